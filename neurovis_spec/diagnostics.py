@@ -34,6 +34,10 @@ class Span(NamedTuple):
         """The part from ``start`` to ``end`` (0-based, exclusive) of a span that lies on one line."""
         return Span(self.file, self.line, self.column + start, self.line, self.column + max(end, start + 1))
 
+    def seen_from(self, here: Span) -> str:
+        """Where it is, in a sentence about another place: its line, or its column on the same line."""
+        return f"column {self.column}" if self.line == here.line else f"line {self.line}"
+
 
 @dataclass(frozen=True, slots=True)
 class Diagnostic:

@@ -8,7 +8,7 @@ import pytest
 
 import neurovis_spec as nv
 from neurovis_spec import plugins
-from neurovis_spec.compiler.checks import hidden_definitions as hidden
+from neurovis_spec.compiler.checks import definitions as hidden
 from neurovis_spec.compiler.values import builtin
 
 THEIRS = """\

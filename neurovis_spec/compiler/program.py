@@ -6,12 +6,12 @@ plasticities say which neurons and connections they are for; operations are what
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from neurovis_spec.arrays import FloatArray, IntArray
-from neurovis_spec.language.expressions.tree import Tree
+from neurovis_spec.language.expressions.tree import Call, Tree, walk
 
 Combine = Literal["sum", "product", "distance"]
 
@@ -47,6 +47,24 @@ class Model:
     activity: Tree
     #: whether its activity, of a step as the activation where it depends on one, is a spike or nothing
     spikes: bool = False
+
+    @property
+    def formulas(self) -> Iterator[Tree]:
+        """All that is computed in a run."""
+        yield self.activity
+        yield from (tree for _, tree in self.let)
+        for state in self.state:
+            yield from (tree for tree in (state.each_step, state.each_episode) if tree is not None)
+
+    @property
+    def reads_activation(self) -> bool:
+        """Whether its activity depends on the neuron's activation."""
+        return any(map(is_activation, walk(self.activity)))
+
+
+def is_activation(node: Tree) -> bool:
+    """Whether a node of a formula of a model is the neuron's activation of something."""
+    return isinstance(node, Call) and node.function == "f"
 
 
 @dataclass(frozen=True, slots=True)

@@ -68,7 +68,9 @@ RULE_SETTING: Final = Role("setting value", "rule", sees=("i", "j", "n_from", "n
 IN_ACTIVATION: Final = Role("formula", sees=("x",))
 IN_MODEL: Final = Role("formula", sees=("drive", "k", "t"))
 ACTIVITY: Final = Role("formula", sees=("drive", "k", "t"), functions=("f",))
-IN_RULE: Final = Role("formula", sees=("pre", "sent", "post", "weight", "k", "t"))
+#: The activities that a rule sees.
+ACTIVITIES: Final = ("pre", "sent", "post")
+IN_RULE: Final = Role("formula", sees=(*ACTIVITIES, "weight", "k", "t"))
 #: A text with formulas in braces.
 LABEL: Final = Role("template", sees=("i", "n", "number"))
 #: References to neurons; the ends of a connection, FROM -> TO, or neurons.

@@ -5,23 +5,41 @@ In: nothing; this is the value that ``compile`` makes when the network is comple
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 from neurovis_spec.compiler.connections.entries import Bundle
+from neurovis_spec.compiler.connections.plasticity import Learning
 from neurovis_spec.compiler.names.modules import Library
 from neurovis_spec.compiler.names.references import Section
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.neurons.groups import Kind
 from neurovis_spec.compiler.neurons.populate import Population
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.library import Library as Definitions
 from neurovis_spec.language.located import Located
-from neurovis_spec.language.sections import ConnectionModel
+from neurovis_spec.language.sections import ConnectionModel, GroupModel
 from neurovis_spec.language.spec import Spec
 
 
-class Compiled(NamedTuple):
+class WrittenEntry(NamedTuple):
+    """An entry of the connections as it is written, with what was made of it in each scope."""
+
+    key: Located[str]
+    body: ConnectionModel
+    bundles: list[Bundle]
+
+    @property
+    def learning(self) -> Learning | None:
+        """What it learns by, in the first scope that has connections."""
+        return next((bundle.learning for bundle in self.bundles if bundle.learning is not None), None)
+
+
+@dataclass(frozen=True)
+class Compiled:
     """A spec without errors, what it became, which modules are used in it, and the files that it includes."""
 
     spec: Spec
@@ -33,19 +51,32 @@ class Compiled(NamedTuple):
     population: Population
     included: tuple[Definitions, ...]
 
-    def sections(self) -> Iterator[tuple[Section, list[Scope]]]:
+    @cached_property
+    def sections(self) -> tuple[tuple[Section, list[Scope]], ...]:
         """The spec, and every module that is used, with the scopes that were made of it."""
         made: dict[str | None, list[Scope]] = {}
         for scope in self.scopes:
             made.setdefault(scope.module, []).append(scope)
-        for scopes in made.values():
-            yield scopes[0].section, scopes
+        return tuple((scopes[0].section, scopes) for scopes in made.values())
 
-    def entries(self) -> Iterator[tuple[Located[str], ConnectionModel, list[Bundle]]]:
-        """Every entry of the connections as it is written, with what was made of it in each scope."""
+    @cached_property
+    def entries(self) -> Mapping[Span, WrittenEntry]:
+        """Every entry of the connections, by the place of its key."""
         made: dict[Span, list[Bundle]] = {}
         for bundle in self.bundles:
             made.setdefault(bundle.key, []).append(bundle)
-        for section, _ in self.sections():
-            for key, body in section.connections:
-                yield key, body, made.get(key.span, [])
+        return {
+            key.span: WrittenEntry(key, body, made.get(key.span, []))
+            for section, _ in self.sections
+            for key, body in section.connections
+        }
+
+    @property
+    def models(self) -> Iterator[tuple[Kind, GroupModel]]:
+        """Every group of every scope: what its neurons are, and how it is written."""
+        return zip(self.population.kinds, self.population.models, strict=True)
+
+    @property
+    def libraries(self) -> tuple[Definitions, ...]:
+        """The spec and the files that it includes, as far as they define something."""
+        return (*self.included, self.spec)

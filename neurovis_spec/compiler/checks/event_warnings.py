@@ -127,7 +127,7 @@ def _lesions(models: tuple[EventModel, ...], reader: _Reader, findings: Findings
             if gone is not None:
                 since, place = _last(lesions, gone)
                 message = f"'{shorten(text.value)}' is lesioned already, since step {since:.0f}"
-                findings.warning("no-effect", text.span, f"{message} ({_place(place, text.span)})", "remove it")
+                findings.warning("no-effect", text.span, f"{message} ({place.seen_from(text.span)})", "remove it")
             elif len(ends) == 1:
                 new = ends[0][np.isinf(lesions.since[ends[0]]) & ~mended[ends[0]]]
                 lesions.since[new], lesions.number[new] = begin, len(lesions.places)
@@ -146,7 +146,7 @@ def _is_lesioned(clamp: _Clamp, lesions: _Lesions, findings: Findings) -> bool:
     if not len(clamp.neurons) or (lesions.since[clamp.neurons] > clamp.begin).any():
         return False
     since, place = _last(lesions, clamp.neurons)
-    message = f"'{shorten(clamp.key.value)}' is lesioned from step {since:.0f} on ({_place(place, clamp.key.span)})"
+    message = f"'{shorten(clamp.key.value)}' is lesioned from step {since:.0f} on ({place.seen_from(clamp.key.span)})"
     findings.warning("no-effect", clamp.key.span, f"{message}: clamping it changes nothing", "remove it")
     return True
 
@@ -170,10 +170,7 @@ def _tell(first: _Clamp, second: _Clamp, findings: Findings) -> None:
     begin, end = max(first.begin, second.begin), min(first.end, second.end) - 1
     when = f"from step {begin:.0f} on" if math.isinf(end) else f"at the steps {begin:.0f} to {end:.0f}"
     when = f"at step {begin:.0f}" if begin == end else when
-    both = f"'{shorten(second.key.value)}' and '{shorten(first.key.value)}' ({_place(first.key.span, second.key.span)})"
+    one, other = second.key, first.key
+    both = f"'{shorten(one.value)}' and '{shorten(other.value)}' ({other.span.seen_from(one.span)})"
     message = f"{both} clamp the same neuron {when}: this one, written last, holds"
     findings.warning("clamps-overlap", second.key.span, message, "end one, with 'to', before the other")
-
-
-def _place(other: Span, here: Span) -> str:
-    return f"column {other.column}" if other.line == here.line else f"line {other.line}"

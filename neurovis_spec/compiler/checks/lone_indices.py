@@ -24,17 +24,16 @@ from neurovis_spec.language.yaml.source import Scalar
 
 def check_lone_indices(compiled: Compiled, findings: Findings) -> None:
     """Warn of every index that can only be 0 (and of ``n`` where it can only be 1)."""
-    signals = {one.key: one.learning.rule.signals for one in compiled.bundles if one.learning is not None}
-    for section, scopes in compiled.sections():
+    for section, scopes in compiled.sections:
         _instances(section, findings)
         for name, group in section.neurons.items():
             if group.count is None and group.names is None:
                 _group(name, group, findings)
         place = compiled.scopes.index(scopes[0])
         for key, body in section.connections:
-            alone = _alone(key, compiled, place)
+            alone, learning = _alone(key, compiled, place), compiled.entries[key.span].learning
             if alone:
-                _connection(body, alone, signals.get(key.span, ()), findings)
+                _connection(body, alone, () if learning is None else learning.rule.signals, findings)
 
 
 def _instances(section: Section, findings: Findings) -> None:

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from neurovis_spec.compiler.checks.compiled import Compiled
+from neurovis_spec.compiler.program import is_activation
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.expressions.arrays import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS, FUNCTIONS
@@ -31,16 +32,15 @@ from neurovis_spec.language.values import Choice
 def check_undefined(compiled: Compiled, findings: Findings) -> None:
     """Warn at each choice of a definition with such an operation."""
     clock: dict[str, Value] = {"dt": compiled.network.dt}
-    population = compiled.population
-    for kind, group in zip(population.kinds, population.models, strict=True):
+    for kind, group in compiled.models:
         model, activation = kind.model, kind.activation
         steps = [state.each_step for state in model.state if state.each_step is not None]
         trees = [model.activity, *steps]
         _tell(group.model, "model", trees, dict(model.let), {**clock, **kind.model_parameters}, findings)
-        if any(isinstance(node, Call) and node.function == "f" for node in _always(trees, dict(model.let))):
+        if any(is_activation(node) for node in _always(trees, dict(model.let))):
             settings = {**clock, **kind.activation_parameters}
             _tell(group.activation, "activation", [activation.value], {}, settings, findings)
-    for _, body, bundles in compiled.entries():
+    for _, body, bundles in compiled.entries.values():
         for learning in (bundle.learning for bundle in bundles if bundle.learning is not None):
             rule = learning.rule
             trees = [tree for tree in (rule.each_step, *(state.each_step for state in rule.state)) if tree is not None]

@@ -196,7 +196,7 @@ class _Trial:
                 key = event.keys[name]
                 if name in due:
                     first = due[name][0]
-                    where = f"line {key.line}" if key.line != first.line else f"column {key.column}"
+                    where = key.seen_from(first)
                     message = f"'{name}' is set again at this step ({where}): what is set here is lost"
                     self.findings.warning("no-effect", first, message, "set it once")
                 due[name] = key, formula

@@ -28,7 +28,7 @@ from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.definitions import Defaults, Definitions
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import meant, nearest, shorten
-from neurovis_spec.language.expressions.tree import Call, Tree, walk
+from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, too_long
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
@@ -317,8 +317,7 @@ class Builder:
 
 def _spikes(kind: Kind) -> bool:
     """Whether neurons spike: their model does, and what its activity is of is no graded activation."""
-    graded = any(isinstance(node, Call) and node.function == "f" for node in walk(kind.model.activity))
-    return kind.model.spikes and (kind.activation.name == "step" or not graded)
+    return kind.model.spikes and (kind.activation.name == "step" or not kind.model.reads_activation)
 
 
 def _default(name: str, model: GroupModel) -> Choice:

@@ -1,45 +1,91 @@
-"""Idle neurons: those whose activity is 0 at every step, whatever happens elsewhere.
+"""Neurons that stay silent, and what a group is given that its model does not read.
 
-In: a Network. Out: for each group the neurons that nothing reaches but themselves or each other, that have no input,
-bias, initial value or noise, and that surely stay at 0 by their model and activation (a cosine would not), whatever
-events set (a model whose formulas read the time is never reported). Neurons that are idle only because all that drives
-them is idle are not reported: that follows from the others. A network without a single connection is a sketch: of its
-neurons only those are reported that an output or a rule names.
+In: what a spec without errors became. Out: warnings at the groups. Idle are the neurons that nothing reaches but
+themselves or each other, that have no input, bias, initial value or noise, and that surely stay at 0 by their model and
+activation (a cosine would not), whatever events set (a model whose formulas read the time is never reported). Neurons
+that are idle only because all that drives them is idle are not reported: that follows from the others. A network
+without a single connection is a sketch: of its neurons only those are reported that an output or a rule names.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import IntArray
-from neurovis_spec.compiler.network import Group, Network
+from neurovis_spec.compiler.checks.compiled import Compiled
+from neurovis_spec.compiler.names.references import key_span
+from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.initial_states import starts_of
-from neurovis_spec.compiler.program import Block
+from neurovis_spec.compiler.program import Block, Model
+from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.arrays import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import names
+from neurovis_spec.language.sections import GroupModel
 
 Mask = npt.NDArray[np.bool_]
 #: How far what is active is followed at once; only long ways are gone step by step.
 _AT_ONCE = 8
+#: the keys of a group that make its drive
+_DRIVING = ("input", "bias", "noise", "combine")
 
 
-class Idle(NamedTuple):
-    """Neurons of a group that stay at 0; ``driven``: by themselves or each other."""
+def check_neurons(compiled: Compiled, findings: Findings) -> None:
+    """Warn of idle neurons, once for each group as it is written, and of what a model leaves out of account."""
+    told: set[Span] = set()
+    for kind, written in compiled.models:
+        for span, message, hint in _ignored(kind.model, written):
+            if span not in told:
+                told.add(span)
+                findings.warning("no-effect", span, message, hint)
+    if any(event.clamp for event in compiled.spec.events):
+        return  # what is clamped is active from outside
+    network = compiled.network
+    idle = _idle(network)
+    driven = np.zeros(len(network.neurons), dtype=np.bool_)
+    driven[network.connections.targets] = True
+    origin = {scope.called(name): (scope, name) for scope in compiled.scopes for name in scope.section.neurons}
+    for group in network.neurons.groups if idle.any() else ():
+        members = [member for member in group.indices if idle[member]]
+        scope, own = origin[group.name]
+        model, span = scope.section.neurons[own], key_span(scope.section, "neurons", own)
+        if not members or span in told or model.bias is not None or model.initial is not None:
+            continue
+        told.add(span)
+        names = [network.neurons.names[member] for member in members]
+        shown = f"'{group.name}'" if len(names) == group.count else ", ".join(f"'{name}'" for name in names[:5])
+        if len(names) > 5 and len(names) < group.count:
+            shown += " and others"
+        outside = "from outside " if driven[members].any() else ""
+        message = (
+            f"nothing {outside}reaches {shown}, and there is no input, bias, initial or noise: the activity stays 0"
+        )
+        hint = "connect something to it, or give it an input, a bias, an initial or a noise"
+        findings.warning("idle-neuron", span, message, hint)
 
-    group: Group
-    members: list[int]
-    driven: bool
+
+def _ignored(model: Model, group: GroupModel) -> Iterator[tuple[Span, str, str]]:
+    """The place of each key that the model does not read, and what to say there."""
+    activation = group.activation
+    if activation is not None and not model.reads_activation:
+        message = f"the model '{model.name}' does not use the activation '{activation.name.value}'"
+        yield activation.name.span, message, "remove it, or take a model whose activity is f(…)"
+    if any("drive" in names(tree) for tree in model.formulas):
+        return
+    for key in _DRIVING:
+        entry = group.source.entry(key)
+        if entry is not None:
+            message = f"the model '{model.name}' does not read its drive: '{key}' changes nothing"
+            yield entry.key.span, message, "remove it, or take a model that reads 'drive'"
 
 
-def idle_neurons(network: Network) -> Iterator[Idle]:
-    """Groups with their idle neurons, in the order of the groups."""
+def _idle(network: Network) -> Mask:
+    """Whether each neuron is idle."""
     neurons, connections = network.neurons, network.connections
-    quiet = (neurons.input < 0) & (neurons.bias == 0) & np.isnan(neurons.initial)
+    quiet: Mask = (neurons.input < 0) & (neurons.bias == 0) & np.isnan(neurons.initial)
     for noise in network.noises:
         quiet[noise.members] = False
     for block in network.blocks:
@@ -48,25 +94,17 @@ def idle_neurons(network: Network) -> Iterator[Idle]:
     if not len(connections.sources):
         quiet &= _needed(network)
     if not quiet.any():
-        return
+        return quiet
     for block in network.blocks:
         quiet[block.members] &= _stays_at_zero(block, network)
-    for binding in network.set_by_events:  # what an event makes of a neuron is not looked at
+    for binding in network.set_by_events:  # what an event makes of a neuron is not checked
         kind, _, number = binding.array.partition("/")
         if kind == "bias":
             quiet[binding.places] = False
         elif kind in ("activation", "model"):
             quiet[network.blocks[int(number.partition("/")[0])].members] = False
     idle = _unreached(quiet, connections.sources, connections.targets)
-    if not idle.any():
-        return
-    idle = _first(idle, connections.sources, connections.targets)
-    driven = np.zeros(len(neurons), dtype=np.bool_)
-    driven[connections.targets] = True
-    for group in neurons.groups:
-        members = [member for member in group.indices if idle[member]]
-        if members:
-            yield Idle(group, members, bool(driven[members].any()))
+    return _first(idle, connections.sources, connections.targets) if idle.any() else idle
 
 
 def _needed(network: Network) -> Mask:
@@ -123,7 +161,7 @@ def _stays_at_zero(block: Block, network: Network) -> Mask:
     """Whether the neurons of a block, never driven, surely keep their states and an activity of 0: then all that their
     formulas read stays what it is at the first step."""
     count = len(block.members)
-    if block.combine == "product" or not _TIME.isdisjoint(_read(block)):
+    if block.combine == "product" or any(not names(tree).isdisjoint(("k", "t")) for tree in block.model.formulas):
         return np.zeros(count, dtype=np.bool_)
     result = np.ones(count, dtype=np.bool_)
     values: dict[str, Value] = {**CONSTANTS, "dt": network.dt, **block.model_parameters, "drive": 0.0}
@@ -137,18 +175,6 @@ def _stays_at_zero(block: Block, network: Network) -> Mask:
                 result &= np.broadcast_to(evaluate_array(change, values) == states[state.name], (count,))
     result &= np.broadcast_to(_activity(block, values) == 0, (count,))
     return result
-
-
-#: What changes by itself.
-_TIME = frozenset(("k", "t"))
-
-
-def _read(block: Block) -> frozenset[str]:
-    """All names that the formulas of a block's model read."""
-    model = block.model
-    trees = [model.activity, *(tree for _, tree in model.let)]
-    trees += [tree for state in model.state for tree in (state.each_step, state.each_episode) if tree is not None]
-    return frozenset().union(*map(names, trees))
 
 
 def _activity(block: Block, values: dict[str, Value]) -> Value:

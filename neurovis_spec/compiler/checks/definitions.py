@@ -1,0 +1,237 @@
+"""Definitions that are surely not meant: unused, read by nothing, hidden by others, replacing what they should change.
+
+In: the activations, models, rules and modules of a spec and of the files that it includes. Out: warnings where they are
+declared, or where they are named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from collections.abc import Mapping as AnyMapping
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from neurovis_spec.compiler.checks.compiled import Compiled
+from neurovis_spec.compiler.names.references import key_of, key_span
+from neurovis_spec.compiler.program import Rule
+from neurovis_spec.compiler.values.builtin import installed
+from neurovis_spec.compiler.values.constants import value_of
+from neurovis_spec.compiler.values.definitions import Defaults
+from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.language.expressions.arrays import Value, evaluate_array
+from neurovis_spec.language.expressions.functions import CONSTANTS
+from neurovis_spec.language.expressions.parser import parse
+from neurovis_spec.language.expressions.tree import Tree, names
+from neurovis_spec.language.grammar import ACTIVITIES
+from neurovis_spec.language.library import ActivationModel, ModelModel, RuleModel, StateModel
+from neurovis_spec.language.located import Formula
+from neurovis_spec.language.unknown import UNKNOWN
+from neurovis_spec.language.values import Choice
+from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
+
+_Definition: TypeAlias = ActivationModel | ModelModel | RuleModel
+_NOUNS = {"let": "intermediate value", "state": "state", "signals": "signal", "parameters": "parameter"}
+
+
+def check_definitions(compiled: Compiled, findings: Findings) -> None:
+    """Warn of all such definitions."""
+    for library in compiled.libraries:
+        for activation in library.activations.values():
+            _check_parts(activation, _read(activation.value), "the value", findings)
+        for model in library.models.values():
+            _check_parts(model, _read(model.activity), "the activity", findings)
+        for name, rule in library.rules.items():
+            _check_parts(rule, _read(rule.weight.each_step, rule.weight.each_episode), "the weight", findings)
+            _check_replaced(rule, *compiled.library.definitions.rules.known()[name], findings)
+    _check_unused(compiled, findings)
+    _check_modules(compiled, findings)
+    _check_hidden(compiled, findings)
+
+
+# Parts that nothing reads
+
+
+class _Part(NamedTuple):
+    """A part of a definition: in which section it is declared and where, and the names that its formulas read."""
+
+    section: str
+    span: Span
+    reads: frozenset[str]
+
+
+def _read(*formulas: Formula | None) -> frozenset[str]:
+    """The names that formulas read."""
+    texts = [formula.value for formula in formulas if formula is not None and isinstance(formula.value, str)]
+    return frozenset().union(*(names(parse(text, extra_functions={"f": 1})) for text in texts))
+
+
+def _parts_of(definition: _Definition) -> dict[str, _Part]:
+    """What a definition declares, by name."""
+    reads: dict[tuple[str, str], frozenset[str]] = {}
+    for name, value in definition.parameters.items():
+        reads["parameters", name] = _read(value.value, value.minimum, value.maximum)
+    for name, formula in definition.let.items():
+        reads["let", name] = _read(formula)
+    states: AnyMapping[str, StateModel] = {} if isinstance(definition, ActivationModel) else definition.state
+    for name, state in states.items():
+        reads["state", name] = _read(state.initial, state.each_step, state.each_episode)
+    parts = {
+        name: _Part(section, key_of(definition.source, section, name).span, read)
+        for (section, name), read in reads.items()
+    }
+    signals = definition.signals if isinstance(definition, RuleModel) else ()
+    return parts | {signal.value: _Part("signals", signal.span, frozenset()) for signal in signals}
+
+
+def _reached(names: Iterable[str], parts: AnyMapping[str, _Part]) -> set[str]:
+    """Some names, and all that the parts among them depend on."""
+    found: set[str] = set()
+    waiting = list(names)
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            waiting += parts[name].reads if name in parts else ()
+    return found
+
+
+def _check_parts(definition: _Definition, wanted: frozenset[str], what: str, findings: Findings) -> None:
+    """Each part on which neither the activity nor the weight depends. A part that only such parts read is not reported:
+    that follows from these."""
+    parts = _parts_of(definition)
+    used = _reached(wanted, parts)
+    for name in _first({name: part for name, part in parts.items() if name not in used}):
+        section, span, _ = parts[name]
+        message = f"{what} does not depend on the {_NOUNS[section]} '{name}'"
+        if section == "parameters":
+            findings.warning("unused-parameter", span, message, "remove it, or use it")
+        else:
+            findings.warning("unused-part", span, message, "remove it, or use it")
+
+
+def _first(unused: AnyMapping[str, _Part]) -> Iterator[str]:
+    """Of unused parts those that no other reads, and one of those that read each other."""
+    left = dict(unused)
+    while left:
+        read_by_others = {name for other, part in left.items() for name in part.reads if name != other}
+        first = next((name for name in left if name not in read_by_others), next(iter(left)))
+        yield first
+        for name in _reached((first,), unused):
+            left.pop(name, None)
+
+
+# Weights that are replaced where a change is meant
+
+
+def _check_replaced(model: RuleModel, rule: Rule, defaults: Defaults, findings: Findings) -> None:
+    """``weight: {each_step: 0.01 * pre * post}``: a formula that reads what is active but nothing that outlasts the
+    step, neither the weight nor a state that builds up, and that is 0 in silence, as a change is. A weight that follows
+    states, the time or a signal, or that has a value in silence, is let be."""
+    parts = _parts_of(model)
+    for formula, tree, when in (
+        (model.weight.each_step, rule.each_step, "each step"),
+        (model.weight.each_episode, rule.each_episode, "the end of each episode"),
+    ):
+        if formula is None or tree is None:
+            continue
+        found = _reached(_read(formula), parts)
+        active = not found.isdisjoint(ACTIVITIES)
+        if active and not _lasts(found, parts) and _in_silence(tree, rule, defaults) == 0:
+            message = f"this replaces the weight at {when}: it does not read 'weight'"
+            findings.warning("replaces-weight", formula.span, message, "for a change write weight + …")
+
+
+def _lasts(found: set[str], parts: dict[str, _Part]) -> bool:
+    """Whether there is among some names one whose value outlasts a step: the weight, or a state that reads itself."""
+    states = [name for name in found if name in parts and parts[name].section == "state"]
+    return "weight" in found or any(name in _reached(parts[name].reads, parts) for name in states)
+
+
+def _in_silence(tree: Tree, rule: Rule, defaults: Defaults) -> Value:
+    """What a formula gives where nothing is active, with the default parameters."""
+    values: dict[str, Value] = {**CONSTANTS, "dt": 1.0, "k": 1.0, "t": 1.0, "weight": 0.0}
+    values |= dict.fromkeys((*ACTIVITIES, *rule.signals), 0.0)
+    for default in defaults:
+        value = value_of(default.value, values)
+        values[default.name] = 0.0 if value is UNKNOWN else value
+    values |= {state.name: evaluate_array(state.initial, values) for state in rule.state}
+    for name, let in rule.let:
+        values[name] = evaluate_array(let, values)
+    with np.errstate(all="ignore"):
+        return evaluate_array(tree, values)
+
+
+# Definitions that nobody names, or that are hidden
+
+
+def _check_unused(compiled: Compiled, findings: Findings) -> None:
+    """Activations, models and rules of the spec's own that are not used. What a module names counts as used, even if it
+    has no instance."""
+    network = compiled.network
+    used = {
+        "activations": {group.activation for group in network.neurons.groups},
+        "models": {group.model for group in network.neurons.groups},
+        "rules": {plasticity.rule.name for plasticity in network.plasticity},
+    }
+    modules = [library.source.get("modules") for library in compiled.libraries]
+    named = {text for node in modules if node is not None for text in _texts(node)}
+    for section, own in used.items():
+        node = compiled.spec.source.get(section)
+        for entry in node.entries if isinstance(node, Mapping) else ():
+            if entry.name not in own | named:
+                message = f"nobody uses the {section.removesuffix('s')} '{entry.name}'"
+                findings.warning("unused-definition", entry.key.span, message, "remove it, or use it")
+
+
+def _texts(node: Node) -> Iterator[str]:
+    """Every text of a node, keys included."""
+    waiting = [node]
+    while waiting:
+        node = waiting.pop()
+        match node:
+            case Scalar(value=str() as text):
+                yield text
+            case Mapping(entries=entries):
+                yield from (entry.name for entry in entries)
+                waiting += [entry.value for entry in entries]
+            case Packed(texts=texts):
+                yield from texts
+            case Sequence(items=items):
+                waiting += items
+
+
+def _check_modules(compiled: Compiled, findings: Findings) -> None:
+    """Modules of the spec's own that have no instance; those of an included file may be there for others."""
+    modules = compiled.library.modules.known()
+    inside = {instance.module.value for module in modules.values() for instance in module.model.instances.values()}
+    for name, module in modules.items():
+        if module.own and name not in compiled.used and name not in inside:
+            message, hint = f"the module '{name}' has no instance", "add one under 'instances', or remove it"
+            findings.warning("unused-module", key_span(compiled.spec, "modules", name), message, hint)
+
+
+def _check_hidden(compiled: Compiled, findings: Findings) -> None:
+    """Names that another installed package defines, too, whose definition is not used: what the spec means is not what
+    its author may think. A definition of the spec's own has another warning (``replaces-builtin``)."""
+    hidden = installed().hidden
+    for section, choice in _choices(compiled) if hidden else ():
+        name = choice.name.value
+        found = hidden.get((section, name))
+        if found is not None and not any(name in getattr(library, section) for library in compiled.libraries):
+            message = f"'{name}' is that of {found.owner}; {found.place} defines one, too, which is not used"
+            hint = "rename it in that package, or define here what is meant"
+            findings.warning("hidden-definition", choice.name.span, message, hint)
+
+
+def _choices(compiled: Compiled) -> Iterator[tuple[str, Choice]]:
+    """What groups and connections name, with the section that defines such."""
+    for section, _ in compiled.sections:
+        for group in section.neurons.values():
+            if group.activation is not None:
+                yield "activations", group.activation
+            if group.model is not None:
+                yield "models", group.model
+        for _, body in section.connections:
+            if body.plasticity is not None:
+                yield "rules", body.plasticity

@@ -1,0 +1,106 @@
+"""Rules in use that change no weight: with a rate of 0, without episodes, or because a signal is the own target.
+
+In: what a spec without errors became. Out: warnings. Whether a rule changes weights is found by trial: it is carried
+out for several steps and episodes at a few arbitrary points. So ``A -> O`` that learns by ``delta`` from the target O
+is told of: there the signal is always ``post``, and with any other it would learn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+import numpy as np
+
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.checks.compiled import Compiled, WrittenEntry
+from neurovis_spec.compiler.connections.entries import Bundle
+from neurovis_spec.compiler.program import Rule
+from neurovis_spec.diagnostics import Findings, shorten
+from neurovis_spec.language.expressions.arrays import Value, evaluate_array
+from neurovis_spec.language.expressions.functions import CONSTANTS
+from neurovis_spec.language.grammar import ACTIVITIES
+from neurovis_spec.language.yaml.source import Scalar
+
+_POINTS = 16
+_STEPS = 6
+
+
+def check_rules(compiled: Compiled, findings: Findings) -> None:
+    """Warn of every entry whose rule changes no weight."""
+    for entry in compiled.entries.values():
+        learning, choice = entry.learning, entry.body.plasticity
+        if learning is None or choice is None:
+            continue
+        for signal in learning.rule.signals:
+            if all(_is_own(bundle, signal) for bundle in entry.bundles):
+                _check_signal(entry, signal, findings)
+        _check_rate(entry, findings)
+        if compiled.network.episode is None and learning.rule.each_step is None:
+            name = learning.rule.name
+            message = f"'{name}' changes weights at the end of an episode, and there are none: no weight will change"
+            hint = "say how many steps an episode has, as in time: {episode: 100}"
+            findings.warning("no-effect", choice.name.span, message, hint)
+
+
+def changes(rule: Rule, parameters: Mapping[str, FloatArray], own: Collection[str] = ()) -> bool:
+    """Whether a weight changes in a few steps and episodes with arbitrary values, from the states' initial values; the
+    signals of ``own`` are the target's activity."""
+    generator = np.random.default_rng(0)  # the points of a test, not a draw of the network
+    values: dict[str, Value] = {**CONSTANTS, "dt": 0.5, "weight": generator.uniform(-2.0, 2.0, _POINTS)}
+    values |= {name: float(array[0]) for name, array in parameters.items()}
+    values |= {state.name: evaluate_array(state.initial, values) for state in rule.state}
+    for k in range(_STEPS):
+        values |= {"k": float(k), "t": k * 0.5}
+        for name in (*ACTIVITIES, *rule.signals):
+            values[name] = generator.uniform(-2.0, 2.0, _POINTS) * 10.0 ** (k % 3)
+        values |= dict.fromkeys(own, values["post"])
+        for episode in (False, True):
+            new: dict[str, Value] = {}
+            for name, tree in rule.let:
+                values[name] = evaluate_array(tree, values)
+            weight = rule.each_episode if episode else rule.each_step
+            if weight is not None and not np.array_equal(evaluate_array(weight, values), values["weight"]):
+                return True
+            for state in rule.state:
+                change = state.each_episode if episode else state.each_step
+                if change is not None:
+                    new[state.name] = evaluate_array(change, values)
+            values |= new
+    return False
+
+
+def _is_own(bundle: Bundle, signal: str) -> bool:
+    """Whether a signal is, for every connection, the activity of its own target."""
+    return bundle.learning is not None and np.array_equal(bundle.learning.signals[signal], bundle.targets)
+
+
+def _check_signal(entry: WrittenEntry, signal: str, findings: Findings) -> None:
+    learning, choice = entry.learning, entry.body.plasticity
+    assert learning is not None
+    assert choice is not None
+    rule = learning.rule
+    if changes(rule, learning.parameters, (signal,)) or not changes(rule, learning.parameters):
+        return
+    span = next(setting.value.span for setting in choice.settings if setting.name == signal)
+    message = (
+        f"'{shorten(learning.texts[signal])}' is this connection's own end: '{signal}' is then always 'post', and "
+        f"'{rule.name}' changes no weight"
+    )
+    findings.warning("no-effect", span, message, "name a neuron or an input that says what 'post' should be")
+
+
+def _check_rate(entry: WrittenEntry, findings: Findings) -> None:
+    """A rate of 0, which changes no weight. One that names a parameter can be set later."""
+    choice = entry.body.plasticity
+    assert choice is not None
+    written = next((setting.value for setting in choice.settings if setting.name == "rate"), None)
+    if isinstance(written, Scalar) and isinstance(written.value, str):
+        return
+    for learning in (bundle.learning for bundle in entry.bundles):
+        if learning is None or "rate" not in learning.parameters or learning.parameters["rate"].any():
+            continue
+        if not changes(learning.rule, learning.parameters):
+            message = f"the rate of '{learning.rule.name}' is 0: no weight will change"
+            span = choice.name.span if written is None else written.span
+            findings.warning("zero-rate", span, message, "give it a rate, or leave the plasticity out")
+            return
