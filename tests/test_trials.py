@@ -82,8 +82,8 @@ def test_a_trial_is_the_run_itself_where_nothing_changes(linear: nv.CompiledNetw
     trials = Trials(network, 100, 100)
     np.testing.assert_array_equal(trials.activity, recording.activity[100:])
     np.testing.assert_array_equal(trials.changed(lambda _: None), trials.intact)
-    np.testing.assert_array_equal(trials.weighed(0, 0.0), trials.intact)
-    np.testing.assert_array_equal(trials.told(network.network.inputs[0], lambda x: x), trials.intact)
+    np.testing.assert_array_equal(trials.with_weight(0, 0.0), trials.intact)
+    np.testing.assert_array_equal(trials.with_input(network.network.inputs[0], lambda x: x), trials.intact)
     assert trials.changed(lambda simulation: simulation.lesion("A")).shape == (100, 1)
     np.testing.assert_array_equal(trials.changed(lambda _: None), trials.intact)
 
