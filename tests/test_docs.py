@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -21,6 +22,7 @@ from neurovis_spec.manual.samples import example, examples
 from neurovis_spec.manual.topics import find, near, topics
 from neurovis_spec.manual.words import FUNCTION_TEXTS, functions, names
 
+ROOT = Path(__file__).parents[1]
 BASE = {
     "neurovis": "neurovis: 1",
     "name": "name: example",
@@ -55,6 +57,7 @@ def docs(*arguments: str) -> subprocess.CompletedProcess[str]:
 def test_an_example_of_a_key_compiles(path: str, tmp_path: Path) -> None:
     (tmp_path / "data").mkdir()
     np.savetxt(tmp_path / "data" / "sensed.csv", [[0.5]], delimiter=",")
+    shutil.copy(ROOT / "specs" / "walk" / "hexapod.xml", tmp_path)
     (tmp_path / "library").mkdir()
     (tmp_path / "library" / "legs.yaml").write_text("modules: {leg: {neurons: {K: {bias: 1}}}}", encoding="utf-8")
     (tmp_path / "legs.layout.yaml").write_text("neurovis_layout: 1\npositions: {A: [0, 0]}", encoding="utf-8")

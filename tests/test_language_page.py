@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import runpy
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -41,6 +42,7 @@ def folder(tmp_path: Path) -> Path:
     np.savez_compressed(data / "trained.npz", weights=np.ones((2, 4)), bias=np.zeros(4))
     (data / "feedback.mtx").write_text("%%MatrixMarket matrix coordinate pattern general\n4 2 2\n1 1\n4 2\n")
     (data / "edges.csv").write_text("from,to,weight,delay\nK1,O,0.5,1\nK2,O,,2\n", encoding="utf-8")
+    shutil.copy(ROOT / "specs" / "walk" / "hexapod.xml", tmp_path)
     (tmp_path / "library").mkdir()
     (included,) = (block for block in PARTS if block.startswith("# library/legs.yaml\n"))
     (tmp_path / "library" / "legs.yaml").write_text(included, encoding="utf-8")

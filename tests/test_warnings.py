@@ -394,7 +394,9 @@ def test_line_ends_of_windows() -> None:
 
 def test_every_warning_of_the_catalogue_can_be_allowed(tmp_path: Path) -> None:
     for code in catalogue().values():
-        if code.severity == "warning" and code.name not in ("useless-allow", "hidden-definition"):  # two packages
+        # a package of another's, and one that is not there
+        elsewhere = ("useless-allow", "hidden-definition", "body-unchecked")
+        if code.severity == "warning" and code.name not in elsewhere:
             assert code.bad is not None
             for name, content in code.files.items():
                 (tmp_path / name).write_text(content)

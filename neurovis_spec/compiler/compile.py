@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from neurovis_spec.arrays import IntArray
+from neurovis_spec.compiler.body_settings import BodySettings
 from neurovis_spec.compiler.canonical import canonical
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.checks.warnings import warn
@@ -72,7 +73,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
     name = known(spec.name.value, "")
     seed = request.seed if request.seed is not None else 0 if spec.seed is None else spec.seed.value
     constants = Constants(names_of(spec, "parameters", {}), 1.0, findings)
-    _step_length(spec, constants)
+    dt_known = _step_length(spec, constants)
     library = library_of(spec, request.includes, request.base, constants.dt, findings)
     make_parameters(spec, constants, request.parameters)
     _check_given(spec, constants, request.parameters)
@@ -96,6 +97,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
 
         render = replace(render, figure=figure_of(spec, population, outputs, finder))
     ros = _ros(spec, inputs, outputs, scopes[0], constants)
+    body = _body(spec, request, inputs, outputs, scopes[0], constants, dt_known=dt_known)
     noises = make_noises(population, sum(entry.size for entry in inputs))
     expansion.depend()
     if not made.complete or findings.errors > before or not _under_way(bundles, findings):
@@ -153,6 +155,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         numbering=own_weights(slots, bundles, connections.weights),
         settable=make_settable(slots, population, bundles, connections, inputs, blocks, plasticity, noises),
         ros=ros,
+        body=body,
     )
     eventful = _eventful(spec, network, finder, constants)
     if eventful is not None and not findings.failed:  # the shape may have been invalid
@@ -167,9 +170,30 @@ def _ros(
     """The ``ros`` section. Most specs have none: nothing that reads it is imported then."""
     if spec.ros is None:
         return RosSettings(rate=1 / constants.dt)
-    from neurovis_spec.compiler.ros import Surroundings, ros_settings
+    from neurovis_spec.compiler.ros import ros_settings
+    from neurovis_spec.compiler.surroundings import Surroundings
 
     return ros_settings(spec.ros, Surroundings(spec, root, inputs, outputs), constants)
+
+
+def _body(
+    spec: Spec,
+    request: Request,
+    inputs: tuple[Input, ...],
+    outputs: tuple[Output, ...],
+    root: Scope,
+    constants: Constants,
+    *,
+    dt_known: bool,
+) -> BodySettings | None:
+    """The ``body`` section. Most specs have none: nothing that reads it is imported then."""
+    if spec.body is None:
+        return None
+    from neurovis_spec.compiler.body import Place, body_settings
+    from neurovis_spec.compiler.surroundings import Surroundings
+
+    around = Surroundings(spec, root, inputs, outputs)
+    return body_settings(spec.body, around, constants, Place(request.base, request.root), dt_known=dt_known)
 
 
 def _check_unused(expander: Expander, limits: Limits, seed: int) -> None:
@@ -260,21 +284,22 @@ def _under_way(bundles: tuple[Bundle, ...], findings: Findings) -> bool:
     return True
 
 
-def _step_length(spec: Spec, constants: Constants) -> None:
-    """dt, before anything else: parameters may use it, so it uses none of them."""
+def _step_length(spec: Spec, constants: Constants) -> bool:
+    """dt, before anything else: parameters may use it, so it uses none of them. Whether it is in order, or left out."""
     if spec.time is None or spec.time.dt is None:
-        return
+        return spec.time is None or "dt" not in spec.time.unknown
     known = "'dt' comes before the parameters, which may use it; known here"
     if parse_formula(spec.time.dt, CONSTANTS, constants.findings, what=known) is UNKNOWN:
-        return
+        return False
     dt = constants.scalar(spec.time.dt)
     if dt is UNKNOWN:
-        return
+        return False
     if not dt > 0:
         message = f"'dt' is seconds a step and above 0, this is {dt:g}"
         constants.findings.error("out-of-range", spec.time.dt.span, message)
-    else:
-        constants.dt = dt
+        return False
+    constants.dt = dt
+    return True
 
 
 def _check_given(spec: Spec, constants: Constants, given: Mapping[str, float]) -> None:

@@ -7,14 +7,12 @@ or findings. No ROS has to be installed: message types are checked against a tab
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import partial
 from typing import Final, Literal, cast
 
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.names.references import key_of, known_inputs
-from neurovis_spec.compiler.names.scope import Scope
-from neurovis_spec.compiler.network import Input, Output
+from neurovis_spec.compiler.network import Input
 from neurovis_spec.compiler.ros_settings import (
     MOST_WAITING,
     NAMESPACE,
@@ -23,6 +21,7 @@ from neurovis_spec.compiler.ros_settings import (
     Subscription,
     absolute,
 )
+from neurovis_spec.compiler.surroundings import Surroundings
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, shorten, suggest
 from neurovis_spec.language.located import Formula
@@ -38,16 +37,6 @@ _DATA: Final = "data"
 _ARRAY: Final = "std_msgs/Float64MultiArray"
 _SPEC: Final = "std_msgs/String"
 #: A queue of more messages is a mistake.
-
-
-@dataclass(frozen=True)
-class Surroundings:
-    """What the section may name: the inputs of the network, or of the spec itself, and its outputs."""
-
-    spec: Spec
-    scope: Scope
-    inputs: tuple[Input, ...]
-    outputs: tuple[Output, ...]
 
 
 def ros_settings(model: RosModel, around: Surroundings, constants: Constants) -> RosSettings:

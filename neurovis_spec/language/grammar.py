@@ -34,6 +34,8 @@ Use: TypeAlias = Literal[
     "engine",
     "message",
     "field",
+    "sensor",
+    "actuator",
     "text",
 ]
 
@@ -65,6 +67,8 @@ PAIR: Final = Role("formula", sees=("i", "j", "n_from", "n_to", "distance"), dra
 CELL: Final = Role("formula", sees=("i", "j", "n_from", "n_to"), draws=True)
 #: The value of a rule's setting: a formula, or the references of a signal.
 RULE_SETTING: Final = Role("setting value", "rule", sees=("i", "j", "n_from", "n_to"))
+#: What an actuator is told: a formula that names outputs, too.
+COMMAND: Final = Role("formula", "output")
 IN_ACTIVATION: Final = Role("formula", sees=("x",))
 IN_MODEL: Final = Role("formula", sees=("drive", "k", "t"))
 ACTIVITY: Final = Role("formula", sees=("drive", "k", "t"), functions=("f",))

@@ -195,7 +195,7 @@ class Model(BaseModel):
     @cached_property
     def _left_out(self) -> frozenset[str]:
         """The keys of the source that are not in the model: unknown ones, and those whose value is invalid."""
-        read = {self._written()[name] for name in self.model_fields_set}
+        read = {self._written().get(name, name) for name in self.model_fields_set}
         return frozenset(entry.name for entry in self.source.entries if entry.name not in read)
 
     @property

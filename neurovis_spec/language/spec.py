@@ -10,6 +10,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
+from neurovis_spec.language.body import BodyModel
 from neurovis_spec.language.drawing import LayoutModel, RenderModel
 from neurovis_spec.language.grammar import declaring
 from neurovis_spec.language.library import LANGUAGE_VERSION, VERSION, Library, version_field
@@ -53,6 +54,7 @@ class Spec(Library):
     events: EventsField = Field(
         default=(), description="What changes during a run: parameters set, neurons clamped, parts lesioned."
     )
+    body: BodyModel | None = Field(None, description="The body that it senses and moves in a run.")
     layout: LayoutModel | None = Field(None, description="How it is laid out.")
     render: RenderModel | None = Field(None, description="How it is drawn.")
     ros: RosModel | None = Field(None, description="How it meets ROS.")

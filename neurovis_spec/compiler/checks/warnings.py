@@ -38,6 +38,7 @@ def warn(compiled: Compiled, findings: Findings) -> None:
     _events(compiled, findings)
     _theme(compiled, findings)
     _outputs(compiled, findings)
+    _reset(compiled, findings)
 
 
 def _theme(compiled: Compiled, findings: Findings) -> None:
@@ -108,3 +109,14 @@ def _outputs(compiled: Compiled, findings: Findings) -> None:
             message = f"the output '{output.name}' is called like a {what}, and is another one"
             hint = f"give it another name, or write {output.name}: {output.name}"
             findings.warning("misleading-output", key_span(spec, "outputs", output.name), message, hint)
+
+
+def _reset(compiled: Compiled, findings: Findings) -> None:
+    """A body that is reset where an episode ends, in a run without episodes."""
+    body = compiled.spec.body
+    if body is None or body.reset is None or body.reset.value == "never" or compiled.network.episode is not None:
+        return
+    message = "the body is reset at the end of an episode, and there are none: it will not be"
+    findings.warning(
+        "no-effect", body.reset.span, message, "say how many steps an episode has, as in time: {episode: 100}"
+    )

@@ -56,9 +56,9 @@ class Scope(Collection[str]):
 
 
 @lru_cache(maxsize=4096)
-def _parsed(text: str, random: bool, functions: tuple[tuple[str, int], ...]) -> Tree:
+def _parsed(text: str, random: bool, functions: tuple[tuple[str, int], ...], subscripts: bool) -> Tree:
     """The tree of a text. A list may hold the same one a hundred thousand times."""
-    return parse(text, random=random, extra_functions=dict(functions))
+    return parse(text, random=random, extra_functions=dict(functions), subscripts=subscripts)
 
 
 def parse_formula(
@@ -70,17 +70,18 @@ def parse_formula(
     functions: Mapping[str, int] | None = None,
     what: str = "known here",
     later: Collection[str] = (),
+    subscripts: bool = False,
 ) -> Tree | Unknown:
     """The tree of a formula whose names are all known; else findings at the invalid characters.
 
-    ``later`` are names that are declared behind the formula.
+    ``later`` are names that are declared behind the formula; ``subscripts`` allows names such as ``legs[3]``.
     """
     if formula.value is UNKNOWN:
         return UNKNOWN
     if not isinstance(formula.value, str):
         return Number(float(formula.value))
     try:
-        tree = _parsed(formula.value, random, tuple((functions or {}).items()))
+        tree = _parsed(formula.value, random, tuple((functions or {}).items()), subscripts)
     except ExpressionError as error:
         for one in (error, *error.others):
             if one.code == "draw-not-allowed" and findings.is_invalid(formula.span):

@@ -40,6 +40,8 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _REFERENCE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(?:\.{1,2}[A-Za-z_][A-Za-z0-9_]*)*")
 #: And ``(K1 -> O).eligibility``, ``(A -> B (2)).x``: an arrow stands nowhere else.
 _OF_RULE = re.compile(r"\([^()]*->[^()]*(?:\([0-9]+\)\s*)?\)\s*\.\s*[A-Za-z_][A-Za-z0-9_]*")
+#: One number of several: ``legs[3]``.
+_SUBSCRIPT = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)\[(?:\s*([0-9]{1,9})\s*\])?")
 _KEYWORD = re.compile(r"=(?!=)")
 _TAIL = re.compile(r"[A-Za-z0-9_.]+")
 #: An integer with zeros in front of it: a text in YAML, an octal number in other languages.
@@ -78,9 +80,10 @@ _LOOKALIKES: Mapping[str, str] = {
 }  # fmt: skip
 
 
-def tokens(text: str, *, references: bool = False) -> tuple[Token, ...]:
+def tokens(text: str, *, references: bool = False, subscripts: bool = False) -> tuple[Token, ...]:
     """The tokens of an expression. Raises ExpressionError. With ``references`` names may hold points, the state of a
-    rule is a name, and ``=`` stands behind the name of an argument.
+    rule is a name, and ``=`` stands behind the name of an argument. With ``subscripts`` a name may have a number behind
+    it, as in ``legs[3]``.
 
     >>> [token.text for token in tokens("-x^2 <= .5e-3")]
     ['-', 'x', '^', '2', '<=', '.5e-3', '']
@@ -98,7 +101,7 @@ def tokens(text: str, *, references: bool = False) -> tuple[Token, ...]:
         if blank := _BLANK.match(text, at):
             at = blank.end()
             continue
-        token = _referring(text, at, found) if references else None
+        token = _referring(text, at, found) if references else _subscripted(text, at) if subscripts else None
         token = token or _token(text, at, after=found[-1] if found else None)
         found.append(token)
         at = token.end
@@ -119,6 +122,17 @@ def _referring(text: str, at: int, found: Sequence[Token]) -> Token | None:
     if _KEYWORD.match(text, at) and len(found) > 2 and found[-1].kind == "name" and found[-2].text in ("(", ","):
         return Token("operator", "=", at, at + 1)
     return None
+
+
+def _subscripted(text: str, at: int) -> Token | None:
+    """A name with a number behind it, without blanks between."""
+    name = _SUBSCRIPT.match(text, at)
+    if name is None or name[1] in WORDS:
+        return None
+    if name[2] is None:
+        message, hint = "behind a name stands a whole number in brackets, from 0 on", f"as in {shorten(name[1])}[0]"
+        raise ExpressionError("no-subscripts", message, name.end(1), name.end(1) + 1, hint)
+    return Token("name", f"{name[1]}[{int(name[2])}]", at, name.end())
 
 
 def _token(text: str, at: int, after: Token | None) -> Token:

@@ -48,17 +48,20 @@ _COMPARISON, _SIGN, _POWER = LEVELS["<"], LEVELS["%"] + 1, LEVELS["^"]
 _NOT = LEVELS["<"] - 1
 
 
-def parse(text: str, *, random: bool = False, extra_functions: Mapping[str, int] | None = None) -> Tree:
+def parse(
+    text: str, *, random: bool = False, extra_functions: Mapping[str, int] | None = None, subscripts: bool = False
+) -> Tree:
     """The tree of an expression. Raises ExpressionError.
 
     ``random`` allows ``normal(m, s)`` and ``uniform(a, b)``, which become Draws numbered from 0 as they are written;
-    ``extra_functions`` are functions of this place besides those of §6, with their arities, which become Calls.
+    ``extra_functions`` are functions of this place besides those of §6, with their arities, which become Calls;
+    ``subscripts`` allows names such as ``legs[3]``.
 
     >>> parse("-x^2")
     Unary(operator='-', operand=Binary(operator='^', left=Name(name='x', start=1, end=2), \
 right=Number(value=2.0, start=3, end=4), start=1, end=4), start=0, end=4)
     """
-    return Parser(text, random, dict(extra_functions or {})).whole()
+    return Parser(text, random, dict(extra_functions or {}), subscripts=subscripts).whole()
 
 
 def unknown_names(tree: Tree, known: Iterable[str]) -> list[Name]:
@@ -81,9 +84,15 @@ class Parser:
     """Goes through the tokens once. Each method starts at the first token of what it is named after."""
 
     def __init__(
-        self, text: str, random: bool, extra_functions: Mapping[str, int], *, references: bool = False
+        self,
+        text: str,
+        random: bool,
+        extra_functions: Mapping[str, int],
+        *,
+        references: bool = False,
+        subscripts: bool = False,
     ) -> None:
-        self.tokens = tokens(text, references=references)
+        self.tokens = tokens(text, references=references, subscripts=subscripts)
         self.at = 0
         self.nesting = 0
         self.draws = 0

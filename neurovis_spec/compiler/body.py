@@ -1,0 +1,273 @@
+"""The ``body`` section: the body is opened, and every name in it compared with what the body and the network have.
+
+In: the section as written, the inputs and outputs, where files may lie. Out: BodySettings, a value of the Network that
+runs read; or findings. Where what a body needs is not installed, its names are not checked, which is a warning.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+from neurovis_spec.body.kinds import BodyMissingError, load_kind, open_body
+from neurovis_spec.body.model import Body, BodyError, Port
+from neurovis_spec.compiler.body_settings import BodySettings, Moved, Sensed
+from neurovis_spec.compiler.events.settable import places_of
+from neurovis_spec.compiler.limits import plural
+from neurovis_spec.compiler.names.references import key_of, known_inputs
+from neurovis_spec.compiler.network import Output
+from neurovis_spec.compiler.surroundings import Surroundings
+from neurovis_spec.compiler.values.constants import ALWAYS, Constants, is_constant, parse_formula
+from neurovis_spec.compiler.values.constants import Scope as Together
+from neurovis_spec.diagnostics import Findings, Span, shorten, suggest
+from neurovis_spec.language.body import BodyModel
+from neurovis_spec.language.data.files import read_data
+from neurovis_spec.language.expressions.tree import Name, names, walk
+from neurovis_spec.language.located import Formula, Located
+from neurovis_spec.language.model import names_of
+from neurovis_spec.language.unknown import UNKNOWN
+
+#: One number of a sensor, an actuator or an output: ``torso_up[2]``.
+_ONE: Final = re.compile(r"(.*)\[\s*([0-9]{1,9})\s*\]", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the files of a spec lie, and which folder they may not leave."""
+
+    base: Path
+    root: Path
+
+
+def body_settings(
+    model: BodyModel, around: Surroundings, constants: Constants, place: Place, *, dt_known: bool
+) -> BodySettings | None:
+    """The ``body`` section of a spec. What is invalid in it is reported and left out. ``dt_known``: the spec's dt is
+    in order."""
+    findings = constants.findings
+    kind, given = next(iter(model.kinds.items()), ("", None))
+    substeps = None if model.substeps is None else constants.integer(model.substeps, "'substeps'", 1)
+    path = body = None
+    if given is not None and len(model.kinds) == 1:
+        path, ready = _found(kind, given, place, findings)
+        if ready and dt_known and substeps is not UNKNOWN:
+            body = _opened(model, kind, given, path, constants.dt, substeps, findings)
+    sensed = tuple(_sensed(model, around, None if body is None else body.sensors, findings))
+    moved = tuple(_moved(model, around, None if body is None else body.actuators, constants))
+    each_episode = model.reset is not None and model.reset.value == "each_episode"
+    if given is None or substeps is UNKNOWN:
+        return None
+    return BodySettings(kind, given.value, path, substeps, sensed, moved, each_episode)
+
+
+def _found(kind: str, given: Located[str], place: Place, findings: Findings) -> tuple[Path | None, bool]:
+    """The file that a body is made of, None where its kind takes none, and whether all is there that it needs."""
+    try:
+        loaded = load_kind(kind)
+        if not loaded.takes_file:
+            return None, True
+        where = (given.value, place.root, place.base, given.span, findings)
+        if read_data(*where) is None:
+            return None, False
+        path = (place.base / given.value).resolve()
+        inside = place.root.resolve()
+        for part in loaded.files(path):
+            real = part.resolve()
+            if not real.is_relative_to(inside):
+                message = f"'{shorten(given.value)}' names the file '{shorten(str(part.name))}', "
+                hint = "data lies in the folder of the main spec or below it (--root names another folder)"
+                findings.error("path-outside", given.span, f"{message}which lies outside the folder of the spec", hint)
+                return path, False
+            findings.files.add(real)
+        return path, True
+    except BodyMissingError as error:
+        findings.warning("body-unchecked", given.span, f"{error}: the names in 'body' are not checked", error.hint)
+        return (place.base / given.value).resolve(), False
+    except (BodyError, OSError, RuntimeError) as error:
+        findings.error("bad-body", given.span, str(error), getattr(error, "hint", None))
+        return None, False
+
+
+def _opened(
+    model: BodyModel,
+    kind: str,
+    given: Located[str],
+    path: Path | None,
+    dt: float,
+    substeps: int | None,
+    findings: Findings,
+) -> Body | None:
+    try:
+        return open_body(kind, given.value, path, dt, substeps)
+    except BodyError as error:
+        at = model.substeps if error.key == "substeps" and model.substeps is not None else given
+        findings.error("bad-body", at.span, str(error), error.hint)
+        return None
+
+
+def _sensed(
+    model: BodyModel, around: Surroundings, ports: Sequence[Port] | None, findings: Findings
+) -> Iterator[Sensed]:
+    indices = {entry.name: index for index, entry in enumerate(around.inputs)}
+    for name, sensors in model.sensors.items():
+        index = indices.get(name)
+        key = key_of(model.source, "sensors", name)
+        if index is None:
+            _report_input(name, key.span, around, findings)
+        sizes = [_size(sensor, ports, "sensor", findings) for sensor in sensors]
+        known = [size for size in sizes if size is not None]
+        if index is None or len(known) < len(sizes):
+            continue
+        size = around.inputs[index].size
+        if ports is not None and sum(known) != size:
+            span = sensors[0].span if len(sensors) == 1 else key.span
+            are = f"'{shorten(sensors[0].value)}' is" if len(sensors) == 1 else "these sensors are"
+            message = f"the input '{name}' takes {plural(size, 'number')}, and {are} {plural(sum(known), 'number')}"
+            hint = f"declare the input with size: {sum(known)}"
+            if len(sensors) == 1 and size == 1 and sum(known) > 1:
+                hint = f"take one of them, as in {shorten(sensors[0].value)}[0], or {hint}"
+            findings.error("wrong-size", span, message, hint)
+            continue
+        yield Sensed(index, tuple(_called(sensor.value, ports) for sensor in sensors))
+
+
+def _report_input(name: str, span: Span, around: Surroundings, findings: Findings) -> None:
+    found = around.scope.input(name)
+    if found is UNKNOWN:
+        return
+    known = tuple(entry.name for entry in around.inputs)
+    if found is not None:
+        message = f"'{shorten(name)}' takes what the input '{shorten(found.name)}' is"
+        findings.error("unknown-input", span, message, f"name '{shorten(found.name)}'")
+    else:
+        message = f"there is no input '{shorten(name)}'"
+        findings.error("unknown-input", span, message, partial(known_inputs, name, known))
+
+
+def _size(name: Located[str], ports: Sequence[Port] | None, what: str, findings: Findings) -> int | None:
+    """How many numbers a name stands for (0 where the body is not known); None, and a finding, where the body has
+    nothing of that name."""
+    if ports is None:
+        return 0
+    sizes = {port.name: port.size for port in ports}
+    if name.value in sizes:
+        return sizes[name.value]
+    one = _ONE.fullmatch(name.value)
+    base = name.value if one is None else one[1]
+    if one is None or base not in sizes:
+        findings.error(
+            "unknown-sensor" if what == "sensor" else "unknown-actuator",
+            name.span,
+            f"the body has no {what} '{shorten(name.value)}'",
+            lambda: suggest(base, sizes, f"{what}s") or f"a {what} needs a name in the model, and this has none",
+        )
+        return None
+    if int(one[2]) < sizes[base]:
+        return 1
+    has = "which is one number" if sizes[base] == 1 else f"of {base}[0] to {base}[{sizes[base] - 1}]"
+    findings.error("wrong-size", name.span, f"there is no number {int(one[2])} in the {what} '{shorten(base)}', {has}")
+    return None
+
+
+def _called(name: str, ports: Sequence[Port] | None) -> str:
+    """A sensor or an actuator as runs name it: one number of several as ``name[i]``, a single one by its name alone."""
+    sizes = {port.name: port.size for port in ports or ()}
+    one = None if name in sizes else _ONE.fullmatch(name)
+    if one is None:
+        return name
+    return one[1] if sizes.get(one[1]) == 1 else f"{one[1]}[{int(one[2])}]"
+
+
+def _moved(
+    model: BodyModel, around: Surroundings, ports: Sequence[Port] | None, constants: Constants
+) -> Iterator[Moved]:
+    findings = constants.findings
+    told: dict[str, str] = {}
+    for name, formula in model.actuators.items():
+        key = key_of(model.source, "actuators", name)
+        size = _size(key, ports, "actuator", findings)
+        if size is not None and size > 1:
+            message = f"the actuator '{shorten(name)}' takes {size} numbers, and a command is one"
+            findings.error("wrong-size", key.span, message, f"command each of them: {shorten(name)}[0], …")
+        called = _called(name, ports)
+        first = told.setdefault(called, name)
+        if first != name:
+            message = f"the actuator '{shorten(name)}' is commanded twice: first as '{shorten(first)}'"
+            findings.error("repeated-reference", key.span, message, "a body takes one command for each actuator")
+        command = _command(called, formula, around, constants)
+        if command is not None and size is not None:
+            yield command
+
+
+def _command(actuator: str, formula: Formula, around: Surroundings, constants: Constants) -> Moved | None:
+    """The command of an actuator; None, and a finding, where it is invalid."""
+    findings = constants.findings
+    outputs = names_of(around.spec, "outputs", {output.name: output for output in around.outputs})
+    known = _Bases(Together((outputs, constants.names, ALWAYS)))
+    tree = parse_formula(formula, known, findings, what="outputs and parameters", subscripts=True)
+    if tree is UNKNOWN:
+        return None
+    constants.read |= names(tree)
+    found: dict[str, tuple[str, int, int]] = {}
+    indices = {output.name: index for index, output in enumerate(around.outputs)}
+    before = findings.errors
+    unknown = False
+    for node in walk(tree):
+        if not isinstance(node, Name) or node.name in found:
+            continue
+        base, bracket, number = node.name.partition("[")
+        span = formula.node.at(node.start, node.end)
+        if base in outputs and base in constants.names and not (outputs.is_open or constants.names.is_open):
+            message = f"'{base}' is an output and a parameter: which of them is meant is not known"
+            findings.error("duplicate-name", span, message, "rename one of them")
+        elif base not in outputs.declared and (base in constants.names or base in ALWAYS):
+            if bracket:
+                findings.error("wrong-size", span, f"'{base}' is one number: nothing is numbered in it")
+            unknown |= base not in ALWAYS and constants.names[base] is UNKNOWN
+        elif outputs[base] is UNKNOWN:
+            unknown = True
+        else:
+            place = _number(around.outputs[indices[base]], int(number.rstrip("]")) if bracket else None, span, findings)
+            if place is not None:
+                found[node.name] = (node.name, indices[base], place)
+    if findings.errors > before or unknown:
+        return None
+    if not found and is_constant(tree, (*ALWAYS, *constants.parameters)) and constants.value(formula) is UNKNOWN:
+        return None
+    parameters = tuple((name, slot) for name, slot in places_of(tree, constants.settable).items() if name not in found)
+    return Moved(actuator, tree, tuple(found.values()), parameters)
+
+
+def _number(output: Output, number: int | None, span: Span, findings: Findings) -> int | None:
+    """The place of a number in an output; None, and a finding, where it is not one, or is not there."""
+    if number is None and output.size == 1:
+        return 0
+    if number is None:
+        message = f"the output '{output.name}' is {output.size} numbers, and a command is one"
+        findings.error("wrong-size", span, message, f"take one of them: {output.name}[0] to [{output.size - 1}]")
+        return None
+    if number < output.size:
+        return number
+    has = "it is one number" if output.size == 1 else f"it has {output.name}[0] to {output.name}[{output.size - 1}]"
+    findings.error("wrong-size", span, f"there is no number {number} in the output '{output.name}': {has}")
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class _Bases(Collection[str]):
+    """Names, each also with a number behind it."""
+
+    names: Collection[str]
+
+    def __contains__(self, name: object) -> bool:
+        return isinstance(name, str) and name.partition("[")[0] in self.names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
