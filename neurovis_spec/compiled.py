@@ -91,12 +91,31 @@ class CompiledNetwork(Drawable):
 
         return whole_text(self.spec, self.request, self.sources)
 
-    def simulator(self, backend: str | None = None, *, start: Recording | None = None) -> Simulation:
-        """Step by step, for a control loop; ``start`` is a recording to go on from."""
+    def simulator(
+        self,
+        backend: str | None = None,
+        *,
+        start: Recording | None = None,
+        record: str | Path | bool = False,
+        every: int = 1,
+        states: str | Sequence[str] = (),
+        neurons: str | Sequence[str] = (),
+        weights: Literal["plastic", "none"] = "plastic",
+        body: str | Path | bool = True,
+    ) -> Simulation:
+        """Step by step, for a control loop; ``start`` is a recording to go on from, ``body`` as in ``run``.
+
+        With ``record`` it leaves a recording (``sim.recording``), in memory or in a file that is there when the
+        simulation is closed (``with network.simulator(record="walk.npz") as sim:``); what of it is recorded is chosen
+        as in ``run``. Raises what ``run`` raises."""
         from neurovis_spec.runtime.simulation import Simulation
 
         check(backend=backend, start=start)
-        return Simulation(self.network, backend, start)
+        made = Simulation(self.with_body(body).network, backend, start)
+        if record is not False:
+            target = None if record is True else arguments.path("record", record)
+            made.record(target, every, self._kept_in(target, _keep(states, neurons, weights)))
+        return made
 
     def run(
         self,
@@ -113,6 +132,7 @@ class CompiledNetwork(Drawable):
         weights: Literal["plastic", "none"] = "plastic",
         checkpoint: str | Path | None = None,
         last: bool = False,
+        body: str | Path | bool = True,
     ) -> Recording:
         """Run ``steps`` steps (default ``time.steps``) and record every ``every``-th.
 
@@ -121,9 +141,10 @@ class CompiledNetwork(Drawable):
         ones that are recorded, ``weights="none"`` leaves the weights out. The run ends at the first step after which
         ``until`` is true (``"rms(O - T, last=129) < 0.01"``). ``checkpoint`` is a file from which the run goes on
         exactly, if it is there, and which holds its state at the end; ``steps`` are those to be made now. With ``last``
-        the last of the steps that would be recorded is the only one, and memory does not grow with the steps. Raises
-        InputError, BackendError, RecordingError, KeyError for a name that there is not, SpecError where ``until`` is
-        invalid.
+        the last of the steps that would be recorded is the only one, and memory does not grow with the steps. The
+        network has the ``body`` of its spec; that of a YAML file in its place; none with ``body=False``. Raises
+        InputError, BackendError, BodyError, RecordingError, KeyError for a name that there is not, SpecError where
+        ``until`` or the file of a body is invalid.
         """
         check(backend=backend, start=start, progress=progress)
         keep = replace(_keep(states, neurons, weights), last=arguments.truth("last", last))
@@ -131,7 +152,8 @@ class CompiledNetwork(Drawable):
         kept = None if checkpoint is None else arguments.path("checkpoint", checkpoint)
         from neurovis_spec.notebook.recording import played
 
-        return played(pipeline.simulate(self.network, course, start, progress, kept), self)
+        network = self.with_body(body).network
+        return played(pipeline.simulate(network, course, start, progress, kept), self)
 
     def live(
         self,
@@ -184,19 +206,31 @@ class CompiledNetwork(Drawable):
         neurons: str | Sequence[str] = (),
         weights: Literal["plastic", "none"] = "plastic",
         checkpoint: str | Path | None = None,
+        body: str | Path | bool = True,
     ) -> None:
         """Run as ``run`` does and write the recording to a file while it is made, in memory that does not grow with the
         steps. What was there stays until the end. Raises what ``run`` and ``Recording.save`` raise, RecordingError
         where the disk has not the room, and after Ctrl-C a KeyboardInterrupt; the file holds the steps until then.
         After any other exception a part beside the file holds them, which is read where the file is not there."""
         check(backend=backend, start=start, progress=progress)
-        keep = _keep(states, neurons, weights)
         target = arguments.path("path", path)
-        if target.suffix.lower() == ".mcap":
-            keep = replace(keep, spec=self.text())
+        keep = self._kept_in(target, _keep(states, neurons, weights))
         course = self._course(steps, inputs, backend, every, until, keep)
         kept = None if checkpoint is None else arguments.path("checkpoint", checkpoint)
-        pipeline.simulate_to(self.network, target, course, start, progress, kept)
+        pipeline.simulate_to(self.with_body(body).network, target, course, start, progress, kept)
+
+    def _kept_in(self, path: Path | None, keep: Keep) -> Keep:
+        """What of a step is recorded in a file of this format."""
+        return replace(keep, spec=self.text()) if path is not None and path.suffix.lower() == ".mcap" else keep
+
+    def with_body(self, body: str | Path | bool) -> CompiledNetwork:
+        """The network with the body of a YAML file (``body: {…}``) in place of its own; without one (False), or as it
+        is (True). Raises SpecError."""
+        if body is True:
+            return self
+        if body is False:
+            return replace(self, network=replace(self.network, body=None))
+        raise NotImplementedError
 
     def _course(
         self,

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 import pytest
-from toy_bodies import Cart, carted, registered
+from toy_bodies import SPEC, Cart, carted, registered
 
+from neurovis_spec.body import BodyError
+from neurovis_spec.compiler.body_settings import Moved
+from neurovis_spec.language.expressions.parser import parse
 from neurovis_spec.runtime.backend import available
-from neurovis_spec.runtime.embodied import seed_of
+from neurovis_spec.runtime.embodied import Embodied, seed_of
 from neurovis_spec.runtime.kinds import Rows
+from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.simulation import Simulation
 
@@ -55,3 +60,143 @@ def test_a_run_with_a_body_is_the_loop_that_one_would_write(given: str, backend:
     if not available(backend).available:
         pytest.fail("the tests need a compiler")
     assert same(carted(given).run(130, backend=backend), by_hand(130, given, backend))
+
+
+# ---- what is given wins over what is sensed ------------------------------------------------------------------------
+
+
+def test_an_input_that_is_given_wins_over_its_sensor() -> None:
+    run, told = carted().run(30), carted().run(30, {"place": np.full(30, 0.3)})
+    assert np.array_equal(told["P"], np.full(30, np.tanh(0.3)))
+    assert np.array_equal(told["A"], np.tanh(told.sensor("arm")[:, ::-1]))
+    assert not np.array_equal(run["P"], told["P"])
+    simulation = carted().simulator()
+    for _ in range(30):
+        simulation.step(place=0.3)
+    assert np.array_equal(simulation.activity, told.activity[-1])
+    simulation.step()
+    assert simulation.sensed is not None
+    assert simulation.activity[0] == np.tanh(simulation.sensed[0])
+
+
+def test_a_source_that_a_sensor_replaces_is_not_warned_of() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        carted(spec=SPEC.replace("place: {expression: 0.5}", "place: {expression: 1/k}")).run(3)
+
+
+def test_a_sensor_that_is_no_number_is_warned_of_by_its_input(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Cart, "sense", lambda self: np.array([np.nan, 0.0, 0.0, 0.0]))
+    with pytest.warns(RuntimeWarning, match="the activity of P is nan at step 0"), pytest.raises(BodyError) as raised:
+        carted().run(3)
+    assert str(raised.value) == "at step 1: the command of 'push' is nan"
+
+
+# ---- parameters, states and numbers in commands --------------------------------------------------------------------
+
+
+def test_commands_follow_parameters_that_are_set_from_the_step_that_they_are_set_for() -> None:
+    compiled, cart = carted(), Cart()
+    simulation = Simulation(compiled.network, body=Embodied(compiled.network, cart))
+    simulation.step()
+    simulation.set(gain=0.0)
+    simulation.step()
+    simulation.set(gain=2.0)
+    drive = float(simulation.step()["drive"])
+    pushes = [push for push, _, _ in cart.commands]
+    assert pushes[1] == 0.0
+    assert pushes[2] == 2.0 * drive
+
+
+def test_a_command_reads_the_states_that_outputs_name() -> None:
+    spec = SPEC.replace(
+        "A: {count: 2, activation: tanh", "A: {count: 2, model: leaky_integrator, activation: tanh"
+    ).replace("both: O}", "both: O, held: A.v}")
+    compiled = carted(spec=spec)
+    body = compiled.network.body
+    assert body is not None
+    index = [output.name for output in compiled.network.outputs].index("held")
+    moved = Moved("lift[0]", parse("-held"), (("held", index, 1),), ())
+    network = replace(compiled.network, body=replace(body, moved=(moved, *body.moved)))
+    cart = Cart()
+    simulation = Simulation(network, body=Embodied(network, cart))
+    for _ in range(5):
+        held = simulation.step()["held"]
+        assert cart.commands[-1][1] == -np.asarray(held)[1]
+
+
+# ---- episodes ------------------------------------------------------------------------------------------------------
+
+
+def test_an_episode_ends_with_its_last_step_and_the_next_begins_with_a_seed_of_its_own() -> None:
+    compiled, cart = carted(), Cart()
+    network = compiled.network
+    simulation = Simulation(network, body=Embodied(network, cart))
+    ended = []
+    for k in range(90):
+        assert simulation.episode == k // 40
+        before = simulation.sensors["clock"]
+        simulation.step()
+        assert simulation.sensed is not None
+        assert simulation.sensed[3] == before == pytest.approx(0.05 * (k % 40))
+        ended.append(simulation.ended_episode)
+    assert [k for k, yes in enumerate(ended) if yes] == [39, 79]
+    assert cart.seeds[1:] == [seed_of(network, 0), seed_of(network, 1), seed_of(network, 2)]
+    assert len(set(cart.seeds)) == 4
+    assert seed_of(replace(network, seed=5), 0) != seed_of(network, 0)
+
+
+def test_a_body_that_ends_an_episode_is_seen_at_its_end_and_reset_then() -> None:
+    recording = carted("short").run(200)
+    x, clock = recording.sensor("x"), recording.sensor("clock")
+    over = np.abs(x) > 0.12
+    assert over.any()
+    assert not over[1:][over[:-1]].any()
+    assert (clock[1:][over[:-1]] == 0).all()
+    simulation = carted("short").simulator()
+    for _ in range(200):
+        simulation.step()
+    ends = over | (np.arange(200) % 40 == 39)
+    assert simulation.episode == ends.sum()
+    assert simulation.ended_episode == ends[-1]
+
+
+def test_without_reset_an_episode_of_the_network_ends_and_the_body_goes_on() -> None:
+    compiled = carted(each_episode=False)
+    simulation, recording = compiled.simulator(), compiled.run(90)
+    assert np.allclose(recording.sensor("clock"), np.arange(90) * 0.05, rtol=1e-12)
+    for _ in range(80):
+        simulation.step()
+    assert (simulation.episode, simulation.ended_episode) == (2, True)
+
+
+def test_a_reward_that_is_sensed_belongs_to_the_episode_that_ends() -> None:
+    """The rule adds up what it is given where an episode ends: the clock of the last step of it."""
+    spec = SPEC.replace("plasticity: hebbian", "plasticity: {told: {reward: P}}").replace(
+        "neurons:",
+        "rules: {told: {signals: [reward], weight: {each_episode: weight + reward}}}\nneurons:",
+        1,
+    )
+    compiled = carted(spec=spec)
+    body = compiled.network.body
+    assert body is not None
+    clock = replace(body.sensed[0], sensors=("clock",))
+    network = replace(compiled.network, body=replace(body, sensed=(clock, body.sensed[1])))
+    recording = record(network, 90)
+    weight = recording.weight("W -> O1")
+    last = np.tanh(recording.sensor("clock")[39])
+    assert last == pytest.approx(np.tanh(39 * 0.05))
+    assert weight[40] - weight[39] == pytest.approx(last)
+    assert weight[80] - weight[40] == pytest.approx(last)
+
+
+def test_episodes_of_a_network_without_a_body_are_those_of_its_time() -> None:
+    simulation = carted().with_body(False).simulator()
+    assert (simulation.episode, simulation.ended_episode) == (0, False)
+    for _ in range(40):
+        simulation.step()
+    assert (simulation.episode, simulation.ended_episode) == (1, True)
+    assert simulation.sensors == {}
+    assert simulation.pose is None
+    assert simulation.skeleton is None
+    assert simulation.sensed is None

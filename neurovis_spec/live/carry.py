@@ -2,8 +2,8 @@
 
 In: a state of the old network, what was turned in it, the new network. Out: a state of the new one at the same step.
 What has the same name keeps its activity, its weight where it learns, the states of its model and rule, and, with the
-same delay, the signals under way; what is new begins as at step 0. Parameters, clamps and lesions are what the events
-of the new spec and what was turned by hand make of them by this step.
+same delay, the signals under way; what is new begins as at step 0. The same body goes on where it was. Parameters,
+clamps and lesions are what the events of the new spec and what was turned by hand make of them by this step.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ from contextlib import suppress
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.body import BodyError
+from neurovis_spec.compiler.body_settings import BodySettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import SourceError, Turned
@@ -29,18 +31,41 @@ def carried(old: SimulatedSource, simulation: Simulation) -> SimulatedSource:
     was, network, turned, step = old.network, simulation.network, old.turned, old.step
     if not set(was.neurons.names) & set(network.neurons.names):
         return SimulatedSource(simulation)
-    origin, then = simulation.state(), old.leave()
+    origin = simulation.state()
+    try:
+        then = old.leave()
+    except BodyError:  # a body that cannot be kept
+        return SimulatedSource(simulation)
     sizes = {entry.name: entry.size for entry in network.inputs}
     done = _replay(simulation, then.k, [entry for entry in turned if entry.step < step], sizes)
     state = simulation.state()
     _carry(was, then, network, state)
-    simulation.restore(state)
+    _restore(simulation, was, then, state)
     kept = {name: values for name, values in old.fed.items() if sizes.get(name) == len(values)}
     source = SimulatedSource(simulation, state, done, kept, origin)
     for entry in (entry for entry in turned if entry.step == step):
         with suppress(SourceError):  # of what is no longer there
             source.turn(entry.turn)
     return source
+
+
+def _restore(simulation: Simulation, was: Network, old: State, state: State) -> None:
+    """Go on from a state, with the body where it was, if it is the same one; else it begins anew."""
+    new = simulation.network
+    if was.body is not None and new.body is not None and old.body is not None and _kind(was.body) == _kind(new.body):
+        fresh, state.body = state.body, old.body
+        try:
+            simulation.restore(state)
+        except BodyError:  # its file was edited
+            state.body = fresh
+        else:
+            return
+    simulation.restore(state)
+
+
+def _kind(body: BodySettings) -> tuple[object, ...]:
+    """What makes a body the same one."""
+    return body.kind, body.given, body.path, body.substeps
 
 
 def _replay(simulation: Simulation, k: int, turned: Sequence[Turned], inputs: Mapping[str, int]) -> list[Turned]:

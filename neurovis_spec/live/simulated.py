@@ -1,7 +1,8 @@
 """The simulator as a source: a run that can be stepped back, turned, and gone on from differently.
 
 In: a Simulation. Out: a Source. Every so many steps, and at every turn, the state is kept; a step of the past is made
-again from the state before it, bit for bit, and what was turned on the way is turned again.
+again from the state before it, bit for bit, and what was turned on the way is turned again. Where the network has a
+body that cannot be kept there is no going back.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from operator import attrgetter
 
 import numpy as np
 
+from neurovis_spec.body import BodyError
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.history import Ring
 from neurovis_spec.live.past import EVERY, ROOM, Kept, Past
@@ -56,6 +58,7 @@ class SimulatedSource:
         self._fed, self._turned = dict(fed), list(turned)
         self._listed: tuple[list[Turned], tuple[Turned, ...]] = ([], ())
         self._started = self._last = state.k
+        self._stuck = False
         self._simulation.restore(state)
         self._keep()
         self._seen = self._make(None)
@@ -69,6 +72,8 @@ class SimulatedSource:
     def reach(self) -> Reach:
         """From the beginning, if that is still kept, else from the second step that is: a picture needs the weights of
         the step before."""
+        if not len(self._past):
+            return Reach(self.step, self._last)
         first = self._past.first
         return Reach(min(self.step, first if first == self._started else first + 1), self._last)
 
@@ -100,7 +105,8 @@ class SimulatedSource:
         return carried_out(self._rules, stopped)
 
     def leave(self) -> State:
-        """The state from which the current step is computed. The source must not be used afterwards."""
+        """The state from which the current step is computed. The source must not be used afterwards. Raises BodyError
+        where the body cannot be kept."""
         run, step = self._simulation, self.step
         kept = self._past.before(step)
         if kept is not None:
@@ -114,9 +120,23 @@ class SimulatedSource:
         return self._seen
 
     def advance(self) -> bool:
-        """Go on by one step."""
-        self._next(self._seen.snapshot)
+        """Go on by one step; False, and a warning, where the body cannot."""
+        try:
+            self._next(self._seen.snapshot)
+        except BodyError as error:
+            warnings.warn(str(error), RuntimeWarning, stacklevel=2)
+            self._stuck = not self._retake()
+            return False
         return True
+
+    def _retake(self) -> bool:
+        """Be again behind the current step, where a step after it was begun; False where nothing before it is kept."""
+        kept, run = self._past.before(self.step + 1), self._simulation
+        if kept is not None:
+            self._take(kept)
+            while run.k <= self.step:
+                self._make(None)
+        return kept is not None
 
     def _next(self, before: Snapshot | None) -> None:
         """Compute a step; ``before`` is what was seen of the one before it."""
@@ -144,12 +164,15 @@ class SimulatedSource:
         if step != self.step and kept is not None and (step < self.step or kept.state.k > self._simulation.k):
             self._take(kept)
             self._next(None)
-        while self.step < step:
-            self.advance()
+        while self.step < step and self.advance():
+            pass
 
     def restart(self) -> None:
-        """Begin anew, at step 0."""
-        self._begin(self._origin, (), {})
+        """Begin anew, at step 0. Raises SourceError where the body cannot."""
+        try:
+            self._begin(self._origin, (), {})
+        except BodyError as error:
+            raise SourceError(str(error)) from None
 
     def recall(self, steps: int) -> list[Seen]:
         """What was seen of the last steps."""
@@ -165,6 +188,8 @@ class SimulatedSource:
 
     def turn(self, what: Turn) -> None:
         """Take a turn, from the next step on. Raises SourceError."""
+        if self._stuck:
+            raise SourceError("the body cannot go on from here: begin anew")
         try:
             if isinstance(what, Feed):
                 self._fed = fed_by(self.network, self._fed, what)
@@ -184,7 +209,12 @@ class SimulatedSource:
         return Seen(self._seen.snapshot, *self._simulation.lesioned, self._simulation.held)
 
     def _keep(self) -> None:
-        self._past.keep(Kept(self._simulation.state(), self._fed, copy(self._fading)))
+        try:
+            state = self._simulation.state()
+        except BodyError:  # a body that cannot be kept
+            self._past = Past(self._room)
+        else:
+            self._past.keep(Kept(state, self._fed, copy(self._fading)))
 
     def _take(self, kept: Kept) -> None:
         self._simulation.restore(kept.state)

@@ -54,8 +54,8 @@ class Course:
 
 
 def simulation(network: Network, backend: str | None) -> Simulation:
-    """The network, made ready: in C where that can be. Its body is what sends and hears the topics, not the one that
-    the spec names. Raises BackendError."""
+    """The network, made ready: in C where that can be. Its body is what is at the topics, not that of the
+    spec. Raises BackendError."""
     network = replace(network, body=None)
     if backend is not None:
         return Simulation(network, backend)

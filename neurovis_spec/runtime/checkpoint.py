@@ -41,7 +41,7 @@ def save_state(state: State, path: Path) -> None:
     """Write a state; what was there stays until all is written. Raises OSError, BodyError where the body is no
     numbers."""
     now, body = state.conditions, state.body
-    about = {
+    about: dict[str, object] = {
         "neurovis_state": 1,
         "network": state.network,
         "k": state.k,
@@ -49,6 +49,8 @@ def save_state(state: State, path: Path) -> None:
         "continued": state.continued,
         "begun": state.begun,
     }
+    if body is not None:
+        about["body"] = {"episode": body.episode, "ended_episode": body.ended_episode}
     clamps = list(now.held.active.values())
     arrays: dict[str, Array] = {
         "about": np.array(json.dumps(about)),
@@ -57,10 +59,8 @@ def save_state(state: State, path: Path) -> None:
         "clamped": _joined([clamp.neurons for clamp in clamps]).astype(np.int64),
         "clamp_values": np.array([_number(clamp) for clamp in clamps], dtype=np.float64),
     }
-    if body is not None:
-        about["body"] = {"episode": body.episode, "ended_episode": body.ended_episode}
-        if body.carried is not None:
-            arrays["body"] = numbers_of(body.carried)
+    if body is not None and body.carried is not None:
+        arrays["body"] = numbers_of(body.carried)
     with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
         put_arrays(archive, arrays)
 

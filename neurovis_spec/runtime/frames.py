@@ -35,9 +35,10 @@ def _changing(recording: Recording) -> list[str]:
 
 
 def to_xarray(recording: Recording) -> xr.Dataset:
-    """``activity`` (step, neuron), ``weight`` (step, connection), ``state`` (step, state_name), with the coordinates
-    ``step``, ``seconds``, ``neuron``, ``connection`` (and its ``source``, ``target``, ``delay``) and ``state_name``.
-    Weights that stay are in ``weight_static`` (static). Raises ImportError without xarray."""
+    """``activity`` (step, neuron), ``weight`` (step, connection), ``state`` (step, state_name), ``sensor`` (step,
+    sensor_name), with the coordinates ``step``, ``seconds``, ``neuron``, ``connection`` (and its ``source``,
+    ``target``, ``delay``), ``state_name`` and ``sensor_name``. Weights that stay are in ``weight_static`` (static).
+    Raises ImportError without xarray."""
     xarray = _extra("xarray")
     names, neurons = _changing(recording), recording.neurons
     plastic = recording.plastic[: len(names)]
@@ -47,6 +48,7 @@ def to_xarray(recording: Recording) -> xr.Dataset:
             "activity": (("step", "neuron"), recording.activity),
             "weight": (("step", "connection"), recording.weights),
             "state": (("step", "state_name"), recording.states),
+            "sensor": (("step", "sensor_name"), recording.rows.sensors),
             "weight_static": ("static", recording.weights_static),
         },
         coords={
@@ -58,6 +60,7 @@ def to_xarray(recording: Recording) -> xr.Dataset:
             "target": ("connection", [neurons[index] for index in recording.targets[plastic].tolist()]),
             "delay": ("connection", recording.delays[plastic]),
             "state_name": list(recording.state_names),
+            "sensor_name": list(recording.sensor_names),
             "static": [recording.connection_names[index] for index in fixed.tolist()],
         },
         attrs={"network": recording.network, "hash": recording.hash, "dt": recording.dt},
@@ -66,15 +69,17 @@ def to_xarray(recording: Recording) -> xr.Dataset:
 
 
 def to_pandas(recording: Recording) -> pd.DataFrame:
-    """A row a step, indexed by ``step`` and ``seconds``; columns by ``quantity`` (activity, weight, state) and ``name``
-    (of the neuron, the connection, the state): ``frame["activity"]["K1"]``. Raises ImportError without pandas."""
+    """A row a step, indexed by ``step`` and ``seconds``; columns by ``quantity`` (activity, weight, state, sensor) and
+    ``name`` (of the neuron, the connection, the state, the sensor): ``frame["activity"]["K1"]``. Raises ImportError
+    without pandas."""
     pandas = _extra("pandas")
     columns = [("activity", name) for name in recording.columns]
     columns += [("weight", name) for name in _changing(recording)]
     columns += [("state", name) for name in recording.state_names]
+    columns += [("sensor", name) for name in recording.sensor_names]
     steps = [recording.step, recording.step * recording.dt]
     result: pd.DataFrame = pandas.DataFrame(
-        np.hstack([recording.activity, recording.weights, recording.states]),
+        np.hstack(recording.rows[:4]),
         index=pandas.MultiIndex.from_arrays(steps, names=["step", "seconds"]),
         columns=pandas.MultiIndex.from_tuples(columns, names=["quantity", "name"]),
     )

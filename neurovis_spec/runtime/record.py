@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, subscript
+from neurovis_spec.body import BodyError
 from neurovis_spec.compiler.events.changes import Change
 from neurovis_spec.compiler.events.patch import PatchError
 from neurovis_spec.compiler.network import Network
@@ -317,13 +318,17 @@ class _OneByOne:
                     body.show(sensors[row], poses[row])
             step(state, vector)
             look(state)
-            if body is not None:
-                body.move(state)
             if keep:
                 activity[row] = state.activity if chosen is None else state.activity[chosen]
                 if probe is not None:
                     probe.read(state, states[row])
                 row += 1
+            if body is not None:
+                try:
+                    body.move(state)
+                except BodyError:
+                    rows.end(row)  # what was recorded until then
+                    raise
             if due():
                 rows.end(row)
                 if rows.over():

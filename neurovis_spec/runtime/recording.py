@@ -308,6 +308,19 @@ class Recording:
     def _static(self) -> IntArray:
         return np.setdiff1d(np.arange(len(self.sources)), self.plastic, assume_unique=True)
 
+    def sensor(self, name: str) -> FloatArray:
+        """What a sensor of the body measured: (rows,), or (rows, size) of one that is several numbers. Raises KeyError
+        with the nearest names."""
+        wanted = arguments.text("name", name)
+        if self.sensors is None:
+            raise UnknownNameError(f"there is no sensor '{wanted}': the recording is of a network without a body")
+        if wanted in self.sensor_names:
+            return self.sensors[:, self.sensor_names.index(wanted)]
+        columns = [column for column, own in enumerate(self.sensor_names) if own.rpartition("[")[0] == wanted]
+        if not columns:
+            raise unknown("sensor", wanted, self.sensor_names)
+        return self.sensors[:, columns]
+
     def row(self, step: int) -> int:
         """The row that holds a step. Raises RecordingError where it was not recorded."""
         arguments.integer("step", step)
@@ -331,15 +344,15 @@ class Recording:
         for_path(place).save(self, place)
 
     def to_xarray(self) -> xr.Dataset:
-        """A Dataset with the coordinates ``step``, ``seconds``, ``neuron``, ``connection``, ``state_name`` (see
-        ``frames``). Raises ImportError without the extra ``xarray``."""
+        """A Dataset with the coordinates ``step``, ``seconds``, ``neuron``, ``connection``, ``state_name``,
+        ``sensor_name`` (see ``frames``). Raises ImportError without the extra ``xarray``."""
         from neurovis_spec.runtime.frames import to_xarray
 
         return to_xarray(self)
 
     def to_pandas(self) -> pd.DataFrame:
         """A DataFrame, a row a step, indexed by ``step`` and ``seconds``, with columns by ``quantity`` (activity,
-        weight, state) and ``name``. Raises ImportError without the extra ``pandas``."""
+        weight, state, sensor) and ``name``. Raises ImportError without the extra ``pandas``."""
         from neurovis_spec.runtime.frames import to_pandas
 
         return to_pandas(self)

@@ -13,6 +13,8 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from math import isfinite
 from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -28,16 +30,19 @@ from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.expressions.tree import Number
 from neurovis_spec.language.references import Sum, parse
 from neurovis_spec.runtime.backend import Backend, prepare
-from neurovis_spec.runtime.columns import probe_of
+from neurovis_spec.runtime.columns import ALL, Keep, probe_of
 from neurovis_spec.runtime.conditions import Controls
 from neurovis_spec.runtime.embodied import Embodied, embodied
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.names import Names, names_of
-from neurovis_spec.runtime.recording import Recording, UnknownNameError, unknown
+from neurovis_spec.runtime.recording import Recording, RecordingError, UnknownNameError, unknown
 from neurovis_spec.runtime.references import find_connections, find_neurons
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.runtime.watch import Watch
+
+if TYPE_CHECKING:
+    from neurovis_spec.runtime.recorder import Recorder
 
 #: Clamps by hand come after those of events.
 _BY_HAND = 1 << 62
@@ -64,7 +69,7 @@ class Simulation:
     ) -> None:
         self.network = network
         self._backend, self._inputs = backend, inputs
-        self._stepper = prepare(network, backend)
+        self._stepper, self._watch = prepare(network, backend), Watch(network)
         self._body = embodied(network) if body is None else body
         self._given = frozenset(inputs or ())
         told = None if self._body is not None else lambda first, rows: self._watch.given(first, rows)
@@ -72,7 +77,44 @@ class Simulation:
         self._controls = Controls(network)
         self._begin = initial_state(network) if start is None else resumed_state(network, start)
         self._apply(self._begin)
+        self._recorder: Recorder | None = None
         self.reset()
+
+    def record(self, path: str | os.PathLike[str] | None = None, every: int = 1, keep: Keep = ALL) -> None:
+        """Record from the next step on, one step in ``every``: into a file, which is there when the simulation is
+        closed, or in memory; ``recording`` is what was recorded. Raises RecordingError, OSError, KeyError."""
+        from neurovis_spec.runtime.recorder import Recorder
+
+        if self._recorder is not None:
+            raise RecordingError("this simulation is recorded already")
+        place = None if path is None else arguments.path("path", path)
+        step = arguments.integer("every", every, 1, arguments.MOST_STEPS)
+        self._recorder = Recorder(self.network, self._state, self._body, place, step, keep)
+
+    @property
+    def recording(self) -> Recording:
+        """What was recorded so far. Raises RecordingError where nothing is recorded (``record``)."""
+        if self._recorder is None:
+            raise RecordingError("nothing is recorded: network.simulator(record=True), or record='FILE.npz'")
+        return self._recorder.recording()
+
+    def close(self) -> None:
+        """End the recording, if there is one: its file is there now."""
+        self._close(None)
+
+    def _close(self, error: BaseException | None) -> None:
+        if self._recorder is not None:
+            self._recorder.close(error)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End the recording. After an exception other than Ctrl-C a part beside the file holds the steps until then, as
+        after a run that broke off."""
+        self._close(error)
 
     def __reduce__(self) -> tuple[Callable[..., Simulation], tuple[object, ...]]:
         """A copy, in another process, goes on from here; code that was made for the network is made there anew."""
@@ -204,9 +246,14 @@ class Simulation:
             vector = body.sense(vector, self._given.union(given))
             if not isfinite(vector.dot(vector)):
                 self._watch.given(state.k, vector[None])
+        recorder = self._recorder if self._recorder is not None and self._recorder.going else None
+        if recorder is not None:
+            recorder.begin(state)
         with np.errstate(all="ignore"):
             self._stepper.step(state, vector)
             self._watch.look(state)
+        if recorder is not None:
+            recorder.end(state)
         if body is not None:
             body.move(state)
         if self._apply(state):  # events of the next step apply now, so that ``weights`` are those of the next step
@@ -301,7 +348,8 @@ class Simulation:
         return none, find_connections(self.network, text, self._names)
 
     def reset(self) -> None:
-        """Back to the beginning, with the parameters of the beginning."""
+        """Back to the beginning, with the parameters of the beginning. Raises RecordingError where it is recorded."""
+        self._check_recorded(self._begin)
         self._watch = Watch(self.network)
         self._state = self._begin.copy()
         self._reader.use(self._state)
@@ -333,6 +381,7 @@ class Simulation:
         arguments.instance("state", state, State, "a state, as state() gives it, or a checkpoint")
         if state.network != self._begin.network:
             raise ValueError("this is a state of another network")
+        self._check_recorded(state)
         if self._body is not None:
             self._body.take(state)
         elif state.body is not None:
@@ -340,6 +389,11 @@ class Simulation:
         self._state = state.copy()
         self._apply(self._state)
         self._reader.use(self._state)
+
+    def _check_recorded(self, state: State) -> None:
+        """A recording holds steps in their order, without a gap."""
+        if self._recorder is not None and self._recorder.going and state.k != self._state.k:
+            raise RecordingError(f"it is recorded, and cannot go to step {state.k} now: close() it before")
 
 
 def _resumed(
