@@ -336,6 +336,15 @@ def reward_modulated(w: float, s: Synapse, rate: float = 0.01, smoothing: float 
     return w
 
 
+def policy_gradient(w: float, s: Synapse, rate: float = 0.01, smoothing: float = 0.9) -> float:
+    s.change("eligibility", s.first * s.pre)
+    if (s.t + 1) % EPISODE == 0:
+        baseline = s.keep.get("baseline", 0.0)
+        w += rate * (s.second - baseline) * s.keep["eligibility"]
+        s.keep.update(eligibility=0.0, baseline=smoothing * baseline + (1 - smoothing) * s.second)
+    return w
+
+
 def decay(w: float, s: Synapse, rate: float = 0.01) -> float:
     return w - rate * w
 
@@ -354,6 +363,8 @@ RULES: tuple[tuple[Learner, dict[str, float]], ...] = (
     (differential_hebbian, {"rate": 0.1}),
     (reward_modulated, {}),
     (reward_modulated, {"rate": 0.05, "smoothing": 0.5}),
+    (policy_gradient, {}),
+    (policy_gradient, {"rate": 0.05, "smoothing": 0.5}),
     (decay, {"rate": 0.02}),
 )
 
@@ -390,7 +401,7 @@ def test_a_rule(learner: Learner, parameters: dict[str, float], delay: int) -> N
     names = builtin_definitions().rules.known()[learner.__name__][0].signals
     given = [f"{name}: {value}" for name, value in parameters.items()]
     given += [f"{name}: {source}" for name, source in zip(names, ("one", "Z"), strict=False)]
-    episode = f", episode: {EPISODE}" if learner is reward_modulated else ""
+    episode = f", episode: {EPISODE}" if learner in (reward_modulated, policy_gradient) else ""
     rule = f"{{{learner.__name__}: {{{', '.join(given)}}}}}"
     x, teach = noise(STEPS, 2) + 0.2, noise(STEPS, 2, seed=2)
     run = on_both(one_target(rule, delay, episode), {"x": x, "one": teach[:, 0], "two": teach[:, 1]})
