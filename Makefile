@@ -1,6 +1,7 @@
 # From a fresh clone, with Python 3.11 or later and nothing else of ours:
 #
 #   make demo       makes .venv, installs, and runs the main job into demo/
+#   make walk       the same for a hexapod that learns to walk in a simulation; installs mujoco
 #   make test       every check that needs Python alone
 #   make gallery    draws the examples into docs/pictures and writes docs/gallery.md; needs graphviz' dot
 #   make test-all   what needs Chromium, graphviz' dot, gcc and g++, node, or starts a cluster, and test-ros; fails without
@@ -23,7 +24,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 NPM := npm --no-audit --no-fund --no-package-lock --loglevel=error
 ELSEWHERE := browser or dot or compiler or cluster or node
 
-.PHONY: help install demo gallery test test-all test-elsewhere test-ros needs needs-ros fuzz layouts docs page page-check format clean
+.PHONY: help install demo walk gallery test test-all test-elsewhere test-ros needs needs-ros fuzz layouts docs page page-check format clean
 .DELETE_ON_ERROR:
 
 help:
@@ -53,6 +54,14 @@ install: $(VENV)/installed
 
 demo: $(VENV)/installed
 	@$(BIN)/python demo.py
+
+$(VENV)/simulated: $(VENV)/installed
+	@echo "installing what bodies are simulated with"
+	@$(PIP) --editable '.[sim]'
+	@touch $@
+
+walk: $(VENV)/simulated
+	@$(BIN)/python demo.py walk
 
 gallery: $(VENV)/installed
 	@$(BIN)/python gallery.py

@@ -25,6 +25,7 @@ from neurovis_spec.version import __version__
 ROOT = Path(__file__).parents[1]
 SPECS = ROOT / "specs"
 HEXAPOD = SPECS / "hexapod" / "hexapod.yaml"
+WALK = SPECS / "walk" / "walk.yaml"
 ERRORS = sorted((ROOT / "tests" / "errors").glob("*.yaml"))
 PULL = np.array([[1.0, 2.0], [3.0, 4.0]])
 
@@ -203,7 +204,7 @@ def test_bytes_that_are_no_text_get_a_finding_at_their_place(folder: Path) -> No
 
 
 def test_validate_says_ok_for_each_spec_of_several() -> None:
-    specs = [*sorted(SPECS.glob("*.yaml")), HEXAPOD]
+    specs = [*sorted(SPECS.glob("*.yaml")), HEXAPOD, WALK]
     lines = good("validate", *specs).splitlines()
     assert [line.split(": ok (")[0] for line in lines] == [str(spec) for spec in specs]
     assert f"{SPECS / 'cpg_rbf.yaml'}: ok (12 neurons, 28 connections)" in lines
@@ -325,7 +326,7 @@ def test_schema_is_a_json_schema_that_the_examples_meet() -> None:
 
     schema = json.loads(good("schema"))
     jsonschema.Draft202012Validator.check_schema(schema)
-    for path in (*SPECS.glob("*.yaml"), HEXAPOD):
+    for path in (*SPECS.glob("*.yaml"), HEXAPOD, WALK):
         jsonschema.Draft202012Validator(schema).validate(yaml.safe_load(path.read_text(encoding="utf-8")))
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.Draft202012Validator(schema).validate({"neurovis": 1, "name": "x", "neurns": {}})
@@ -513,7 +514,7 @@ def test_new_writes_a_spec_that_goes_all_the_way(folder: Path) -> None:
     good("render", "first.yaml", "-o", "first.svg")
 
 
-@pytest.mark.parametrize("example", [*sorted(SPECS.glob("*.yaml")), HEXAPOD], ids=lambda path: path.stem)
+@pytest.mark.parametrize("example", [*sorted(SPECS.glob("*.yaml")), HEXAPOD, WALK], ids=lambda path: path.stem)
 def test_new_from_an_example_is_that_example_under_another_name(folder: Path, example: Path) -> None:
     good("new", "mine", "--from", example.stem)
     mine = nv.compile("mine/mine.yaml" if example.parent.name == example.stem else "mine.yaml")

@@ -18,7 +18,7 @@ from neurovis_spec.cli.targets import check_target
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}")
 _NAME_LINE = re.compile(r"^name:[^\n]*$", re.MULTILINE)
-_DATA_FILE = re.compile(r"\bfile: *([^\s,}\]]+)")
+_DATA_FILE = re.compile(r"\b(?:file|mujoco): *([^\s,}\]]+)")
 _INCLUDED = re.compile(r"^include: *\[([^\]]*)\]", re.MULTILINE)
 
 
