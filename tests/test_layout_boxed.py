@@ -6,8 +6,8 @@ from random import Random
 import pytest
 
 from neurovis_spec.layout.arrange import lay_out_problem
-from neurovis_spec.layout.frames import Frames, meet
-from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.frames import Frames
+from neurovis_spec.layout.geometry import distance, meet
 from neurovis_spec.layout.model import LayoutProblem
 from neurovis_spec.layout.problem import canonical
 

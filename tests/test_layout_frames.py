@@ -12,6 +12,7 @@ from neurovis_layouts.layered.hierarchy import Composer
 import neurovis_spec as nv
 import neurovis_spec.scene.boxes
 from neurovis_spec.layout import Direction, frames
+from neurovis_spec.layout.geometry import bounds
 from neurovis_spec.layout.problem import problem_of
 
 LEGS = """
@@ -50,7 +51,7 @@ def test_frames_are_drawn_where_engines_and_memory_keep_room_for_them(direction:
         assert rect is not None
         assert drawn[path] == pytest.approx(rect, abs=0.02), path  # routes are sampled, more or less finely
         x0, y0, x1, y1 = planned[frames.Frames(problem).members[number]]
-        kept = frames.bounds([to_picture(corner, direction) for corner in ((x0, y0), (x1, y1))])
+        kept = bounds([to_picture(corner, direction) for corner in ((x0, y0), (x1, y1))])
         room = [side + shift[k % 2] for k, side in enumerate(kept)]
         if direction == "down":
             assert room == pytest.approx(rect, abs=0.03), path

@@ -5,12 +5,13 @@ from itertools import pairwise
 from unittest.mock import patch
 
 import layout_conformance as suite
+import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from neurovis_spec.layout import Direction, Layout, LayoutProblem, Point, Route
 from neurovis_spec.layout import metrics as measures
-from neurovis_spec.layout.geometry import cubics, distance, point_on, snap, straight, turn
+from neurovis_spec.layout.geometry import cubic, distance, pieces_of, snap, straight, turn
 from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.problem import canonical
 
@@ -58,7 +59,7 @@ def test_two_routes_may_cross_more_than_once() -> None:
     wave: Route = ((0.0, 0.0), (0.0, 8.0), (2.0, -8.0), (2.0, 0.0))
     places = {"A": (0.0, 0.0), "B": (2.0, 0.0), "C": (-1.0, 0.5), "D": (3.0, 0.5)}
     layout, problem = drawn(places, [("A", "B"), ("C", "D")], routes={"A -> B": wave})
-    line = [point_on(cubics(wave)[0], t / 1000) for t in range(1001)]
+    line = [(x, y) for x, y in cubic(pieces_of([wave])[0], np.arange(1001) / 1000).tolist()]
     times = sum((a[1] < 0.5) != (b[1] < 0.5) for a, b in pairwise(line))
     assert times == 2
     assert metrics(layout, problem)["crossings"] == times

@@ -19,7 +19,7 @@ from neurovis_layouts.routing.walls import Frame
 import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.layout.frames import Frames
-from neurovis_spec.layout.geometry import distance, sampled, segment_distance, straight
+from neurovis_spec.layout.geometry import distance, sampled, straight
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 from neurovis_spec.layout.problem import problem_of
 
@@ -36,6 +36,14 @@ def routes(draw: st.DrawFn) -> Route:
         curved = draw(st.booleans())
         found += [draw(point), draw(point), b] if curved else straight(a, b)[1:]
     return tuple(found)
+
+
+def segment_distance(place: Point, a: Point, b: Point) -> float:
+    """From a point to the segment from ``a`` to ``b``."""
+    ux, uy = b[0] - a[0], b[1] - a[1]
+    t = ((place[0] - a[0]) * ux + (place[1] - a[1]) * uy) / max(ux * ux + uy * uy, 1e-300)
+    t = max(0.0, min(1.0, t))
+    return distance(place, (a[0] + t * ux, a[1] + t * uy))
 
 
 def kink(*line: Point) -> Route:

@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from neurovis_layouts.routing import route_all
 from neurovis_layouts.routing.detours import Detours
 from neurovis_layouts.routing.rounded import rounded
-from neurovis_layouts.routing.walls import Rect, Walls, meet, touch
+from neurovis_layouts.routing.walls import Walls, meet, touch
 
 import neurovis_spec as nv
 from neurovis_spec.layout import Direction, Layout, LayoutEdge, LayoutProblem, LayoutRefusalError, Point
 from neurovis_spec.layout.arrange import lay_out_problem
-from neurovis_spec.layout.geometry import distance, sampled
+from neurovis_spec.layout.geometry import Rect, distance, sampled
 from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.model import Route
 from neurovis_spec.layout.problem import canonical, problem_of

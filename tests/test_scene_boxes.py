@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import neurovis_spec as nv
+from neurovis_spec.layout.geometry import meet
 from neurovis_spec.scene.boxes import Box, boxes_of
-from neurovis_spec.scene.geometry import overlap
 
 RING = """
 neurovis: 1
@@ -61,6 +61,6 @@ def test_no_two_frames_of_boxes_lie_on_each_other(engine: str, counts: tuple[int
     for name, count in zip("ABC", counts, strict=True):
         text = text.replace(f"{name}: {{count: 6", f"{name}: {{count: {count}")
     boxes = drawn(text)
-    assert not any(overlap(one.rect, other.rect) for one, other in combinations(boxes, 2))
+    assert not any(meet(one.rect, other.rect) for one, other in combinations(boxes, 2))
     if engine not in ("circular", "grid"):
         assert len(boxes) == len(counts)

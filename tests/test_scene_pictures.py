@@ -17,8 +17,9 @@ from random_specs import Spec, specs
 
 import neurovis_spec as nv
 from neurovis_spec import pipeline
+from neurovis_spec.layout.geometry import Rect, meet
 from neurovis_spec.scene import Arrowhead, Disc, Rectangle, Scene, Spline, Text, texts
-from neurovis_spec.scene.geometry import Rect, overlap, sample
+from neurovis_spec.scene.geometry import sample
 
 SPECS = Path(__file__).parent.parent / "specs"
 EXAMPLES = [*sorted(SPECS.glob("*.yaml")), SPECS / "hexapod" / "hexapod.yaml"]
@@ -106,7 +107,7 @@ def check(scene: Scene) -> None:
         assert one[1] >= 0, text.text
         assert one[2] <= scene.width, text.text
         assert one[3] <= scene.height, text.text
-        assert not [(text.text, t.text) for t, other in rects[place + 1 :] if overlap(one, other)]
+        assert not [(text.text, t.text) for t, other in rects[place + 1 :] if meet(one, other)]
     discs = [shape for shape in scene.shapes() if isinstance(shape, Disc)]
     for text, (x0, y0, x1, y1) in rects:
         for disc in discs:
@@ -241,7 +242,7 @@ def test_titles_find_a_place_that_no_line_crosses_in_narrow_frames_within_frames
     for number, title in enumerate(titles):
         x0, y0, x1, y1 = text_rect(title)
         assert not ((lines > (x0, y0)) & (lines < (x1, y1))).all(axis=1).any()
-        assert not any(overlap(text_rect(title), text_rect(other)) for other in titles[:number])
+        assert not any(meet(text_rect(title), text_rect(other)) for other in titles[:number])
 
 
 def test_a_title_does_not_stand_in_the_frame_of_another_box() -> None:
@@ -257,7 +258,7 @@ def test_a_title_does_not_stand_in_the_frame_of_another_box() -> None:
         assert isinstance(title, Text)
         assert isinstance(other, Rectangle)
         (x, y), wide, high = other.corner, other.width, other.height
-        assert not overlap(text_rect(title), (x, y, x + wide, y + high))
+        assert not meet(text_rect(title), (x, y, x + wide, y + high))
 
 
 #: between T and Y, and to the left, stand others

@@ -16,12 +16,13 @@ import neurovis_spec as nv
 from neurovis_spec import pipeline
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.layout.geometry import Rect, meet
 from neurovis_spec.layout.model import Layout, Point
 from neurovis_spec.scene import Arrowhead, Disc, Group, Rectangle, Scene, Spline, Text, legend, still, texts
 from neurovis_spec.scene.encode import encode
 from neurovis_spec.scene.film import film
 from neurovis_spec.scene.gains import choose_gains
-from neurovis_spec.scene.geometry import Rect, overlap, sample, samples
+from neurovis_spec.scene.geometry import sample, samples
 from neurovis_spec.scene.legend_entry import LegendEntry
 from neurovis_spec.scene.legend_scales import nice_weights
 from neurovis_spec.scene.lines import trimmed
@@ -63,7 +64,7 @@ def check_texts(scene: Scene) -> None:
         assert one[1] >= 0
         assert one[2] <= scene.width
         assert one[3] <= scene.height
-        assert not [t.text for t, other in rects[place + 1 :] if overlap(one, other)]
+        assert not [t.text for t, other in rects[place + 1 :] if meet(one, other)]
     for shape in scene.shapes():
         if isinstance(shape, Disc):
             (x, y), r = shape.centre, shape.radius

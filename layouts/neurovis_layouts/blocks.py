@@ -14,8 +14,8 @@ from typing import TypeAlias
 from neurovis_layouts.packing import packed
 from neurovis_layouts.pins import fit
 from neurovis_layouts.routing import route_all
-from neurovis_spec.layout.frames import PAD, PAD_FRAME, PAD_ROUTE, TITLE, Rect
-from neurovis_spec.layout.geometry import sampled, snap
+from neurovis_spec.layout.frames import PAD, PAD_FRAME, PAD_ROUTE, TITLE
+from neurovis_spec.layout.geometry import Rect, sampled, snap
 from neurovis_spec.layout.model import LayoutEdge, LayoutProblem, Point, Route
 
 #: A connection by its ends and its number among those that share them.

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from itertools import chain, takewhile
 
 from neurovis_layouts.pins import CentreCells
-from neurovis_spec.layout.frames import Frames, Rect, bounds, meet, padded, titled, united, untitled
-from neurovis_spec.layout.geometry import sampled, snap
+from neurovis_spec.layout.frames import Frames, titled, untitled
+from neurovis_spec.layout.geometry import Rect, bounds, meet, padded, sampled, snap, united
 from neurovis_spec.layout.model import RADIUS, Point, Route
 
 #: Steps of the search and how many of them it goes: near first, then far, then beyond everything.

@@ -17,7 +17,8 @@ from neurovis_layouts.incremental_places import remembered
 from neurovis_layouts.routing import route_all
 from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
 from neurovis_layouts.routing.walls import Frame, Walls
-from neurovis_spec.layout.frames import Frames, bounds
+from neurovis_spec.layout.frames import Frames
+from neurovis_spec.layout.geometry import bounds
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point, Route
 
 #: With more new connections than this nobody can follow one: they do not go round frames.

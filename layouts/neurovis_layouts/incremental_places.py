@@ -17,8 +17,8 @@ from neurovis_layouts.free_space import Copy, Room, Side
 from neurovis_layouts.manual_edits import by_hand, giving_way, moved_routes
 from neurovis_layouts.pins import CentreCells
 from neurovis_layouts.rows import GroupRows
-from neurovis_spec.layout.frames import Frames, Rect, bounds
-from neurovis_spec.layout.geometry import snap
+from neurovis_spec.layout.frames import Frames
+from neurovis_spec.layout.geometry import Rect, bounds, snap
 from neurovis_spec.layout.model import RADIUS, LayoutMirror, LayoutModule, LayoutProblem, Point, Route
 
 #: Discs that touch do not overlap, whatever rounding says.

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from collections.abc import Set as AbstractSet
 
-from neurovis_spec.layout.frames import Frames, Rect, meet
-from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.frames import Frames
+from neurovis_spec.layout.geometry import Rect, distance, meet
 from neurovis_spec.layout.model import RADIUS, LayoutProblem, Point, Route
 
 #: Differences up to this are rounding.

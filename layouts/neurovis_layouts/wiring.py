@@ -10,12 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.model import LayoutProblem
-
-BoolArray = npt.NDArray[np.bool_]
 
 #: How heavy a hub is, and its links.
 _HUB, _SPOKE = 0.2, 1.0

@@ -1,6 +1,6 @@
 """Layouts: the problem an engine is given, the Layout it gives back, layout files and metrics."""
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import BoolArray, FloatArray, IntArray
 from neurovis_spec.layout.model import (
     GRID,
     RADIUS,
@@ -24,6 +24,7 @@ __all__ = [
     "GRID",
     "RADIUS",
     "Arrangement",
+    "BoolArray",
     "Capabilities",
     "CheckingEngine",
     "Direction",

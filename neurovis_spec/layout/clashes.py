@@ -11,8 +11,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.layout.engines import engines_that
 from neurovis_spec.layout.frames import BOX_ACROSS, BOX_TIGHT, SLACK, Frames
 from neurovis_spec.layout.model import Layout, LayoutProblem
@@ -21,8 +21,6 @@ from neurovis_spec.layout.model import Layout, LayoutProblem
 _MOST = 2000
 #: So many neurons are looked for in a spec.
 _MOST_ABOUT = 20
-
-_Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +42,7 @@ def clashes(problem: LayoutProblem, layout: Layout) -> list[Clash]:
     placed = {i: layout.positions[name] for i, name in enumerate(problem.neurons)}
     routes = {i: layout.routes[edge.name] for i, edge in enumerate(problem.edges)}
     nowhere = (np.nan,) * 4
-    rects: _Floats = np.array([rect or nowhere for rect in frames.rects(placed, routes)[:count]], dtype=np.float64)
+    rects: FloatArray = np.array([rect or nowhere for rect in frames.rects(placed, routes)[:count]], dtype=np.float64)
     names = [module.path for module in problem.modules] + [name for name, _ in problem.boxes]
     meeting = set(_meeting(frames, rects))
     result = [
@@ -64,7 +62,7 @@ def clashes(problem: LayoutProblem, layout: Layout) -> list[Clash]:
     return result
 
 
-def _meeting(frames: Frames, rects: _Floats) -> Iterator[tuple[int, int]]:
+def _meeting(frames: Frames, rects: FloatArray) -> Iterator[tuple[int, int]]:
     """Frames without a neuron in common that share more than an edge; boxes are drawn tighter before they do."""
     rects = rects.copy()
     rects[frames.instances :] += np.array([1, 1, -1, -1]) * (BOX_ACROSS - BOX_TIGHT)
@@ -76,7 +74,7 @@ def _meeting(frames: Frames, rects: _Floats) -> Iterator[tuple[int, int]]:
                 yield one, one + 1 + other
 
 
-def _strangers(frames: Frames, rects: _Floats, at: _Floats) -> Iterator[tuple[int, int]]:
+def _strangers(frames: Frames, rects: FloatArray, at: FloatArray) -> Iterator[tuple[int, int]]:
     """Frames, each with the first neuron in it that is none of its."""
     for number, rect in enumerate(rects):
         inside = ((at > rect[:2] + SLACK) & (at < rect[2:] - SLACK)).all(axis=1)

@@ -7,14 +7,10 @@ who is in a frame, which frames hold which, and the rectangles of what is placed
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import TypeAlias
+from collections.abc import Mapping
 
-from neurovis_spec.layout.geometry import sampled
+from neurovis_spec.layout.geometry import Rect, bounds, padded, sampled, united
 from neurovis_spec.layout.model import LayoutProblem, Point, Route
-
-#: x0, y0, x1, y1
-Rect: TypeAlias = tuple[float, float, float, float]
 
 #: From centres, routes and frames within to the line of an instance's frame, and room for its title on top.
 PAD, PAD_ROUTE, PAD_FRAME, TITLE = 0.65, 0.2, 0.35, 0.35
@@ -84,26 +80,9 @@ class Frames:
         return not self.members[one].isdisjoint(self.members[other])
 
 
-def bounds(points: Iterable[Point]) -> Rect:
-    """The rectangle around points."""
-    xs, ys = zip(*points, strict=True)
-    return min(xs), min(ys), max(xs), max(ys)
-
-
-def padded(rect: Rect, by: float) -> Rect:
-    """A rectangle wider on all sides."""
-    return rect[0] - by, rect[1] - by, rect[2] + by, rect[3] + by
-
-
 def _boxed(rect: Rect) -> Rect:
     """The line of a box around centres."""
     return rect[0] - BOX_ACROSS, rect[1] - BOX_DOWN, rect[2] + BOX_ACROSS, rect[3] + BOX_DOWN
-
-
-def united(rects: Iterable[Rect]) -> Rect:
-    """The rectangle around rectangles."""
-    x0, y0, x1, y1 = zip(*rects, strict=True)
-    return min(x0), min(y0), max(x1), max(y1)
 
 
 def titled(rect: Rect) -> Rect:
@@ -114,8 +93,3 @@ def titled(rect: Rect) -> Rect:
 def untitled(rect: Rect) -> Rect:
     """Without the room for a title."""
     return rect[0], rect[1] + TITLE, rect[2], rect[3]
-
-
-def meet(one: Rect, other: Rect, gap: float = 0.0) -> bool:
-    """Whether rectangles come closer than ``gap``."""
-    return one[0] < other[2] + gap and other[0] < one[2] + gap and one[1] < other[3] + gap and other[1] < one[3] + gap

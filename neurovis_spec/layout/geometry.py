@@ -1,18 +1,28 @@
-"""Plane geometry for layouts: the coordinate grid, points on a circle, cubic Bézier splines.
+"""Plane geometry: the coordinate grid, points on a circle, cubic Bézier splines, straight segments, rectangles.
 
-In: points and routes. Out: points. Everything here uses + − × ÷ and √ alone, which IEEE 754 fixes to the last bit,
+In: points, routes and rectangles, one or as arrays of many. Out: points, distances, crossings. Engines, metrics and
+scenes measure with this module alone. Everything here uses + − × ÷ and √ alone, which IEEE 754 fixes to the last bit,
 so that engines built on it give the same bytes on every machine.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TypeAlias
 
+import numpy as np
+
+from neurovis_spec.arrays import BoolArray, FloatArray, IntArray
 from neurovis_spec.layout.model import GRID, Point, Route
+
+#: x0, y0, x1, y1
+Rect: TypeAlias = tuple[float, float, float, float]
 
 _PER_UNIT = round(1 / GRID)
 _PI = 3.141592653589793
+#: How many points there are on a piece, and how many are made at once: so many stay in the processor's cache.
+_FEWEST, _MOST, _AT_ONCE = 4, 400, 1 << 14
 
 
 def snap(value: float) -> float:
@@ -49,28 +59,52 @@ def _series(angle: float) -> Point:
     return cosine, sine
 
 
-def cubics(route: Route) -> list[tuple[Point, Point, Point, Point]]:
-    """The cubic pieces of a route, each with its four points."""
-    return [(route[i], route[i + 1], route[i + 2], route[i + 3]) for i in range(0, len(route) - 3, 3)]
+def cubic(pieces: FloatArray, t: FloatArray) -> FloatArray:
+    """The points (…, 2) of cubic pieces (…, 4, 2) at ``t`` (…) in [0, 1] (Bernstein's weights)."""
+    t = t[..., None]
+    s, (a, b, c, d) = 1 - t, np.moveaxis(pieces, -2, 0)
+    points: FloatArray = s * s * s * a + 3 * s * s * t * b + 3 * s * t * t * c + t * t * t * d
+    return points
 
 
-def point_on(piece: Sequence[Point], t: float) -> Point:
-    """The point of a cubic piece at ``t`` in [0, 1] (de Casteljau's weights)."""
-    (ax, ay), (bx, by), (cx, cy), (dx, dy) = piece
-    s = 1 - t
-    a, b, c, d = s * s * s, 3 * s * s * t, 3 * s * t * t, t * t * t
-    return a * ax + b * bx + c * cx + d * dx, a * ay + b * by + c * cy + d * dy
+def pieces_of(routes: Sequence[Route]) -> tuple[FloatArray, IntArray]:
+    """The cubic pieces (p, 4, 2) of routes, and which route each (p,) is of."""
+    pieces = [route[i : i + 4] for route in routes for i in range(0, len(route) - 3, 3)]
+    counts = [(len(route) - 1) // 3 for route in routes]
+    owner = np.repeat(np.arange(len(routes), dtype=np.int64), counts)
+    return np.array(pieces, dtype=np.float64).reshape(-1, 4, 2), owner
+
+
+def points_on(pieces: FloatArray, owner: IntArray, apart: float) -> tuple[FloatArray, IntArray]:
+    """Points on cubic pieces (p, 4, 2), about ``apart``, without the first of each, and whose they are."""
+    parts = _counts(pieces, apart)
+    piece = np.repeat(np.arange(len(pieces), dtype=np.int64), parts)
+    number = np.arange(len(piece), dtype=np.int64) - np.repeat(np.cumsum(parts) - parts, parts) + 1
+    return cubic(pieces[piece], number / parts[piece]), owner[piece]
+
+
+def points_in_turn(pieces: FloatArray, owner: IntArray, apart: float) -> Iterator[tuple[FloatArray, IntArray]]:
+    """What ``points_on`` gives, of some pieces after the other: points of many long routes would fill the memory."""
+    until = np.cumsum(_counts(pieces, apart))
+    first = before = 0
+    while first < len(pieces):
+        last = max(first + 1, int(np.searchsorted(until, before + _AT_ONCE, side="right")))
+        yield points_on(pieces[first:last], owner[first:last], apart)
+        first, before = last, int(until[last - 1])
+
+
+def _counts(pieces: FloatArray, apart: float) -> IntArray:
+    """(p,) how many points there are on each piece: by the length of its control polygon."""
+    steps = np.diff(pieces, axis=1)
+    legs = np.sqrt(steps[:, :, 0] * steps[:, :, 0] + steps[:, :, 1] * steps[:, :, 1])
+    counts: IntArray = np.clip(np.ceil((legs[:, 0] + legs[:, 1] + legs[:, 2]) / apart), _FEWEST, _MOST).astype(np.int64)
+    return counts
 
 
 def sampled(route: Route, step: float = 0.2) -> list[Point]:
     """Points along a route, about ``step`` apart, both ends included."""
-    points = [route[0]]
-    for piece in cubics(route):
-        # not by sum(), which rounds once at the end from Python 3.12 on
-        length = distance(piece[0], piece[1]) + distance(piece[1], piece[2]) + distance(piece[2], piece[3])
-        parts = max(4, min(400, math.ceil(length / step)))
-        points.extend(point_on(piece, i / parts) for i in range(1, parts + 1))
-    return points
+    points, _ = points_on(*pieces_of([route]), step)
+    return [route[0], *((x, y) for x, y in points.tolist())]
 
 
 def distance(a: Point, b: Point) -> float:
@@ -79,17 +113,56 @@ def distance(a: Point, b: Point) -> float:
     return math.sqrt(x * x + y * y)
 
 
-def segment_distance(point: Point, a: Point, b: Point) -> float:
-    """From a point to the segment from ``a`` to ``b``."""
-    ux, uy = b[0] - a[0], b[1] - a[1]
-    squared = ux * ux + uy * uy
-    if squared == 0:
-        return distance(point, a)
-    t = max(0.0, min(1.0, ((point[0] - a[0]) * ux + (point[1] - a[1]) * uy) / squared))
-    return distance(point, (a[0] + t * ux, a[1] + t * uy))
-
-
 def straight(a: Point, b: Point) -> Route:
     """A straight route, its control points on the line."""
     third = ((2 * a[0] + b[0]) / 3, (2 * a[1] + b[1]) / 3)
     return (a, third, ((a[0] + 2 * b[0]) / 3, (a[1] + 2 * b[1]) / 3), b)
+
+
+def squared_distances(x: FloatArray, y: FloatArray, ux: FloatArray, uy: FloatArray) -> FloatArray:
+    """How far points are from segments, squared: points (x, y) as seen from where their segments (ux, uy) begin."""
+    t = np.clip((x * ux + y * uy) / np.maximum(ux * ux + uy * uy, 1e-12), 0.0, 1.0)
+    dx, dy = x - t * ux, y - t * uy
+    squared: FloatArray = dx * dx + dy * dy
+    return squared
+
+
+def crossing(
+    ax: FloatArray, ay: FloatArray, ux: FloatArray, uy: FloatArray,
+    bx: FloatArray, by: FloatArray, vx: FloatArray, vy: FloatArray,
+) -> tuple[FloatArray, BoolArray]:  # fmt: skip
+    """Whether segments a to a + u and b to b + v cross (half-open, so that a corner counts once; parallel ones never
+    do), and for those that do, at what share of u: the shares of these alone, and the whole answer."""
+    bx, by = bx - ax, by - ay
+    cross = ux * vy - uy * vx
+    sign, whole = np.sign(cross), np.abs(cross)
+    s, t = sign * (bx * vy - by * vx), sign * (bx * uy - by * ux)
+    hit = (s >= 0) & (s < whole) & (t >= 0) & (t < whole)
+    return s[hit] / whole[hit], hit
+
+
+def bounds(points: Iterable[Point]) -> Rect:
+    """The rectangle around points."""
+    xs, ys = zip(*points, strict=True)
+    return min(xs), min(ys), max(xs), max(ys)
+
+
+def padded(rect: Rect, by: float) -> Rect:
+    """A rectangle wider on all sides."""
+    return rect[0] - by, rect[1] - by, rect[2] + by, rect[3] + by
+
+
+def shifted(rect: Rect, by: Point) -> Rect:
+    """A rectangle moved."""
+    return rect[0] + by[0], rect[1] + by[1], rect[2] + by[0], rect[3] + by[1]
+
+
+def united(rects: Iterable[Rect]) -> Rect:
+    """The rectangle around rectangles."""
+    x0, y0, x1, y1 = zip(*rects, strict=True)
+    return min(x0), min(y0), max(x1), max(y1)
+
+
+def meet(one: Rect, other: Rect, gap: float = 0.0) -> bool:
+    """Whether rectangles share more than an edge, or come closer than ``gap``."""
+    return one[0] < other[2] + gap and other[0] < one[2] + gap and one[1] < other[3] + gap and other[1] < one[3] + gap

@@ -11,12 +11,10 @@ from collections.abc import Iterator
 
 import networkx as nx
 import numpy as np
-import numpy.typing as npt
 
-from neurovis_spec.arrays import FloatArray, IntArray
-from neurovis_spec.layout.geometry import cubics, distance
+from neurovis_spec.arrays import BoolArray, FloatArray, IntArray
+from neurovis_spec.layout.geometry import crossing, cubic, distance, pieces_of, squared_distances
 from neurovis_spec.layout.model import RADIUS, Direction, Layout, LayoutProblem, Point, Route
-from neurovis_spec.layout.segments import meet
 
 #: Crossings this close to a neuron that both routes have are how edges meet, not how they cross.
 _MEETING = 0.35
@@ -61,33 +59,22 @@ class _Segments:
     """All routes as short straight segments: ``a``, ``b`` (m, 2) and the edge of each."""
 
     def __init__(self, routes: list[Route]) -> None:
-        pieces = [(i, piece) for i, route in enumerate(routes) for piece in cubics(route)]
         a: list[FloatArray] = [np.zeros((0, 2))]
         b: list[FloatArray] = [np.zeros((0, 2))]
         edge: list[IntArray] = [np.zeros(0, dtype=np.int64)]
-        points = np.array([piece for _, piece in pieces], dtype=np.float64).reshape(-1, 4, 2)
-        owner = np.array([i for i, _ in pieces], dtype=np.int64)
+        points, owner = pieces_of(routes)
         length = np.sqrt((np.diff(points, axis=1) ** 2).sum(axis=2)).sum(axis=1)
         step = max(_STEP, float(length.sum()) / _MOST_SEGMENTS)
         parts = np.clip(np.ceil(length / step), 8, _FINEST).astype(np.int64)
         for count in np.unique(parts).tolist():
             chosen = parts == count
-            line = _flatten(points[chosen], int(count))
+            line = cubic(points[chosen][:, None], np.linspace(0.0, 1.0, count + 1))
             a.append(line[:, :-1].reshape(-1, 2))
             b.append(line[:, 1:].reshape(-1, 2))
             edge.append(np.repeat(owner[chosen], count))
         self.a, self.b, self.edge = np.concatenate(a), np.concatenate(b), np.concatenate(edge)
         lengths = np.sqrt(((self.b - self.a) ** 2).sum(axis=1))
         self.longest = float(lengths.max()) if len(lengths) else 0.0
-
-
-def _flatten(points: FloatArray, parts: int) -> FloatArray:
-    """Cubic pieces (p, 4, 2) as polylines (p, parts + 1, 2)."""
-    t = np.linspace(0.0, 1.0, parts + 1)[None, :, None]
-    s = 1 - t
-    p = points[:, :, None, :]
-    line: FloatArray = s**3 * p[:, 0] + 3 * s * s * t * p[:, 1] + 3 * s * t * t * p[:, 2] + t**3 * p[:, 3]
-    return line
 
 
 def _in_cells(low: FloatArray, high: FloatArray, cell: FloatArray) -> tuple[IntArray, IntArray]:
@@ -143,7 +130,7 @@ def _crossings(segments: _Segments, ends: IntArray, centres: FloatArray) -> tupl
     for first, second in _pairs(keys):
         other = edge[first] != edge[second]
         i, j = first[other], second[other]
-        share, hit = meet(a[0][i], a[1][i], u[0][i], u[1][i], a[0][j], a[1][j], u[0][j], u[1][j])
+        share, hit = crossing(a[0][i], a[1][i], u[0][i], u[1][i], a[0][j], a[1][j], u[0][j], u[1][j])
         i, j = i[hit], j[hit]
         where = (a[:, i] + share * u[:, i]).T
         # a pair may share several cells: it counts in the one that the point lies in
@@ -152,7 +139,7 @@ def _crossings(segments: _Segments, ends: IntArray, centres: FloatArray) -> tupl
     return round(total * scale), sampled
 
 
-def _sample(count: int, share: float) -> npt.NDArray[np.bool_]:
+def _sample(count: int, share: float) -> BoolArray:
     """Which of so many routes are in a sample; two at least, the same each time."""
     scattered = np.arange(count, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)  # Knuth's multiplicative hashing
     chosen = np.zeros(count, dtype=np.bool_)
@@ -160,7 +147,7 @@ def _sample(count: int, share: float) -> npt.NDArray[np.bool_]:
     return chosen
 
 
-def _outside(where: FloatArray, one: IntArray, two: IntArray, centres: FloatArray) -> npt.NDArray[np.bool_]:
+def _outside(where: FloatArray, one: IntArray, two: IntArray, centres: FloatArray) -> BoolArray:
     """Whether a point is not near a neuron that both edges have."""
     result = np.ones(len(where), dtype=np.bool_)
     for i in (0, 1):
@@ -201,17 +188,10 @@ def _edges_over_neurons(segments: _Segments, ends: IntArray, centres: FloatArray
                 neuron = order[begin[chosen] + offset]
                 edge = segments.edge[chosen]
                 foreign = (ends[edge, 0] != neuron) & (ends[edge, 1] != neuron)
-                near = _near(centres[neuron], segments.a[chosen], segments.b[chosen])
+                way = (segments.b - segments.a)[chosen]
+                near = squared_distances(*(centres[neuron] - segments.a[chosen]).T, *way.T) < (_OVER - _SLACK) ** 2
                 over.update(edge[foreign & near].tolist())
     return len(over)
-
-
-def _near(p: FloatArray, a: FloatArray, b: FloatArray) -> npt.NDArray[np.bool_]:
-    u = b - a
-    squared = np.maximum((u**2).sum(axis=1), 1e-300)
-    t = np.clip(((p - a) * u).sum(axis=1) / squared, 0.0, 1.0)
-    result: npt.NDArray[np.bool_] = ((a + t[:, None] * u - p) ** 2).sum(axis=1) < (_OVER - _SLACK) ** 2
-    return result
 
 
 def _flow(layout: Layout, problem: LayoutProblem) -> float:

@@ -16,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.scene.geometry import Rect
+from neurovis_spec.layout.geometry import Rect, meet
 
 #: The smallest scale (page units for a layout unit) at which there are labels, and the steps from it on.
 _FIRST, _STEP = 6.0, 1.25
@@ -192,7 +192,7 @@ class _Ground:
             claims = [self.claim(*own) for own in zip(one.members, one.widths, sides, strict=False)]
             if not all(self._free(claim, index) for claim, index in zip(claims, one.members, strict=True)):
                 continue
-            if len(claims) == 2 and _meet(*claims):
+            if len(claims) == 2 and meet(claims[0], claims[1]):
                 continue
             lines = sum(self._lines(claim) for claim in claims)
             if best is None or lines < best[0]:
@@ -221,10 +221,6 @@ class _Ground:
         first, last = np.searchsorted(self._dots_xs, (x0, x1))
         heights = self._dots[int(first) : int(last), 1]
         return int(np.count_nonzero((heights > y0) & (heights < y1)))
-
-
-def _meet(one: Rect, other: Rect) -> bool:
-    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
 
 def _meeting(claims: FloatArray, claim: Rect) -> bool:

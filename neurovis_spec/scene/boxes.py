@@ -24,8 +24,9 @@ from neurovis_spec.layout.frames import (
     SLACK,
     TITLE,
 )
+from neurovis_spec.layout.geometry import Rect, meet
 from neurovis_spec.scene import texts
-from neurovis_spec.scene.geometry import Rect, bounds, overlap, sample
+from neurovis_spec.scene.geometry import bounds, sample
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +63,7 @@ def boxes_of(network: Network, positions: FloatArray, routes: Sequence[FloatArra
             if item.kind == "instance":
                 rects[item] = _framed(positions, inner.get(item.path, []), item.members, held)
             elif not tight or any(
-                overlap(rects[item], rects[o])
+                meet(rects[item], rects[o])
                 for o in named
                 if not (within[o] <= within[item] or within[item] <= within[o])
             ):
@@ -72,7 +73,7 @@ def boxes_of(network: Network, positions: FloatArray, routes: Sequence[FloatArra
         Box(_titled(network, n), n.path.rpartition(".")[2], n.members, rects[n], n.kind, n.path)
         for n in clean
         if n.kind == "instance"
-        or not any(overlap(_padded(rects[n], -SLACK), rects[o]) and within[n].isdisjoint(within[o]) for o in clean)
+        or not any(meet(_padded(rects[n], -SLACK), rects[o]) and within[n].isdisjoint(within[o]) for o in clean)
     ]
     return sorted(boxes, key=lambda b: (-(b.rect[2] - b.rect[0]) * (b.rect[3] - b.rect[1]), b.kind, b.path))
 

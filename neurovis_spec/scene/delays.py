@@ -11,7 +11,8 @@ import math
 from collections.abc import Mapping
 
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.scene.geometry import Point, point_at
+from neurovis_spec.layout.model import Point
+from neurovis_spec.scene.geometry import point_at
 from neurovis_spec.scene.lines import Line
 from neurovis_spec.scene.model import Rectangle, Theme
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.scene.geometry import Rect
+from neurovis_spec.layout.geometry import Rect
 
 #: Page units for one layout unit in a picture that is small enough.
 UNIT = 66.0

@@ -12,9 +12,8 @@ from itertools import pairwise
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
-
-Point = tuple[float, float]
-Rect = tuple[float, float, float, float]  # x0, y0, x1, y1
+from neurovis_spec.layout.geometry import Rect, cubic
+from neurovis_spec.layout.model import Point
 
 _SAMPLES = 24
 
@@ -29,7 +28,7 @@ def samples(splines: Sequence[Sequence[Point] | FloatArray], per_segment: int = 
     result = [np.zeros((0, 2))] * len(splines)
     t = np.arange(per_segment) / per_segment
     for members, control in batches(splines):
-        inner = _at(_segments(control)[:, :, None], t).reshape(len(control), -1, 2)
+        inner = cubic(_segments(control)[:, :, None], t).reshape(len(control), -1, 2)
         for index, dots in zip(members, np.concatenate([inner, control[:, -1:]], axis=1), strict=True):
             result[index] = dots
     return result
@@ -47,19 +46,6 @@ def batches(splines: Sequence[Sequence[Point] | FloatArray]) -> Iterator[tuple[l
 def _segments(control: FloatArray) -> FloatArray:
     """Splines (m, 1 + 3k, 2) as segments (m, k, 4, 2)."""
     return np.stack([control[:, 0:-1:3], control[:, 1::3], control[:, 2::3], control[:, 3::3]], axis=2)
-
-
-def _at(segments: FloatArray, t: FloatArray) -> FloatArray:
-    """Points at ``t`` of segments (…, 4, 2)."""
-    u, s = t[..., None], 1 - t[..., None]
-    p = segments
-    result: FloatArray = (
-        s * s * s * p[..., 0, :]
-        + 3 * s * s * u * p[..., 1, :]
-        + 3 * s * u * u * p[..., 2, :]
-        + u * u * u * p[..., 3, :]
-    )
-    return result
 
 
 def bounds(points: Iterable[FloatArray]) -> Rect | None:
@@ -83,7 +69,7 @@ def leaving(routes: FloatArray, radius: FloatArray | float) -> FloatArray:
     segments = _segments(routes)
     steps = np.arange(1, 16 * k + 1) / 16
     segment = np.minimum(np.floor(steps).astype(int), k - 1)
-    dots = _at(segments[:, segment], np.broadcast_to(steps - segment, (m, len(steps))))
+    dots = cubic(segments[:, segment], np.broadcast_to(steps - segment, (m, len(steps))))
     outside = np.hypot(*np.moveaxis(dots - routes[:, :1], 2, 0)) >= radii[:, None]
     first = np.argmax(outside, axis=1)
     low, high = first / 16, (first + 1) / 16
@@ -91,7 +77,7 @@ def leaving(routes: FloatArray, radius: FloatArray | float) -> FloatArray:
     for _ in range(40):
         middle = (low + high) / 2
         part = np.minimum(np.floor(middle).astype(int), k - 1)
-        at = _at(segments[rows, part], middle - part)
+        at = cubic(segments[rows, part], middle - part)
         out = np.hypot(*(at - routes[:, 0]).T) >= radii
         low, high = np.where(out, low, middle), np.where(out, middle, high)
     result: FloatArray = np.where(outside.any(axis=1), high, k / 2)
@@ -140,8 +126,3 @@ def _cut(piece: Sequence[Point], low: float, high: float) -> list[Point]:
 def point_at(points: Sequence[Point], parameter: float) -> Point:
     """The point of a spline at a parameter in 0…k."""
     return between(points, parameter, parameter)[0]
-
-
-def overlap(one: Rect, other: Rect) -> bool:
-    """Whether two rectangles share more than an edge."""
-    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]

@@ -16,10 +16,11 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.layout.geometry import Rect
+from neurovis_spec.layout.model import Point
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.beside import Field, Slot, Wanted, placed
 from neurovis_spec.scene.cut import Cut
-from neurovis_spec.scene.geometry import Point, Rect
 from neurovis_spec.scene.model import Text
 from neurovis_spec.scene.obstacles import Obstacles
 

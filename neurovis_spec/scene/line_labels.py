@@ -10,8 +10,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.layout.geometry import Rect
+from neurovis_spec.layout.model import Point
 from neurovis_spec.scene import texts
-from neurovis_spec.scene.geometry import Point, Rect, point_at
+from neurovis_spec.scene.geometry import point_at
 from neurovis_spec.scene.lines import Line
 from neurovis_spec.scene.model import Text, Theme
 from neurovis_spec.scene.obstacles import Obstacles

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.layout.model import Layout
-from neurovis_spec.scene.geometry import Point, batches, between, between_all, leaving, point_at
+from neurovis_spec.layout.model import Layout, Point
+from neurovis_spec.scene.geometry import batches, between, between_all, leaving, point_at
 from neurovis_spec.scene.model import Arrowhead
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.scene.geometry import Rect, overlap
+from neurovis_spec.layout.geometry import Rect, meet
 
 
 class Obstacles:
@@ -75,7 +75,7 @@ class Obstacles:
 
     def text_hits(self, rect: Rect) -> int:
         """How many texts a rectangle touches."""
-        return sum(overlap(rect, other) for other in self._texts)
+        return sum(meet(rect, other) for other in self._texts)
 
     def hits(self, rect: Rect, crossed: int = 1) -> int:
         """How much is in the way: a text or a disc weighs more than all lines, and a line ``crossed`` times as much as

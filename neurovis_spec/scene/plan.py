@@ -16,7 +16,8 @@ import numpy.typing as npt
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.layout.model import RADIUS, Layout
+from neurovis_spec.layout.geometry import Rect
+from neurovis_spec.layout.model import RADIUS, Layout, Point
 from neurovis_spec.layout.naming import natural_key
 from neurovis_spec.scene import delays, encoding, legend, texts
 from neurovis_spec.scene.beside import beyond
@@ -26,7 +27,7 @@ from neurovis_spec.scene.fading import seconds_of
 from neurovis_spec.scene.frame import MARGIN, MOST, UNIT, Frame, Margins, fit, unit_for
 from neurovis_spec.scene.gains import Gains, in_pages
 from neurovis_spec.scene.gathered_layout import radius_of
-from neurovis_spec.scene.geometry import Point, Rect, batches, bounds, samples
+from neurovis_spec.scene.geometry import batches, bounds, samples
 from neurovis_spec.scene.glyphs import raised
 from neurovis_spec.scene.heading import CAPTION, CAPTION_Y, HEADER, TITLE, caption_text, title_text
 from neurovis_spec.scene.labels import Ground, Label, labels_of, margin_beside, room_beside

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from neurovis_spec.scene.geometry import Point
+from neurovis_spec.layout.model import Point
 from neurovis_spec.scene.labels import Label
 from neurovis_spec.scene.lines import Line
 from neurovis_spec.scene.model import Arrowhead, Disc, Group, Image, Polyline, Ramp, Rectangle, Shape, Spline, Text

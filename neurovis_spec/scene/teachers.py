@@ -14,7 +14,8 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.scene.geometry import Rect, sample
+from neurovis_spec.layout.geometry import Rect
+from neurovis_spec.scene.geometry import sample
 from neurovis_spec.scene.lines import Line, trimmed
 from neurovis_spec.scene.obstacles import Obstacles
 

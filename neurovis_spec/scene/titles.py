@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
+from neurovis_spec.layout.geometry import Rect, meet
+from neurovis_spec.layout.model import Point
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.boxes import Box
-from neurovis_spec.scene.geometry import Point, Rect, overlap
 from neurovis_spec.scene.model import Text, Theme
 from neurovis_spec.scene.obstacles import Obstacles
 
@@ -107,7 +108,7 @@ def _together(boxes: list[Titled], obstacles: Obstacles, theme: Theme) -> list[T
     reach = [_grown(item, weight) for item in boxes]
     around = [obstacles.near(rect) for rect in reach]
     boxes = [
-        replace(item, foreign=tuple(other for other in item.foreign if overlap(rect, other)))
+        replace(item, foreign=tuple(other for other in item.foreign if meet(rect, other)))
         for item, rect in zip(boxes, reach, strict=True)
     ]
     found = _found(boxes, around, weight)
@@ -211,7 +212,7 @@ def _best(item: Titled, slot: int, width: float, size: float, obstacles: Obstacl
         if taken[1] < y0 or taken[3] > y1:
             continue
         hits = obstacles.hits(taken, _CROSSED)
-        hits += _FOREIGN * sum(overlap(taken, other) for other in item.foreign)
+        hits += _FOREIGN * sum(meet(taken, other) for other in item.foreign)
         if best is None or hits < best.hits:
             best = _Place((x, y), taken, hits)
     return best

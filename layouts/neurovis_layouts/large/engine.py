@@ -21,8 +21,8 @@ from neurovis_layouts.large.settle import Cooling, settle
 from neurovis_layouts.large.spread import SMALL, SPARSE, spread, spread_small
 from neurovis_layouts.large.trees import trees_of
 from neurovis_layouts.packing import packed
-from neurovis_layouts.wiring import BoolArray, Wiring, parts_of, wiring_of
-from neurovis_spec.layout import Capabilities, FloatArray, IntArray, Layout, LayoutProblem, Progress
+from neurovis_layouts.wiring import Wiring, parts_of, wiring_of
+from neurovis_spec.layout import BoolArray, Capabilities, FloatArray, IntArray, Layout, LayoutProblem, Progress
 
 #: In spacings: how far three quarters are from their next at most, how long links are in the mean at least, how far
 #: discs are kept apart, and parts.

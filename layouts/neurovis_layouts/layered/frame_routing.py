@@ -18,8 +18,7 @@ from neurovis_layouts.routing.channel_routing import channels
 from neurovis_layouts.routing.corners import reflected
 from neurovis_layouts.routing.route_cost import Judge
 from neurovis_layouts.routing.simplify_routes import MOST_EASED, eased
-from neurovis_spec.layout.frames import Rect
-from neurovis_spec.layout.geometry import snap
+from neurovis_spec.layout.geometry import Rect, snap
 from neurovis_spec.layout.model import LayoutEdge, LayoutProblem, Point, Route
 
 #: With more connections than this nobody can tell them apart.

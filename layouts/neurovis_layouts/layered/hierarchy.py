@@ -22,8 +22,8 @@ from neurovis_layouts.layered.pinning import Settled, settled
 from neurovis_layouts.layered.same_rank import bonded
 from neurovis_layouts.layered.templates import Book, Key, keys_of, restricted
 from neurovis_layouts.layered.units import Unit
-from neurovis_spec.layout.frames import BOX_DOWN, Rect
-from neurovis_spec.layout.geometry import distance, snap
+from neurovis_spec.layout.frames import BOX_DOWN
+from neurovis_spec.layout.geometry import Rect, distance, snap
 from neurovis_spec.layout.model import Direction, LayoutMirror, LayoutProblem, Point, Route
 
 #: What a module pins gives way to pins closer than this.

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from neurovis_layouts.pins import CentreCells
-from neurovis_spec.layout.frames import Rect
+from neurovis_spec.layout.geometry import Rect, bounds, meet, shifted
 from neurovis_spec.layout.model import RADIUS, LayoutRefusalError, Point
 
 #: How far what gives way keeps off other discs, and frames off frames, so that lines find a way between them.
@@ -31,10 +31,6 @@ class Body:
     wish: Point
     pinned: bool = False
     level: bool = False
-
-
-def _at(rect: Rect, place: Point) -> Rect:
-    return rect[0] + place[0], rect[1] + place[1], rect[2] + place[0], rect[3] + place[1]
 
 
 def _holds(rect: Rect, point: Point, by: float) -> bool:
@@ -58,15 +54,15 @@ class Ground:
             self._points.append(point)
         self._bodies.append((body, place))
         if body.frame is not None:
-            self._frames.append((_at(body.frame, place), _tight(points), body))
+            self._frames.append((shifted(body.frame, place), bounds(points), body))
 
     def takes(self, body: Body, place: Point, clear: float = _CLEAR) -> bool:
         """Whether a body may stand here."""
         if body.frame is None:
             point = (place[0] + body.offsets[0][0], place[1] + body.offsets[0][1])
             return self._cells.free(point, clear) and not any(_holds(f, point, RADIUS) for f, _, _ in self._frames)
-        own = _at(body.frame, place)
-        if any(_near(own, frame, _BETWEEN) for frame, _, _ in self._frames):
+        own = shifted(body.frame, place)
+        if any(meet(own, frame, _BETWEEN) for frame, _, _ in self._frames):
             return False
         return not any(_holds(own, point, RADIUS) for point in self._points)
 
@@ -76,9 +72,9 @@ class Ground:
         points = [
             (x + other.offsets[0][0], y + other.offsets[0][1]) for other, (x, y) in self._bodies if not other.frame
         ]
-        own = _tight([(place[0] + body.offsets[0][0], place[1] + body.offsets[0][1])])
+        own = bounds([(place[0] + body.offsets[0][0], place[1] + body.offsets[0][1])])
         if body.frame is not None:
-            own = _at(body.frame, place)
+            own = shifted(body.frame, place)
         rects = [frame for frame, _, _ in self._frames]
         gap = RADIUS if body.frame is None else _BETWEEN
         pairs = [(rect, gap) for rect in rects]
@@ -89,12 +85,12 @@ class Ground:
     def refuse(self, names: Sequence[str], body: Body) -> None:
         """Raise LayoutRefusalError where a pinned body would stand in the frame of another, or that in its own."""
         points = [(body.wish[0] + dx, body.wish[1] + dy) for dx, dy in body.offsets]
-        own = _tight(points) if body.frame is not None else None
+        own = bounds(points) if body.frame is not None else None
         for _, tight, other in self._frames:
             for member, point in zip(body.members, points, strict=True):
                 if _holds(tight, point, _DISCS):
                     raise _within(names[member], names[other.members[0]])
-            if own is not None and _near(own, tight, _DISCS):
+            if own is not None and meet(own, tight, _DISCS):
                 raise _within(names[body.members[0]], names[other.members[0]])
         if own is None:
             return
@@ -107,16 +103,6 @@ class Ground:
 def _depth(one: Rect, other: Rect) -> float:
     """How far one would have to move off the other, negative where they are apart."""
     return min(one[2] - other[0], other[2] - one[0], one[3] - other[1], other[3] - one[1])
-
-
-def _near(one: Rect, other: Rect, gap: float) -> bool:
-    low, high = (one[0] - gap, one[1] - gap), (one[2] + gap, one[3] + gap)
-    return low[0] < other[2] and other[0] < high[0] and low[1] < other[3] and other[1] < high[1]
-
-
-def _tight(points: Sequence[Point]) -> Rect:
-    xs, ys = [x for x, _ in points], [y for _, y in points]
-    return min(xs), min(ys), max(xs), max(ys)
 
 
 def _within(name: str, mate: str) -> LayoutRefusalError:

@@ -15,8 +15,7 @@ from typing import TypeAlias
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.layered.drawing import Drawing, FrameMove, Piece
 from neurovis_layouts.layered.parts import Part, imaged, part_of_module
-from neurovis_spec.layout.frames import Rect
-from neurovis_spec.layout.geometry import distance, snap
+from neurovis_spec.layout.geometry import Rect, distance, snap
 from neurovis_spec.layout.model import Direction, LayoutProblem, LayoutRefusalError, Point
 
 #: A part drawn in a direction, with the frame around it.

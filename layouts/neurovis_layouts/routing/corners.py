@@ -7,14 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from neurovis_layouts.routing.rounded import arc
-from neurovis_spec.layout.geometry import cubics, distance, point_on, segment_distance, snap, straight
+from neurovis_spec.layout import FloatArray
+from neurovis_spec.layout.geometry import cubic, distance, pieces_of, snap, squared_distances, straight
 from neurovis_spec.layout.model import Point, Route
 
 #: Corners closer to the line than this are none; there are so many at most, else more is none.
 _FLAT, _MOST, _MORE = 0.12, 6, 1.6
 #: Where on a piece corners are looked for.
-_ON = (0.25, 0.5, 0.75, 1.0)
+_ON = np.array([0.25, 0.5, 0.75, 1.0])
 #: How much of the first and of the last leg stays straight, for the arrowhead, and what share of a short one.
 _HEAD, _SHARE = 0.5, 0.8
 #: How much more of one leg may be cut off than of the other.
@@ -27,7 +30,7 @@ _SHORT = 1e-3
 
 def corners(route: Route) -> tuple[Point, ...]:
     """The line of few points that the route follows (Douglas and Peucker 1973)."""
-    points = [route[0], *(point_on(piece, t) for piece in cubics(route) for t in _ON)]
+    points = np.concatenate([np.array(route[:1]), cubic(pieces_of([route])[0][:, None], _ON).reshape(-1, 2)])
     flat = _FLAT
     while len(line := _simple(points, flat)) > _MOST + 2:
         flat *= _MORE
@@ -39,20 +42,18 @@ def reflected(route: Route, twice: float, start: Point, end: Point) -> Route:
     return (start, *((twice - x, y) for x, y in route[1:-1]), end)
 
 
-def _simple(points: Sequence[Point], flat: float) -> tuple[Point, ...]:
+def _simple(points: FloatArray, flat: float) -> tuple[Point, ...]:
     keep = {0, len(points) - 1}
     waiting = [(0, len(points) - 1)]
     while waiting:
         first, last = waiting.pop()
-        far, at = flat, -1
-        for k in range(first + 1, last):
-            off = segment_distance(points[k], points[first], points[last])
-            if off > far:
-                far, at = off, k
-        if at >= 0:
+        x, y = (points[first + 1 : last] - points[first]).T
+        off = squared_distances(x, y, *(points[last] - points[first]))
+        if off.max(initial=0.0) > flat * flat:
+            at = first + 1 + int(np.argmax(off))
             keep.add(at)
             waiting += [(first, at), (at, last)]
-    return tuple(points[k] for k in sorted(keep))
+    return tuple((x, y) for x, y in points[sorted(keep)].tolist())
 
 
 def smooth(line: Sequence[Point], cut: float) -> Route:

@@ -18,8 +18,8 @@ import numpy as np
 from neurovis_layouts.routing.nearby import Nearby
 from neurovis_layouts.routing.rounded import rounded
 from neurovis_layouts.routing.visibility import MOST, Sight, lengths, runs_along
-from neurovis_layouts.routing.walls import BoolArray, Walls, blocked, meet, touch
-from neurovis_spec.layout import FloatArray, IntArray
+from neurovis_layouts.routing.walls import Walls, blocked, meet, touch
+from neurovis_spec.layout import BoolArray, FloatArray, IntArray
 from neurovis_spec.layout.geometry import distance, sampled
 from neurovis_spec.layout.model import Point, Route
 

@@ -17,7 +17,7 @@ from neurovis_layouts.routing.line_overlap import Strokes, line_of, together
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
 from neurovis_layouts.routing.walls import Walls
 from neurovis_spec.layout import FloatArray
-from neurovis_spec.layout.geometry import distance, turn
+from neurovis_spec.layout.geometry import cubic, distance, turn
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
 #: How far from a centre arrowheads are checked, how far apart two lines are there at best, and below what too close.
@@ -254,13 +254,12 @@ def _places(routes: Sequence[Route]) -> list[Point]:
     """Where each route leaves the ring round its first point in which arrowheads lie."""
     if not routes:
         return []
-    p = np.array([route[:4] for route in routes], dtype=np.float64)[:, :, None, :]
-    t, s = _T[None, :, None], 1 - _T[None, :, None]
-    away = s * s * s * p[:, 0] + 3 * s * s * t * p[:, 1] + 3 * s * t * t * p[:, 2] + t * t * t * p[:, 3] - p[:, 0]
+    p = np.array([route[:4] for route in routes], dtype=np.float64)
+    away = cubic(p[:, None], _T) - p[:, None, 0]
     x, y = away[:, :, 0], away[:, :, 1]
     far = np.sqrt(x * x + y * y)
     far[:, -1] = np.where((far < _AT).all(axis=1), np.maximum(far[:, -1], 1e-9), far[:, -1])
     beyond = np.where((far < _AT).all(axis=1), far.shape[1] - 1, np.argmax(far >= _AT, axis=1))
     each = np.arange(len(p))
-    found = _AT / far[each, beyond][:, None] * away[each, beyond] + p[:, 0, 0]
+    found = _AT / far[each, beyond][:, None] * away[each, beyond] + p[:, 0]
     return [(px, py) for px, py in found.tolist()]

@@ -10,12 +10,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from neurovis_layouts.routing.obstacles import points_on
-from neurovis_layouts.routing.walls import BoolArray
-from neurovis_spec.layout import FloatArray, IntArray
-from neurovis_spec.layout.geometry import cubics
+from neurovis_spec.layout import BoolArray, FloatArray, IntArray
+from neurovis_spec.layout.geometry import crossing, pieces_of, points_on
 from neurovis_spec.layout.model import Point, Route
-from neurovis_spec.layout.segments import meet
 
 #: Closer than this two lines are one to the eye.
 _CLOSE = 0.12
@@ -41,9 +38,7 @@ def lines_of(routes: Sequence[Route]) -> list[FloatArray]:
     """The line of each route."""
     if not routes:
         return []
-    pieces = [(i, piece) for i, route in enumerate(routes) for piece in cubics(route)]
-    owner = np.array([i for i, _ in pieces], dtype=np.int64)
-    points, owner = points_on(np.array([piece for _, piece in pieces], dtype=np.float64), owner, _STEP)
+    points, owner = points_on(*pieces_of(routes), _STEP)
     ends = np.array([(route[0], route[-1]) for route in routes], dtype=np.float64)
     away = points[:, None, :] - ends[owner]
     seen = ((away * away).sum(axis=2) > _END * _END).all(axis=1)
@@ -188,4 +183,4 @@ def _crossing(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> Boo
     """(k, n) which of the segments from a to b (k, 2) cross which of those from c to d (n, 2)."""
     (ax, ay), (ux, uy) = a.T[:, :, None], (b - a).T[:, :, None]
     (cx, cy), (vx, vy) = c.T[:, None, :], (d - c).T[:, None, :]
-    return meet(ax, ay, ux, uy, cx, cy, vx, vy)[1]
+    return crossing(ax, ay, ux, uy, cx, cy, vx, vy)[1]

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles, points_on
+from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
 from neurovis_layouts.routing.walls import Walls
 from neurovis_spec.layout import FloatArray
-from neurovis_spec.layout.geometry import cubics, distance
+from neurovis_spec.layout.geometry import distance, pieces_of, points_on
 from neurovis_spec.layout.model import Point, Route
 
 _DIAGONAL = math.sqrt(0.5)
@@ -146,7 +146,7 @@ class _Tried:
 
 def _seen(route: Route) -> FloatArray:
     """(n, 2) points on a loop, outside its disc."""
-    points, _ = points_on(np.array(cubics(route), dtype=np.float64), np.zeros(1, dtype=np.int64), _STEP)
+    points, _ = points_on(*pieces_of([route]), _STEP)
     x, y = (points - np.array(route[0])).T
     seen: FloatArray = points[x * x + y * y > _SEEN * _SEEN]
     return seen

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from neurovis_layouts.routing.visibility import lengths, runs_along
-from neurovis_layouts.routing.walls import BoolArray, meetings, touch
-from neurovis_spec.layout import FloatArray, IntArray
+from neurovis_layouts.routing.walls import meetings, touch
+from neurovis_spec.layout import BoolArray, FloatArray, IntArray
 from neurovis_spec.layout.model import Point
 
 #: A corner sees what is around so many of the nearest frames.

@@ -10,11 +10,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from neurovis_layouts.routing.walls import BoolArray, blocked
-from neurovis_spec.layout import FloatArray, IntArray
-from neurovis_spec.layout.geometry import cubics
+from neurovis_layouts.routing.walls import blocked
+from neurovis_spec.layout import BoolArray, FloatArray, IntArray
+from neurovis_spec.layout.geometry import crossing, cubic, pieces_of, squared_distances
 from neurovis_spec.layout.model import Route
-from neurovis_spec.layout.segments import meet
 
 #: Into how many segments a piece is cut that is not straight, and how far off its chord such a piece reaches, by the
 #: length of that.
@@ -29,7 +28,7 @@ _ROW = 1 << 31
 _HIDDEN = 0.4
 #: A bend is no tighter than this for a turn of one.
 _TIGHTEST, _LEAST = 4.0, 0.05
-_T = np.arange(1, _PARTS + 1, dtype=np.float64)[None, :, None] / _PARTS
+_T = np.arange(1, _PARTS + 1, dtype=np.float64) / _PARTS
 
 
 class Polylines:
@@ -131,9 +130,7 @@ class Polylines:
         if not near.any():
             return np.full(len(self), most)
         (x, y), (ux, uy) = (centres[near][:, None, :] - self.a[None, :, :]).transpose(2, 0, 1), self._way.T
-        along = np.clip((x * ux + y * uy) / np.maximum(ux * ux + uy * uy, 1e-12), 0.0, 1.0)
-        dx, dy = x - along * ux, y - along * uy
-        least = np.sqrt((dx * dx + dy * dy).min(axis=0))
+        least = np.sqrt(squared_distances(x, y, ux, uy).min(axis=0))
         clear: FloatArray = np.minimum(np.minimum.reduceat(least, self._segments), most)
         return clear
 
@@ -159,16 +156,15 @@ class Polylines:
 
 def polylines(routes: Sequence[Route]) -> Polylines:
     """Routes as lines: a straight piece is one step."""
-    pieces = np.array([piece for route in routes for piece in cubics(route)], dtype=np.float64).reshape(-1, 4, 2)
-    many = np.array([(len(route) - 1) // 3 for route in routes], dtype=np.int64)
+    pieces, owner = pieces_of(routes)
+    many = np.bincount(owner, minlength=len(routes))
     a, b, c, d = (pieces[:, k] for k in range(4))
     way, one, other = d - a, b - a, c - a
     squared = way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1]
     off = np.maximum(
         np.abs(way[:, 0] * one[:, 1] - way[:, 1] * one[:, 0]), np.abs(way[:, 0] * other[:, 1] - way[:, 1] * other[:, 0])
     )
-    t, s = _T, 1 - _T
-    points = s * s * s * a[:, None] + 3 * s * s * t * b[:, None] + 3 * s * t * t * c[:, None] + t * t * t * d[:, None]
+    points = cubic(pieces[:, None], _T)
     keep: BoolArray = np.zeros((len(pieces), _PARTS), dtype=np.bool_)
     # what ends where it begins has no straight way that it could be
     looped = (squared < 1e-9) & (np.abs(np.concatenate([one, other], axis=1)).max(axis=1) > _STRAIGHT)
@@ -206,5 +202,5 @@ def _meetings(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> tup
     near = (least[None, :, 0] <= high[:, None, 0]) & (most[None, :, 0] >= low[:, None, 0])
     near &= (least[None, :, 1] <= high[:, None, 1]) & (most[None, :, 1] >= low[:, None, 1])
     i, j = np.nonzero(near)
-    share, hit = meet(*a[i].T, *(b - a)[i].T, *c[j].T, *(d - c)[j].T)
+    share, hit = crossing(*a[i].T, *(b - a)[i].T, *c[j].T, *(d - c)[j].T)
     return i[hit], share

@@ -16,8 +16,7 @@ from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
 from neurovis_layouts.routing.polylines import END, STEP, Polylines, polylines
 from neurovis_layouts.routing.walls import Frame, Walls, meet
 from neurovis_spec.layout import FloatArray, IntArray
-from neurovis_spec.layout.frames import padded
-from neurovis_spec.layout.geometry import distance, straight
+from neurovis_spec.layout.geometry import distance, padded, straight
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
 #: What it costs to enter a foreign frame or a disc, to come a unit closer to a disc than ``REACH``, to cross a line, to

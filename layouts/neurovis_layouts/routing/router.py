@@ -22,8 +22,7 @@ from neurovis_layouts.routing.ports import Port, leanings
 from neurovis_layouts.routing.route_cost import OFF, Judge
 from neurovis_layouts.routing.simplify_routes import MOST_EASED, eased
 from neurovis_layouts.routing.walls import Frame, Walls
-from neurovis_spec.layout.frames import padded
-from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.geometry import distance, padded
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
 __all__ = ["Waypoint", "route_all", "told_apart"]

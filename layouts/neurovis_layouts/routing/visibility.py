@@ -11,8 +11,8 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_layouts.routing.walls import BoolArray, meet
-from neurovis_spec.layout import FloatArray, IntArray
+from neurovis_layouts.routing.walls import meet
+from neurovis_spec.layout import BoolArray, FloatArray, IntArray
 
 Words: TypeAlias = npt.NDArray[np.uint64]
 

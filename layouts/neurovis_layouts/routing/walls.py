@@ -10,16 +10,11 @@ from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
-from neurovis_layouts.routing.obstacles import points_in_turn
-from neurovis_spec.layout import FloatArray, IntArray
-from neurovis_spec.layout.geometry import cubics
+from neurovis_spec.layout import BoolArray, FloatArray, IntArray
+from neurovis_spec.layout.geometry import Rect, pieces_of, points_in_turn, squared_distances
 from neurovis_spec.layout.model import Route
 
-BoolArray: TypeAlias = npt.NDArray[np.bool_]
-#: x0, y0, x1, y1
-Rect: TypeAlias = tuple[float, float, float, float]
 Frame: TypeAlias = tuple[frozenset[int], Rect]
 
 #: How far apart the points of a route are that must not lie in a foreign frame.
@@ -42,14 +37,11 @@ class Walls:
 
     def entered(self, routes: Sequence[Route], own: Sequence[tuple[int, int]]) -> list[bool]:
         """For each route, from the first of its ``own`` neurons to the second, whether it enters a foreign frame."""
-        pieces = [(i, piece) for i, route in enumerate(routes) for piece in cubics(route)]
         result = np.zeros(len(routes), dtype=np.bool_)
-        if not pieces or not len(self.rects):
+        if not len(routes) or not len(self.rects):
             return [False] * len(routes)
         ends = np.array(own, dtype=np.int64)
-        shapes = np.array([piece for _, piece in pieces], dtype=np.float64)
-        owner = np.array([i for i, _ in pieces], dtype=np.int64)
-        for points, whose in points_in_turn(shapes, owner, _STEP):
+        for points, whose in points_in_turn(*pieces_of(routes), _STEP):
             x, y = np.ascontiguousarray(points.T)
             low, high = points.min(axis=0), points.max(axis=0)
             near = np.flatnonzero(((self.rects[:, :2] < high) & (self.rects[:, 2:] > low)).all(axis=1))
@@ -93,10 +85,6 @@ def meetings(a: FloatArray, b: FloatArray, rects: FloatArray) -> tuple[IntArray,
 
 def touch(a: FloatArray, b: FloatArray, centres: FloatArray, clear: float) -> BoolArray:
     """(c, k) whether the segments from ``a`` (k, 2) to ``b`` (k, 2) come closer than ``clear`` to centres (c, 2)."""
-    ux, uy = b[:, 0] - a[:, 0], b[:, 1] - a[:, 1]
-    squared = np.maximum(ux * ux + uy * uy, 1e-12)
     x, y = centres[:, 0, None] - a[:, 0], centres[:, 1, None] - a[:, 1]
-    t = np.minimum(np.maximum((x * ux + y * uy) / squared, 0.0), 1.0)
-    dx, dy = x - t * ux, y - t * uy
-    near: BoolArray = dx * dx + dy * dy < clear * clear
+    near: BoolArray = squared_distances(x, y, *(b - a).T) < clear * clear
     return near
