@@ -1,13 +1,15 @@
 """Boxes in engines that place neurons anywhere: each by itself, whatever the network (layouts/boxed)."""
 
+from dataclasses import replace
 from itertools import combinations
 from random import Random
 
 import pytest
+from layout_conformance import named
 
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.frames import Frames
-from neurovis_spec.layout.geometry import distance, meet
+from neurovis_spec.layout.geometry import Rect, distance, meet
 from neurovis_spec.layout.model import LayoutProblem
 from neurovis_spec.layout.problem import canonical
 
@@ -48,3 +50,42 @@ def test_frames_of_boxes_hold_nothing_foreign(engine: str, count: int, edges: in
         inside_it = {i for i, (x, y) in places.items() if rect[0] < x < rect[2] and rect[1] < y < rect[3]}
         assert inside_it == set(members)
     assert min(distance(a, b) for a, b in combinations(places.values(), 2)) >= 0.6
+
+
+def assert_apart(problem: LayoutProblem, engine: str) -> list[Rect]:
+    """Frames hold their neurons alone, but for pinned ones; the frames."""
+    layout = lay_out_problem(problem, engine)
+    places = {i: layout.positions[name] for i, name in enumerate(problem.neurons)}
+    rects = [rect for rect in Frames(problem).rects(places, {}) if rect is not None]
+    for (name, members), rect in zip(problem.boxes, rects, strict=True):
+        inside = {i for i, (x, y) in places.items() if rect[0] < x < rect[2] and rect[1] < y < rect[3]}
+        assert inside - set(problem.pins) == set(members) - set(problem.pins), name
+    assert all(layout.positions[problem.neurons[i]] == point for i, point in problem.pins.items())
+    assert min(distance(a, b) for a, b in combinations(places.values(), 2)) >= 0.6
+    return rects
+
+
+@pytest.mark.parametrize("engine", ["organic", "large"])
+def test_boxes_within_boxes_hold_nothing_foreign(engine: str) -> None:
+    problem = classes(120, 500, 1, 3, 0.5)
+    boxes = (("outer", range(0, 80, 2)), ("first", range(0, 20, 2)), ("second", range(30, 60, 4)), ("other", (1, 61)))
+    assert_apart(replace(problem, boxes=tuple((name, tuple(members)) for name, members in boxes)), engine)
+
+
+@pytest.mark.parametrize("engine", ["organic", "large"])
+def test_a_box_is_as_large_as_its_neurons_need_wherever_else_they_would_be(engine: str) -> None:
+    chain = canonical("chain", [f"N{i}" for i in range(60)], edges=named((f"N{i}", f"N{i + 1}") for i in range(59)))
+    for members in ((0, 59), (0, 30, 59), tuple(range(0, 60, 12))):
+        (x0, y0, x1, y1), *_ = assert_apart(replace(chain, boxes=(("far", members),)), engine)
+        assert (x1 - x0) * (y1 - y0) < 12 * len(members)
+
+
+@pytest.mark.parametrize("engine", ["organic", "large"])
+def test_boxes_are_kept_together_around_pins(engine: str) -> None:
+    problem = classes(60, 300, 3, 60, 0.5)
+    first, second = problem.boxes[0][1], problem.boxes[1][1]
+    pins = {first[0]: (0.0, 0.0), first[1]: (2.0, 1.0), second[0]: (40.0, 3.0)}
+    for (_, members), (x0, y0, x1, y1) in zip(
+        problem.boxes, assert_apart(replace(problem, pins=pins), engine), strict=True
+    ):
+        assert (x1 - x0) * (y1 - y0) < 12 * len(members)

@@ -189,3 +189,29 @@ def test_packed_parts_do_not_overlap(sizes: list[tuple[float, float]]) -> None:
         for (p, q), (v, g) in list(zip(corners, sizes, strict=True))[:i]:
             slack = 1 - 1e-9
             assert x + w + slack <= p or p + v + slack <= x or y + h + slack <= q or q + g + slack <= y
+
+
+@pytest.mark.parametrize("tail", [30, 100])
+def test_what_hangs_on_one_connection_leaves_the_rest_its_room(tail: int) -> None:
+    random = Random(1)
+    pairs = {(i, j) for i in range(300) for j in random.sample(range(300), 4) if i != j}
+    pairs |= {(299 + i, 300 + i) for i in range(tail)}
+    names = [f"N{i}" for i in range(300 + tail)]
+    problem = canonical("tail", names, edges=suite.named((names[a], names[b]) for a, b in sorted(pairs)))
+    places = np.array(list(lay_out_problem(problem, "large").positions.values()))
+    core, whole = np.ptp(np.quantile(places[:300], [0.05, 0.95], axis=0), axis=0), np.ptp(places, axis=0)
+    assert (core > whole / 4).all()
+    assert whole.prod() < 12 * len(places)
+
+
+def test_many_clusters_with_few_connections_between_them_stay_close() -> None:
+    random = Random(1)
+    pairs: set[tuple[int, int]] = set()
+    while len(pairs) < 2400:
+        i = random.randrange(600)
+        j = random.randrange(600) if random.random() < 0.01 else i - i % 30 + random.randrange(30)
+        pairs |= {(i, j)} if i != j else set()
+    names = [f"N{i}" for i in range(600)]
+    problem = canonical("clusters", names, edges=suite.named((names[a], names[b]) for a, b in sorted(pairs)))
+    places = np.array(list(lay_out_problem(problem, "large").positions.values()))
+    assert np.ptp(places, axis=0).prod() < 20 * len(places)

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from neurovis_layouts.apart import apart
-from neurovis_layouts.boxed import boxes_apart
+from neurovis_layouts.boxed import ROOM, boxes_apart
 from neurovis_layouts.finish import drawn, nearest, pinned_places
 from neurovis_layouts.large.field import GridField
 from neurovis_layouts.large.flow import downward, in_flow
@@ -31,8 +31,6 @@ _MOST = 0.75
 #: How far an arc leads down at least, and how much too high its target may be to be put there: others would move many
 #: neurons far, and make crossings.
 _STEP, _NEARLY = 0.1, 3.0
-#: A neuron's share of the picture, in square spacings, at most: discs have to stay in sight.
-_ROOM = 7.0
 #: A part wider than this by its height is stretched, but not farther than this.
 _FLATTEST, _STRETCH = 1.3, 3.0
 _PINNED_STEPS = 60
@@ -61,8 +59,7 @@ class LargeEngine:
         places, planar = _free(wiring, problem.neuron_spacing, progress)
         if problem.pins:
             places = _around_pins(problem, wiring, places)
-            return drawn(problem, self.name, places)
-        if problem.boxes:
+        if problem.pins or problem.boxes:
             real = places[: len(problem.neurons)]
             return drawn(problem, self.name, boxes_apart(problem, real, _APART * problem.neuron_spacing))
         clear = [i for i, edge in enumerate(problem.edges) if planar[edge.source] and edge.source != edge.target]
@@ -179,7 +176,7 @@ def _scales(wiring: Wiring, places: FloatArray, part: IntArray, spacing: float) 
     by_room = _NEXT * spacing / np.maximum(_quantile(part[: wiring.neurons], next_one, count), 1e-3)
     by_link = _LINK * spacing / np.maximum(_mean(part[wiring.a[links]], length, count, 1.0), 1e-3)
     width, height = (_extent(places, part) + 0.1).T
-    by_area = spacing * np.sqrt(_ROOM * np.bincount(part) / (width * height))
+    by_area = spacing * np.sqrt(ROOM * np.bincount(part) / (width * height))
     scales: FloatArray = np.maximum(np.minimum(by_room, by_area), by_link)[part]
     return scales
 

@@ -1,8 +1,9 @@
 """The field: how all points push each other off, by the inverse of their distance.
 
 In: places and masses. Out: the push on each. Few points are taken pair by pair; many give their mass to a grid, whose
-field is one convolution, by Fourier transform (Hockney and Eastwood 1988: particle-mesh); closer than a cell the push
-fades, which is as well, as discs are kept apart afterwards.
+field is one convolution, by Fourier transform (Hockney and Eastwood 1988: particle-mesh). Closer than a cell that push
+fades, which is as well, as discs are kept apart afterwards; but of a network that reaches far out on one side cells are
+so large that whole clusters would fall into one: there what the grid cannot tell apart is added pair by pair.
 """
 
 from __future__ import annotations
@@ -11,8 +12,12 @@ from typing import Protocol
 
 import numpy as np
 
+from neurovis_layouts.apart import near_pairs
 from neurovis_spec.layout import FloatArray, IntArray
 
+#: Cells wider than this, in the distance that points of such a mass have from each other, are too wide; how far, in the
+#: same, pairs are added then.
+_WIDEST, _REACH = 2.0, 3.0
 _FEWEST_CELLS, _MOST_CELLS = 16, 1024
 
 
@@ -45,6 +50,7 @@ class GridField:
 
     def __init__(self, mass: FloatArray) -> None:
         self._mass = mass
+        self._unit = float(np.sqrt(mass.mean()))
         self._cells = _smooth(int(np.clip(2 * np.sqrt(len(mass)), _FEWEST_CELLS, _MOST_CELLS)))
         self._size = 2 * self._cells  # twice, so that what leaves on one side does not come back on the other
         steps = np.arange(self._size, dtype=np.float64)
@@ -76,7 +82,16 @@ class GridField:
         field = np.fft.ifft(np.fft.ifft(waves, axis=0)[:used], axis=1).ravel()
         felt = sum((share * field[place] for share, place in zip(shares, where, strict=True)), start=np.zeros(1))
         push: FloatArray = np.stack([felt.real, felt.imag], axis=1) * (self._mass / cell)[:, None]
-        return push
+        return push if cell <= _WIDEST * self._unit else push + self._within(places, cell)
+
+    def _within(self, places: FloatArray, cell: float) -> FloatArray:
+        """What the field of clouds one cell wide lacks between points close by."""
+        one, other, way, far = near_pairs(places, min(2 * cell, _REACH * self._unit))
+        lacking = np.exp(-((far / cell) ** 2)) / (far**2 + 0.01)
+        push = way * (lacking * self._mass[one] * self._mass[other])[:, None]
+        count = len(places)
+        sums = [np.bincount(other, push[:, k], count) - np.bincount(one, push[:, k], count) for k in (0, 1)]
+        return np.stack(sums, axis=1)
 
 
 def _smooth(least: int) -> int:

@@ -80,12 +80,12 @@ def _tick(total: int, report: Report | None) -> Callable[[int], None]:
 
 def _evened(line: FloatArray) -> FloatArray:
     """Coordinates (count,) in the same order, crowded stretches widened and empty ones narrowed: the order decides
-    about flow, and about crossings nearly so."""
+    about flow, and about crossings nearly so. Stretches end where so many points lie below, so that what is far out
+    is drawn in, and whatever is drawn tight, be it all but a tail, is told apart."""
     bins = max(8, int(_BINS * np.sqrt(len(line))))
-    low, high = float(line.min()), float(line.max())
-    crowd = np.histogram(line, bins, (low, high))[0] / len(line)
-    edges = np.concatenate([[0.0], np.cumsum(_EVEN * crowd + (1 - _EVEN) / bins)])
-    evened: FloatArray = low + (high - low) * np.interp(line, np.linspace(low, high, bins + 1), edges)
+    edges = np.quantile(line, np.linspace(0, 1, bins + 1))
+    wide = (1 - _EVEN) * (edges - edges[0]) + _EVEN * (edges[-1] - edges[0]) * np.linspace(0, 1, bins + 1)
+    evened: FloatArray = edges[0] + np.interp(line, edges, wide)
     return evened
 
 
