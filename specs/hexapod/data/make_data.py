@@ -12,7 +12,7 @@ from pathlib import Path
 #: the next, how many.
 FIRST, EVERY, BEAMS = 600, 180, 8
 #: Steps until the front, the middle and the hind leg are there; steps in which a leg is past.
-LATER, PASSING = (0, 45, 80), 4
+LATER, PASSING = (0, 70, 105), 20
 
 #: From SOFT on the floor is soft for all legs but the right front one, from WHOLLY on for that one, too.
 SOFT, WHOLLY = 2100, 2500
@@ -26,12 +26,12 @@ def obstacle(step, leg):
 
 def floor_left(step, leg):
     """How soft the floor is below a left leg."""
-    return int(step >= SOFT)
+    return 0.6 if step >= SOFT else 1
 
 
 def floor_right(step, leg):
     """How soft the floor is below a right leg."""
-    return int(step >= (WHOLLY if leg == 0 else SOFT))
+    return 0.6 if step >= (WHOLLY if leg == 0 else SOFT) else 1
 
 
 def write(value, last):
