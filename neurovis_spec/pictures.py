@@ -90,10 +90,10 @@ class Drawable(ABC):
         Without ``step`` it is the last of the recording, or of a default run. Without ``recording`` the network runs
         as far as the step; ``inputs`` replace the sources of inputs, as in ``run``, and the gains are those of this
         run. ``view`` says what is shown, from top to bottom: ``network``, ``matrix``, ``traces``, ``raster``,
-        ``weights``, alone or with references (``traces: C1, C2`` or {"traces": ["C1", "C2"]}); by default it is the
-        spec's ``figure``. Views over time show the whole recording or run, or ``window`` steps around the one that is
-        drawn. ``effort`` is that of ``layout``. ``dpi`` are the pixels of an inch, 96 of which are a picture's usual
-        size on the screen.
+        ``weights``, alone or with references (``traces: C1, C2`` or {"traces": ["C1", "C2"]}), and ``body``; by default
+        it is the spec's ``figure``, else the network, with its body where there is one. Views over time show the whole
+        recording or run, or ``window`` steps around the one that is drawn. ``effort`` is that of ``layout``. ``dpi``
+        are the pixels of an inch, 96 of which are a picture's usual size on the screen.
 
         ``collapse`` names groups and instances that are one glyph each in the picture of the network, ``focus``
         neurons that are shown with all they are connected to, ``paths`` (``"A -> B"``) what the shortest paths are
@@ -108,7 +108,7 @@ class Drawable(ABC):
         place, wanted = arguments.path("path", path), None if step is None else arguments.integer("step", step)
         renderer_for(suffix := place.suffix, moving=False)
         density = None if dpi is None else _density(dpi)
-        panels = self._panels(view)
+        panels = self._panels(view, recording)
         seen, settings = self._seen(theme, _excerpt(collapse, focus, paths, min_weight, full), panels)
         if window is not None:
             settings = replace(settings, window=arguments.integer("window", window, 1))
@@ -119,6 +119,7 @@ class Drawable(ABC):
                 shown, glyphs = recording, seen._gains_of(panels, recording)
             else:
                 shown, glyphs = seen._ran(max(self.network.steps, (wanted or 0) + 1), inputs, panels, progress)
+            panels = self._posed(panels, view, shown)
             some = seen._whole_gains(panels, glyphs, shown)
             shots = pipeline.shot_of(self.network, shown, wanted, settings.window)
 
@@ -184,7 +185,7 @@ class Drawable(ABC):
             fps = frames_a_second(self.network)
         if not (math.isfinite(arguments.number("fps", fps)) and fps > 0):
             raise ValueError(f"frames a second are above 0, not {fps}")
-        panels = self._panels(view)
+        panels = self._panels(view, recording)
         seen, settings = self._seen(theme, _excerpt(collapse, focus, paths, min_weight, full), panels)
         span = steps_from(self.network, first, count, recording)
         stride = thinned(span, each, most)
@@ -200,6 +201,7 @@ class Drawable(ABC):
         films: Iterator[Film]
         if panels:
             assert made is not None
+            panels = self._posed(panels, view, made)
             chosen = snapshots_from(self.network, first, count, made, stride)
             shots = pipeline.shots_of(chosen.recording, chosen.steps)
             glyphs = seen._gains_of(panels, recording, inputs)
@@ -256,13 +258,23 @@ class Drawable(ABC):
             raise RendererError(f"there is no theme '{theme}'", suggest(theme, THEMES, "there are"))
         return self.network.render if theme is None else replace(self.network.render, theme=theme, colours=())
 
-    def _panels(self, view: View | Sequence[View] | None) -> tuple[Panel, ...]:
-        """The views of a picture; none where it is the network alone."""
+    def _panels(self, view: View | Sequence[View] | None, recording: Recording | None = None) -> tuple[Panel, ...]:
+        """The views of a picture; none where it is the network alone. By default the body stands below the network, of
+        a recording where it holds its poses."""
         if view is None and not self.network.render.figure:
-            return ()
+            embodied = self.network.body is not None if recording is None else _is_posed(recording)
+            return (Panel("network"), Panel("body")) if embodied else ()
         from neurovis_spec.scene.panels import panels_of
 
         return panels_of(self.network, view)
+
+    def _posed(
+        self, panels: tuple[Panel, ...], view: View | Sequence[View] | None, shown: Recording
+    ) -> tuple[Panel, ...]:
+        """The views of a picture, without the body where nobody asks for it and the run has shown that it has none that
+        can be drawn."""
+        asked = view is not None or self.network.render.figure
+        return panels if asked or _is_posed(shown) else tuple(panel for panel in panels if panel.view != "body")
 
     def _states(self, panels: Sequence[Panel]) -> tuple[str, ...]:
         """The states that views show."""
@@ -461,6 +473,13 @@ def _note(scene: Scene) -> None:
 
     for note in scene.notes:
         warnings.warn(note, LeftOut, stacklevel=4)
+
+
+def _is_posed(recording: Recording) -> bool:
+    """Whether a recording holds the poses of a body."""
+    from neurovis_spec.scene.poses import posed_of
+
+    return posed_of(recording) is not None
 
 
 def _shows(panels: Sequence[Panel], *views: str) -> bool:

@@ -92,6 +92,7 @@ def _areas() -> list[Shape]:
         Ramp((10, 75), 100, 10, ramp),
         Polyline(tuple((10 + k, 115 + 15 * math.sin(k / 5) + (k % 7)) for k in range(180)), INK, 1.2),
         Spline(((10, 95), (70, 95), (130, 95), (190, 95)), INK, 2.0, (2.0, 4.0)),
+        Polyline(((120, 20), (150, 60), (180, 30)), RED, 14.0, round=True),
     ]
 
 

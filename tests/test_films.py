@@ -34,6 +34,7 @@ from neurovis_spec.scene import (
     Text,
     channels,
     colours,
+    part,
     shifted,
     still,
 )
@@ -76,6 +77,22 @@ FILM = Film(
 )
 
 
+def leg(frame: int) -> tuple[Shape, ...]:
+    """What is another line, disc and text in each frame."""
+    x = 30.0 + 10 * frame
+    line = Polyline(((20, 20), (x, 40 + frame)), EDGE if frame else INK, 4.0, round=True)
+    return line, Disc((x, 60), 3.0 + frame, INK, EDGE, 1), Text((x, 80), f"{frame // 2} m", 10, INK)
+
+
+REDRAWN = replace(
+    FILM,
+    scene=replace(SCENE, groups=(*SCENE.groups[:2], Group(leg(0), "leg", {"part": "leg"}), SCENE.groups[3])),
+    shifts=(),
+    shift_values=np.zeros((3, 0, 2)),
+    redrawn={"leg": leg},
+)
+
+
 def shapes(scene: Scene, name: str) -> tuple[Shape, ...]:
     return next(group.shapes for group in scene.groups if group.id == name)
 
@@ -103,6 +120,48 @@ def test_a_group_that_is_shifted_moves_as_a_whole(frame: int) -> None:
     assert line.width == 2.0
 
 
+@pytest.mark.parametrize("frame", range(3))
+def test_a_group_that_is_redrawn_has_the_shapes_of_the_frame(frame: int) -> None:
+    assert shapes(still(REDRAWN, frame), "leg") == leg(frame)
+    assert set(part(REDRAWN, {"leg"}).redrawn) == {"leg"}
+    assert not part(REDRAWN, {"disc"}).redrawn
+
+
+def test_the_frames_of_what_is_redrawn_are_those_of_its_stills() -> None:
+    for frame, picture in enumerate(frames(REDRAWN)):
+        assert np.abs(picture.astype(int) - paint(still(REDRAWN, frame))).max() <= 1
+
+
+def test_the_animated_svg_animates_what_changes_of_what_is_redrawn() -> None:
+    root = ET.fromstring(AnimatedSvgRenderer().animate(REDRAWN, ".svg"))
+    moving, standing = group_of(root, "leg").findall(NS + "g")
+    line, disc, first, second = list(moving)
+    found = [{one.attrib["attributeName"]: one.attrib["values"] for one in shape} for shape in moving]
+    assert set(found[0]) == {"d", "stroke"}
+    assert found[1] == {"cx": "30;40;50", "r": "3;4;5"}
+    assert (first.text, found[2]["display"], found[2]["x"]) == ("0 m", "inline;inline;none", "30;40;40")
+    assert (second.text, found[3]) == ("1 m", {"display": "none;none;inline"})
+    assert second.attrib["display"] == "none"
+    assert [shape.tag for shape in standing] == [line.tag, disc.tag, first.tag]
+    assert standing.attrib["display"] == "none"
+    style = root.findtext(NS + "style") or ""
+    assert "@media (prefers-reduced-motion:reduce){." in style
+    assert ".moving{display:none}" in style
+
+
+def test_a_polyline_ends_round_where_it_says_so() -> None:
+    def drawn(round_: bool) -> Scene:
+        line = Polyline(((40, 50), (160, 50)), INK, 20.0, round=round_)
+        return replace(SCENE, groups=(Group((line,)),))
+
+    for round_ in (False, True):
+        pixels = paint(drawn(round_))
+        assert tuple(pixels[50, 100]) == channels(INK)
+        for x, y, inside in ((33, 50, True), (166, 50, True), (33, 42, False), (28, 50, False)):
+            assert (tuple(pixels[y, x]) == channels(INK)) == (round_ and inside)
+        assert (b'stroke-linecap="round"' in SvgRenderer().draw(drawn(round_), ".svg")) == round_
+
+
 @pytest.mark.parametrize(
     "shape",
     [
@@ -122,14 +181,14 @@ def test_every_shape_can_be_moved_and_moved_back(shape: Shape) -> None:
     assert shifted(moved, (-2, 1)) == shape
 
 
-def group_of(root: ET.Element, part: str) -> ET.Element:
-    return next(g for g in root.iter(NS + "g") if g.attrib.get("data-part") == part)
+def group_of(root: ET.Element, name: str) -> ET.Element:
+    return next(g for g in root.iter(NS + "g") if g.attrib.get("data-part") == name)
 
 
 def test_the_animated_svg_fills_and_moves_the_same() -> None:
     root = ET.fromstring(AnimatedSvgRenderer().animate(FILM, ".svg"))
-    for part, element in (("disc", "circle"), ("cell", "rect")):
-        group = group_of(root, part)
+    for name, element in (("disc", "circle"), ("cell", "rect")):
+        group = group_of(root, name)
         first, second = group.findall(NS + element)
         assert "class" not in first.attrib  # it has the colour of its group's class
         assert second.attrib["class"] == "fixed"

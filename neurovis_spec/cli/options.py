@@ -189,8 +189,8 @@ view_option = click.option(
     metavar="V",
     multiple=True,
     shell_complete=one_of(_views),
-    help="network, matrix, traces, raster or weights; 'traces: C1, C2' or 'weights: K -> O' says of what. Repeatable, "
-    "from top to bottom; default: the spec's figure, else the network.",
+    help="network, matrix, traces, raster, weights or body; 'traces: C1, C2' or 'weights: K -> O' says of what. "
+    "Repeatable, from top to bottom; default: the spec's figure, else the network, with its body where there is one.",
 )
 recording_option = click.option(
     "--recording",

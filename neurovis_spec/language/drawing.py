@@ -58,7 +58,7 @@ from neurovis_spec.language.values import (
     pair,
     sole,
 )
-from neurovis_spec.language.views import VIEWS
+from neurovis_spec.language.views import VIEWS, WHOLE
 from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
 
 
@@ -291,8 +291,9 @@ def _panel(node: Node, info: ValidationInfo) -> PanelModel:
     name = view(entry.key, info)
     if isinstance(entry.value, Scalar) and entry.value.value is None:
         return PanelModel(name, None)
-    if name.value == "network":
-        refuse(info, entry.value, "nothing here: the view 'network' shows the whole network", "write network alone")
+    if name.value in WHOLE:
+        message = f"nothing here: the view '{name.value}' shows the whole {name.value}"
+        refuse(info, entry.value, message, f"write {name.value} alone")
     return PanelModel(name, as_reference(entry.value, info))
 
 
@@ -302,7 +303,10 @@ _PANEL = Either(
     (
         grammar.words(*VIEWS),
         Map(
-            {"network": Key(NULL, "The network."), **dict.fromkeys(VIEWS[1:], Key(_PARTS, "What it shows."))},
+            {
+                **{name: Key(_PARTS, "What it shows.") for name in VIEWS if name not in WHOLE},
+                **{name: Key(NULL, f"The {name}.") for name in WHOLE},
+            },
             one=True,
         ),
     )
@@ -334,7 +338,7 @@ class RenderModel(Model):
     figure: FigureField = Field(
         (),
         description="The views that make up the picture, from top to bottom: network, matrix, traces, raster, weights, "
-        "or {traces: references} (default the network alone).",
+        "body, or {traces: references} (default the network, with its body where a run has one).",
     )
     window: FormulaField | None = Field(
         None, description="How many steps around the one that is drawn the views over time show (default all)."

@@ -1,3 +1,5 @@
 """What a picture can show: the names of the views."""
 
-VIEWS = ("network", "matrix", "traces", "raster", "weights")
+VIEWS = ("network", "matrix", "traces", "raster", "weights", "body")
+#: Those that show the whole of something, and take no references.
+WHOLE = ("network", "body")

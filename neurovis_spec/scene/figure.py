@@ -19,8 +19,8 @@ from neurovis_spec.scene.film import film
 from neurovis_spec.scene.frame import DENSEST, DENSITIES, MOST, whole
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.heading import HEADER, caption_text, title_text
-from neurovis_spec.scene.model import Film, Group, shifted
-from neurovis_spec.scene.parts import Page, Part, stacked
+from neurovis_spec.scene.model import Film, Group
+from neurovis_spec.scene.parts import Page, Part, moved, stacked
 from neurovis_spec.scene.shots import Shots
 from neurovis_spec.scene.themes import theme_of
 from neurovis_spec.scene.views import AXIS, Block, BlockSpace, Drawing, Maker, span_of
@@ -161,12 +161,4 @@ def _fitted(
     density = settings.size[1] / needed
     width = settings.size[0] / density
     aside = (width - sheet.width) / 2
-    return _Sheet(width, needed, density), [(top, _aside(part, aside)) for top, part in parts]
-
-
-def _aside(part: Part, by: float) -> Part:
-    """A part, moved to the right."""
-    groups = tuple(
-        replace(group, shapes=tuple(shifted(shape, (by, 0.0)) for shape in group.shapes)) for group in part.groups
-    )
-    return replace(part, groups=groups)
+    return _Sheet(width, needed, density), [(top, moved(part, (aside, 0.0))) for top, part in parts]

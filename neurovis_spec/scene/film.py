@@ -154,6 +154,8 @@ def still(film: Film, frame: int) -> Scene:
     }
 
     def repaint(group: Group) -> Group:
+        if group.id in film.redrawn:
+            return replace(group, shapes=film.redrawn[group.id](frame))
         shapes: list[Shape] = []
         filled = filled_shape(group) if group.id in fills else None
         for place, shape in enumerate(group.shapes):
@@ -201,4 +203,5 @@ def part(film: Film, names: Collection[str]) -> Film:
         line_bars=film.line_bars[:, lines],
         shifts=tuple(film.shifts[number] for number in shifts),
         shift_values=film.shift_values[:, shifts] if shifts else film.shift_values[:, :0],
+        redrawn={name: shapes for name, shapes in film.redrawn.items() if name in names},
     )

@@ -7,7 +7,7 @@ attributes and a tooltip. Lengths are user units (``Scene.density`` pixels), x r
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import BinaryIO, ClassVar, Literal, Protocol, TypeAlias, runtime_checkable
@@ -49,12 +49,13 @@ class Spline:
 
 @dataclass(frozen=True, slots=True)
 class Polyline:
-    """Points joined by straight lines, stroked with round joins and butt caps."""
+    """Points joined by straight lines, stroked with round joins and butt caps, or round ones (what is opaque alone)."""
 
     points: tuple[Point, ...]
     stroke: str
     width: float
     opacity: float = 1.0
+    round: bool = False
 
     @property
     def spline(self) -> Spline:
@@ -239,6 +240,10 @@ class Scene:
             yield from group.shapes
 
 
+#: The shapes of a group at a frame: in all frames as many, of the same kinds in the same order.
+Redrawn: TypeAlias = Callable[[int], tuple[Shape, ...]]
+
+
 @dataclass(frozen=True, slots=True)
 class Film:
     """A scene that changes: ``scene`` is frame 0, and the arrays say how groups differ, frame by frame.
@@ -249,9 +254,10 @@ class Film:
     ``glow_widths[f, j]`` (0 for none; a group that glows at any time has a glow in ``scene``, of width 0 where it
     does not glow in frame 0). Where ``line_bars[f, j]`` it ends in a bar rather than in an arrow. Group ``shifts[k]``
     is moved from where it stands in ``scene`` by ``shift_values[f, k]`` (x and y, user units; 0 in frame 0). A group
-    may be in one of the three at most. From frame ``faint[id]`` on, a group that stands there has the opacity
-    ``faintness``. ``captions[f]`` is the text in group ``caption``. Colours are linear in sRGB between the theme's
-    anchors, of NaN that of texts; ``still(f)`` is frame f as a scene.
+    may be in one of the three at most. A group ``redrawn`` (an id) is in none of them: its shapes at frame f are
+    ``redrawn[id](f)``, and nothing that stays as it is stands in front of them. From frame ``faint[id]`` on, a group
+    that stands there has the opacity ``faintness``. ``captions[f]`` is the text in group ``caption``. Colours are
+    linear in sRGB between the theme's anchors, of NaN that of texts; ``still(f)`` is frame f as a scene.
     """
 
     scene: Scene
@@ -269,6 +275,7 @@ class Film:
     shift_values: FloatArray = field(default_factory=lambda: np.zeros((0, 0, 2)))
     faint: Mapping[str, int] = field(default_factory=dict)
     faintness: float = 1.0
+    redrawn: Mapping[str, Redrawn] = field(default_factory=dict)
 
     @property
     def frames(self) -> int:

@@ -14,7 +14,7 @@ from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.references import Part, Sum, parse, state_of
-from neurovis_spec.language.views import VIEWS
+from neurovis_spec.language.views import VIEWS, WHOLE
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.recording import UnknownNameError
 from neurovis_spec.runtime.references import find_connections, find_states
@@ -47,8 +47,8 @@ def _one(network: Network, own: Sequence[Panel], wanted: View) -> Iterator[Panel
     for name, references in _taken_apart(wanted):
         if name not in VIEWS:
             raise ViewError(f"there is no view '{name}'", suggest(name, VIEWS, "views"))
-        if references and name == "network":
-            raise ViewError("the view 'network' shows the whole network: it takes no references")
+        if references and name in WHOLE:
+            raise ViewError(f"the view '{name}' shows the whole {name}: it takes no references")
         named = [panel for panel in own if panel.view == name and panel.shown is not None]
         if references:
             curves = [curve for reference in references for curve in curves_of(network, name, reference)]

@@ -6,13 +6,13 @@ is given.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.scene.model import Film, Group, Scene, Theme, shifted
+from neurovis_spec.scene.model import Film, Group, Point, Redrawn, Scene, Shape, Theme, shifted
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +23,7 @@ class Changes:
     fill_values: FloatArray | None = None
     shifts: tuple[str, ...] = ()
     shift_values: FloatArray | None = None
+    redrawn: Mapping[str, Redrawn] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +33,24 @@ class Part:
     groups: tuple[Group, ...]
     height: float
     changes: Changes = field(default_factory=Changes)
+
+
+@dataclass(frozen=True, slots=True)
+class _Elsewhere:
+    """The shapes of a group that is redrawn, moved by so much in every frame."""
+
+    redrawn: Redrawn
+    by: Point
+
+    def __call__(self, frame: int) -> tuple[Shape, ...]:
+        return tuple(shifted(shape, self.by) for shape in self.redrawn(frame))
+
+
+def moved(part: Part, by: Point) -> Part:
+    """A part that stands elsewhere, by so much to the right and down."""
+    groups = tuple(replace(group, shapes=tuple(shifted(shape, by) for shape in group.shapes)) for group in part.groups)
+    redrawn = {name: _Elsewhere(shapes, by) for name, shapes in part.changes.redrawn.items()}
+    return replace(part, groups=groups, changes=replace(part.changes, redrawn=redrawn))
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,12 +70,9 @@ class Page:
 def stacked(page: Page, parts: Sequence[tuple[float, Part]], network: Film | None) -> Film:
     """Parts on a page, each from a height (user units) on. The film of the ``network`` is among them, if there is one:
     it says how its lines change."""
-    groups = [
-        replace(group, shapes=tuple(shifted(shape, (0.0, top)) for shape in group.shapes)) if top else group
-        for top, part in parts
-        for group in part.groups
-    ]
-    changes, frames = [part.changes for _, part in parts], len(page.captions)
+    placed = [moved(part, (0.0, top)) if top else part for top, part in parts]
+    groups = [group for part in placed for group in part.groups]
+    changes, frames = [part.changes for part in placed], len(page.captions)
     base = _still(page) if network is None else network
 
     def side_by_side(values: Sequence[FloatArray | None], *more: int) -> FloatArray:
@@ -71,6 +87,7 @@ def stacked(page: Page, parts: Sequence[tuple[float, Part]], network: Film | Non
         fill_values=side_by_side([base.fill_values, *(one.fill_values for one in changes)]),
         shifts=(*base.shifts, *(name for one in changes for name in one.shifts)),
         shift_values=side_by_side([base.shift_values, *(one.shift_values for one in changes)], 2),
+        redrawn={name: shapes for one in changes for name, shapes in one.redrawn.items()},
         caption=page.caption,
         captions=page.captions,
     )

@@ -1,4 +1,4 @@
-"""Views: what a page is made of: the network, its matrix, traces, a raster, weights, each as a Block.
+"""Views: what a page is made of: the network, its matrix, traces, a raster, weights, its body, each as a Block.
 
 In: a network, its layout (where a view needs it), the rows of a recording that are shown, Panels. Out: Blocks, which
 say how high they are and draw themselves into a Part.
@@ -17,7 +17,7 @@ from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.runtime.recording import Snapshot
-from neurovis_spec.scene import encoding, strips
+from neurovis_spec.scene import body, encoding, strips
 from neurovis_spec.scene.encode import tooltips
 from neurovis_spec.scene.fading import snapshots_of
 from neurovis_spec.scene.frame import MARGIN
@@ -28,6 +28,7 @@ from neurovis_spec.scene.matrix import MatrixCells, order_of
 from neurovis_spec.scene.model import Film, Group, Text, Theme
 from neurovis_spec.scene.palette import MOST as MOST_COLOURS
 from neurovis_spec.scene.parts import Part
+from neurovis_spec.scene.poses import posed_of, poses_of
 from neurovis_spec.scene.scales import ScaleLabel, scale_of
 from neurovis_spec.scene.series import chosen, full_name, kind_of, short_name, values_of
 from neurovis_spec.scene.shots import Shots
@@ -158,6 +159,23 @@ class Grid:
 
 
 @dataclass(frozen=True)
+class Embodied:
+    """The body, from above and from its side."""
+
+    picture: body.BodyPicture
+    timed = False
+    sides = (0.0, 0.0)
+
+    def heights(self, width: float) -> tuple[float, float]:
+        """Titles and numbers, and the drawings."""
+        return self.picture.fixed, body.PLOT
+
+    def part(self, place: BlockSpace) -> Part:
+        """Both drawings."""
+        return self.picture.part(MARGIN, place.width - MARGIN, body.PLOT * place.share, place.theme, place.prefix)
+
+
+@dataclass(frozen=True)
 class Drawing:
     """The picture of the network, which is as large as it was made."""
 
@@ -195,6 +213,8 @@ class Maker:
                 return self._matrix(panel.shown)
             case "raster":
                 return self._raster(panel.shown)
+            case "body":
+                return self._body()
             case _:
                 return self._traces(panel)
 
@@ -202,6 +222,14 @@ class Maker:
         """Those of the frames."""
         recording = self.shots.recording
         return list(snapshots_of(self.network, recording, recording.step[self.shots.frames].tolist()))
+
+    def _body(self) -> Block:
+        posed = posed_of(self.shots.recording)
+        if posed is None:
+            return Note("there is no body to show: the recording holds no poses of one")
+        skeleton, values = posed
+        first = values[0] if len(values) else np.zeros(skeleton.size)
+        return Embodied(body.BodyPicture(poses_of(skeleton, values[self.shots.frames], first)))
 
     def _traces(self, panel: Panel) -> Block:
         named = panel.shown is not None

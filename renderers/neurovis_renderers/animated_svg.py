@@ -5,11 +5,14 @@ each group that changes has one SMIL animation of its ``class``: a letter or two
 changes one each for width and glow, and where it changes its sign one more while it is negative. What these classes
 look like stands in a style sheet that holds only where no reduced motion is asked for: where it is, the picture stands
 still at frame 0. A group that is shifted has an animation of its ``transform``, which the style sheet takes back there.
+One that is redrawn has an animation of each attribute of its shapes that changes, and is there twice: as it is in frame
+0 where no motion is welcome.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from string import ascii_lowercase
@@ -51,8 +54,10 @@ LETTERS: tuple[str, ...] = (*ascii_lowercase, *(f"a{letter}" for letter in ascii
 _MOST_WIDTHS, _MOST_CAPTIONS = 240, 500
 #: The classes of what is lesioned, of what is shifted, and of shapes of a changing group that stay as they are.
 _FAINT, _SHIFTED, _FIXED = "lesioned", "shifted", "fixed"
+#: The classes of what is redrawn, as it moves and as it stands still.
+_MOVING, _STANDING = "moving", "standing"
 #: Groups that have the class of a colour.
-_COLOURED = f"[class]:not(.{_SHIFTED})"
+_COLOURED = f"[class]:not(.{_SHIFTED},.{_MOVING},.{_STANDING})"
 #: The class of a line whose weight is less than 0 at the moment, where it is not always.
 _LESS = "less"
 
@@ -96,7 +101,7 @@ class _Writer:
         self._glows: set[int] = set()
         self._turning = False
         self._captions = -1
-        self._moves = False
+        self._moves = self._redraws = False
 
     def group(self, group: Group) -> str:
         """A group, animated where it changes."""
@@ -109,6 +114,8 @@ class _Writer:
             return self._shifted(group, self._film.shift_values[:, self._shifts[group.id]])
         if group.id in self._lines:
             return self._connection(group, self._lines[group.id])
+        if group.id in self._film.redrawn:
+            return self._redrawn(group)
         return unchanging(group)
 
     def _letter(self, level: int) -> str:
@@ -160,6 +167,15 @@ class _Writer:
         self._moves = True
         shapes = "".join(element(shape) for shape in group.shapes)
         return f"{open_group(group, _class(_SHIFTED))}{shapes}{frames}</g>\n"
+
+    def _redrawn(self, group: Group) -> str:
+        """A group whose shapes are others in each frame, and what it is in frame 0."""
+        seconds, redrawn = self._film.frames / self._film.fps, self._film.redrawn[group.id]
+        frames = [redrawn(frame) for frame in range(self._film.frames)]
+        moving = "".join(redrawn_shape(shapes, seconds) for shapes in zip(*frames, strict=True))
+        standing = "".join(element(shape) for shape in frames[0])
+        self._redraws = True
+        return f"{open_group(group)}<g{_class(_MOVING)}>{moving}</g><g{_shown(_STANDING, False)}>{standing}</g></g>\n"
 
     def _head_element(self, head: Arrowhead, bars: npt.NDArray[np.bool_]) -> str:
         """A head in its own coordinates, so that its width alone can be scaled: at the tip, pointing right. One that
@@ -227,10 +243,11 @@ class _Writer:
             rules.append(".caption text{display:none}")
             rules += [f".t{n}>:nth-child({n + 1}){{display:inline}}" for n in range(self._captions)]
         scoped = "".join(_scoped(rule, root) for rule in rules)
-        still = ""
-        if self._moves:
-            rule = _scoped(f".{_SHIFTED}{{transform:none!important}}", root)
-            still = f"@media (prefers-reduced-motion:reduce){{{rule}}}"
+        calm = [f".{_SHIFTED}{{transform:none!important}}"] if self._moves else []
+        if self._redraws:
+            calm += [f".{_MOVING}{{display:none}}", f".{_STANDING}{{display:inline}}"]
+        still = "".join(_scoped(rule, root) for rule in calm)
+        still = f"@media (prefers-reduced-motion:reduce){{{still}}}" if still else ""
         return f"<style>@media (prefers-reduced-motion:no-preference){{{scoped}}}{still}</style>\n"
 
     def _palette(self, theme: Theme) -> list[str]:
@@ -302,6 +319,42 @@ def animation(tokens: Sequence[str], seconds: float, start: str = '<animate attr
     if len(some) + len(times) + 12 < len(every):
         values = f'values="{some}" keyTimes="{times}"'
     return f'{start} calcMode="discrete" dur="{seconds:.6g}s" repeatCount="indefinite" {values}/>'
+
+
+#: The attributes in the start tag of an element.
+_ATTRIBUTE = re.compile(r' ([a-z-]+)="([^"]*)"')
+
+
+def redrawn_shape(shapes: Sequence[Shape], seconds: float) -> str:
+    """A shape that is another one, of the same kind, in each frame: each attribute that changes is animated. Of a text
+    that says other words there is one for each, of which those that are not said are not displayed."""
+    words = [shape.text if isinstance(shape, Text) else "" for shape in shapes]
+    said = list(dict.fromkeys(words))
+    if len(said) == 1:
+        return _attributes_animated(shapes, seconds)
+    result = ""
+    for one in filter(None, said):
+        held, last = [], shapes[words.index(one)]
+        for shape, word in zip(shapes, words, strict=True):
+            last = shape if word == one else last  # while it is not displayed, it stays where it was
+            held.append(last)
+        display = ["inline" if word == one else "none" for word in words]
+        result += _attributes_animated(held, seconds, display)
+    return result
+
+
+def _attributes_animated(shapes: Sequence[Shape], seconds: float, display: Sequence[str] = ()) -> str:
+    """A shape with an animation of each attribute that changes, and of whether it is displayed."""
+    first = f' display="{display[0]}"' if display else ""
+    starts = [element(shape).partition(">")[0] for shape in shapes]
+    found: list[dict[str, str]] = [dict(_ATTRIBUTE.findall(start)) for start in starts]
+    frames = "".join(
+        animation([one.get(name, value) for one in found], seconds, f'<animate attributeName="{name}"')
+        for name, value in found[0].items()
+    )
+    if display:
+        frames += animation(display, seconds, '<animate attributeName="display"')
+    return element(shapes[0], first, frames)
 
 
 def _fraction(place: int, frames: int, digits: int) -> str:

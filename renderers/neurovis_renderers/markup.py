@@ -139,7 +139,8 @@ def _polyline(shape: Polyline) -> str:
     line = "l" + pairs([(x / 10, y / 10) for x, y in steps]) if steps else ""
     opacity = f' stroke-opacity="{num(shape.opacity)}"' if shape.opacity != 1 else ""
     width = exact(shape.width)
-    return f' d="M{start}{line}" stroke="{shape.stroke}" stroke-width="{width}" stroke-linejoin="round"{opacity}'
+    caps = ' stroke-linecap="round"' if shape.round else ""
+    return f' d="M{start}{line}" stroke="{shape.stroke}" stroke-width="{width}" stroke-linejoin="round"{caps}{opacity}'
 
 
 def _ramp(shape: Ramp) -> str:

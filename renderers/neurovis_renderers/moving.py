@@ -152,7 +152,8 @@ class Moving:
 
 def _stands_apart(film: Film, group: Group) -> bool:
     """Whether a group changes in other ways than by a colour or a width, or is seen in part."""
-    changes = group.id and (group.id == film.caption or group.id in film.shifts or group.id in film.faint)
+    others = (film.shifts, film.faint, film.redrawn)
+    changes = group.id and (group.id == film.caption or any(group.id in names for names in others))
     return bool(changes) or group.opacity != 1
 
 

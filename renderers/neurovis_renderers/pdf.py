@@ -212,6 +212,8 @@ class _Page:
         style = f"{_number(shape.width)} w "
         if isinstance(shape, Spline) and shape.dash:
             style += f"1 J [{_numbers(*shape.dash)}] 0 d "
+        if isinstance(shape, Polyline) and shape.round:
+            style += "1 J "
         if shape.opacity != 1:
             style += self._seen(shape.opacity)
         drawn = f"{_colour(shape.stroke, 'RG')}{style}\n{way}S\n"

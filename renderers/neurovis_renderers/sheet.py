@@ -109,6 +109,10 @@ class Sheet:
             case Polyline():
                 self._splines.append((place, shape.spline))
                 self.colours.append(packed(shape.stroke))
+                for end in (shape.points[0], shape.points[-1]) if shape.round else ():
+                    cap = Disc(end, shape.width / 2, shape.stroke, shape.stroke, 0.0)
+                    self._discs.append((len(self.colours), cap))
+                    self.colours += 2 * [packed(shape.stroke)]
                 return False
             case Arrowhead():
                 self._heads.append((place, shape))

@@ -1,0 +1,289 @@
+"""The body: its pose from above and from its right side, in metres, as it moves over the ground.
+
+In: Poses. Out: a Part: two drawings of the same scale beside each other, forward to the right, that follow the body's
+middle, over a grid of the ground with how far it has come; links as thick as they are, feet that touch something filled
+and others hollow, solids, a scale bar.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.body.model import Solid
+from neurovis_spec.scene import texts
+from neurovis_spec.scene.model import Disc, Group, Point, Polyline, Rectangle, Redrawn, Shape, Text, Theme
+from neurovis_spec.scene.parts import Changes, Part
+from neurovis_spec.scene.poses import Poses
+from neurovis_spec.scene.strips import SMALL, TITLE
+from neurovis_spec.scene.themes import channels
+from neurovis_spec.scene.ticks import words
+
+Side: TypeAlias = Literal["above", "side"]
+
+#: How high a drawing is where nothing else is asked for, and the line of numbers beneath it.
+PLOT, NUMBERS = 210.0, 17.0
+#: Between the two drawings, and around the body in its own sizes.
+_GAP, _ROOM = 18.0, 1.12
+#: User units between lines of the grid, at least, and of a scale bar.
+_APART, _BAR = 46.0, 50.0
+#: Lines around links, the least thickness of these, the least and largest radius of a foot.
+_CASING, _THIN, _FOOT, _LARGE = 1.3, 2.2, 3.4, 6.0
+#: Lines that lie on the ground, and how much of a link's colour is left on the far side.
+_LINE, _FAR = 0.8, 0.45
+#: What lies so far aside of the middle, as a share of what the body reaches aside, is on the near or the far side.
+_ASIDE = 0.12
+#: A solid as high as the ground is the ground.
+_FLAT = 1e-6
+
+
+@dataclass(frozen=True)
+class BodyPicture:
+    """A body in the poses of frames."""
+
+    poses: Poses
+
+    @property
+    def fixed(self) -> float:
+        """How much of its height cannot change: the titles and the numbers beneath."""
+        return TITLE + NUMBERS
+
+    def part(self, left: float, right: float, plot: float, theme: Theme, prefix: str) -> Part:
+        """Both drawings, so high, from ``left`` to ``right``."""
+        wide = (right - left - _GAP) / 2
+        reach = self.poses.reach
+        scale = min(
+            wide / (2 * _ROOM * reach.ahead),
+            plot / (2 * _ROOM * reach.aside),
+            plot / (_ROOM * (reach.high - reach.low) + 0.15 * reach.aside),
+        )
+        above = _Drawn(self.poses, "above", left, left + wide, TITLE, plot, scale, theme)
+        beside = _Drawn(self.poses, "side", right - wide, right, TITLE, plot, scale, theme)
+        groups: list[Group] = []
+        redrawn: dict[str, Redrawn] = {}
+        for drawn in (above, beside):
+            name = f"{prefix}{drawn.side}"
+            data = {"view": "body"} if drawn is above else {}
+            groups.append(Group(tuple(_ground(drawn)), f"{name}:ground", data))
+            moving: list[tuple[str, Redrawn, str]] = [("world", drawn.world, ""), ("links", drawn.links, drawn.said)]
+            moving.append(("come", drawn.come, "") if drawn is beside else ("bar", drawn.bar, ""))
+            for what, shapes, said in moving:
+                redrawn[f"{name}:{what}"] = shapes
+                groups.append(Group(shapes(0), f"{name}:{what}", {"body": what} if said else {}, said))
+        return Part(tuple(groups), self.fixed + plot, Changes(redrawn=redrawn))
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """A drawing: which side of the body it shows, where it stands, user units of a metre."""
+
+    poses: Poses
+    side: Side
+    left: float
+    right: float
+    top: float
+    plot: float
+    scale: float
+    theme: Theme
+
+    @property
+    def bottom(self) -> float:
+        """Where the frame ends."""
+        return self.top + self.plot
+
+    @property
+    def level(self) -> float:
+        """Where the ground is, of the drawing from the side."""
+        reach = self.poses.reach
+        free = self.plot - self.scale * (reach.high - reach.low)
+        return self.bottom - 0.4 * free + self.scale * reach.low
+
+    @property
+    def said(self) -> str:
+        """What a pointer shows on the body."""
+        feet = len(self.poses.skeleton.feet)
+        more = f", {feet} feet, filled where they touch something" if feet else ""
+        return f"the body {'from above' if self.side == 'above' else 'from its right side'}{more}"
+
+    def across(self, ahead: float, frame: int) -> float:
+        """Where something so far forward lies (metres from the origin of the world)."""
+        middle = float(self.poses.middles[frame, 0])
+        return (self.left + self.right) / 2 + self.scale * (ahead - middle)
+
+    def down(self, far: float, frame: int) -> float:
+        """Where something so far to the left of the origin, or of such a height, lies."""
+        if self.side == "side":
+            return self.level - self.scale * far
+        return (self.top + self.bottom) / 2 - self.scale * (far - float(self.poses.middles[frame, 1]))
+
+    def world(self, frame: int) -> tuple[Shape, ...]:
+        """The ground with its grid and what stands on it; the lines of the grid say how far it is from the start."""
+        theme, start = self.theme, self.poses.start
+        step, half = round_above(_APART / self.scale), (self.right - self.left) / 2 / self.scale
+        shapes: list[Shape] = [self._solid(solid, frame) for solid in self.poses.skeleton.solids]
+        middle = float(self.poses.middles[frame, 0]) - start[0]
+        count = math.floor(2 * half / step) + 1  # at most so many are seen, at times one less
+        first = math.ceil((middle - half) / step)
+        values = [step * (first + place) for place in range(count)]
+        said = words([step, *values])[1:]
+        if self.side == "side":
+            shapes.append(Polyline(((self.left, self.level), (self.right, self.level)), theme.muted, 1.4))
+        for value, word in zip(values, said, strict=True):
+            x = self.across(start[0] + value, frame)
+            seen, x = x <= self.right, min(x, self.right)
+            begin, end = (self.top, self.bottom) if self.side == "above" else (self.level, self.level + 5.0)
+            stroke, width = (theme.muted, 1.2) if self.side == "side" or value == 0 else (theme.box_line, _LINE)
+            shapes.append(Polyline(((x, begin), (x, end)), stroke if seen else theme.box_line, width))
+            label = f"{word} m" if seen and self._fits(x, word) else ""
+            shapes.append(Text((x, self.bottom + 13.0), label, SMALL, theme.muted, "middle"))
+        if self.side == "above":
+            shapes += self._along(frame, step)
+        return tuple(shapes)
+
+    def _fits(self, x: float, word: str) -> bool:
+        half = texts.width(f"{word} m", SMALL) / 2
+        return self.left <= x - half and x + half <= self.right
+
+    def _along(self, frame: int, step: float) -> list[Shape]:
+        """The lines of the grid that lie along the way forward."""
+        half, aside = self.plot / 2 / self.scale, float(self.poses.middles[frame, 1]) - self.poses.start[1]
+        first = math.ceil((aside - half) / step)
+        shapes: list[Shape] = []
+        for place in range(math.floor(2 * half / step) + 1):
+            value = step * (first + place)
+            y = max(self.down(self.poses.start[1] + value, frame), self.top)
+            shapes.append(Polyline(((self.left, y), (self.right, y)), self.theme.box_line, _LINE))
+        return shapes
+
+    def _solid(self, solid: Solid, frame: int) -> Rectangle:
+        """What is seen of a box that stands in the world; of one that is not, nothing."""
+        (x0, y0, z0), (x1, y1, z1) = solid.low, solid.high
+        near, far = (y0, y1) if self.side == "above" else (z0, z1)
+        left, right = (min(max(self.across(x, frame), self.left), self.right) for x in (x0, x1))
+        above, beneath = (min(max(self.down(end, frame), self.top), self.bottom) for end in (far, near))
+        wide, high = right - left, beneath - above
+        if (self.side == "above" and z1 <= _FLAT) or not (wide > 0 and high > 0):
+            wide = high = 0.0
+        edge = 0.0 if wide == 0 or high == 0 else _LINE
+        return Rectangle((left, above), wide, high, 0.0, self.theme.box_line, self.theme.muted, edge)
+
+    def links(self, frame: int) -> tuple[Shape, ...]:
+        """Links, the nearest last, then feet, so that it is seen at any time whether they touch something."""
+        poses, skeleton, theme = self.poses, self.poses.skeleton, self.theme
+        places, shapes = self._places(frame), list[Shape]()
+        above = self.side == "above"
+        layers = self._heights if above else self._layers([(link.start, link.end) for link in skeleton.links], frame)
+        for number in np.argsort(layers, kind="stable").tolist():
+            link = skeleton.links[number]
+            line, thick = (places[link.start], places[link.end]), max(2 * link.radius * self.scale, _THIN)
+            shapes.append(Polyline(line, theme.box_fill, thick + 2 * _CASING, round=True))
+            shapes.append(Polyline(line, self._seen(theme.zero, layers[number]), thick, round=True))
+        layers = np.zeros(len(skeleton.feet)) if above else self._layers([(foot,) for foot in skeleton.feet], frame)
+        for number in np.argsort(layers, kind="stable").tolist():
+            touches = poses.touching[frame, number]
+            fill, edge = (theme.positive, theme.ink) if touches else (theme.box_fill, theme.muted)
+            fill, edge = (self._seen(colour, layers[number]) for colour in (fill, edge))
+            shapes.append(Disc(places[skeleton.feet[number]], self.foot, fill, edge, 1.4))
+        return tuple(shapes)
+
+    def _seen(self, colour: str, layer: float) -> str:
+        """A colour, paler on the far side."""
+        far = self.side == "side" and layer < 0
+        return mixed(colour, self.theme.box_fill, _FAR) if far else colour
+
+    @property
+    def foot(self) -> float:
+        """The radius of a foot."""
+        thick = min((link.radius for link in self.poses.skeleton.links), default=0.0)
+        return min(max(1.4 * thick * self.scale, _FOOT), _LARGE)
+
+    def _places(self, frame: int) -> list[Point]:
+        """Where the points are on the page; far outside of it where nobody knows."""
+        if not self.poses.known[frame]:
+            return [(-1e4, -1e4)] * len(self.poses.skeleton.points)
+        deep = 1 if self.side == "above" else 2
+        points = self.poses.points[frame]
+        return [(self.across(x, frame), self.down(far, frame)) for x, far in points[:, [0, deep]].tolist()]
+
+    @cached_property
+    def _heights(self) -> FloatArray:
+        """How high links are in the middle of all frames: what is higher is drawn over what is lower, at any time."""
+        ends, heights = self.poses.skeleton.links, self.poses.points[:, :, 2].mean(axis=0)
+        return np.array([(heights[link.start] + heights[link.end]) / 2 for link in ends]).round(6)
+
+    def _layers(self, ends: Sequence[Sequence[int]], frame: int) -> FloatArray:
+        """On which side of the body something is that lies between points: −1 on the far side, 1 on the near one."""
+        aside = self.poses.points[frame, :, 1] - self.poses.middles[frame, 1]
+        off = np.array([aside[list(one)].mean() for one in ends]) / self.poses.reach.aside
+        layers: FloatArray = np.where(off > _ASIDE, -1.0, np.where(off < -_ASIDE, 1.0, 0.0))
+        return layers
+
+    def come(self, frame: int) -> tuple[Shape, ...]:
+        """How far it has come, above the frame."""
+        far = float(self.poses.forward[frame])
+        way = "back" if far < -0.005 else "forward"
+        said = f"from its right side · {abs(far):.2f} m {way}" if self.poses.known[frame] else "its pose is not known"
+        return (Text((self.left, TITLE - 6.0), said, SMALL, self.theme.muted),)
+
+    def bar(self, frame: int) -> tuple[Shape, ...]:
+        """A length in metres, at the right beneath, in front of what moves."""
+        theme, metres = self.theme, round_above(_BAR / self.scale)
+        right, y = self.right - 10.0, self.bottom - 9.0
+        left = right - metres * self.scale
+        said = f"{words([metres])[0]} m"
+        line = ((left, y - 4.0), (left, y), (right, y), (right, y - 4.0))
+        middle = ((left + right) / 2, y - 6.0)
+        return Polyline(line, theme.ink, 1.4), Text(middle, said, SMALL, theme.ink, "middle", halo=theme.box_fill)
+
+
+def _ground(drawn: _Drawn) -> list[Shape]:
+    """The frame; above it what is seen, and what feet mean."""
+    theme = drawn.theme
+    extent = drawn.right - drawn.left, drawn.plot
+    shapes: list[Shape] = [Rectangle((drawn.left, drawn.top), *extent, 0.0, theme.box_fill, theme.box_line, 1.0)]
+    if drawn.side == "above":
+        shapes.append(Text((drawn.left, TITLE - 6.0), "from above, forward →", SMALL, theme.muted))
+        if drawn.poses.skeleton.feet:
+            shapes += _feet_explained(drawn)
+    else:
+        beneath = drawn.bottom - drawn.level
+        shapes.append(Rectangle((drawn.left, drawn.level), extent[0], beneath, 0.0, theme.box_line, theme.box_line, 0))
+    return shapes
+
+
+def _feet_explained(drawn: _Drawn) -> list[Shape]:
+    """What a filled foot is, and a hollow one, at the right above the frame."""
+    theme, x = drawn.theme, drawn.right
+    shapes: list[Shape] = []
+    for said, fill, edge in (("in the air", theme.box_fill, theme.muted), ("touching", theme.positive, theme.ink)):
+        shapes.append(Text((x, TITLE - 6.0), said, SMALL, theme.muted, "end"))
+        x -= texts.width(said, SMALL) + 8.0
+        shapes.append(Disc((x, TITLE - 9.8), 4.0, fill, edge, 1.4))
+        x -= 14.0
+    return shapes
+
+
+def round_above(least: float) -> float:
+    """The smallest of 1, 2 and 5 times a power of ten that is no less.
+
+    >>> round_above(0.13), round_above(0.2), round_above(34)
+    (0.2, 0.2, 50.0)
+    """
+    power = math.floor(math.log10(least))
+    return next(float(f"{n}e{power}") for n in (1, 2, 5, 10, 20) if float(f"{n}e{power}") >= least * (1 - 1e-9))
+
+
+def mixed(colour: str, other: str, share: float) -> str:
+    """A colour of which so much is left in another one.
+
+    >>> mixed("#000000", "#ffffff", 0.2)
+    '#cccccc'
+    """
+    pairs = zip(channels(colour), channels(other), strict=True)
+    return "#" + "".join(f"{round(share * one + (1 - share) * two):02x}" for one, two in pairs)

@@ -1,0 +1,94 @@
+"""Poses: a body's poses as arrays of points in metres, and how far it reaches from its middle.
+
+In: a Skeleton, poses as recordings have them. Out: Poses. Where a pose holds something that is no finite number (a
+simulation that diverged), nothing of it is drawn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.body.model import Skeleton
+from neurovis_spec.runtime.recording import Recording
+
+#: Metres from the middle that are shown at least, of a body that is a point.
+_LEAST = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """How far a body reaches in all its poses, in metres: forward or back and to either side of its middle, down to
+    ``low`` (the ground, or below) and up to ``high``."""
+
+    ahead: float
+    aside: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Poses:
+    """The poses of frames, ``values`` (frames, size); ``start`` is where the middle was when the run began (x and y in
+    metres)."""
+
+    skeleton: Skeleton
+    values: FloatArray
+    start: tuple[float, float]
+
+    @cached_property
+    def known(self) -> npt.NDArray[np.bool_]:
+        """Of which frames the pose is known, (frames,)."""
+        return np.array([bool(np.isfinite(row).all()) for row in self.values], np.bool_)
+
+    @cached_property
+    def points(self) -> FloatArray:
+        """Where the points are, (frames, points, 3); of what is not known at 0."""
+        count = len(self.skeleton.points)
+        known = np.where(self.known[:, None], self.values[:, : 3 * count], 0.0)
+        return known.reshape(len(self.values), count, 3)
+
+    @cached_property
+    def touching(self) -> npt.NDArray[np.bool_]:
+        """Which feet touch something, (frames, feet)."""
+        result: npt.NDArray[np.bool_] = self.values[:, 3 * len(self.skeleton.points) :] > 0.5
+        return result
+
+    @cached_property
+    def middles(self) -> FloatArray:
+        """Where the point is that the picture follows, (frames, 2)."""
+        return self.points[:, self.skeleton.middle, :2]
+
+    @cached_property
+    def forward(self) -> FloatArray:
+        """How far it has come forward since the run began, (frames,)."""
+        return self.middles[:, 0] - self.start[0]
+
+    @cached_property
+    def reach(self) -> Reach:
+        """How far it reaches in all of these poses."""
+        thick = max((link.radius for link in self.skeleton.links), default=0.0)
+        off = np.abs(self.points[:, :, :2] - self.middles[:, None])[self.known]
+        ahead, aside = (max(_LEAST, float(off[:, :, axis].max(initial=0.0)) + thick) for axis in (0, 1))
+        heights = self.points[self.known][:, :, 2]
+        return Reach(
+            ahead, aside, float(heights.min(initial=0.0)), max(_LEAST, float(heights.max(initial=0.0)) + thick)
+        )
+
+
+def posed_of(recording: Recording) -> tuple[Skeleton, FloatArray] | None:
+    """The skeleton and the poses (rows, size) of a recording; None where it has none."""
+    pose: FloatArray | None = getattr(recording, "pose", None)
+    skeleton: Skeleton | None = getattr(recording, "skeleton", None)
+    return None if pose is None or skeleton is None or not skeleton.points else (skeleton, pose)
+
+
+def poses_of(skeleton: Skeleton, values: FloatArray, first: FloatArray) -> Poses:
+    """The poses of frames of a run, the ``first`` of which it is (size,)."""
+    x, y = first[3 * skeleton.middle : 3 * skeleton.middle + 2].tolist()
+    start = (x, y) if np.isfinite([x, y]).all() else (0.0, 0.0)
+    return Poses(skeleton, values, start)
