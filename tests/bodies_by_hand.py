@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import replace
 
 import numpy as np
 
@@ -43,16 +43,7 @@ def _pose(seconds: float, turn: float) -> list[float]:
     return [*(number for point in placed for number in point), *touching]
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Posed(Recording):
-    """A recording that holds the poses of a body."""
-
-    pose: FloatArray | None = None
-    skeleton: Skeleton | None = None
-
-
-def posed(recording: Recording, skeleton: Skeleton, poses: FloatArray) -> Posed:
+def posed(recording: Recording, skeleton: Skeleton, poses: FloatArray) -> Recording:
     """The recording with poses, one a row."""
     assert len(poses) == len(recording)
-    held = {field.name: getattr(recording, field.name) for field in fields(Recording)}
-    return Posed(**{**held, "pose": poses, "skeleton": skeleton})
+    return replace(recording, pose=poses, skeleton=skeleton)

@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
-from bodies_by_hand import HEIGHT, Posed, hexapod, posed
+from bodies_by_hand import HEIGHT, hexapod, posed
 from click.testing import CliRunner
 from neurovis_renderers.animated_svg import AnimatedSvgRenderer
 from neurovis_renderers.canvas import paint
@@ -49,7 +49,7 @@ SOLIDS = (Solid((-9, -9, -1), (9, 9, 0)), Solid((0.3, -0.4, 0), (0.5, 0.3, 0.03)
 SIDES = ("above", "side")
 
 
-def walked(turn: float = 0.0, solids: tuple[Solid, ...] = SOLIDS) -> Posed:
+def walked(turn: float = 0.0, solids: tuple[Solid, ...] = SOLIDS) -> Recording:
     return posed(RUN, *hexapod(len(RUN), turn, solids))
 
 

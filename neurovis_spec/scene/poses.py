@@ -82,8 +82,7 @@ class Poses:
 
 def posed_of(recording: Recording) -> tuple[Skeleton, FloatArray] | None:
     """The skeleton and the poses (rows, size) of a recording; None where it has none."""
-    pose: FloatArray | None = getattr(recording, "pose", None)
-    skeleton: Skeleton | None = getattr(recording, "skeleton", None)
+    pose, skeleton = recording.pose, recording.skeleton
     return None if pose is None or skeleton is None or not skeleton.points else (skeleton, pose)
 
 
