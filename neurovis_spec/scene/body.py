@@ -33,8 +33,9 @@ PLOT, NUMBERS = 210.0, 17.0
 _GAP, _ROOM = 18.0, 1.12
 #: User units between lines of the grid, at least, and of a scale bar.
 _APART, _BAR = 46.0, 50.0
-#: Lines around links, the least thickness of these, the least and largest radius of a foot.
-_CASING, _THIN, _FOOT, _LARGE = 1.3, 2.2, 3.4, 6.0
+#: Lines around links, the least thickness of these; the radius of a foot in those of its links, at least and at most.
+_CASING, _THIN = 1.3, 2.2
+_FOOT, _LEAST, _LARGEST = 1.25, 3.4, 9.0
 #: Lines that lie on the ground, and how much of a link's colour is left on the far side.
 _LINE, _FAR = 0.8, 0.45
 #: What lies so far aside of the middle, as a share of what the body reaches aside, is on the near or the far side.
@@ -177,31 +178,34 @@ class _Drawn:
         """Links, the nearest last, then feet, so that it is seen at any time whether they touch something."""
         poses, skeleton, theme = self.poses, self.poses.skeleton, self.theme
         places, shapes = self._places(frame), list[Shape]()
-        above = self.side == "above"
-        layers = self._heights if above else self._layers([(link.start, link.end) for link in skeleton.links], frame)
-        for number in np.argsort(layers, kind="stable").tolist():
+        order = self._order(frame)
+        for number in np.argsort(order, kind="stable").tolist():
             link = skeleton.links[number]
             line, thick = (places[link.start], places[link.end]), max(2 * link.radius * self.scale, _THIN)
             shapes.append(Polyline(line, theme.box_fill, thick + 2 * _CASING, round=True))
-            shapes.append(Polyline(line, self._seen(theme.zero, layers[number]), thick, round=True))
-        layers = np.zeros(len(skeleton.feet)) if above else self._layers([(foot,) for foot in skeleton.feet], frame)
-        for number in np.argsort(layers, kind="stable").tolist():
+            shapes.append(Polyline(line, self._seen(theme.zero, order[number]), thick, round=True))
+        order = self._layers([(foot,) for foot in skeleton.feet], frame) * (self.side == "side")
+        for number in np.argsort(order, kind="stable").tolist():
             touches = poses.touching[frame, number]
             fill, edge = (theme.positive, theme.ink) if touches else (theme.box_fill, theme.muted)
-            fill, edge = (self._seen(colour, layers[number]) for colour in (fill, edge))
-            shapes.append(Disc(places[skeleton.feet[number]], self.foot, fill, edge, 1.4))
+            fill, edge = (self._seen(colour, order[number]) for colour in (fill, edge))
+            shapes.append(Disc(places[skeleton.feet[number]], self._feet[number], fill, edge, 1.4))
         return tuple(shapes)
 
-    def _seen(self, colour: str, layer: float) -> str:
+    def _seen(self, colour: str, order: float) -> str:
         """A colour, paler on the far side."""
-        far = self.side == "side" and layer < 0
+        far = self.side == "side" and order < 0
         return mixed(colour, self.theme.box_fill, _FAR) if far else colour
 
-    @property
-    def foot(self) -> float:
-        """The radius of a foot."""
-        thick = min((link.radius for link in self.poses.skeleton.links), default=0.0)
-        return min(max(1.4 * thick * self.scale, _FOOT), _LARGE)
+    @cached_property
+    def _feet(self) -> list[float]:
+        """The radius of each foot: a little more than that of the links that end there."""
+        skeleton = self.poses.skeleton
+        thick = [
+            max((link.radius for link in skeleton.links if foot in (link.start, link.end)), default=0.0)
+            for foot in skeleton.feet
+        ]
+        return [min(max(_FOOT * radius * self.scale, _LEAST), _LARGEST) for radius in thick]
 
     def _places(self, frame: int) -> list[Point]:
         """Where the points are on the page; far outside of it where nobody knows."""
@@ -211,11 +215,18 @@ class _Drawn:
         points = self.poses.points[frame]
         return [(self.across(x, frame), self.down(far, frame)) for x, far in points[:, [0, deep]].tolist()]
 
-    @cached_property
-    def _heights(self) -> FloatArray:
-        """How high links are in the middle of all frames: what is higher is drawn over what is lower, at any time."""
-        ends, heights = self.poses.skeleton.links, self.poses.points[:, :, 2].mean(axis=0)
-        return np.array([(heights[link.start] + heights[link.end]) / 2 for link in ends]).round(6)
+    def _order(self, frame: int) -> FloatArray:
+        """Links from back to front. From above, what reaches higher is in front, in the middle of all frames, so that
+        it always is; from the side what is right of the body, and of what is in the middle the thickest."""
+        links, points = self.poses.skeleton.links, self.poses.points
+        radii = np.array([link.radius for link in links])
+        if self.side == "above":
+            heights = points[:, :, 2].mean(axis=0)
+            above: FloatArray = np.array([(heights[link.start] + heights[link.end]) / 2 for link in links]).round(6)
+            return above + radii
+        layers = self._layers([(link.start, link.end) for link in links], frame)
+        middle: FloatArray = np.where(layers == 0, 0.5 * radii / max(radii.max(initial=0.0), 1e-300), layers)
+        return middle
 
     def _layers(self, ends: Sequence[Sequence[int]], frame: int) -> FloatArray:
         """On which side of the body something is that lies between points: −1 on the far side, 1 on the near one."""
@@ -253,7 +264,8 @@ def _ground(drawn: _Drawn) -> list[Shape]:
             shapes += _feet_explained(drawn)
     else:
         beneath = drawn.bottom - drawn.level
-        shapes.append(Rectangle((drawn.left, drawn.level), extent[0], beneath, 0.0, theme.box_line, theme.box_line, 0))
+        fill = mixed(theme.box_line, theme.box_fill, 0.5)
+        shapes.append(Rectangle((drawn.left, drawn.level), extent[0], beneath, 0.0, fill, fill, 0.0))
     return shapes
 
 
