@@ -1,0 +1,137 @@
+"""The recorder: what a simulation does, step by step, in memory or in a file that is written meanwhile.
+
+In: the State before and after each step. Out: a Recording at any time; a file when it is closed. After an exception
+other than Ctrl-C there is a part in its place, as after a run that broke off.
+"""
+
+from __future__ import annotations
+
+import os
+from contextlib import ExitStack
+from pathlib import Path
+from time import monotonic
+
+import numpy as np
+
+from neurovis_spec.arrays import subscript
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.runtime.columns import Keep, columns_of
+from neurovis_spec.runtime.embodied import Embodied
+from neurovis_spec.runtime.formats import StreamingFormat, load, settle
+from neurovis_spec.runtime.inputs import STRETCH
+from neurovis_spec.runtime.kinds import Rows
+from neurovis_spec.runtime.parts import beside
+from neurovis_spec.runtime.record import after
+from neurovis_spec.runtime.recording import Numbers, Recording, RecordingError, for_path, recording_of
+from neurovis_spec.runtime.rows import RowWriter, Steps
+from neurovis_spec.runtime.state import State
+from neurovis_spec.runtime.stream import OFTEN, frame_of
+
+#: more steps than are ever made
+_ENDLESS = 1 << 53
+
+
+class Recorder:
+    """Records from a state on, one step in ``every``; into a file at ``path``, else in memory. Raises KeyError for a
+    name that there is not, RecordingError, OSError."""
+
+    def __init__(
+        self, network: Network, state: State, body: Embodied | None, path: Path | None, every: int, keep: Keep
+    ) -> None:
+        self._network, self._body, self._path = network, body, path
+        self._columns, self._steps = columns_of(network, keep, body), Steps(_ENDLESS, every, state.k)
+        self._changing = subscript(self._columns.weights)
+        self._last, self._row, self._closed = state, -1, False
+        self._widths = self._columns.widths(network)
+        self._room, self._filled, self._before = Rows.room(self._widths, STRETCH), 0, list[Rows]()
+        self._writer: RowWriter | None = None
+        self._open, self._due = ExitStack(), monotonic() + OFTEN
+        self._part: Path | None = None
+        if path is not None:
+            format_ = for_path(path)
+            if isinstance(format_, StreamingFormat):
+                self._stream(format_, path)
+
+    def _stream(self, format_: StreamingFormat, path: Path) -> None:
+        settle(path, format_)
+        target = Path(os.path.realpath(path))
+        there = set(beside(target, "part"))
+        frame = frame_of(self._network, self._columns, self._last)
+        self._writer = self._open.enter_context(format_.stream(path, frame, self._steps))
+        self._part = next(iter(set(beside(target, "part")) - there), None)
+
+    @property
+    def going(self) -> bool:
+        """Whether it records on."""
+        return not self._closed
+
+    def begin(self, state: State) -> None:
+        """Before a step, when its inputs are known."""
+        self._row = -1
+        if state.k % self._steps.every:
+            return
+        if self._filled == STRETCH:
+            self._hand_on()
+        self._row = self._filled
+        if self._changing is not None:
+            self._room.weights[self._row] = state.weights[self._changing]
+        if self._body is not None:
+            self._body.show(self._room.sensors[self._row], self._room.pose[self._row])
+
+    def end(self, state: State) -> None:
+        """After a step."""
+        self._last = state
+        if self._row >= 0:
+            chosen = self._columns.neurons
+            self._room.activity[self._row] = state.activity if chosen is None else state.activity[chosen]
+            if self._columns.probe.names:
+                self._columns.probe.read(state, self._room.states[self._row])
+            self._filled += 1
+        if self._writer is not None and monotonic() >= self._due:
+            self._hand_on()
+
+    def _hand_on(self) -> None:
+        """Give the rows to the file, or put them to those before."""
+        rows = self._room.part(slice(self._filled))
+        if self._writer is not None:
+            self._writer.write(rows, after(self._network, self._last))
+            self._due = monotonic() + OFTEN
+        elif self._filled:
+            self._before.append(rows)
+            self._room = Rows.room(self._widths, STRETCH)
+        self._filled = 0
+
+    def recording(self) -> Recording:
+        """What was recorded so far; of a file what this holds. Raises RecordingError where it was removed."""
+        if self._writer is None:
+            return self._in_memory()
+        assert self._path is not None
+        if self._closed:
+            return load(self._path)
+        self._hand_on()
+        if self._part is None:
+            raise RecordingError(f"{self._path} cannot be read while it is written")
+        return load(self._part)
+
+    def _in_memory(self) -> Recording:
+        parts = [*self._before, self._room.part(slice(self._filled))]
+        rows = Rows(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+        count = len(rows.activity)
+        step = np.array([self._steps.at(row) for row in range(count)], dtype=np.int64)
+        state = self._last
+        numbers = Numbers(step, rows)
+        return recording_of(self._network, self._columns, numbers, state.weights, after(self._network, state))
+
+    def close(self, error: BaseException | None = None) -> None:
+        """End the recording; with an ``error`` other than Ctrl-C as that of a run that broke off. Raises what
+        ``Recording.save`` raises."""
+        if self._closed:
+            return
+        self._closed = True
+        broken = error is not None and not isinstance(error, KeyboardInterrupt)
+        if self._writer is not None:
+            self._hand_on()
+            found = error if broken else None
+            self._open.__exit__(None if found is None else type(found), found, None)
+        elif self._path is not None and not broken:
+            for_path(self._path).save(self._in_memory(), self._path)
