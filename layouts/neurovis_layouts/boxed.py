@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from neurovis_layouts.apart import apart
-from neurovis_layouts.wiring import BoolArray
-from neurovis_spec.layout import FloatArray, IntArray
+from neurovis_spec.layout import BoolArray, FloatArray, IntArray
 from neurovis_spec.layout.frames import BOX_ACROSS, BOX_DOWN, TITLE
 from neurovis_spec.layout.model import RADIUS, LayoutProblem
 

@@ -223,7 +223,8 @@ class _Drawn:
         if self.side == "above":
             heights = points[:, :, 2].mean(axis=0)
             above: FloatArray = np.array([(heights[link.start] + heights[link.end]) / 2 for link in links]).round(6)
-            return above + radii
+            order: FloatArray = above + radii
+            return order
         layers = self._layers([(link.start, link.end) for link in links], frame)
         middle: FloatArray = np.where(layers == 0, 0.5 * radii / max(radii.max(initial=0.0), 1e-300), layers)
         return middle
