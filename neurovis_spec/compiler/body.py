@@ -85,11 +85,15 @@ def _found(kind: str, given: Located[str], place: Place, findings: Findings) -> 
             findings.files.add(real)
         return path, True
     except BodyMissingError as error:
-        findings.warning("body-unchecked", given.span, f"{error}: the names in 'body' are not checked", error.hint)
+        _warn_unchecked(error, given, findings)
         return (place.base / given.value).resolve(), False
     except (BodyError, OSError, RuntimeError) as error:
         findings.error("bad-body", given.span, str(error), getattr(error, "hint", None))
         return None, False
+
+
+def _warn_unchecked(error: BodyMissingError, given: Located[str], findings: Findings) -> None:
+    findings.warning("body-unchecked", given.span, f"{error}: the names in 'body' are not checked", error.hint)
 
 
 def _opened(
@@ -103,6 +107,9 @@ def _opened(
 ) -> Body | None:
     try:
         return open_body(kind, given.value, path, dt, substeps)
+    except BodyMissingError as error:
+        _warn_unchecked(error, given, findings)
+        return None
     except BodyError as error:
         at = model.substeps if error.key == "substeps" and model.substeps is not None else given
         findings.error("bad-body", at.span, str(error), error.hint)

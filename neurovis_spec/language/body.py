@@ -37,6 +37,7 @@ class BodyModel(Model):
     __pydantic_extra__: dict[str, TextField]
 
     mujoco: TextField | None = Field(None, description="A model of MuJoCo: a file in MJCF beside the spec.")
+    gymnasium: TextField | None = Field(None, description="An environment of Gymnasium, by its id.")
     substeps: FormulaField | None = Field(
         None, description="Steps of the body that are one of the network (default those that make dt)."
     )
@@ -53,7 +54,8 @@ class BodyModel(Model):
     @property
     def kinds(self) -> dict[str, Located[str]]:
         """What is given for each kind of body that is named: a sound section names one."""
-        given = {} if self.mujoco is None else {"mujoco": self.mujoco}
+        own = {"mujoco": self.mujoco, "gymnasium": self.gymnasium}
+        given = {name: value for name, value in own.items() if value is not None}
         return {**given, **(self.__pydantic_extra__ or {})}
 
     @classmethod
