@@ -29,7 +29,7 @@ SPECS = sorted([*(HERE.parent / "specs").glob("*.yaml"), *(HERE.parent / "specs"
 #: specs whose scene is pinned: of the others a change of the layout would change thousands of lines and say no more
 SMALL = [path for path in SPECS if path.stem != "hexapod"]
 #: the step that the scene shows
-STEPS = {"cpg_rbf": 90, "mlp": 3, "hebbian": 250, "reward": 630}
+STEPS = {"cpg_rbf": 90, "mlp": 3, "hebbian": 250, "reward": 630, "walk": 50}
 Plain: TypeAlias = "bool | int | float | str | list[Plain] | dict[str, Plain] | None"
 
 
