@@ -31,8 +31,8 @@ def hexapod(rows: int, turn: float = 0.0, solids: Sequence[Solid] = ()) -> tuple
 def _pose(seconds: float, turn: float) -> list[float]:
     points, touching = [(0.0, 0.0, HEIGHT), (0.15, 0.0, HEIGHT), (-0.15, 0.0, HEIGHT)], []
     for number, (_, ahead, side) in enumerate(LEGS):
-        phase = 5.0 * seconds + np.pi * (number % 2 ^ (side < 0))
-        swing, lift = -0.35 * np.cos(phase), max(0.0, 0.04 * np.sin(phase))
+        phase = 5.0 * seconds + np.pi * (number % 2)
+        swing, lift = -0.35 * np.cos(phase), max(0.0, round(0.04 * np.sin(phase), 9))
         out = np.array([np.sin(swing), side * np.cos(swing), 0.0])
         hip = np.array([ahead, 0.05 * side, HEIGHT])
         knee = hip + 0.1 * out + (0, 0, lift)

@@ -16,6 +16,7 @@ from neurovis_renderers.canvas import paint
 from neurovis_renderers.frames import frames
 from neurovis_renderers.svg import SvgRenderer
 from PIL import Image as Pillow
+from toy_bodies import carted, registered
 
 import neurovis_spec as nv
 from neurovis_spec import pipeline
@@ -411,3 +412,19 @@ def test_the_command_names_the_view(tmp_path: Path) -> None:
     given = ["render", str(tmp_path / "walker.yaml"), "-o", str(tmp_path / "x.svg"), "--view"]
     assert CliRunner().invoke(neurovis, [*given, "body"]).exit_code == 0
     assert "body" in CliRunner().invoke(neurovis, [*given, "bodi"]).output
+
+
+@pytest.mark.parametrize(("given", "wanted"), [("plain", ["body"]), ("bare", [])])
+def test_a_network_with_a_body_is_drawn_with_it_where_it_can_be(
+    given: str, wanted: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    registered(monkeypatch)
+    network, target = carted(given), tmp_path / "x.svg"
+    network.render(target, step=20)
+    assert views(target) == wanted
+    network.animate(target, steps=5)
+    assert views(target) == wanted
+    network.render(target, step=20, view="network")
+    assert views(target) == []
+    network.render(target, step=20, recording=network.run(30))
+    assert views(target) == wanted

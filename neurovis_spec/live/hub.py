@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from neurovis_spec.live.protocol import (
     Trace,
+    body_message,
     frame_message,
     refused_message,
     scene_message,
@@ -26,6 +27,7 @@ from neurovis_spec.live.protocol import (
     values_message,
 )
 from neurovis_spec.live.run import Shown
+from neurovis_spec.live.source import NOTHING, Drawn
 
 #: Frames that a client may be sent before it has drawn them.
 AHEAD: Final = 2
@@ -46,6 +48,8 @@ class Client:
     version: int = 0
     sent: int = 0
     status: str = ""
+    #: the body that it was told of
+    body: Drawn = NOTHING
     #: the serials of frames that were sent and are not drawn yet
     ahead: deque[int] = field(default_factory=deque)
     #: what it wants the values of, and whether it has just asked
@@ -183,6 +187,9 @@ class Hub:
         if client.status != status:
             client.status = status
             yield status
+        if client.body.skeleton is not shown.body.skeleton:
+            client.body = shown.body
+            yield body_message(shown.body)
         if client.sent < self._serial and len(client.ahead) < AHEAD:
             since, client.sent = client.sent, self._serial
             client.ahead.append(self._serial)

@@ -17,6 +17,7 @@ from typing import Final, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.body.skeletons import text_of
 from neurovis_spec.compiler.drawing.pins import FARTHEST
 from neurovis_spec.layout.model import Point
 from neurovis_spec.live.appearance import MOST, Appearance
@@ -27,7 +28,7 @@ from neurovis_spec.live.moved import Moved
 from neurovis_spec.live.requests import Fetch, PlaceNeuron, Request, Save, Unplace, Write
 from neurovis_spec.live.run import Status
 from neurovis_spec.live.saving import MOST_SECONDS
-from neurovis_spec.live.source import Reach, Turned
+from neurovis_spec.live.source import Drawn, Reach, Turned
 from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set
 from neurovis_spec.live.view import Look
 from neurovis_spec.themes import THEMES
@@ -36,8 +37,10 @@ from neurovis_spec.themes import THEMES
 SCENE, FRAME, TRACE, FILE = 1, 2, 3, 4
 #: kind, scene
 _SCENE_HEAD = struct.Struct("<BxH")
-#: kind, scene, serial, changed, step, first, last, bytes of the caption, of what follows it none
-_HEAD = struct.Struct("<BxHIIdddHxx")
+#: kind, scene, serial, changed, step, first, last, bytes of the caption, numbers of the pose
+_HEAD = struct.Struct("<BxHIIdddHH")
+#: The most numbers of a pose; of a body with more there is no picture.
+_POSED = (1 << 16) - 1
 #: kind, scene, traces, the bins: the first step, steps in each, how many
 _TRACE_HEAD = struct.Struct("<BxHIdII")
 #: A message of a client: at most so many bytes, names so many characters.
@@ -71,17 +74,20 @@ def scene_message(content: bytes, version: int) -> bytes:
 
 
 def frame_message(look: Look, reach: Reach, version: int, serial: int, changed: npt.NDArray[np.int64]) -> bytes:
-    """A frame: all colours, and of the ``changed`` items (connections, then neurons) widths, glows and kinds."""
+    """A frame: all colours, and of the ``changed`` items (connections, then neurons) widths, glows and kinds; and the
+    pose of the body."""
     lines = len(look.lines)
     of_lines = np.minimum(changed, max(lines - 1, 0))
     none = np.zeros(len(changed), np.uint16)
     widths, glows = (values[of_lines] if lines else none for values in (look.widths, look.glows))
     words = look.caption.encode("utf-8", "replace")[:4096]
-    head = _HEAD.pack(FRAME, version, serial, len(changed), look.step, reach.first, reach.last, len(words))
+    pose = look.pose if len(look.pose) <= _POSED else look.pose[:0]
+    counts = len(words), len(pose)
+    head = _HEAD.pack(FRAME, version, serial, len(changed), look.step, reach.first, reach.last, *counts)
     colours = look.discs.tobytes() + look.lines.tobytes()
     parts = [
         *(head, changed.astype("<u4").tobytes(), widths.astype("<u2").tobytes(), glows.astype("<u2").tobytes()),
-        *(look.kinds[changed].tobytes(), colours, words),
+        *(look.kinds[changed].tobytes(), colours, words, pose.astype("<f4").tobytes()),
     ]
     return b"".join(parts)
 
@@ -103,6 +109,15 @@ def status_message(status: Status, owner: bool, takes: frozenset[str] = frozense
         events=list(status.events[:_LISTED]),
         appearance=asdict(status.appearance),
     )
+
+
+def body_message(body: Drawn) -> str:
+    """How the pose is drawn that frames have from now on, and where the body was when the view began; null where there
+    is nothing to draw."""
+    skeleton = body.skeleton
+    if skeleton is None or skeleton.size > _POSED:
+        return _text("body", skeleton=None, start=[0.0, 0.0])
+    return _text("body", skeleton=json.loads(text_of(skeleton)), start=list(body.start))
 
 
 def _turned(entry: Turned) -> dict[str, object]:

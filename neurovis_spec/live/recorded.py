@@ -12,7 +12,7 @@ import numpy as np
 from neurovis_spec.compiler.events.changes import Clamp
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.history import Recorded
-from neurovis_spec.live.source import Capabilities, Drawn, Mask, Reach, Seen, SourceError, Turned, recalled
+from neurovis_spec.live.source import Capabilities, Mask, Reach, Seen, SourceError, Turned, drawn, recalled
 from neurovis_spec.live.turns import Turn
 from neurovis_spec.runtime.recording import Recording, RecordingError
 from neurovis_spec.scene.fading import snapshots_of
@@ -31,7 +31,8 @@ class RecordedSource:
         self.network, self._recording = network, fitted(recording, network)
         if not len(recording):
             raise RecordingError("the recording holds no step")
-        self.body = Drawn(recording.skeleton, recording.sensor_names)
+        first = None if recording.pose is None else recording.pose[0]
+        self.body = drawn(recording.skeleton, recording.sensor_names, first)
         self._steps: list[int] = recording.step.tolist()
         self._lesions = lesions_of(network)
         self._row = 0

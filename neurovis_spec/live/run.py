@@ -19,7 +19,7 @@ from neurovis_spec.live.appearance import Appearance
 from neurovis_spec.live.clock import FRAMES, Clock, Pace
 from neurovis_spec.live.commands import Branch, Command, Draw, Event, Pause, Play, Present, Restart, Seek, Speed, Step
 from neurovis_spec.live.history import History
-from neurovis_spec.live.source import Capabilities, Reach, Seen, Source, SourceError, Turned
+from neurovis_spec.live.source import Capabilities, Drawn, Reach, Seen, Source, SourceError, Turned
 from neurovis_spec.live.view import Look, View
 
 
@@ -42,7 +42,7 @@ class Status:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shown:
-    """All that is shown of the current step. ``view`` is replaced when the network is edited."""
+    """All that is shown of the current step. ``view`` and ``body`` are replaced when the network is edited."""
 
     view: View
     seen: Seen
@@ -50,6 +50,7 @@ class Shown:
     reach: Reach
     status: Status
     history: History
+    body: Drawn
 
 
 Stage: TypeAlias = tuple[Source, View]
@@ -316,4 +317,4 @@ class Run:
             appearance=self.appearance,
         )
         seen = source.seen()
-        return Shown(self._view, seen, self._view.look(seen), source.reach, status, source.history)
+        return Shown(self._view, seen, self._view.look(seen), source.reach, status, source.history, source.body)

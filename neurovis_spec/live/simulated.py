@@ -20,7 +20,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.history import Ring
 from neurovis_spec.live.past import EVERY, ROOM, Kept, Past
 from neurovis_spec.live.rules import carried_out, rules
-from neurovis_spec.live.source import Capabilities, Drawn, Reach, Seen, SourceError, Turned, recalled
+from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned, drawn, recalled
 from neurovis_spec.live.turns import TURNS, Feed, Hold, Set, Turn, fed_by, same_value, turn
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
@@ -44,12 +44,12 @@ class SimulatedSource:
         room: int = ROOM,
     ) -> None:
         self.network: Network = simulation.network
-        self.body = Drawn(simulation.skeleton, tuple(simulation.sensors))
         self._rules = rules(self.network)
         self._all_learn: Mapping[str, bool | None] = {rule.connections: True for rule in self._rules}
         self._simulation, self._room = simulation, room
         self._origin = simulation.state() if origin is None else origin
         self._begin(self._origin if begin is None else begin, turned, fed or {})
+        self.body = drawn(simulation.skeleton, tuple(simulation.sensors), self._seen.snapshot.pose)
 
     def _begin(self, state: State, turned: Sequence[Turned], fed: Mapping[str, tuple[float, ...]]) -> None:
         self._past = Past(self._room)

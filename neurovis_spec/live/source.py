@@ -14,11 +14,13 @@ from typing import Protocol, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.body import Skeleton
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.history import History
 from neurovis_spec.live.turns import Turn
 from neurovis_spec.runtime.recording import Snapshot
+from neurovis_spec.scene.poses import start_of
 
 Mask: TypeAlias = npt.NDArray[np.bool_]
 
@@ -60,10 +62,18 @@ class Seen:
 @dataclass(frozen=True, slots=True)
 class Drawn:
     """The body of what is shown: how its pose is drawn, None where there is nothing to draw, and what its sensors are
-    called."""
+    called; ``start`` is where its middle was when the view began, x and y in metres."""
 
     skeleton: Skeleton | None = None
     sensor_names: tuple[str, ...] = ()
+    start: tuple[float, float] = (0.0, 0.0)
+
+
+def drawn(skeleton: Skeleton | None, sensor_names: tuple[str, ...], pose: FloatArray | None) -> Drawn:
+    """The body of what is shown from this pose on."""
+    if skeleton is None or pose is None or not skeleton.points:
+        return Drawn(None, sensor_names)
+    return Drawn(skeleton, sensor_names, start_of(skeleton, pose))
 
 
 #: No body.

@@ -51,7 +51,7 @@ class Look:
     """What a step looks like: colour values of discs (n,) and lines (m,); widths and glow widths (m,); and ``kinds``
     (m + n,): of each connection, then of each neuron, BAR where its line ends in a bar, FAINT where it is lesioned,
     of a line NEGATIVE where its weight is, and in the higher bits how large it is; of a neuron CLAMPED where it is, and
-    UNDEFINED where its activity is no finite number."""
+    UNDEFINED where its activity is no finite number. ``pose`` is that of the body, no numbers where there is none."""
 
     step: int
     caption: str
@@ -60,6 +60,7 @@ class Look:
     widths: npt.NDArray[np.uint16]
     glows: npt.NDArray[np.uint16]
     kinds: npt.NDArray[np.uint8]
+    pose: npt.NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,6 +98,7 @@ class View:
             widths=_parts(shown.widths),
             glows=_parts(shown.glows),
             kinds=np.concatenate([of_lines, of_neurons]).astype(np.uint8),
+            pose=np.zeros(0, np.float32) if whole.pose is None else _metres(whole.pose),
         )
 
     def _shares(self, weights: FloatArray) -> npt.NDArray[np.int64]:
@@ -199,6 +201,12 @@ def _without_value(tooltip: str) -> str:
 
 def _levels(values: npt.NDArray[np.float64]) -> npt.NDArray[np.int8]:
     return np.where(np.isnan(values), _NO_LEVEL, np.rint(np.nan_to_num(values, nan=0.0) * LEVELS)).astype(np.int8)
+
+
+def _metres(pose: FloatArray) -> npt.NDArray[np.float32]:
+    """A pose as a page gets it; what is too large for it is as good as nowhere."""
+    with np.errstate(over="ignore"):
+        return pose.astype(np.float32)
 
 
 def _parts(widths: npt.NDArray[np.float64]) -> npt.NDArray[np.uint16]:

@@ -222,12 +222,12 @@ class _Drawn:
         radii = np.array([link.radius for link in links])
         if self.side == "above":
             heights = points[:, :, 2].mean(axis=0)
-            above: FloatArray = np.array([(heights[link.start] + heights[link.end]) / 2 for link in links]).round(6)
-            order: FloatArray = above + radii
-            return order
+            tops: FloatArray = np.array([(heights[link.start] + heights[link.end]) / 2 for link in links]) + radii
+            return tops.round(6)
         layers = self._layers([(link.start, link.end) for link in links], frame)
-        middle: FloatArray = np.where(layers == 0, 0.5 * radii / max(radii.max(initial=0.0), 1e-300), layers)
-        return middle
+        thick: FloatArray = 0.5 * radii / max(float(radii.max(initial=0.0)), 1e-300)
+        order: FloatArray = np.where(layers == 0, thick, layers)
+        return order
 
     def _layers(self, ends: Sequence[Sequence[int]], frame: int) -> FloatArray:
         """On which side of the body something is that lies between points: −1 on the far side, 1 on the near one."""

@@ -86,8 +86,7 @@ def posed_of(recording: Recording) -> tuple[Skeleton, FloatArray] | None:
     return None if pose is None or skeleton is None or not skeleton.points else (skeleton, pose)
 
 
-def poses_of(skeleton: Skeleton, values: FloatArray, first: FloatArray) -> Poses:
-    """The poses of frames of a run, the ``first`` of which it is (size,)."""
+def start_of(skeleton: Skeleton, first: FloatArray) -> tuple[float, float]:
+    """Where the middle is in the ``first`` pose of a run, x and y in metres; the origin where that is not known."""
     x, y = first[3 * skeleton.middle : 3 * skeleton.middle + 2].tolist()
-    start = (x, y) if np.isfinite([x, y]).all() else (0.0, 0.0)
-    return Poses(skeleton, values, start)
+    return (x, y) if np.isfinite([x, y]).all() else (0.0, 0.0)

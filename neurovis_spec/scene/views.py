@@ -28,7 +28,7 @@ from neurovis_spec.scene.matrix import MatrixCells, order_of
 from neurovis_spec.scene.model import Film, Group, Text, Theme
 from neurovis_spec.scene.palette import MOST as MOST_COLOURS
 from neurovis_spec.scene.parts import Part
-from neurovis_spec.scene.poses import posed_of, poses_of
+from neurovis_spec.scene.poses import Poses, posed_of, start_of
 from neurovis_spec.scene.scales import ScaleLabel, scale_of
 from neurovis_spec.scene.series import chosen, full_name, kind_of, short_name, values_of
 from neurovis_spec.scene.shots import Shots
@@ -228,8 +228,8 @@ class Maker:
         if posed is None:
             return Note("there is no body to show: the recording holds no poses of one")
         skeleton, values = posed
-        first = values[0] if len(values) else np.zeros(skeleton.size)
-        return Embodied(body.BodyPicture(poses_of(skeleton, values[self.shots.frames], first)))
+        poses = Poses(skeleton, values[self.shots.frames], start_of(skeleton, values[0]))
+        return Embodied(body.BodyPicture(poses))
 
     def _traces(self, panel: Panel) -> Block:
         named = panel.shown is not None

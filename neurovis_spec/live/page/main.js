@@ -3,6 +3,7 @@
  */
 
 import { Attention } from './attention.js';
+import { Body } from './body.js';
 import { Camera } from './camera.js';
 import { channels, luminance } from './colours.js';
 import { Controls, part } from './controls.js';
@@ -77,6 +78,7 @@ function show() {
   controls.frame(look);
   scrubber.show(look);
   strips.show();
+  if (link.scene) body.show(look, link.scene);
   if (more) redraw();
   if (fresh) {
     fresh = false;
@@ -146,6 +148,7 @@ const link = new Link({
       turning.status(message);
       placing.status(message);
     } else if (message.type === 'values') attention.take(message);
+    else if (message.type === 'body') body.use(message.skeleton, message.start);
     else if (message.type === 'findings') controls.found(message);
     else if (message.type === 'moved') placing.take(message);
     else if (message.type === 'placed') placing.told(message);
@@ -179,6 +182,7 @@ const attention = new Attention(
 const outline = new Outline(attention, part, (id) => go(id));
 const scrubber = new Scrubber(link, part, redraw);
 const strips = new Strips(link, attention, scrubber, part('strips'));
+const body = new Body(part('embodied'), part('posed'), part('bodily'), redraw);
 
 /** Show the matrix in place of the picture, or the picture. @param {boolean} asMatrix */
 function choose(asMatrix) {
@@ -252,7 +256,7 @@ function tellAll() {
   if (attention.held) attention.say(look);
   else
     say(
-      `${scene.title}, ${look.caption || `step ${look.step}`}, ${controls.playing ? 'playing' : 'paused'}, neurons ${scene.discs}, connections ${scene.lines}`,
+      `${scene.title}, ${look.caption || `step ${look.step}`}, ${controls.playing ? 'playing' : 'paused'}, neurons ${scene.discs}, connections ${scene.lines}${body.words && `, ${body.words}`}`,
     );
 }
 /** List the keys, or close the list. */
@@ -285,6 +289,7 @@ Object.assign(controls.keys, {
   o: ['open or close the outline', () => outline.toggle()],
   v: ['say what is held with its value, or how the run stands', tellAll],
   t: ['open or close the panel for turning', () => turning.toggle()],
+  y: ['open or close the panel of the body', () => body.toggle()],
   m: ['the matrix of the weights in place of the picture, and back', () => choose(!matrix)],
   p: ['pin the strip of what is held, or unpin it', () => strips.toggle(attention.held)],
   '<': ['show more of the past', () => scrubber.more(1)],

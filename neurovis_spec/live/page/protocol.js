@@ -26,11 +26,15 @@ import { isStill } from './camera.js';
  *   groups: Group[]}} Scene */
 /** @typedef {{first: number, every: number, ranges: Map<string, Float32Array>}} Traces */
 /** @typedef {{serial: number, step: number, first: number, last: number, caption: string, discs: Int8Array,
- *   lines: Int8Array, widths: Uint16Array, glows: Uint16Array, kinds: Uint8Array}} Look */
+ *   lines: Int8Array, widths: Uint16Array, glows: Uint16Array, kinds: Uint8Array, pose: Float32Array}} Look */
+/** How the pose of a body is drawn: links are two points and a radius in metres, solids the lowest and the highest corner.
+ * @typedef {{points: string[], links: [number, number, number][], feet: number[], middle: number,
+ *   solids: [number[], number[]][]}} Skeleton */
 /** @typedef {{type: 'status', playing: boolean, speed: string, ended: boolean, owner: boolean,
  *   can: {takes: string[], ends: boolean, arrives: boolean}, parameters: Object<string, number>, fed: Object<string, number[]>,
  *   learning: Object<string, boolean | null>, turned: Turned[], events: number[], appearance: Gains}} Status */
 /** @typedef {Status | {type: 'values', step: number, values: Object<string, number | null>}
+ *   | {type: 'body', skeleton: Skeleton | null, start: number[]}
  *   | {type: 'findings', text: string, errors: boolean}
  *   | {type: 'moved', discs: Object<string, number[]>, lines: Object<string, number[][]>}
  *   | {type: 'placed', neurons: string[], undo: boolean, files: boolean}
@@ -64,7 +68,8 @@ export function take(buffer, version, look) {
   if (view.getUint16(2, true) !== version) return false;
   look.serial = view.getUint32(4, true);
   const changed = view.getUint32(8, true),
-    words = view.getUint16(36, true);
+    words = view.getUint16(36, true),
+    numbers = view.getUint16(38, true);
   [look.step, look.first, look.last] = [12, 20, 28].map((at) => view.getFloat64(at, true));
   const items = new Uint32Array(buffer, HEAD, changed);
   const widths = new Uint16Array(buffer, HEAD + 4 * changed, changed);
@@ -81,7 +86,9 @@ export function take(buffer, version, look) {
   const colours = HEAD + 9 * changed;
   look.discs = new Int8Array(buffer, colours, discs);
   look.lines = new Int8Array(buffer, colours + discs, lines);
-  look.caption = new TextDecoder().decode(new Uint8Array(buffer, colours + discs + lines, words));
+  const text = colours + discs + lines;
+  look.caption = new TextDecoder().decode(new Uint8Array(buffer, text, words));
+  look.pose = new Float32Array(buffer.slice(text + words, text + words + 4 * numbers));
   return true;
 }
 
@@ -203,6 +210,7 @@ export class Link {
         widths: new Uint16Array(lines),
         glows: new Uint16Array(lines),
         kinds: new Uint8Array(lines + discs),
+        pose: new Float32Array(0),
       };
       this.listener.scene(this.scene);
     } else if (kind === FRAME && this.scene && this.look && take(data, this.scene.version, this.look)) {

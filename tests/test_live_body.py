@@ -1,0 +1,155 @@
+"""The body in the live page, in Chromium: the pose of the step that is shown, in a panel of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bodies_by_hand import hexapod, posed
+from chromium import Page, chromium
+from PIL import Image
+from test_live_browser import STEP, pause
+
+import neurovis_spec as nv
+from neurovis_spec.body.model import Solid
+from neurovis_spec.live.access import Access
+from neurovis_spec.live.hub import Hub
+from neurovis_spec.live.live import listen
+from neurovis_spec.live.recorded import RecordedSource
+from neurovis_spec.live.requests import REQUESTS
+from neurovis_spec.live.run import Run
+from neurovis_spec.live.server import Server
+from neurovis_spec.live.source import Source
+from neurovis_spec.live.view import view_of
+from neurovis_spec.scene import THEMES, channels
+
+pytestmark = pytest.mark.browser
+
+NETWORK = nv.compile_text("""
+neurovis: 1
+name: walker
+time: {dt: 0.05, steps: 60}
+neurons: {C1: {initial: 0.2}, C2: {}}
+connections: {C1 -> C1: 1.2, C2 -> C2: 1.2, C1 -> C2: -0.3, C2 -> C1: 0.3}
+""")
+RUN = NETWORK.run()
+SOLIDS = (Solid((-9, -9, -1), (9, 9, 0)), Solid((0.4, -0.4, 0), (0.5, 0.3, 0.03)))
+
+
+@asynccontextmanager
+async def shown(source: Source, folder: Path, theme: str = "default") -> AsyncIterator[Page]:
+    """A live view of a source, paused at its first step."""
+    hub = Hub(asyncio.get_running_loop(), REQUESTS)
+    run = Run(source, view_of(NETWORK, NETWORK.gains, theme), hub.show, lambda: hub.watched)
+    sock = listen("127.0.0.1", 0)
+    access = Access("127.0.0.1", sock.getsockname()[1])
+    server = Server(access, hub, run)
+    await server.start(sock)
+    run.start()
+    try:
+        async with chromium(folder) as opened:
+            await opened.size(1000, 800)
+            await opened.call("Page.navigate", url=access.url())
+            await opened.until(f"{STEP} >= 0")
+            await pause(opened)
+            await opened.ask("document.querySelector('#restart').click()")
+            await opened.until(f"{STEP} == 0")
+            yield opened
+            assert opened.errors == []
+    finally:
+        run.end()
+        await server.stop()
+
+
+def walked(turn: float = 0.0) -> RecordedSource:
+    return RecordedSource(NETWORK.network, posed(RUN, *hexapod(len(RUN), turn, SOLIDS)))
+
+
+async def said(opened: Page) -> str:
+    """What the picture of the body is to whoever cannot see it."""
+    return str(await opened.ask("document.querySelector('#posed').getAttribute('aria-label')"))
+
+
+async def go(opened: Page, step: int) -> None:
+    await opened.ask(f"document.querySelector('#scrub').value = {step}")
+    await opened.ask("document.querySelector('#scrub').dispatchEvent(new Event('input', {bubbles: true}))")
+    await opened.until(f"{STEP} == {step}")
+    await opened.ask("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+async def pixels(opened: Page) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
+    """The panel as it is seen."""
+    box = await opened.ask("(({x, y, width, height}) => [x, y, width, height])(posed.getBoundingClientRect())")
+    assert isinstance(box, list)
+    x, y, wide, high = (round(value) for value in box)
+    picture = Image.open(io.BytesIO(await opened.shot())).convert("RGB").crop((x, y, x + wide, y + high))
+    return np.asarray(picture, np.int64)
+
+
+@pytest.mark.parametrize("theme", ["default", "dark"])
+def test_the_pose_is_that_of_the_step_that_is_shown(tmp_path: Path, theme: str) -> None:
+    async def look() -> None:
+        async with shown(walked(), tmp_path, theme) as opened:
+            assert await said(opened) == (
+                "the body 0.00 m forward, 6 of 6 feet touching; from above, and from its right side"
+            )
+            first = await pixels(opened)
+            await go(opened, 50)
+            assert (await said(opened)).startswith("the body 0.30 m forward, 3 of 6 feet touching;")
+            far = await pixels(opened)
+            assert (np.abs(first - far).sum(axis=2) > 30).mean() > 0.02
+            colours = THEMES[theme]
+            filled = (far[:, : far.shape[1] // 2] == channels(colours.positive)).all(axis=2)
+            torso = (far == channels(colours.zero)).all(axis=2)
+            assert filled.sum() > 3 * 30
+            assert torso.sum() > 2000
+            await opened.ask("document.querySelector('#back').click()")
+            await opened.until(f"{STEP} == 49")
+            await go(opened, 0)
+            assert (await pixels(opened) != first).mean() < 0.2  # it may have reached further by now
+
+    asyncio.run(look())
+
+
+def test_the_panel_closes_and_opens_and_is_read(tmp_path: Path) -> None:
+    async def look() -> None:
+        async with shown(walked(), tmp_path) as opened:
+            closed, button = "document.querySelector('#embodied').hidden", "document.querySelector('#bodily')"
+            assert await opened.ask(f"{closed} || {button}.hidden") is False
+            await opened.key("y")
+            assert await opened.ask(f"{closed} && {button}.getAttribute('aria-expanded') == 'false'") is True
+            await opened.ask(f"{button}.click()")
+            assert await opened.ask(closed) is False
+            await opened.key("v")
+            await opened.until("document.querySelector('#said').textContent.includes('the body 0.00 m forward')")
+
+    asyncio.run(look())
+
+
+def test_without_a_body_there_is_no_panel(tmp_path: Path) -> None:
+    async def look() -> None:
+        async with shown(RecordedSource(NETWORK.network, RUN), tmp_path) as opened:
+            assert await opened.ask("embodied.hidden && bodily.hidden") is True
+            await opened.key("y")
+            assert await opened.ask("embodied.hidden") is True
+
+    asyncio.run(look())
+
+
+def test_of_a_pose_that_is_not_known_nothing_is_drawn(tmp_path: Path) -> None:
+    skeleton, poses = hexapod(len(RUN))
+    poses[20:] = np.nan
+
+    async def look() -> None:
+        async with shown(RecordedSource(NETWORK.network, posed(RUN, skeleton, poses)), tmp_path) as opened:
+            await go(opened, 30)
+            assert (await said(opened)).startswith("the body: its pose is not known;")
+            torso = (await pixels(opened) == channels(THEMES["default"].zero)).all(axis=2)
+            assert torso.sum() < 50
+
+    asyncio.run(look())

@@ -1,0 +1,144 @@
+"""What the live view sends of a body: how it is drawn, once, and its pose with each frame; and the past of both."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import struct
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bodies_by_hand import hexapod, posed
+from toy_bodies import SKELETON, carted, registered
+
+import neurovis_spec as nv
+from neurovis_spec.body.model import Link, Skeleton
+from neurovis_spec.body.skeletons import skeleton_of
+from neurovis_spec.live.hub import Client, Hub
+from neurovis_spec.live.protocol import FRAME, SCENE, body_message
+from neurovis_spec.live.recorded import RecordedSource
+from neurovis_spec.live.run import Run, Shown
+from neurovis_spec.live.simulated import SimulatedSource
+from neurovis_spec.live.source import Drawn, Source
+from neurovis_spec.live.view import View, view_of
+
+
+@pytest.fixture(autouse=True)
+def _carts(monkeypatch: pytest.MonkeyPatch) -> None:
+    registered(monkeypatch)
+
+
+PLAIN = nv.compile_text("neurovis: 1\nname: plain\ntime: {dt: 0.05, steps: 30}\nneurons: {A: {}, B: {}}\n")
+
+
+def shown(source: Source, view: View) -> Shown:
+    return Run(source, view, lambda _: None).shown()
+
+
+def sent(*several: Shown) -> list[bytes | str]:
+    """What a client is sent that sees each of these."""
+
+    async def look() -> list[bytes | str]:
+        hub, client = Hub(asyncio.get_running_loop()), Client(True)
+        hub.join(client)
+        messages: list[bytes | str] = []
+        for one in several:
+            hub.show(one)
+            await asyncio.sleep(0)
+            messages += hub.messages(client)
+            client.ahead.clear()
+        return messages
+
+    return asyncio.run(look())
+
+
+def poses(messages: list[bytes | str]) -> Iterator[list[float]]:
+    """The poses of the frames among messages."""
+    for message in messages:
+        if isinstance(message, bytes) and message[0] == FRAME:
+            count = struct.unpack_from("<H", message, 38)[0]
+            yield np.frombuffer(message[len(message) - 4 * count :], "<f4").tolist()
+
+
+def bodies(messages: list[bytes | str]) -> list[dict[str, object]]:
+    """The messages that say how a body is drawn."""
+    read = [json.loads(message) for message in messages if isinstance(message, str)]
+    return [message for message in read if message["type"] == "body"]
+
+
+def test_a_body_that_runs_is_drawn_as_it_was_recorded_also_of_the_past() -> None:
+    network = carted()
+    source, view = SimulatedSource(network.simulator()), view_of(network, network.gains)
+    recording = network.run(100)
+    assert recording.pose is not None
+    seen = [shown(source, view)]
+    for step in [*range(1, 100), 17, 64, 3]:
+        source.go(step) if step <= source.reach.last else source.advance()
+        seen.append(shown(source, view))
+    for one in seen:
+        assert one.look.pose.tolist() == recording.pose[one.look.step].astype(np.float32).tolist()
+    assert [one.look.step for one in seen[-3:]] == [17, 64, 3]
+    messages = sent(*seen[:3], seen[-1])
+    assert list(poses(messages)) == [seen[at].look.pose.tolist() for at in (0, 1, 2, -1)]
+
+
+def test_how_it_is_drawn_is_sent_once_before_its_first_pose() -> None:
+    network = carted()
+    source, view = SimulatedSource(network.simulator()), view_of(network, network.gains)
+    first = shown(source, view)
+    source.advance()
+    messages = sent(first, shown(source, view))
+    (told,) = bodies(messages)
+    kinds = [message[0] if isinstance(message, bytes) else json.loads(message)["type"] for message in messages]
+    assert kinds == [SCENE, "status", "body", FRAME, FRAME]
+    assert skeleton_of(json.dumps(told["skeleton"])) == SKELETON
+    assert told["start"] == pytest.approx(network.run(1).pose[0, :2].tolist())  # type: ignore[index]
+
+
+def test_another_body_is_told_of_when_the_network_is_edited_and_none_where_it_has_none() -> None:
+    view, run = view_of(PLAIN, PLAIN.gains), PLAIN.run()
+    skeleton, walked = hexapod(len(run))
+    source = RecordedSource(PLAIN.network, posed(run, skeleton, walked))
+    point = Skeleton(("point",), ())
+    other = RecordedSource(PLAIN.network, posed(run, point, np.ones((len(run), 3))))
+    messages = sent(shown(source, view), shown(other, view), shown(RecordedSource(PLAIN.network, run), view))
+    told = bodies(messages)
+    read = [one["skeleton"] and skeleton_of(json.dumps(one["skeleton"])) for one in told]
+    assert read == [skeleton, point, None]
+    assert [len(pose) for pose in poses(messages)] == [skeleton.size, 3, 0]
+    assert [one["start"] for one in told] == [[0.0, 0.0], [1.0, 1.0], [0.0, 0.0]]
+
+
+@pytest.mark.parametrize("given", ["bare", None])
+def test_of_what_has_nothing_to_draw_nothing_is_said(given: str | None) -> None:
+    network = PLAIN if given is None else carted(given)
+    source = SimulatedSource(network.simulator())
+    messages = sent(shown(source, view_of(network, network.gains)))
+    assert bodies(messages) == []
+    assert list(poses(messages)) == [[]]
+
+
+def test_a_recording_is_drawn_by_the_poses_of_its_rows() -> None:
+    run = PLAIN.run()
+    skeleton, walked = hexapod(len(run))
+    walked[9] = np.nan
+    walked[10, 0] = 1e300
+    source = RecordedSource(PLAIN.network, posed(run, skeleton, walked))
+    view = view_of(PLAIN, PLAIN.gains)
+    for step in (0, 9, 10, 22):
+        source.go(step)
+        with np.errstate(over="ignore"):
+            wanted = walked[step].astype(np.float32)
+        assert shown(source, view).look.pose.tobytes() == wanted.tobytes()
+
+
+def test_a_body_of_more_numbers_than_a_frame_holds_is_not_drawn() -> None:
+    run = PLAIN.run(2)
+    vast = Skeleton(tuple(f"p{number}" for number in range(22_000)), (Link(0, 1, 0.1),))
+    source = RecordedSource(PLAIN.network, posed(run, vast, np.zeros((2, vast.size))))
+    messages = sent(shown(source, view_of(PLAIN, PLAIN.gains)))
+    assert [one["skeleton"] for one in bodies(messages)] == [None]
+    assert list(poses(messages)) == [[]]
+    assert json.loads(body_message(replace(Drawn(vast))))["skeleton"] is None
