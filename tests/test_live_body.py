@@ -14,6 +14,7 @@ from bodies_by_hand import hexapod, posed
 from chromium import Page, chromium
 from PIL import Image
 from test_live_browser import STEP, pause
+from test_live_everyone import violations
 
 import neurovis_spec as nv
 from neurovis_spec.body.model import Solid
@@ -151,5 +152,32 @@ def test_of_a_pose_that_is_not_known_nothing_is_drawn(tmp_path: Path) -> None:
             assert (await said(opened)).startswith("the body: its pose is not known;")
             torso = (await pixels(opened) == channels(THEMES["default"].zero)).all(axis=2)
             assert torso.sum() < 50
+
+    asyncio.run(look())
+
+
+@pytest.mark.parametrize("theme", ["default", "dark"])
+def test_axe_finds_nothing_where_the_body_is_shown(tmp_path: Path, theme: str) -> None:
+    async def look() -> None:
+        async with shown(walked(), tmp_path, theme) as opened:
+            assert await violations(opened) == []
+
+    asyncio.run(look())
+
+
+@pytest.mark.parametrize(("wide", "high", "beside"), [(1200, 800, True), (500, 800, False), (390, 844, False)])
+def test_the_panel_stands_where_there_is_room_for_it(tmp_path: Path, wide: int, high: int, beside: bool) -> None:
+    async def look() -> None:
+        async with shown(walked(), tmp_path) as opened:
+            await opened.size(wide, high)
+            boxes = "['#stage', '#embodied'].map(one => document.querySelector(one).getBoundingClientRect())"
+            found = await opened.ask(f"{boxes}.map(({{x, y, width, height}}) => [x, y, width, height])")
+            assert isinstance(found, list)
+            (x0, y0, wide0, high0), (x1, y1, wide1, high1) = found
+            assert (x1 >= x0 + wide0 - 1) == beside
+            assert (y1 >= y0 + high0 - 1) != beside
+            assert min(wide0, wide1) > 250
+            assert min(high0, high1) > 150
+            assert await opened.ask("document.documentElement.scrollWidth") == wide
 
     asyncio.run(look())
