@@ -10,6 +10,7 @@ import random
 from collections.abc import Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass
 
+from neurovis_spec.language.places import keys_at
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Scalar
 from neurovis_spec.language.yaml.source import Sequence as List
 
@@ -66,7 +67,7 @@ def _of_leaf(path: tuple[str, ...], entry: Entry | None, node: Scalar, free: Set
         yield Fault("wrong type", span.line, start, end, "true", start)
         # each is a mistake of its own: an expression that stands in several cells is told of once
         yield Fault("unknown name", span.line, start, end, f"nothing{span.line}x{start}*2", start)
-    elif isinstance(node.value, str):
+    elif isinstance(node.value, str) and not keys_at(path):  # as a theme, which may be a mapping
         yield Fault("wrong type", span.line, start, end, "{}", start)
     if number and key in _COUNTS:
         yield Fault("out of range", span.line, start, end, "-1", start)

@@ -10,9 +10,9 @@ those of their own checks of a dozen such specs, as measured once.
 A suggestion is right where the word stands first, or behind none but words that are as few slips away from what is
 written: ``sensorp`` may be ``sensor1`` as well as ``sensor2``. Of several faults each has to be found at its place; a
 finding at another place is a follow-up, which is counted, too. One fault alone can wait for another: a setting of a
-definition, such as ``{chase: {colour: red}}``, where another fault lies in what the same definition declares
-(``signals: [{}]``, ``parameters``), so that nobody can know whether ``colour`` is among it. Such are told apart
-(``waits``); all others are misses.
+definition, such as ``{chase: {colour: red}}``, or a name in its formulas, where another fault lies in what the same
+definition declares (``signals: [{}]``, ``parameters``): nobody can know whether ``colour`` is among it. Such are
+told apart (``waits``); all others are misses.
 """
 
 from __future__ import annotations
@@ -245,14 +245,15 @@ def possible(words: list[Word], root: Mapping) -> list[Fault]:
 
 
 def bound(root: Mapping) -> list[tuple[Span, Span]]:
-    """Where each definition declares what can be set, and where something of it is set."""
+    """Where each definition declares what can be set, and where something of it is set, or read by its formulas."""
     result: list[tuple[Span, Span]] = []
     for section in ("activations", "models", "rules"):
         definitions = root.get(section)
         for definition in definitions.entries if isinstance(definitions, Mapping) else ():
             assert isinstance(definition.value, Mapping)
             declared = [entry for entry in definition.value.entries if entry.name in ("parameters", "signals")]
-            for used in settings(root, definition.name):
+            formulas = [entry.value.span for entry in definition.value.entries if entry not in declared]
+            for used in (*settings(root, definition.name), *formulas):
                 for entry in declared:
                     key, value = entry.key.span, entry.value.span
                     whole = Span(key.file, key.line, key.column, value.end_line, value.end_column)
@@ -274,7 +275,7 @@ def settings(node: Node, name: str, under: str = "") -> Iterator[Span]:
 
 
 def waits(fault: Fault, picked: list[Fault], places: list[tuple[Span, Span]]) -> bool:
-    """Whether a fault is a setting of a definition of which another fault hides what can be set."""
+    """Whether a fault is a setting or a name of a definition of which another fault hides what can be set."""
     return any(
         inside(fault, used) and any(inside(other, declared) for other in picked if other is not fault)
         for declared, used in places
