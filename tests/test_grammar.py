@@ -121,7 +121,7 @@ def test_its_formulas_are_found_by_what_they_see() -> None:
     spec = shape.read_spec(document, findings)
     assert spec is not None
     group = spec.neurons["K"]
-    assert [(one.path, one.text) for one in formulas_of(group, ("i",))] == [
+    assert [(one.path, one.text) for one in formulas_of(group, ("i", "n"))] == [
         (("mood",), "i*k"),
         (("bias",), "i"),
         (("activation", "gaussian", "mean"), "n"),

@@ -5,6 +5,7 @@ In: a path of keys and indices. Out: Keys, Roles and words, read from the fields
 
 from __future__ import annotations
 
+import re
 import types
 from collections.abc import Collection, Iterator
 from functools import lru_cache
@@ -107,24 +108,26 @@ class Written(NamedTuple):
 
 
 def formulas_of(model: Model, seen: Collection[str]) -> Iterator[Written]:
-    """The formulas of a model that are texts and see any of some names."""
-    yield from _formulas(model.source, (_Place(type(model)),), frozenset(seen), ())
+    """The formulas of a model that are texts, hold any of some names and see them."""
+    wanted = re.compile(rf"\b(?:{'|'.join(seen)})\b", re.ASCII)
+    for node, path in _texts(model.source, (), wanted):
+        role = role_at(type(model), *path)
+        if role is not None and role.use in ("formula", "setting value") and not set(seen).isdisjoint(role.sees):
+            yield Written(str(node.value), node, tuple(part for part in path if isinstance(part, str)))
 
 
-def _formulas(node: Node, places: tuple[_Place, ...], seen: frozenset[str], path: tuple[str, ...]) -> Iterator[Written]:
+def _texts(node: Node, path: Path, wanted: re.Pattern[str]) -> Iterator[tuple[Scalar, Path]]:
     match node:
         case Scalar(value=str() as text):
-            role = _role(places)
-            if role is not None and role.use in ("formula", "setting value") and not seen.isdisjoint(role.sees):
-                yield Written(text, node, path)
+            if wanted.search(text):
+                yield node, path
         case Mapping(entries=entries):
             for entry in entries:
-                yield from _formulas(entry.value, _below(places, entry.name), seen, (*path, entry.name))
-        case Packed(texts=texts) if all(text.isidentifier() and text not in seen for text in texts):
-            return  # of many numbers and names none is asked
+                yield from _texts(entry.value, (*path, entry.name), wanted)
         case Sequence() | Packed():
-            for index, item in enumerate(node.items):
-                yield from _formulas(item, _below(places, index), seen, path)
+            if isinstance(node, Sequence) or any(map(wanted.search, node.texts)):  # of many numbers none is asked
+                for index, item in enumerate(node.items):
+                    yield from _texts(item, (*path, index), wanted)
 
 
 def _role(places: tuple[_Place, ...]) -> Role | None:

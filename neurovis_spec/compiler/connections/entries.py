@@ -53,7 +53,7 @@ class Bundle(NamedTuple):
     high: float
     learning: Learning | None
     description: str | None
-    #: whether no neuron is in both ends of the entry
+    #: whether no neuron is in both ends of an entry that says what holds of these
     apart: bool
     #: what of it follows parameters: ``weights``, ``first`` of an entry that learns (its first weights, which nothing
     #: that is set in a run changes), ``centres``, ``low``, ``high``, ``rule``
@@ -152,7 +152,7 @@ class EntryBuilder:
             bounds[1],
             learning,
             None if body.description is None else body.description.value,
-            not np.isin(self.sources, self.targets).any(),
+            body.self is not None and not np.isin(self.sources, self.targets).any(),
             (
                 *(part._replace(field="weights" if learning is None else "first") for part in weighted),
                 *(part._replace(field="centres") for part in centred),
