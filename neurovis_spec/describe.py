@@ -5,6 +5,12 @@ In: a Network, and the layout engine with the reason for it. Out: a dict of plai
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from math import isfinite
+from typing import NamedTuple
+
+from neurovis_spec.body.kinds import open_body
+from neurovis_spec.body.model import BodyError, Port
 from neurovis_spec.compiler.names.state_references import names_of_states
 from neurovis_spec.compiler.network import Network
 
@@ -13,6 +19,7 @@ def describe(network: Network, engine: tuple[str, str]) -> dict[str, object]:
     """The object of ``inspect``: keys and shapes as the contract states them."""
     owners = [group for group in network.neurons.groups for _ in range(group.count)]
     names, connections = network.neurons.names, network.connections
+    sensed = set() if network.body is None else {one.input for one in network.body.sensed}
     rules = [None if rule < 0 else network.plasticity[rule].rule.name for rule in connections.rules.tolist()]
     return {
         "name": network.name,
@@ -44,8 +51,12 @@ def describe(network: Network, engine: tuple[str, str]) -> dict[str, object]:
             )
         ],
         "inputs": [
-            {"name": entry.name, "size": entry.size, "source": _source(entry.expression, entry.table)}
-            for entry in network.inputs
+            {
+                "name": entry.name,
+                "size": entry.size,
+                "source": "sensors" if index in sensed else _source(entry.expression, entry.table),
+            }
+            for index, entry in enumerate(network.inputs)
         ],
         "outputs": [
             {"name": entry.name, "neurons": [names[neuron] for neuron in entry.neurons.tolist()]}
@@ -54,7 +65,54 @@ def describe(network: Network, engine: tuple[str, str]) -> dict[str, object]:
         ],
         "engine": {"name": engine[0], "reason": engine[1]},
         "hash": network.hash,
+        **({} if network.body is None else {"body": _body(network)}),
     }
+
+
+class Wired(NamedTuple):
+    """The sensors of a body, each with the inputs that take of it, and its actuators, each with its commands."""
+
+    sensors: tuple[tuple[Port, tuple[str, ...]], ...]
+    actuators: tuple[tuple[Port, Mapping[str, str]], ...]
+
+
+def wired(network: Network) -> Wired | None:
+    """What of its body a network senses and moves; None where the body cannot be opened: what it needs is missing."""
+    settings = network.body
+    assert settings is not None
+    try:
+        body = open_body(settings.kind, settings.given, settings.path, network.dt, settings.substeps)
+    except BodyError:
+        return None
+    taken = [(name, network.inputs[one.input].name) for one in settings.sensed for name in one.sensors]
+    told = [(one.actuator, one.text) for one in settings.moved]
+    return Wired(
+        tuple((port, tuple(dict.fromkeys(of for name, of in taken if _is_of(name, port)))) for port in body.sensors),
+        tuple((port, {name: text for name, text in told if _is_of(name, port)}) for port in body.actuators),
+    )
+
+
+def _body(network: Network) -> dict[str, object]:
+    """The body, its ports null where they are not known."""
+    settings, found = network.body, wired(network)
+    assert settings is not None
+    sensors = found and [{**_port(port), "inputs": list(inputs)} for port, inputs in found.sensors]
+    actuators = found and [{**_port(port), **_range(port), "commands": told} for port, told in found.actuators]
+    about = {"kind": settings.kind, "given": settings.given, "substeps": settings.substeps}
+    return {**about, "sensors": sensors, "actuators": actuators}
+
+
+def _port(port: Port) -> dict[str, object]:
+    return {"name": port.name, "size": port.size, "unit": port.unit}
+
+
+def _range(port: Port) -> dict[str, object]:
+    return {key: bound if isfinite(bound) else None for key, bound in (("low", port.low), ("high", port.high))}
+
+
+def _is_of(name: str, port: Port) -> bool:
+    """Whether a name is that of a sensor or an actuator, or of one number of it."""
+    return name == port.name or any(name == f"{port.name}[{i}]" for i in range(port.size))
 
 
 def _source(expression: object, table: object) -> str:

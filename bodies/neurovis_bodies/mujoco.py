@@ -64,8 +64,8 @@ class _Whole:
 
 def _whole(path: Path) -> _Whole:
     """A model and its files. Raises BodyError."""
-    places = sorted({path, *(place for place in files_of(path) if place.is_file())})
     try:
+        places = sorted({path, *(place for place in files_of(path) if place.is_file())})
         return _Whole(path, tuple((os.path.relpath(place, path.parent), _digest(place)) for place in places))
     except OSError as error:
         raise BodyError(f"'{path.name}': {error}") from None

@@ -32,7 +32,8 @@ def substeps_of(dt: float, given: int | None, own: float, whose: str) -> int:
         return fitting
     if fits:
         message = f"{given} substeps are {given * own:.12g} s, a step of the network is {dt:.12g} s; {steps}"  # type: ignore[operator]
-        raise BodyError(message, f"write substeps: {fitting}", "substeps")
+        raise BodyError(message, f"write substeps: {fitting}", "substeps", (dt, fitting))
     taken = max(fitting, 1) if given is None else given
     message = f"no number of substeps makes a step of the network, which is {dt:.12g} s: {steps}"
-    raise BodyError(message, f"write time: {{dt: {taken * own:.12g}}} and substeps: {taken}", "substeps")
+    hint = f"write time: {{dt: {taken * own:.12g}}} and substeps: {taken}"
+    raise BodyError(message, hint, "substeps", (taken * own, taken))

@@ -28,7 +28,7 @@ def kinds() -> tuple[str, ...]:
 def load_kind(name: str) -> BodyKind:
     """A kind of bodies by its name. Raises BodyError, BodyMissingError where what it needs is not installed."""
     try:
-        return cast(BodyKind, plugins.load(plugins.BODIES, name))
+        loaded = plugins.load(plugins.BODIES, name)
     except KeyError:
         raise BodyError(f"there is no kind of body '{name}'") from None
     except plugins.PluginError as error:
@@ -37,6 +37,9 @@ def load_kind(name: str) -> BodyKind:
             hint = "pip install 'neurovis-spec[sim]'" if name in _NEEDS else None
             raise BodyMissingError(message, hint, name) from None
         raise BodyError(str(error), key=name) from None
+    if not all(hasattr(loaded, part) for part in ("takes_file", "files", "open")):
+        raise BodyError(f"the plug-in '{name}' opens no bodies: it has not all that a BodyKind has", key=name)
+    return cast(BodyKind, loaded)
 
 
 def open_body(kind: str, given: str, path: Path | None, dt: float, substeps: int | None) -> Body:

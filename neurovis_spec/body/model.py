@@ -17,11 +17,18 @@ from neurovis_spec.arrays import FloatArray
 
 class BodyError(ValueError):
     """A body cannot be opened, or cannot do what is asked of it; ``hint`` says what would help. ``key`` is the key of
-    the spec's ``body`` that the fault lies in (``mujoco``, ``substeps``), if it lies in one."""
+    the spec's ``body`` that the fault lies in (``mujoco``, ``substeps``), if it lies in one. Where the length of a step
+    does not fit, ``fitting`` are the seconds and the substeps of one that does."""
 
-    def __init__(self, message: str, hint: str | None = None, key: str | None = None) -> None:
+    def __init__(
+        self,
+        message: str,
+        hint: str | None = None,
+        key: str | None = None,
+        fitting: tuple[float, int] | None = None,
+    ) -> None:
         super().__init__(message)
-        self.hint, self.key = hint, key
+        self.hint, self.key, self.fitting = hint, key, fitting
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,11 +14,13 @@ import numpy as np
 from neurovis_spec.cli.files import count
 from neurovis_spec.cli.tables import number, spread, table
 from neurovis_spec.compiler.names.state_references import names_of_states
+from neurovis_spec.describe import wired
 from neurovis_spec.findings import printable
 
 if TYPE_CHECKING:
     from neurovis_spec.arrays import IntArray
     from neurovis_spec.compiled import CompiledNetwork
+    from neurovis_spec.compiler.body_settings import BodySettings
     from neurovis_spec.compiler.network import Group, Input, Network
 
 #: The largest network whose connection matrix is shown, in neurons.
@@ -43,7 +45,9 @@ def _parts(compiled: CompiledNetwork, network: Network) -> Iterator[str]:
         entries = [_entry(network, index, name) for index, name in enumerate(network.connections.entries)]
         yield "connections\n" + table(*_without_empty(entries, _OF_ENTRIES))
     if network.inputs:
-        yield "inputs\n" + table([_input(entry) for entry in network.inputs], ("name", "size", "source"))
+        sensed = set() if network.body is None else {one.input for one in network.body.sensed}
+        inputs = [_input(entry, index in sensed) for index, entry in enumerate(network.inputs)]
+        yield "inputs\n" + table(inputs, ("name", "size", "source"))
     if network.outputs:
         names = network.neurons.names
         outputs = [
@@ -51,6 +55,8 @@ def _parts(compiled: CompiledNetwork, network: Network) -> Iterator[str]:
             for o in network.outputs
         ]
         yield "outputs\n" + table(outputs, ("name", "of"))
+    if network.body is not None:
+        yield from _body(network, network.body)
     yield _matrix(network)
     choices = [("layout engine", *compiled.choose_engine()), ("backend", *compiled.choose_backend())]
     yield "choices\n" + table([(what, f"{name}: {why}") for what, name, why in choices])
@@ -124,13 +130,39 @@ def _bounds(low: float, high: float) -> str:
     return "" if low == -np.inf and high == np.inf else f"{number(low)} … {number(high)}"
 
 
-def _input(entry: Input) -> tuple[str, str, str]:
+def _input(entry: Input, is_sensed: bool) -> tuple[str, str, str]:
     source = "external"
-    if entry.expression is not None:
+    if is_sensed:
+        source = "sensors"
+    elif entry.expression is not None:
         source = "expression"
     elif entry.table is not None:
         source = f"table of {count(len(entry.table), 'row')}"
     return entry.name, str(entry.size), source
+
+
+def _body(network: Network, settings: BodySettings) -> Iterator[str]:
+    """The body, and what of it is sensed and moved."""
+    steps = "" if settings.substeps is None else f", {count(settings.substeps, 'substep')} a step"
+    head = f"body\n  {printable(f'{settings.kind}: {settings.given}')}{steps}"
+    found = wired(network)
+    if found is None:
+        yield f"{head}\n  it cannot be opened here: its sensors and actuators are not known"
+        return
+    yield head
+    if found.sensors:
+        rows = [(port.name, str(port.size), port.unit, " ".join(inputs)) for port, inputs in found.sensors]
+        yield "sensors\n" + table(rows, ("name", "size", "unit", "input"))
+    if found.actuators:
+        told = [
+            (port.name, str(port.size), port.unit, _bounds(port.low, port.high), _commands(port.name, commands))
+            for port, commands in found.actuators
+        ]
+        yield "actuators\n" + table(told, ("name", "size", "unit", "range", "command"))
+
+
+def _commands(actuator: str, commands: Mapping[str, str]) -> str:
+    return ", ".join(text if name == actuator else f"{name}: {text}" for name, text in commands.items())
 
 
 def _matrix(network: Network) -> str:

@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from neurovis_spec.body.kinds import BodyMissingError, load_kind, open_body
 from neurovis_spec.body.model import Body, BodyError, Port
@@ -35,6 +35,14 @@ from neurovis_spec.language.unknown import UNKNOWN
 _ONE: Final = re.compile(r"(.*)\[\s*([0-9]{1,9})\s*\]", re.DOTALL)
 
 
+class Clock(NamedTuple):
+    """The seconds of a step of the network, and how many steps of the body these are, as the spec says it."""
+
+    dt: float
+    substeps: int | None = None
+    written: Formula | None = None
+
+
 @dataclass(frozen=True)
 class Place:
     """Where the files of a spec lie, and which folder they may not leave."""
@@ -53,15 +61,23 @@ def body_settings(
     substeps = None if model.substeps is None else constants.integer(model.substeps, "'substeps'", 1)
     path = body = None
     if given is not None and len(model.kinds) == 1:
-        path, ready = _found(kind, given, place, findings)
-        if ready and dt_known and substeps is not UNKNOWN:
-            body = _opened(model, kind, given, path, constants.dt, substeps, findings)
+        clock = None if substeps is UNKNOWN or not dt_known else Clock(constants.dt, substeps, model.substeps)
+        path, body = find_body(kind, given, place, clock, findings)
     sensed = tuple(_sensed(model, around, None if body is None else body.sensors, findings))
     moved = tuple(_moved(model, around, None if body is None else body.actuators, constants))
     each_episode = model.reset is not None and model.reset.value == "each_episode"
     if given is None or substeps is UNKNOWN:
         return None
     return BodySettings(kind, given.value, path, substeps, sensed, moved, each_episode)
+
+
+def find_body(
+    kind: str, given: Located[str], place: Place, clock: Clock | None, findings: Findings
+) -> tuple[Path | None, Body | None]:
+    """The file that a body is made of, where its kind takes one, and the body; None where it cannot be opened, or the
+    clock is not known."""
+    path, ready = _found(kind, given, place, findings)
+    return path, _opened(kind, given, path, clock, findings) if ready and clock is not None else None
 
 
 def _found(kind: str, given: Located[str], place: Place, findings: Findings) -> tuple[Path | None, bool]:
@@ -87,33 +103,29 @@ def _found(kind: str, given: Located[str], place: Place, findings: Findings) -> 
     except BodyMissingError as error:
         _warn_unchecked(error, given, findings)
         return (place.base / given.value).resolve(), False
-    except (BodyError, OSError, RuntimeError) as error:
-        findings.error("bad-body", given.span, str(error), getattr(error, "hint", None))
-        return None, False
+    except BodyError as error:
+        findings.error("bad-body", given.span, str(error), error.hint)
+    except Exception as error:  # whatever somebody's code raises while it looks at a file
+        findings.error("bad-body", given.span, f"'{shorten(given.value)}' cannot be opened: {error!r}")
+    return None, False
 
 
 def _warn_unchecked(error: BodyMissingError, given: Located[str], findings: Findings) -> None:
     findings.warning("body-unchecked", given.span, f"{error}: the names in 'body' are not checked", error.hint)
 
 
-def _opened(
-    model: BodyModel,
-    kind: str,
-    given: Located[str],
-    path: Path | None,
-    dt: float,
-    substeps: int | None,
-    findings: Findings,
-) -> Body | None:
+def _opened(kind: str, given: Located[str], path: Path | None, clock: Clock, findings: Findings) -> Body | None:
     try:
-        return open_body(kind, given.value, path, dt, substeps)
+        return open_body(kind, given.value, path, clock.dt, clock.substeps)
     except BodyMissingError as error:
         _warn_unchecked(error, given, findings)
         return None
     except BodyError as error:
-        at = model.substeps if error.key == "substeps" and model.substeps is not None else given
+        at = clock.written if error.key == "substeps" and clock.written is not None else given
         findings.error("bad-body", at.span, str(error), error.hint)
-        return None
+        if error.fitting is None:
+            return None
+        return _opened(kind, given, path, Clock(*error.fitting), Findings())  # its names are what they are
 
 
 def _sensed(
@@ -213,7 +225,8 @@ def _moved(
 def _command(actuator: str, formula: Formula, around: Surroundings, constants: Constants) -> Moved | None:
     """The command of an actuator; None, and a finding, where it is invalid."""
     findings = constants.findings
-    outputs = names_of(around.spec, "outputs", {output.name: output for output in around.outputs})
+    made = {output.name: output for output in around.outputs}
+    outputs = names_of(around.spec, "outputs", {**dict.fromkeys(around.spec.outputs, UNKNOWN), **made})
     known = _Bases(Together((outputs, constants.names, ALWAYS)))
     tree = parse_formula(formula, known, findings, what="outputs and parameters", subscripts=True)
     if tree is UNKNOWN:
@@ -246,7 +259,7 @@ def _command(actuator: str, formula: Formula, around: Surroundings, constants: C
     if not found and is_constant(tree, (*ALWAYS, *constants.parameters)) and constants.value(formula) is UNKNOWN:
         return None
     parameters = tuple((name, slot) for name, slot in places_of(tree, constants.settable).items() if name not in found)
-    return Moved(actuator, tree, tuple(found.values()), parameters)
+    return Moved(actuator, tree, tuple(found.values()), parameters, str(formula.value))
 
 
 def _number(output: Output, number: int | None, span: Span, findings: Findings) -> int | None:

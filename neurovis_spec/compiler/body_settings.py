@@ -24,14 +24,15 @@ class Sensed:
 class Moved:
     """An actuator (``name``, or ``name[i]``) and its command: an expression of outputs and parameters.
 
-    ``outputs``: the names in the expression, each with the index of an output and of a number in it. ``parameters``:
-    the names in it, each with a slot of ``Network.settable``.
+    ``outputs``: the names in it, each with the index of an output and of a number in that. ``parameters``: the names in
+    it, each with a slot of ``Network.settable``. ``text`` is the expression as it is written.
     """
 
     actuator: str
     command: Tree
     outputs: tuple[tuple[str, int, int], ...]
     parameters: tuple[tuple[str, int], ...]
+    text: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ from neurovis_spec.language.patterns import PATTERNS
 from neurovis_spec.language.places import keys_at, role_of, words_at
 from neurovis_spec.language.ros_types import all_types, numbers_of
 from neurovis_spec.language.templates import Hole, pieces
+from neurovis_spec.lsp.bodies import described, ports_of
 from neurovis_spec.lsp.cursor import Where, where
 from neurovis_spec.lsp.definitions import Definition, known
 from neurovis_spec.lsp.document import Document
@@ -105,7 +106,7 @@ def _offers(
     span = _span(document.file, place, word, rest)
     front = at.typed[: len(at.typed) - len(word)]
     colon = ": " if is_key and not at.colon and role is not None and role.use != "ends" else ""
-    for offer in _of_role(role, scope, path, front, index, place):
+    for offer in (*_of_role(role, scope, path, front, index, place), *_of_body(role, document)):
         label = offer.label
         yield Completion(label, offer.sort, label + colon, span, offer.detail, offer.documentation)
     for label, about in () if is_key else words_at(path).items():
@@ -159,6 +160,20 @@ def _of_role(role: Role | None, scope: Scope, path: Path, front: str, index: Ind
             yield from _modules(index)
         case "names" if role.kind == "output":
             yield from (_Offer(name.text, "word", "output") for name in index.declared("output"))
+
+
+def _of_body(role: Role | None, document: Document) -> Iterator[_Offer]:
+    """The names that a body has, and the kinds of what a command is made of besides parameters."""
+    if role is None:
+        return
+    if role.use == "formula" and role.kind == "output":
+        yield from (_Offer(name.text, "word", "output") for name in document.index.declared("output"))
+    if role.use not in ("sensor", "actuator"):
+        return
+    for port in ports_of(document, role.use):
+        yield _Offer(port.name, "word", described(port))
+        several = range(port.size if 1 < port.size <= _FEW else 0)
+        yield from (_Offer(f"{port.name}[{i}]", "word", port.unit) for i in several)
 
 
 def _in_braces(front: str) -> bool:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.expressions.given import GIVEN
@@ -17,6 +18,7 @@ from neurovis_spec.language.grammar import Role
 from neurovis_spec.language.patterns import PATTERNS
 from neurovis_spec.language.places import key_at, role_of
 from neurovis_spec.language.templates import Hole, pieces
+from neurovis_spec.lsp.bodies import described, ports_of
 from neurovis_spec.lsp.definitions import known
 from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.index import Found, Index
@@ -53,11 +55,21 @@ def hover(document: Document, place: Place) -> Hover | None:
         pattern = PATTERNS[item.text]
         settings = ", ".join(pattern.settings)
         return Hover(f"**{item.text}** (pattern): {pattern.about}" + (f" ({settings})" * bool(settings)), item.span)
+    if role is not None and role.use in ("sensor", "actuator"):
+        return _port(document, item, role.use)
     if role is not None and role.use == "ends" and item.is_key:
         description = document.index.values.get((*item.path, "description"))
         return None if description is None else Hover(f"**{item.text}**\n\n{description.text}", item.span)
     key = key_at(item.path) if item.is_key else None
     return None if key is None else Hover(f"**{key.name}**: {key.description}", item.span)
+
+
+def _port(document: Document, item: Item, use: Literal["sensor", "actuator"]) -> Hover | None:
+    """A sensor or an actuator of the body."""
+    base = item.text.partition("[")[0]
+    named = {port.name: port for port in ports_of(document, use)}
+    port = named.get(item.text) or named.get(base)
+    return None if port is None else Hover(f"**{port.name}** ({use}): {described(port)}", item.span)
 
 
 def _given(item: Item, role: Role, place: Place) -> Hover | None:

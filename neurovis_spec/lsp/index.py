@@ -70,7 +70,7 @@ class Index:
 
     @property
     def _lookup(self) -> Lookup:
-        return Lookup(self.module_of, self._is_signal)
+        return Lookup(self.module_of, self._is_signal, lambda name: ("outputs", name) in self.keys)
 
     @cached_property
     def declarations(self) -> tuple[Name, ...]:

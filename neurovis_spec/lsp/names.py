@@ -44,10 +44,11 @@ class Name:
 @dataclass(frozen=True)
 class Lookup:
     """What the reading of some names needs to know of others: the module of an instance, whether a setting of a rule
-    is a signal."""
+    is a signal, whether an output is called so."""
 
     module_of: Callable[[str, str | None], str | None]
     is_signal: Callable[[str, str], bool]
+    is_output: Callable[[str], bool]
 
 
 def names_of(items: Iterable[Item], text: Text, lookup: Lookup) -> Iterator[Name]:
@@ -61,13 +62,13 @@ def names_of(items: Iterable[Item], text: Text, lookup: Lookup) -> Iterator[Name
 def _names(item: Item, role: Role, scope: Scope, text: Text, lookup: Lookup) -> Iterator[Name]:
     match role.use:
         case "formula" | "template":
-            yield from _formula(item, role, scope, text)
+            yield from _formula(item, role, scope, text, lookup)
         case "setting value":
             rule, setting = item.path[-2:] if isinstance(item.path[-1], str) else item.path[-3:-1]
             if lookup.is_signal(str(rule), str(setting)):
                 yield from _references(item, scope, text, lookup)
             else:
-                yield from _formula(item, role, scope, text)
+                yield from _formula(item, role, scope, text, lookup)
         case "ends" | "references":
             yield from _references(item, scope, text, lookup)
         case "setting":
@@ -95,7 +96,7 @@ def _whole(item: Item, kind: Kind, scope: Scope, text: Text, declares: bool = Fa
     return Name(kind, item.text, span, scope, item, declares, exact)
 
 
-def _formula(item: Item, role: Role, scope: Scope, text: Text) -> Iterator[Name]:
+def _formula(item: Item, role: Role, scope: Scope, text: Text, lookup: Lookup) -> Iterator[Name]:
     """The names of an expression that somebody declares: no constants, no functions, nothing that is given here."""
     found = [match for match in _IN_FORMULA.finditer(item.text) if match[1] not in _WORDS]
     if role.use == "template":
@@ -105,7 +106,9 @@ def _formula(item: Item, role: Role, scope: Scope, text: Text) -> Iterator[Name]
     local = scope.definition is not None
     for match, (span, exact) in zip(found, places, strict=True):
         if match[2] is None and match[1] not in ALWAYS and match[1] not in role.sees:
-            yield Name("local" if local else "parameter", match[1], span, scope, item, False, exact)
+            output = role.kind == "output" and lookup.is_output(match[1])
+            kind: Kind = "output" if output else "local" if local else "parameter"
+            yield Name(kind, match[1], span, scope, item, False, exact)
 
 
 def _references(item: Item, scope: Scope, text: Text, lookup: Lookup) -> Iterator[Name]:
