@@ -21,6 +21,7 @@ PAGES = [
         "CONTRIBUTING.md",
         "CHANGELOG.md",
         "docs/architecture.md",
+        "docs/bodies.md",
         "docs/editors.md",
         "docs/language.md",
         "docs/measures.md",

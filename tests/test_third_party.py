@@ -63,7 +63,9 @@ def good(site: Path, *arguments: str) -> str:
 def test_the_page_has_one_of_each(site: Path) -> None:
     points = (site / "acme-1.0.dist-info" / "entry_points.txt").read_text(encoding="utf-8")
     groups = re.findall(r"^\[(.*)\]$", points, re.MULTILINE)
-    assert groups == [f"neurovis.{kind}" for kind in ("libraries", "layouts", "renderers", "backends", "formats")]
+    assert groups == [
+        f"neurovis.{kind}" for kind in ("libraries", "layouts", "renderers", "backends", "formats", "bodies")
+    ]
 
 
 def test_without_the_package_nothing_of_it_is_known(site: Path) -> None:
@@ -139,3 +141,23 @@ def test_a_format(site: Path) -> None:
     done = call(site, "render", "guest.yaml", "--recording", "other.json", "-o", "c.svg")
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.startswith("error: other.json: no recording")
+
+
+def test_a_body(site: Path) -> None:
+    body = "outputs: {back: B}\nbody: {cart: '4', substeps: 3, sensors: {push: place}, actuators: {push: -back}}\n"
+    (site / "cart.yaml").write_text(SPEC.replace("{push: {expression: sin(k)}}", "{push: {}}") + body, encoding="utf-8")
+    assert good(site, "validate", "cart.yaml") == "cart.yaml: ok (2 neurons, 2 connections)\n"
+    shown = good(site, "inspect", "cart.yaml")
+    assert "place  1     m     push" in shown
+    assert "push  1     N     -1 … 1  -back" in shown
+    good(site, "run", "cart.yaml", "-o", "cart.csv")
+    table = np.genfromtxt(site / "cart.csv", delimiter=",", names=True)
+    (place,) = (name for name in table.dtype.names or () if name.endswith("place"))
+    assert 0.1 < table[place][0] < 0.2
+    np.testing.assert_array_equal(table["A"], table[place])
+    (site / "slip.yaml").write_text((site / "cart.yaml").read_text().replace("push: place", "push: plaec"))
+    done = call(site, "validate", "slip.yaml")
+    assert "error[unknown-sensor]: the body has no sensor 'plaec'" in done.stderr
+    assert "did you mean 'place'?" in done.stderr
+    (site / "soft.yaml").write_text((site / "cart.yaml").read_text().replace("'4'", "soft"))
+    assert "error[bad-body]: 'soft' is no stiffness" in call(site, "validate", "soft.yaml").stderr
