@@ -1,7 +1,8 @@
 """The spec as one text: what it includes and the data that it reads are inside.
 
 In: a Spec, how it was compiled. Out: a YAML text that compiles to the same network (of the same hash) anywhere. A spec
-that names no files, and of which nothing was set from outside, stays as it was written.
+that names no files, and of which nothing was set from outside, stays as it was written. A body stays behind: it is not
+of the network, and lies where its files are.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ class _Reader:
             return {**rest, "values": self._table(node, folder)}
         result: dict[str, Plain] = {}
         for entry in node.entries:
-            if path == ("layout",) and entry.name == "file":
+            if (path == ("layout",) and entry.name == "file") or (not path and entry.name == "body"):
                 self.inlined = True
                 continue
             result[entry.name] = self.value(entry.value, folder, (*path, entry.name))

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from neurovis_bodies import mujoco as kind
 
 from neurovis_spec.body import Body, BodyError
@@ -197,6 +200,15 @@ def test_a_model_says_which_files_it_names(tmp_path: Path) -> None:
     )
     found = {path.relative_to(folder).as_posix() for path in kind.MujocoKind().files(folder / "leg.xml")}
     assert {"parts/foot.xml", "skins/sky.png", "shapes/../toe.stl", "parts/../toe.stl", "../toe.stl"} <= found
+
+
+@given(st.binary(max_size=60), st.integers(0, 10_000), st.integers(0, 60))
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_no_text_is_too_odd_to_be_searched_for_files(tmp_path: Path, odd: bytes, at: int, less: int) -> None:
+    whole = LEG.replace("<worldbody>", '<include file="leg.xml"/><worldbody>').encode()
+    (tmp_path / "leg.xml").write_bytes(whole[: at % len(whole)] + odd + whole[at % len(whole) + less :])
+    with suppress(BodyError):
+        assert all(isinstance(place, Path) for place in kind.MujocoKind().files(tmp_path / "leg.xml"))
 
 
 def test_a_command_that_is_no_number_and_a_simulation_that_fails(

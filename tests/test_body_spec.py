@@ -206,3 +206,28 @@ def test_an_output_is_renamed_in_commands(folder: Path) -> None:
     document, place = marked((SPEC + BODY).replace("legs: B", "le¦gs: B"), folder)
     edited = apply(document, rename(document, place, "limbs"))
     assert edited.source == (SPEC + BODY).replace("legs", "limbs")
+
+
+def test_the_text_of_a_network_goes_anywhere_without_its_body(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    compiled = nv.compile_text(SPEC + BODY, folder=folder)
+    elsewhere = nv.compile_text(compiled.text(), folder=tmp_path_factory.mktemp("elsewhere"))
+    assert elsewhere.hash == compiled.hash
+    assert elsewhere.network.body is None
+
+
+ODD = ["[]", "0", "''", "~", "{}", "{a: }", *(f"{{hip: {odd}}}" for odd in ("[1]", "''", "{}", "1e999")), "{[a]: 1}"]
+
+
+@pytest.mark.parametrize("key", ["sensors", "actuators", "substeps", "reset", "mujoco"])
+def test_what_is_out_of_place_is_a_finding(folder: Path, key: str) -> None:
+    for value in ODD:
+        body = {"mujoco": "leg.xml", key: value}
+        text = SPEC + "body:\n" + "".join(f"  {one}: {what}\n" for one, what in body.items())
+        if value == "{}" and key in ("sensors", "actuators"):
+            nv.compile_text(text, folder=folder)
+            continue
+        with pytest.raises(nv.SpecError) as caught:
+            nv.compile_text(text, folder=folder)
+        assert {found.span.line for found in caught.value.diagnostics} <= {10, 11}, value
