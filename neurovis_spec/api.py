@@ -40,21 +40,23 @@ def compile(
     seed: int | None = None,
     root: str | Path | None = None,
     limit: int | None = None,
+    body: str | Path | bool = True,
     **more: float,
 ) -> CompiledNetwork:
     """Compile a spec: a path, or a mapping with the content of one.
 
     ``parameters`` (and further keywords) replace the values of the spec's parameters, ``seed`` its seed. Data files
-    may not lie outside ``root`` (default: the folder of the spec). ``limit`` is the most connections. Raises
-    SpecError with all findings; TypeError or ValueError for an argument that cannot be meant.
+    may not lie outside ``root`` (default: the folder of the spec). ``limit`` is the most connections. The network has
+    the ``body`` of its spec; that of another YAML file in its place; none with ``body=False``. Raises SpecError with
+    all findings; TypeError or ValueError for an argument that cannot be meant.
     """
     if isinstance(source, Mapping):
         from neurovis_spec.plain import text_of
 
-        request = _request(Path(), root, parameters, more, seed, limit)
+        request = _request(Path(), root, parameters, more, seed, limit, body)
         return _compile_text(text_of(source), "<mapping>", request)
     path = arguments.path("source", source)
-    request = _request(path.parent, root, parameters, more, seed, limit)
+    request = _request(path.parent, root, parameters, more, seed, limit, body)
     findings = Findings()
     document = pipeline.read(path, str(source), findings)
     return _finish(document, request, findings, str(source))
@@ -69,6 +71,7 @@ def compile_text(
     seed: int | None = None,
     root: str | Path | None = None,
     limit: int | None = None,
+    body: str | Path | bool = True,
     **more: float,
 ) -> CompiledNetwork:
     """Compile the text of a spec; its data files are looked for in ``folder`` (default: the working one).
@@ -78,7 +81,8 @@ def compile_text(
     ('A',)
     """
     arguments.text("text", text)
-    request = _request(arguments.path("folder", "." if folder is None else folder), root, parameters, more, seed, limit)
+    base = arguments.path("folder", "." if folder is None else folder)
+    request = _request(base, root, parameters, more, seed, limit, body)
     return _compile_text(text, arguments.text("file", file), request)
 
 
@@ -115,12 +119,14 @@ def _request(
     more: Mapping[str, float],
     seed: int | None,
     limit: int | None,
+    body: str | Path | bool,
 ) -> Request:
     limits = Limits.of(None if limit is None else arguments.integer("limit", limit, least=0))
     given = {**arguments.mapping("parameters", parameters), **more}
     values = {name: arguments.number(name, value) for name, value in given.items()}
     whole = None if seed is None else arguments.integer("seed", seed, -_SEEDS, _SEEDS - 1)
-    return Request(folder, folder if root is None else arguments.path("root", root), values, whole, limits)
+    inside = folder if root is None else arguments.path("root", root)
+    return Request(folder, inside, values, whole, limits, body=arguments.body(body))
 
 
 def _compile_text(text: str, file: str, request: Request) -> CompiledNetwork:

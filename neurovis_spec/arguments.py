@@ -41,6 +41,11 @@ def path(name: str, value: object) -> Path:
     return Path(plain)
 
 
+def body(value: object) -> bool | Path:
+    """Which body a network has: that of its spec (True), none (False), or that of a file."""
+    return value if isinstance(value, bool) else path("body", value)
+
+
 def integer(name: str, value: object, least: int | None = None, most: int | None = None) -> int:
     """An integer from ``least`` to ``most``.
 

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from neurovis_spec import arguments, pipeline
 from neurovis_spec.compiler.compile import Request
-from neurovis_spec.diagnostics import Diagnostic
+from neurovis_spec.diagnostics import Diagnostic, Findings
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.pictures import Drawable, check, svg
 from neurovis_spec.progress import Progress
@@ -226,11 +226,18 @@ class CompiledNetwork(Drawable):
     def with_body(self, body: str | Path | bool) -> CompiledNetwork:
         """The network with the body of a YAML file (``body: {…}``) in place of its own; without one (False), or as it
         is (True). Raises SpecError."""
-        if body is True:
+        given = arguments.body(body)
+        if given is True:
             return self
-        if body is False:
-            return replace(self, network=replace(self.network, body=None))
-        raise NotImplementedError
+        request = replace(self.request, body=given)
+        if given is False:
+            return replace(self, request=request, network=replace(self.network, body=None))
+        findings = Findings(dict(self.sources))
+        network = pipeline.build(self.spec, request, findings)
+        findings.check()
+        assert network is not None
+        files, sources = self.files | findings.files, dict(findings.sources)
+        return replace(self, request=request, network=network, sources=sources, files=files)
 
     def _course(
         self,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -22,8 +23,9 @@ from neurovis_spec.runtime.simulation import Simulation
 
 
 @pytest.fixture(autouse=True)
-def _carts(monkeypatch: pytest.MonkeyPatch) -> None:
-    registered(monkeypatch)
+def _carts() -> Iterator[None]:
+    with registered():
+        yield
 
 
 def same(one: Recording, other: Recording) -> bool:

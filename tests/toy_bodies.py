@@ -5,8 +5,9 @@ In: the name of a variant, as the spec gives it. Out: a Body. ``registered`` put
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from neurovis_spec.body import Body, BodyError, Link, Port, Skeleton, Solid
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.body_settings import BodySettings, Moved, Sensed
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.language.body import BodyModel
 from neurovis_spec.language.expressions.parser import parse
 from neurovis_spec.language.expressions.tree import names
 
@@ -131,7 +133,8 @@ class CartKind:
         return variants[given]()
 
 
-def registered(monkeypatch: pytest.MonkeyPatch) -> None:
+@contextmanager
+def registered() -> Iterator[None]:
     """Have the kind ``toy`` among those that are installed."""
     before = plugins._points
 
@@ -141,7 +144,12 @@ def registered(monkeypatch: pytest.MonkeyPatch) -> None:
             found["toy"] = EntryPoint("toy", "toy_bodies:CartKind", group)
         return found
 
-    monkeypatch.setattr(plugins, "_points", points)
+    keys = BodyModel.__dict__["_fields"].__func__  # which keys there are is asked once
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plugins, "_points", points)
+        keys.cache_clear()
+        yield
+    keys.cache_clear()
 
 
 SPEC = """
@@ -190,15 +198,11 @@ def settings_for(network: Network, given: str = "plain", **more: object) -> Body
         ),
         each_episode=True,
     )
-    from dataclasses import replace
-
     return replace(settings, **more)  # type: ignore[arg-type]
 
 
 def carted(given: str = "plain", spec: str = SPEC, **more: object) -> CompiledNetwork:
     """The network above with a cart."""
-    from dataclasses import replace
-
     compiled = nv.compile_text(spec)
     network = compiled.network
     return replace(compiled, network=replace(network, body=settings_for(network, given, **more)))

@@ -11,6 +11,7 @@ from neurovis_spec.cli.completion import paths
 from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.files import count, network_of, recording_of, tables, writing
 from neurovis_spec.cli.options import (
+    body_options,
     examples,
     finite,
     input_option,
@@ -65,6 +66,7 @@ from neurovis_spec.cli.targets import check_files, check_folder, check_target, f
 @theme_option
 @set_option
 @input_option
+@body_options
 def command(
     spec: str,
     output: Path,

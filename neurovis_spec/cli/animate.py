@@ -8,6 +8,7 @@ import click
 
 from neurovis_spec.cli.files import network_of, recording_of, show_warnings, tables, writing
 from neurovis_spec.cli.options import (
+    body_options,
     engine_option,
     examples,
     excerpt_options,
@@ -61,6 +62,7 @@ from neurovis_spec.cli.targets import check_files, check_target, files_of
 @engine_option
 @excerpt_options
 @set_option
+@body_options
 def command(
     spec: str,
     output: Path,

@@ -33,16 +33,22 @@ _INPUTS: Final = (".csv", ".npy")
 
 
 def compiled(spec: str, parameters: Mapping[str, float] | None = None) -> CompiledNetwork:
-    """The network of a SPEC, ``-`` being standard input, with the command's --root and --limit. Raises SpecError."""
+    """The network of a SPEC, ``-`` being standard input, with the command's --root, --limit and --body. Raises
+    SpecError."""
+    with progress("compiling"):
+        return compiler(spec, parameters)()
+
+
+def compiler(spec: str, parameters: Mapping[str, float] | None = None) -> Callable[[], CompiledNetwork]:
+    """What compiles a SPEC so, also in another thread when the command has long begun. It raises SpecError."""
     from neurovis_spec import api
 
-    root, limit = _options()
-    with progress("compiling"):
-        if spec == "-":
-            folder = Path.cwd()
-            text = standard_input()
-            return api.compile_text(text, file=STDIN, folder=folder, parameters=parameters, root=root, limit=limit)
-        return api.compile(spec, parameters=parameters, root=root, limit=limit)
+    (root, limit), body = _options(), given_body()
+    if spec != "-":
+        return lambda: api.compile(spec, parameters=parameters, root=root, limit=limit, body=body)
+    return lambda: api.compile_text(
+        standard_input(), file=STDIN, folder=Path.cwd(), parameters=parameters, root=root, limit=limit, body=body
+    )
 
 
 def compiler_in_place(spec: str, parameters: Mapping[str, float]) -> Callable[[str], CompiledNetwork]:
@@ -50,9 +56,10 @@ def compiler_in_place(spec: str, parameters: Mapping[str, float]) -> Callable[[s
     SpecError."""
     from neurovis_spec import api
 
-    root, limit = _options()
-    folder = Path(spec).parent
-    return lambda text: api.compile_text(text, file=spec, folder=folder, parameters=parameters, root=root, limit=limit)
+    (root, limit), body, folder = _options(), given_body(), Path(spec).parent
+    return lambda text: api.compile_text(
+        text, file=spec, folder=folder, parameters=parameters, root=root, limit=limit, body=body
+    )
 
 
 def _options() -> tuple[Path | None, int | None]:
@@ -60,6 +67,16 @@ def _options() -> tuple[Path | None, int | None]:
     context = click.get_current_context(silent=True)
     given = {} if context is None else context.meta
     return given.get("neurovis.root"), given.get("neurovis.limit")
+
+
+def given_body() -> bool | Path:
+    """The command's --body and --no-body: the body of the spec, none, or that of a file. Raises UsageError."""
+    context = click.get_current_context(silent=True)
+    given = {} if context is None else context.meta
+    path, without = given.get("neurovis.body_file"), given.get("neurovis.bodiless")
+    if path is not None and without:
+        raise click.UsageError("--body names a body, and --no-body asks for none: give one of them")
+    return not without if path is None else path
 
 
 def network_of(spec: str, parameters: Mapping[str, float] | None = None) -> CompiledNetwork:

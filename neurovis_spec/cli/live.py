@@ -12,9 +12,10 @@ import click
 
 from neurovis_spec.cli.completion import paths
 from neurovis_spec.cli.failure import fault
-from neurovis_spec.cli.files import compiled, compiler_in_place, network_of, recording_of
+from neurovis_spec.cli.files import compiler, compiler_in_place, network_of, recording_of
 from neurovis_spec.cli.options import (
     backend_option,
+    body_options,
     compile_options,
     engine_option,
     examples,
@@ -67,6 +68,7 @@ _RECORDINGS = (".npz", ".csv", ".mcap", ".bag")
 @engine_option
 @backend_option
 @set_option
+@body_options
 @compile_options
 def command(
     specs: tuple[str, ...],
@@ -103,7 +105,7 @@ def command(
         )
     network, played = _network(spec, recording, run, settings, watch or start is not None)
     compile = None if spec == "-" or _is_recording(spec) else compiler_in_place(spec, settings)
-    _show(network, played, recording_of(start), partial(compiled, spec, settings) if watch else None,
+    _show(network, played, recording_of(start), compiler(spec, settings) if watch else None,
           compile, spec, host, port, viewers, browse, theme, engine, backend)  # fmt: skip
 
 
@@ -123,7 +125,7 @@ def _network(
     if not played.spec:
         hint = f"name it: neurovis live SPEC --recording {spec}; a .mcap or .bag holds its spec"
         raise fault(f"{spec} is a recording that does not hold its spec", hint)
-    return api.compile_text(played.spec, file=f"{spec} (spec)", parameters=settings), played
+    return api.compile_text(played.spec, file=f"{spec} (spec)", parameters=settings, body=False), played
 
 
 def _is_recording(spec: str) -> bool:

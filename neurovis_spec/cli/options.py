@@ -123,6 +123,29 @@ def compile_options(command: F) -> F:
     return root(limit(command))
 
 
+def body_options(command: F) -> F:
+    """Which body the network has in a run."""
+    file = click.option(
+        "--body",
+        "body_file",
+        type=click.Path(path_type=Path),
+        metavar="FILE",
+        expose_value=False,
+        callback=_noted,
+        shell_complete=paths,
+        help="Give the network the body of this YAML file (body: {…}) in place of the spec's.",
+    )
+    none = click.option(
+        "--no-body",
+        "bodiless",
+        is_flag=True,
+        expose_value=False,
+        callback=_noted,
+        help="Run without the spec's body: inputs are what their sources say.",
+    )
+    return file(none(command))
+
+
 def spec_argument(command: F) -> F:
     """``SPEC``, with these options."""
     return click.argument("spec", metavar="SPEC", shell_complete=paths)(compile_options(command))

@@ -9,6 +9,7 @@ import click
 
 from neurovis_spec.cli.files import count, network_of, recording_of, show_warnings, tables, writing
 from neurovis_spec.cli.options import (
+    body_options,
     effort_option,
     engine_option,
     examples,
@@ -71,6 +72,7 @@ def _why(network: CompiledNetwork, step: int | None, steps: int) -> str:
     help="Pixels of an inch, such as 300 for print; a picture has 96 to 384 by itself.",
 )
 @set_option
+@body_options
 def command(
     spec: str,
     output: Path,

@@ -10,7 +10,15 @@ import click
 
 from neurovis_spec.cli.completion import paths
 from neurovis_spec.cli.files import count, network_of, recording_of, tables, writing
-from neurovis_spec.cli.options import backend_option, compile_options, examples, input_option, output_option, set_option
+from neurovis_spec.cli.options import (
+    backend_option,
+    body_options,
+    compile_options,
+    examples,
+    input_option,
+    output_option,
+    set_option,
+)
 from neurovis_spec.cli.progress import progress
 from neurovis_spec.cli.targets import check_files, check_target, files_of
 
@@ -92,6 +100,7 @@ class Chosen(TypedDict):
     help="Go on exactly from FILE, if it is there; write the run's state to it at the end, also after Ctrl-C.",
 )
 @output_option("Write the recording here (.npz, .csv, .mcap); without it a summary is printed.")
+@body_options
 @compile_options
 def command(
     spec: str | None,

@@ -10,9 +10,10 @@ from time import perf_counter
 import click
 
 from neurovis_spec.cli.completion import axes, paths
-from neurovis_spec.cli.files import STDIN, count, show_findings, standard_input, tables, writing
+from neurovis_spec.cli.files import STDIN, count, given_body, show_findings, standard_input, tables, writing
 from neurovis_spec.cli.options import (
     backend_option,
+    body_options,
     compile_options,
     examples,
     input_option,
@@ -61,6 +62,7 @@ from neurovis_spec.cli.targets import check_files, check_target, files_of
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Run on the cluster of this scheduler of dask.distributed.")
 @output_option("Write the table here (.csv or .parquet), each row as it comes; without it the table is printed.")
+@body_options
 @compile_options
 def command(
     spec: str,
@@ -96,8 +98,11 @@ def command(
         check_suffix(output)
     source = Source(standard_input(), STDIN, Path.cwd()) if spec == "-" else spec
     root, limit = (click.get_current_context().meta.get(f"neurovis.{name}") for name in ("root", "limit"))
+    body = given_body()
     with progress("compiling"):
-        plan = planned(source, over, metrics, steps=steps, parameters=settings, backend=backend, root=root, limit=limit)
+        plan = planned(
+            source, over, metrics, steps=steps, parameters=settings, backend=backend, root=root, limit=limit, body=body
+        )
     show_findings(plan.network)
     check_files(output, plan.network)
     arrays = tables(inputs, plan.network.network)

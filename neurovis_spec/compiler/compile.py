@@ -65,6 +65,8 @@ class Request:
     read: ReadBytes = read_bytes
     includes: Includes = field(default_factory=Includes)
     files: Mapping[Path, Files] = field(default_factory=dict)
+    #: whether the network has a body: that of the spec, or that of this file
+    body: bool | Path = True
 
 
 def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | None:
@@ -186,14 +188,21 @@ def _body(
     *,
     dt_known: bool,
 ) -> BodySettings | None:
-    """The ``body`` section. Most specs have none: nothing that reads it is imported then."""
-    if spec.body is None:
+    """The ``body`` section, of the spec or of the file that is asked for. Most specs have none: nothing that reads it
+    is imported then."""
+    if request.body is False or (request.body is True and spec.body is None):
         return None
     from neurovis_spec.compiler.body import Place, body_settings
     from neurovis_spec.compiler.surroundings import Surroundings
 
-    around = Surroundings(spec, root, inputs, outputs)
-    return body_settings(spec.body, around, constants, Place(request.base, request.root), dt_known=dt_known)
+    model, place = spec.body, Place(request.base, request.root)
+    if isinstance(request.body, Path):
+        from neurovis_spec.language.body_file import read_body
+
+        model, place = read_body(request.body, constants.findings), Place(request.body.parent, request.body.parent)
+    if model is None:
+        return None
+    return body_settings(model, Surroundings(spec, root, inputs, outputs), constants, place, dt_known=dt_known)
 
 
 def _check_unused(expander: Expander, limits: Limits, seed: int) -> None:

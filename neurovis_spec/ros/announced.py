@@ -22,9 +22,9 @@ _OTHERS = 0.5
 
 
 def compiled_from(text: str, where: str) -> CompiledNetwork:
-    """The network of a spec that came from elsewhere. Raises SpecError."""
+    """The network of a spec that came from elsewhere, where its body is, too. Raises SpecError."""
     with TemporaryDirectory() as empty:
-        return api.compile_text(text, file=f"{where} (spec)", folder=empty, root=empty)
+        return api.compile_text(text, file=f"{where} (spec)", folder=empty, root=empty, body=False)
 
 
 def specs_of(node: Node) -> tuple[str, ...]:

@@ -11,13 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
 from math import isfinite
-from typing import cast
 
 import numpy as np
 
-from neurovis_spec import plugins
 from neurovis_spec.arrays import FloatArray, IntArray
-from neurovis_spec.body import Body, BodyError, BodyKind, Port
+from neurovis_spec.body import Body, BodyError, Port
+from neurovis_spec.body.kinds import open_body
 from neurovis_spec.compiler.body_settings import BodySettings, Moved
 from neurovis_spec.compiler.names.state_references import StateOf, singles
 from neurovis_spec.compiler.network import Network
@@ -34,16 +33,6 @@ _SEEDS = 2.0**31
 _Commands = Callable[[FloatArray, FloatArray, FloatArray], tuple[float, ...]]
 
 
-def opened(settings: BodySettings, dt: float) -> Body:
-    """The body of a spec. Raises BodyError, PluginError."""
-    try:
-        kind = plugins.load(plugins.BODIES, settings.kind)
-    except KeyError:
-        hint = suggest(settings.kind, plugins.names(plugins.BODIES), "kinds of bodies are")
-        raise BodyError(f"there is no kind of body '{settings.kind}'", hint) from None
-    return cast(BodyKind, kind).open(settings.given, settings.path, dt, settings.substeps)
-
-
 class Embodied:
     """A network's body in a run, at the moment of a state. Raises BodyError where it cannot be opened, or has not the
     sensors and actuators that the network asks for."""
@@ -51,7 +40,10 @@ class Embodied:
     def __init__(self, network: Network, body: Body | None = None) -> None:
         assert network.body is not None
         self._network, self._settings = network, network.body
-        self.body = opened(self._settings, network.dt) if body is None else body
+        own = self._settings
+        if body is None:
+            body = open_body(own.kind, own.given, own.path, network.dt, own.substeps)
+        self.body = body
         #: the names of what is sensed, ``name`` or ``name[i]``, and how the pose is drawn
         self.sensor_names = tuple(_names(self.body.sensors))
         self.skeleton = self.body.skeleton

@@ -7,7 +7,9 @@ recording is drawn, its gains are those of the whole of it: what comes from outs
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 
+from neurovis_spec.body.kinds import BodyMissingError
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.record import record
@@ -39,7 +41,10 @@ def probe(network: Network, progress: Progress | None = None, made: Recording | 
     if made is None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # the run that the author asks for warns
-            made = record(network, steps, progress=progress)
+            try:
+                made = record(network, steps, progress=progress)
+            except BodyMissingError:  # its pictures can be drawn all the same
+                made = record(replace(network, body=None), steps, progress=progress)
     return choose_gains(drawn.network, drawn.network.render, drawn.reached(made.part(slice(steps))))
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from neurovis_spec import api
 from neurovis_spec.arrays import FloatArray
@@ -55,6 +56,7 @@ class Job:
     backend: str | None = None
     root: str | None = None
     limit: int | None = None
+    body: bool | Path = True
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,7 @@ def compiled(job: Job, point: Point | None) -> CompiledNetwork:
         seed=None if seed is None else int(seed),
         root=job.root,
         limit=job.limit,
+        body=job.body,
     )
 
 

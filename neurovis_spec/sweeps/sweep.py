@@ -80,17 +80,18 @@ def sweep(
     path: str | Path | None = None,
     root: str | Path | None = None,
     limit: int | None = None,
+    body: str | Path | bool = True,
     progress: Progress | None = None,
 ) -> Table:
     """Run a spec at every point of a grid, and measure each run.
 
     ``over`` gives names their values, numbers or a range (``"0.001:0.1:log20"``, ``"0..9"``): ``seed`` is the seed, the
     others are parameters. ``metrics`` are measures (``"rms(T - O, last=514)"``), by themselves, as ``"name=…"`` or by
-    name; what they are after the last step is a column. ``parameters`` are the same at every point. Points run in
-    ``jobs`` processes (in a script, call this under ``if __name__ == "__main__":``), or on the cluster of a
-    ``scheduler``. With ``path`` rows are in that file as soon as they are there, and those that are in it already are
-    not run again. Raises SweepError, InputError, BackendError, OSError, and SpecError where the spec or a metric is
-    invalid at both ends of the grid and without it; what is wrong with a single point is in its row.
+    name; what they are after the last step is a column. ``parameters`` are the same at every point, ``body`` is as in
+    ``compile``. Points run in ``jobs`` processes (in a script, call this under ``if __name__ == "__main__":``), or on
+    the cluster of a ``scheduler``. With ``path`` rows are in that file as soon as they are there, and those that are in
+    it already are not run again. Raises SweepError, InputError, BackendError, OSError, and SpecError where the spec or
+    a metric is invalid at both ends of the grid and without it; what is wrong with a single point is in its row.
     """
     for name, text in (("backend", backend), ("scheduler", scheduler)):
         if text is not None:
@@ -103,7 +104,17 @@ def sweep(
     arguments.mapping("inputs", inputs)
     arguments.function("progress", progress)
     jobs = arguments.integer("jobs", jobs, least=1)
-    plan = planned(source, over, metrics, steps=steps, parameters=parameters, backend=backend, root=root, limit=limit)
+    plan = planned(
+        source,
+        over,
+        metrics,
+        steps=steps,
+        parameters=parameters,
+        backend=backend,
+        root=root,
+        limit=limit,
+        body=arguments.body(body),
+    )
     return carried_out(plan, inputs, jobs=jobs, scheduler=scheduler, path=path, progress=progress)
 
 
@@ -117,6 +128,7 @@ def planned(
     backend: str | None = None,
     root: str | Path | None = None,
     limit: int | None = None,
+    body: bool | Path = True,
 ) -> CheckedSweep:
     """A sweep before anything is run. Raises what ``sweep`` raises."""
     grid = axes(over)
@@ -138,6 +150,7 @@ def planned(
         backend,
         None if root is None else str(Path(root).resolve()),
         limit,
+        body if isinstance(body, bool) else body.resolve(),
     )
     every = tuple(points(grid))
     return CheckedSweep(job, columns, every, _checked(job, grid, every))
@@ -181,6 +194,8 @@ def _by_itself(plan: CheckedSweep) -> Job:
     """The job with all included and data files written into the text of its spec, since other machines need not have
     these files. Raises SweepError; SpecError where a file is missing by now."""
     made = plan.network
+    if isinstance(plan.job.body, Path) or (made.network.body is not None and made.network.body.path is not None):
+        raise SweepError("the file of a body is not sent to a cluster", "run the sweep in processes of this machine")
     text = whole_text(made.spec, replace(made.request, parameters={}, seed=None), made.sources)
     if text == plan.job.text:
         return plan.job
