@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -23,9 +22,8 @@ from neurovis_spec.runtime.simulation import Simulation
 
 
 @pytest.fixture(autouse=True)
-def _carts() -> Iterator[None]:
-    with registered():
-        yield
+def _carts(monkeypatch: pytest.MonkeyPatch) -> None:
+    registered(monkeypatch)
 
 
 def same(one: Recording, other: Recording) -> bool:

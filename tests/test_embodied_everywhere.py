@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -38,9 +37,8 @@ WITH_BODY = SPEC + BODY
 
 
 @pytest.fixture(autouse=True)
-def _carts() -> Iterator[None]:
-    with registered():
-        yield
+def _carts(monkeypatch: pytest.MonkeyPatch) -> None:
+    registered(monkeypatch)
 
 
 def same(one: Seen, other: Seen) -> bool:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import pickle
 import zipfile
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,9 +19,8 @@ from neurovis_spec.runtime.recording import Recording, RecordingError, UnknownNa
 
 
 @pytest.fixture(autouse=True)
-def _carts() -> Iterator[None]:
-    with registered():
-        yield
+def _carts(monkeypatch: pytest.MonkeyPatch) -> None:
+    registered(monkeypatch)
 
 
 def same(one: Recording, other: Recording) -> bool:

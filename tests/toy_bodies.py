@@ -5,8 +5,7 @@ In: the name of a variant, as the spec gives it. Out: a Body. ``registered`` put
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -133,8 +132,7 @@ class CartKind:
         return variants[given]()
 
 
-@contextmanager
-def registered() -> Iterator[None]:
+def registered(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have the kind ``toy`` among those that are installed."""
     before = plugins._points
 
@@ -144,12 +142,9 @@ def registered() -> Iterator[None]:
             found["toy"] = EntryPoint("toy", "toy_bodies:CartKind", group)
         return found
 
-    keys = BodyModel.__dict__["_fields"].__func__  # which keys there are is asked once
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plugins, "_points", points)
-        keys.cache_clear()
-        yield
-    keys.cache_clear()
+    monkeypatch.setattr(plugins, "_points", points)
+    keys = BodyModel.__dict__["_fields"].__func__  # which keys there are is asked once, and kept
+    monkeypatch.setattr(BodyModel, "_fields", classmethod(keys.__wrapped__))
 
 
 SPEC = """
