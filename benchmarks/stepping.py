@@ -18,6 +18,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 from networks_by_hand import TANH, Link, Unit, build, cpg_rbf
+from toy_bodies import Cart, carted
 
 import neurovis_spec as nv
 from neurovis_spec import pipeline
@@ -26,8 +27,10 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Block
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.runtime.backend import load
+from neurovis_spec.runtime.embodied import Embodied
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.record import record
+from neurovis_spec.runtime.simulation import Simulation
 from neurovis_spec.runtime.state import initial_state
 
 Run = Callable[[int], None]
@@ -154,6 +157,28 @@ def many_events(count: int) -> tuple[float, float]:
     return read - begin, time.process_time() - read
 
 
+def with_a_cart() -> tuple[float, float, float]:
+    """A step of a network without a body, with one, and of this alone."""
+    compiled, cart = carted(), Cart()
+    network, still = compiled.network, np.zeros(3)
+
+    def stepped(simulation: Simulation) -> Run:
+        def run(steps: int) -> None:
+            for _ in range(steps):
+                simulation.step()
+
+        return run
+
+    def alone(steps: int) -> None:
+        for _ in range(steps):
+            cart.sense()
+            cart.advance(network.dt, still)
+
+    embodied = Simulation(network, body=Embodied(network, Cart()))
+    bare = Simulation(replace(network, body=None))
+    return microseconds(stepped(bare), 5000), microseconds(stepped(embodied), 5000), microseconds(alone, 5000)
+
+
 def main() -> None:
     cases = (
         ("12/28, use case 1", cpg_rbf(), cpg_by_hand, 20000),
@@ -170,6 +195,8 @@ def main() -> None:
     for path, parameter in (("specs/cpg_rbf.yaml", "phi"), ("specs/hexapod/hexapod.yaml", "phi")):
         took, step, reach, ratio = setting(path, parameter)
         print(f"{f'{Path(path).stem}, {parameter}':34}{reach:8}{took:8.2f}{step:9.2f}{ratio:10.2f}")
+    bare, embodied, cart = with_a_cart()
+    print(f"\nwith a body: {embodied:.2f} µs a step, {bare:.2f} without it, and {cart:.2f} of the body alone")
     read, compiled = many_events(10_000)
     print(f"\n10,000 different set events: read in {read:.2f} s, compiled in {compiled:.2f} s of the processor")
 

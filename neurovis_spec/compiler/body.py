@@ -52,15 +52,15 @@ class Place:
 
 
 def body_settings(
-    model: BodyModel, around: Surroundings, constants: Constants, place: Place, *, dt_known: bool
+    model: BodyModel, around: Surroundings, constants: Constants, place: Place | None, *, dt_known: bool
 ) -> BodySettings | None:
     """The ``body`` section of a spec. What is invalid in it is reported and left out. ``dt_known``: the spec's dt is
-    in order."""
+    in order. Without a ``place`` the body is not opened, and its own names are not checked."""
     findings = constants.findings
     kind, given = next(iter(model.kinds.items()), ("", None))
     substeps = None if model.substeps is None else constants.integer(model.substeps, "'substeps'", 1)
     path = body = None
-    if given is not None and len(model.kinds) == 1:
+    if given is not None and len(model.kinds) == 1 and place is not None:
         clock = None if substeps is UNKNOWN or not dt_known else Clock(constants.dt, substeps, model.substeps)
         path, body = find_body(kind, given, place, clock, findings)
     sensed = tuple(_sensed(model, around, None if body is None else body.sensors, findings))

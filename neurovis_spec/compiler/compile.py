@@ -190,19 +190,23 @@ def _body(
 ) -> BodySettings | None:
     """The ``body`` section, of the spec or of the file that is asked for. Most specs have none: nothing that reads it
     is imported then."""
-    if request.body is False or (request.body is True and spec.body is None):
+    if spec.body is None and isinstance(request.body, bool):
         return None
     from neurovis_spec.compiler.body import Place, body_settings
     from neurovis_spec.compiler.surroundings import Surroundings
 
-    model, place = spec.body, Place(request.base, request.root)
-    if isinstance(request.body, Path):
-        from neurovis_spec.language.body_file import read_body
+    around, made = Surroundings(spec, root, inputs, outputs), None
+    if spec.body is not None:  # where it is not wanted it is not opened, but it reads parameters all the same
+        place = Place(request.base, request.root) if request.body is True else None
+        made = body_settings(spec.body, around, constants, place, dt_known=dt_known)
+    if not isinstance(request.body, Path):
+        return made if request.body else None
+    from neurovis_spec.language.body_file import read_body
 
-        model, place = read_body(request.body, constants.findings), Place(request.body.parent, request.body.parent)
-    if model is None:
+    other, folder = read_body(request.body, constants.findings), request.body.parent
+    if other is None:
         return None
-    return body_settings(model, Surroundings(spec, root, inputs, outputs), constants, place, dt_known=dt_known)
+    return body_settings(other, around, constants, Place(folder, folder), dt_known=dt_known)
 
 
 def _check_unused(expander: Expander, limits: Limits, seed: int) -> None:
