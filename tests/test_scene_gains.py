@@ -6,13 +6,16 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hand_networks import C, G, network, numbered, use_case_1
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings, StatedGain
 from neurovis_spec.scene.gains import choose_gains
+from neurovis_spec.scene.probe import probe_steps
 from neurovis_spec.scene.reached import Reached, nothing, reached_by
 
 CASE = use_case_1(1300)
@@ -208,3 +211,19 @@ def test_scales_are_named_as_the_picture_shows_neurons() -> None:
     gains = choose_gains(made, stated, reaches([1.0] * 6, [1.0, 0.01]))
     assert [scale.names for scale in gains.signal_scales] == [("d -> bell",), ("bell -> S",)]
     assert [scale.names for scale in gains.activity_scales] == [("d", "bell", "S", "R"), ("d0 + S",)]
+
+
+@pytest.mark.parametrize(
+    ("gain", "runs"),
+    [
+        ("activity: 1, signal: 1, thickness: 1, change: 1", False),
+        ("activity: {A: 1, B: 2}, signal: {A -> B: 1, B -> A: 1}, thickness: 1, change: 1", False),
+        ("activity: {A: 1}, signal: 1, thickness: 1, change: 1", True),
+        ("activity: 1, signal: {A -> B: 1}, thickness: 1, change: 1", True),
+        ("activity: 1, signal: 1, thickness: 1", True),
+    ],
+)
+def test_nothing_is_run_for_gains_that_are_stated_for_all(gain: str, runs: bool) -> None:
+    text = "neurovis: 1\nname: x\nneurons: {A: {count: 2}, B: {}}\nconnections: {A -> B: 1, B -> A: 1}\n"
+    network = nv.compile_text(f"{text}render: {{gain: {{{gain}}}}}\n").network
+    assert (probe_steps(network) > 0) == runs

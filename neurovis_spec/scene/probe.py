@@ -7,9 +7,11 @@ recording is drawn, its gains are those of the whole of it: what comes from outs
 from __future__ import annotations
 
 import warnings
+from collections.abc import Collection
 from dataclasses import replace
 
 from neurovis_spec.body.kinds import BodyMissingError
+from neurovis_spec.compiler.drawing.drawing_settings import StatedGain
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.record import record
@@ -24,12 +26,24 @@ BUDGET = 4_000_000
 
 def probe_steps(network: Network) -> int:
     """How many steps the gains of a network take: none where its spec states all of them."""
-    settings = network.render
-    sorts = (settings.activity, settings.signal, settings.thickness, settings.change)
-    if all(any(one.members is None for one in stated) for stated in sorts):
+    settings, connections = network.render, len(network.connections)
+    sorts = (
+        (settings.activity, len(network.neurons)),
+        (settings.signal, connections),
+        (settings.thickness, connections),
+        (settings.change, connections),
+    )
+    if all(_is_for_all(stated, count) for stated, count in sorts):
         return 0
     width = len(network.neurons) + len(network.changing) + 1
     return max(1, min(network.steps, BUDGET // width))
+
+
+def _is_for_all(stated: Collection[StatedGain], count: int) -> bool:
+    """Whether gains are stated for each of ``count`` neurons or connections, at once or by references."""
+    if any(one.members is None for one in stated):
+        return True
+    return len({member for one in stated for member in one.members or ()}) == count
 
 
 def probe(network: Network, progress: Progress | None = None, made: Recording | None = None) -> Gains:
