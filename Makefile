@@ -63,7 +63,7 @@ $(VENV)/simulated: $(VENV)/installed
 walk: $(VENV)/simulated
 	@$(BIN)/python demo.py walk
 
-gallery: $(VENV)/installed
+gallery: $(VENV)/simulated
 	@$(BIN)/python gallery.py
 
 test: $(VENV)/tested

@@ -70,7 +70,7 @@ class Picture:
     @property
     def whole(self) -> bool:
         """Whether it is a still of the network, all of it, in the spec's own theme."""
-        return not (self.theme or self.frames or self.views or self.collapse or self.focus)
+        return not (self.theme or self.frames or self.views not in ((), ("network",)) or self.collapse or self.focus)
 
 
 PICTURES = (
@@ -184,6 +184,17 @@ PICTURES = (
         "the difference.",
     ),
     Picture(
+        "walk",
+        "walk/walk",
+        52,
+        "Use case 2: a hexapod that learns to walk",
+        "In the first episode. The network is that of use case 1; what guides its learning (dotted) is N, the noise: "
+        "O + N swings the legs of a [simulated robot](../specs/walk/hexapod.xml), C1 lifts them, and the way that they "
+        "make in an episode is the reward. Nothing has been learned yet: K to O are as thin as they can be. "
+        "[250 episodes later](pictures/walk.webp) it walks.",
+        views=("network",),
+    ),
+    Picture(
         "hexapod",
         "hexapod/hexapod",
         588,
@@ -269,6 +280,7 @@ BESIDE = {
     "sound": "Much the same.",
     "reward": "As above, C2 stands below C1, and the kernels are out of order. G stands near what it drives; ours near"
     " what drives it.",
+    "walk": "As above, C2 stands below C1, and the kernels are out of order.",
     "hexapod": "dot draws six legs six times: each has other ranks and another place for its parts, left and right are"
     " no mirror images, and the delay lines run down, one beside the other. Free of all that it needs less room and may"
     " cross fewer lines. Here all legs are one drawing, so that only colours differ between them, and both delay lines"
