@@ -275,7 +275,7 @@ def look(shape: ET.Element, frame: int, count: int) -> tuple[str | None, ...]:
 
 
 def test_the_pixels_of_a_frame_are_those_of_its_still() -> None:
-    made = film(walked(2.0), "dark", rows=9)
+    made = film(walked(2.0), "dark", rows=4)
     for frame, picture in enumerate(frames(made)):
         assert np.abs(picture.astype(int) - paint(still(made, frame))).max() <= 2
 

@@ -26,6 +26,8 @@ from neurovis_renderers.raster import PillowRenderer
 from neurovis_renderers.svg import SvgRenderer
 from PIL import Image
 from renderer_conformance import ALIKE, SCENES, short_film, similarity
+from test_body_view import film as body_film
+from test_body_view import walked
 
 import neurovis_spec as nv
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
@@ -172,6 +174,17 @@ def test_svg_shows_what_the_pixels_show(browser: Browser, tmp_path: Path, kind: 
 def test_frames_of_an_animated_svg_show_what_the_pixels_show(browser: Browser, tmp_path: Path) -> None:
     made = short_film(8)
     svg, chosen = AnimatedSvgRenderer().animate(made, ".svg"), (0, 3, 7)
+    pictures = [at(svg, (frame + 0.02) / made.fps) for frame in chosen]
+    seen = shots(browser, tmp_path, pictures, [made.scene.pixels] * len(chosen))
+    ours = [Image.fromarray(paint(still(made, frame))) for frame in chosen]
+    alike = [[similarity(picture, other) for other in ours] for picture in seen]
+    assert min(alike[k][k] for k in range(len(chosen))) >= ALIKE, alike
+    assert [row.index(max(row)) for row in alike] == [0, 1, 2], alike
+
+
+def test_frames_of_a_body_that_walks_show_what_the_pixels_show(browser: Browser, tmp_path: Path) -> None:
+    made = body_film(walked(2.0), "dark", rows=12)
+    svg, chosen = AnimatedSvgRenderer().animate(made, ".svg"), (0, 5, 11)
     pictures = [at(svg, (frame + 0.02) / made.fps) for frame in chosen]
     seen = shots(browser, tmp_path, pictures, [made.scene.pixels] * len(chosen))
     ours = [Image.fromarray(paint(still(made, frame))) for frame in chosen]
@@ -334,6 +347,23 @@ def test_what_is_shifted_moves_and_stands_still_with_reduced_motion(browser: Bro
     assert isinstance(still, list)
     assert np.diff(np.array(moving), axis=0) == pytest.approx(np.array([[50, 0], [50.5, -4]]))
     assert still[0] == still[1] == still[2] == moving[0]
+
+
+FEET = """
+svg.pauseAnimations();
+return [0, 5, 11].map(frame => { svg.setCurrentTime((frame + 0.02) / 20);
+  return [...svg.querySelectorAll('circle')].filter(disc => disc.getClientRects().length).map(disc => {
+    const box = disc.getBoundingClientRect(); return [box.x, box.y]; }); });
+"""
+
+
+def test_a_body_walks_and_stands_still_with_reduced_motion(browser: Browser) -> None:
+    svg = AnimatedSvgRenderer().animate(body_film(walked(), rows=12), ".svg")
+    moving = np.array(measured(browser, svg, FEET))
+    still = np.array(measured(browser, svg, FEET, "--force-prefers-reduced-motion"))
+    assert moving.shape == still.shape == (3, 14, 2)  # six feet from above and from the side, two that are explained
+    assert (np.abs(np.diff(moving, axis=0)).sum(axis=(1, 2)) > 5).all()
+    assert (still == moving[0]).all()
 
 
 def test_a_film_moves_inside_img_and_there_shows_its_frames(browser: Browser, tmp_path: Path) -> None:
