@@ -132,6 +132,44 @@ def test_the_panel_closes_and_opens_and_is_read(tmp_path: Path) -> None:
     asyncio.run(look())
 
 
+SAVED = """
+new Promise(done => {
+  URL.createObjectURL = blob => {
+    createImageBitmap(blob).then(picture => {
+      const canvas = new OffscreenCanvas(picture.width, picture.height), context = canvas.getContext('2d');
+      context.drawImage(picture, 0, 0);
+      const rgb = [COLOUR], high = picture.height - BELOW;
+      const { data } = context.getImageData(0, high, picture.width, BELOW);
+      let count = 0;
+      for (let at = 0; at < data.length; at += 4) count += rgb.every((value, channel) => data[at + channel] === value);
+      done([picture.width, picture.height, count]);
+    });
+    return '#';
+  };
+  document.querySelector('#png').click();
+})
+"""
+
+
+@pytest.mark.parametrize("bodied", [True, False])
+def test_a_picture_that_is_saved_has_the_body_in_it(tmp_path: Path, bodied: bool) -> None:
+    source = walked() if bodied else RecordedSource(NETWORK.network, RUN)
+
+    async def look() -> None:
+        async with shown(source, tmp_path) as opened:
+            plan = view_of(NETWORK, NETWORK.gains).plan.frame
+            colour = ",".join(str(value) for value in channels(THEMES["default"].zero))
+            script = SAVED.replace("COLOUR", colour).replace("BELOW", str(round(260 * plan.density)))
+            found = await opened.ask(script)
+            assert isinstance(found, list)
+            wide, high, count = found
+            assert wide == round(plan.width * plan.density)
+            assert high == round((plan.height + 260 * bodied) * plan.density)
+            assert count > 2000 or not bodied
+
+    asyncio.run(look())
+
+
 def test_without_a_body_there_is_no_panel(tmp_path: Path) -> None:
     async def look() -> None:
         async with shown(RecordedSource(NETWORK.network, RUN), tmp_path) as opened:

@@ -7,6 +7,7 @@ import json
 import struct
 from collections.abc import Iterator
 from dataclasses import replace
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from neurovis_spec.live.hub import Client, Hub
 from neurovis_spec.live.protocol import FRAME, SCENE, body_message
 from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.run import Run, Shown
+from neurovis_spec.live.saving import film, picture
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import Drawn, Source
 from neurovis_spec.live.view import View, view_of
@@ -30,6 +32,7 @@ def _carts(monkeypatch: pytest.MonkeyPatch) -> None:
     registered(monkeypatch)
 
 
+NS = "{http://www.w3.org/2000/svg}"
 PLAIN = nv.compile_text("neurovis: 1\nname: plain\ntime: {dt: 0.05, steps: 30}\nneurons: {A: {}, B: {}}\n")
 
 
@@ -142,3 +145,18 @@ def test_a_body_of_more_numbers_than_a_frame_holds_is_not_drawn() -> None:
     assert [one["skeleton"] for one in bodies(messages)] == [None]
     assert list(poses(messages)) == [[]]
     assert json.loads(body_message(replace(Drawn(vast))))["skeleton"] is None
+
+
+def test_a_picture_and_a_film_that_are_saved_have_the_body_below_the_network() -> None:
+    network = carted()
+    source, view = SimulatedSource(network.simulator()), view_of(network, network.gains)
+    for _ in range(20):
+        source.advance()
+    seen = source.recall(10)
+    plain = ET.fromstring(picture(view, seen[-1]))
+    for made in (picture(view, seen[-1], source.body), film(view, seen, source.body)):
+        root = ET.fromstring(made)
+        assert [group for group in root.iter(f"{NS}g") if group.attrib.get("data-view") == "body"]
+        assert float(root.attrib["height"]) > float(plain.attrib["height"]) + 200
+        assert root.attrib["width"] == plain.attrib["width"]
+        assert len([one for one in root.iter() if "data-neuron" in one.attrib]) == len(network.network.neurons)

@@ -162,7 +162,8 @@ class Desk:
             raise SavingError("the steps could not be had: the spec was edited, or the run has ended") from None
         if request.what == "npz":
             return file_message(f"{name}.npz", recording(network, seen, parameters, body))
-        return file_message(f"{name}.svg", picture(view, seen[-1]) if request.what == "svg" else film(view, seen))
+        still = request.what == "svg"
+        return file_message(f"{name}.svg", picture(view, seen[-1], body) if still else film(view, seen, body))
 
     def _written(self) -> Written:
         if self._spec is None:

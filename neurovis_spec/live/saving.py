@@ -20,8 +20,10 @@ from neurovis_spec.runtime.columns import columns_of
 from neurovis_spec.runtime.kinds import Rows
 from neurovis_spec.runtime.recording import After, Numbers, Recording, recording_of
 from neurovis_spec.scene import Film
+from neurovis_spec.scene.figure import with_body
 from neurovis_spec.scene.film import filmed
 from neurovis_spec.scene.film_size import frames_a_second
+from neurovis_spec.scene.poses import Poses
 
 #: The most steps that are looked back, the most numbers in them, and the most seconds of a film.
 MOST_STEPS, _NUMBERS, MOST_SECONDS = 10_000, 8_000_000, 60
@@ -34,22 +36,27 @@ def steps_for(network: Network, seconds: float | None) -> int:
     return max(1, min(wanted, room, MOST_STEPS))
 
 
-def picture(view: View, seen: Seen) -> bytes:
-    """A step as SVG."""
-    return pipeline.draw(pipeline.frame(_film(view, [seen]), 0), ".svg")
+def picture(view: View, seen: Seen, drawn: Drawn = NOTHING) -> bytes:
+    """A step as SVG, with the body that is drawn."""
+    return pipeline.draw(pipeline.frame(_film(view, [seen], drawn), 0), ".svg")
 
 
-def film(view: View, seen: Sequence[Seen]) -> bytes:
-    """Steps as a moving SVG."""
-    return pipeline.animate(_film(view, seen), ".svg")
+def film(view: View, seen: Sequence[Seen], drawn: Drawn = NOTHING) -> bytes:
+    """Steps as a moving SVG, with the body that is drawn."""
+    return pipeline.animate(_film(view, seen, drawn), ".svg")
 
 
-def _film(view: View, seen: Sequence[Seen]) -> Film:
+def _film(view: View, seen: Sequence[Seen], drawn: Drawn) -> Film:
     network = view.drawn.network
     made = filmed(view.drawn, view.plan, [one.snapshot for one in seen], view.gains, frames_a_second(network))
     masks = [view.lesioned(one) for one in seen]
     faint = _first("n", [neurons for neurons, _ in masks]) | _first("c", [lines for _, lines in masks])
-    return replace(made, faint=faint)
+    made = replace(made, faint=faint)
+    if drawn.skeleton is None:
+        return made
+    unknown = np.full(drawn.skeleton.size, np.nan)
+    poses = [unknown if one.snapshot.pose is None else one.snapshot.pose for one in seen]
+    return with_body(made, Poses(drawn.skeleton, np.array(poses), drawn.start))
 
 
 def _first(kind: str, masks: Sequence[Mask]) -> dict[str, int]:

@@ -169,7 +169,7 @@ class _Drawn:
         left, right = (min(max(self.across(x, frame), self.left), self.right) for x in (x0, x1))
         above, beneath = (min(max(self.down(end, frame), self.top), self.bottom) for end in (far, near))
         wide, high = right - left, beneath - above
-        if (self.side == "above" and z1 <= _FLAT) or not (wide > 0 and high > 0):
+        if z1 <= _FLAT or not (wide > 0 and high > 0):
             wide = high = 0.0
         edge = 0.0 if wide == 0 or high == 0 else _LINE
         return Rectangle((left, above), wide, high, 0.0, self.theme.box_line, self.theme.muted, edge)
@@ -241,6 +241,7 @@ class _Drawn:
         far = float(self.poses.forward[frame])
         way = "back" if far < -0.005 else "forward"
         said = f"from its right side · {abs(far):.2f} m {way}" if self.poses.known[frame] else "its pose is not known"
+        said = texts.shorten(said, SMALL, self.right - self.left)
         return (Text((self.left, TITLE - 6.0), said, SMALL, self.theme.muted),)
 
     def bar(self, frame: int) -> tuple[Shape, ...]:
@@ -249,6 +250,8 @@ class _Drawn:
         right, y = self.right - 10.0, self.bottom - 9.0
         left = right - metres * self.scale
         said = f"{words([metres])[0]} m"
+        if left < self.left + 10.0 or self.plot < 2 * SMALL + 18.0:
+            return ()
         line = ((left, y - 4.0), (left, y), (right, y), (right, y - 4.0))
         middle = ((left + right) / 2, y - 6.0)
         return Polyline(line, theme.ink, 1.4), Text(middle, said, SMALL, theme.ink, "middle", halo=theme.box_fill)
@@ -260,9 +263,13 @@ def _ground(drawn: _Drawn) -> list[Shape]:
     extent = drawn.right - drawn.left, drawn.plot
     shapes: list[Shape] = [Rectangle((drawn.left, drawn.top), *extent, 0.0, theme.box_fill, theme.box_line, 1.0)]
     if drawn.side == "above":
-        shapes.append(Text((drawn.left, TITLE - 6.0), "from above, forward →", SMALL, theme.muted))
-        if drawn.poses.skeleton.feet:
-            shapes += _feet_explained(drawn)
+        said = "from above, forward →"
+        explained = _feet_explained(drawn) if drawn.poses.skeleton.feet else []
+        begin = min((shape.centre[0] for shape in explained if isinstance(shape, Disc)), default=drawn.right) - 12.0
+        if explained and drawn.left + texts.width(said, SMALL) > begin:
+            explained = []
+        said = texts.shorten(said, SMALL, extent[0])
+        shapes += [Text((drawn.left, TITLE - 6.0), said, SMALL, theme.muted), *explained]
     else:
         beneath = drawn.bottom - drawn.level
         fill = mixed(theme.box_line, theme.box_fill, 0.5)

@@ -13,14 +13,16 @@ from dataclasses import dataclass, replace
 from neurovis_spec.compiler.drawing.drawing_settings import Panel, RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.model import Layout
+from neurovis_spec.scene.body import PLOT, BodyPicture
 from neurovis_spec.scene.caption import caption
 from neurovis_spec.scene.encode import CAPTION
 from neurovis_spec.scene.film import film
-from neurovis_spec.scene.frame import DENSEST, DENSITIES, MOST, whole
+from neurovis_spec.scene.frame import DENSEST, DENSITIES, MARGIN, MOST, whole
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.heading import HEADER, caption_text, title_text
 from neurovis_spec.scene.model import Film, Group
 from neurovis_spec.scene.parts import Page, Part, moved, stacked
+from neurovis_spec.scene.poses import Poses
 from neurovis_spec.scene.shots import Shots
 from neurovis_spec.scene.themes import theme_of
 from neurovis_spec.scene.views import AXIS, Block, BlockSpace, Drawing, Maker, span_of
@@ -98,6 +100,18 @@ def figure(
     assert sheet.height is not None
     name = f"{network.title or network.name}, {captions[0]}"
     return stacked(Page(sheet.width, sheet.height, sheet.density, theme, name, fps, CAPTION, said), parts, picture)
+
+
+def with_body(picture: Film, poses: Poses) -> Film:
+    """A film of a network with the body below it, in the pose of each frame."""
+    scene, body = picture.scene, BodyPicture(poses)
+    part = body.part(MARGIN, scene.width - MARGIN, PLOT, scene.theme, "body:")
+    top = scene.height + _GAP
+    height = whole(top + part.height + _FOOT)
+    captions = picture.caption, picture.captions
+    page = Page(scene.width, height, scene.density, scene.theme, scene.title, picture.fps, *captions)
+    made = stacked(page, [(0.0, Part(scene.groups, scene.height)), (top, part)], picture)
+    return replace(made, scene=replace(made.scene, notes=scene.notes))
 
 
 def _captions(network: Network, shots: Shots) -> list[str]:

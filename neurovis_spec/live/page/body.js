@@ -37,6 +37,8 @@ const FOOT = 1.25,
 /** How much is left of a colour on the far side; what lies so far aside, as a share of the reach, is there or near. */
 const FAR = 0.45,
   ASIDE = 0.12;
+/** A solid as high as the ground is the ground. */
+const FLAT = 1e-6;
 
 /** The smallest of 1, 2 and 5 times a power of ten that is no less. @param {number} least @returns {number} */
 function roundAbove(least) {
@@ -126,16 +128,25 @@ export class Body {
       wanted = [look.step, look.serial, wide, high, devicePixelRatio, scene.version].join(' ');
     if (!wide || !high || wanted === this.drawn) return;
     this.drawn = wanted;
-    const points = this.points(look.pose),
-      context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
+    const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
     [canvas.width, canvas.height] = [Math.round(wide * devicePixelRatio), Math.round(high * devicePixelRatio)];
     context.scale(devicePixelRatio, devicePixelRatio);
+    this.paint(context, wide, high, look, scene);
+    this.tell(look);
+  }
+
+  /** Draw a pose into so much room. @param {CanvasRenderingContext2D} context @param {number} wide @param {number} high
+   * @param {Look} look @param {Scene} scene */
+  paint(context, wide, high, look, scene) {
+    const { skeleton } = this,
+      points = this.points(look.pose);
+    if (!skeleton) return;
     context.fillStyle = scene.theme.background;
     context.fillRect(0, 0, wide, high);
     context.font = `${FONT}px ${scene.constants.families.map((name) => JSON.stringify(name)).join()}`;
     context.lineCap = context.lineJoin = 'round';
     if (points) this.measure(points);
-    const touching = Array.from(look.pose.subarray(3 * skeleton.points.length), (value) => value > 0.5);
+    const touching = this.touching(look);
     for (const frame of this.frames(wide, high, points?.[skeleton.middle] ?? [...this.start, 0])) {
       context.save();
       this.ground(context, frame, scene.theme);
@@ -147,7 +158,11 @@ export class Body {
       this.numbers(context, frame, scene.theme);
       this.title(context, frame, scene.theme, points);
     }
-    this.tell(points, touching);
+  }
+
+  /** Which feet touch something. @param {Look} look @returns {boolean[]} */
+  touching(look) {
+    return Array.from(look.pose.subarray(3 * (this.skeleton?.points.length ?? 0)), (value) => value > 0.5);
   }
 
   /** How far it reaches. @param {number[][]} points */
@@ -209,7 +224,7 @@ export class Body {
     }
     context.lineWidth = 1;
     for (const [low, above] of this.skeleton?.solids ?? []) {
-      if (up === 1 && above[2] <= 1e-6) continue;
+      if (above[2] <= FLAT) continue;
       const [[x0, y0], [x1, y1]] = [this.at(frame, low), this.at(frame, above)];
       context.fillStyle = theme.box_line;
       context.strokeStyle = theme.muted;
@@ -397,12 +412,12 @@ export class Body {
     return `${Math.abs(far).toFixed(2)} m ${far < -0.005 ? 'back' : 'forward'}`;
   }
 
-  /** Put into words what is seen. @param {number[][] | null} points @param {boolean[]} touching */
-  tell(points, touching) {
-    const { skeleton } = this;
-    if (!skeleton) return;
-    const count = touching.filter(Boolean).length,
-      feet = touching.length ? `, ${count} of ${touching.length} feet touching` : '';
+  /** Put into words what is seen. @param {Look} look */
+  tell(look) {
+    const points = this.points(look.pose),
+      touching = this.touching(look),
+      count = touching.filter(Boolean).length;
+    const feet = touching.length ? `, ${count} of ${touching.length} feet touching` : '';
     this.words = points ? `the body ${this.come(points)}${feet}` : 'the body: its pose is not known';
     this.canvas.setAttribute('aria-label', `${this.words}; from above, and from its right side`);
   }

@@ -264,7 +264,7 @@ function help() {
   listKeys(/** @type {HTMLDialogElement} */ (part('keys')), controls.keys);
 }
 part('png').onclick = () => {
-  if (link.scene && link.look) savePng(link.scene, link.look);
+  if (link.scene && link.look) savePng(link.scene, link.look, body);
 };
 for (const what of ['svg', 'npz']) part(what).onclick = () => link.ask('fetch', { what, seconds: 1 });
 part('film').onclick = () => withNumber(part('seconds'), (seconds) => link.ask('fetch', { what: 'film', seconds }));

@@ -5,8 +5,12 @@
 import { Camera } from './camera.js';
 import { Drawing } from './draw.js';
 
+/** @typedef {import('./body.js').Body} Body */
 /** @typedef {import('./protocol.js').Look} Look */
 /** @typedef {import('./protocol.js').Scene} Scene */
+
+/** How high the body is in a picture that is saved. */
+const BELOW = 260;
 
 /** Have the browser save something. @param {Blob} blob @param {string} name */
 export function download(blob, name) {
@@ -17,16 +21,19 @@ export function download(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 }
 
-/** Save the whole picture as pixels, whatever part of it is seen. @param {Scene} scene @param {Look} look */
-export function savePng(scene, look) {
+/** Save the whole picture as pixels, whatever part of it is seen, with the body below it. @param {Scene} scene
+ * @param {Look} look @param {Body} body */
+export function savePng(scene, look, body) {
   const canvas = document.createElement('canvas'),
     camera = new Camera(),
     { width, height, density } = scene;
   camera.size = [width, height];
   camera.window = [Math.round(width * density), Math.round(height * density)];
-  [canvas.width, canvas.height] = camera.window;
+  [canvas.width, canvas.height] = [camera.window[0], Math.round((height + (body.skeleton ? BELOW : 0)) * density)];
   const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d', { alpha: false }));
   new Drawing(scene).draw(context, camera, look);
+  context.setTransform(density, 0, 0, density, 0, camera.window[1]);
+  body.paint(context, width, BELOW, look, scene);
   canvas.toBlob((blob) => {
     if (blob) download(blob, `${scene.name}.png`);
   });
