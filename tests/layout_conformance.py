@@ -233,3 +233,39 @@ def _within(rect: Rect, point: Point) -> bool:
     """Farther in than rounding to the grid of coordinates goes."""
     slack = 1 / 128
     return rect[0] + slack < point[0] < rect[2] - slack and rect[1] + slack < point[1] < rect[3] - slack
+
+
+def across(problem: LayoutProblem) -> int:
+    return 0 if problem.direction in ("down", "up") else 1
+
+
+def check_mirror(layout: Layout, problem: LayoutProblem) -> None:
+    """Images to the last bit, those of routes as well (to the own image and back: each its own)."""
+    axis = across(problem)
+    image = {a: b for mirror in problem.mirrors for pair in mirror.pairs for a, b in (pair, pair[::-1])}
+    at = [layout.positions[name] for name in problem.neurons]
+    sums = {at[a][axis] + at[b][axis] for a, b in image.items()}
+    assert len(sums) <= 1
+    assert all(at[a][1 - axis] == at[b][1 - axis] for a, b in image.items())
+    if not sums:
+        return
+    twice = sums.pop()
+    keys: dict[tuple[int, int, int], str] = {}
+    times: dict[tuple[int, int], int] = {}
+    for edge in problem.edges:
+        number = times[edge.source, edge.target] = times.get((edge.source, edge.target), 0) + 1
+        keys[edge.source, edge.target, number] = edge.name
+    for (a, b, number), name in keys.items():
+        ends = [image.get(n, n if 2 * at[n][axis] == twice else -1) for n in (a, b)]
+        other = keys.get((ends[0], ends[1], number))
+        if other is None or other == name:
+            continue
+        if (ends[0], ends[1]) == (b, a) != (a, b):
+            # to the image and back: reflections of each other would share a line, so each is one of itself
+            route = layout.routes[name]
+            half = len(route) // 2
+            mates = tuple((twice - x, y) if axis == 0 else (x, twice - y) for x, y in route[:half])
+            assert route[: -half - 1 : -1] == mates, name
+            continue
+        expected = tuple((twice - x, y) if axis == 0 else (x, twice - y) for x, y in layout.routes[name])
+        assert layout.routes[other] == expected, name

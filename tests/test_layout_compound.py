@@ -72,10 +72,6 @@ def inner_routes(layout: Layout, problem: LayoutProblem, number: int) -> dict[st
     }
 
 
-def across(problem: LayoutProblem) -> int:
-    return 0 if problem.direction in ("down", "up") else 1
-
-
 def reflected(points: tuple[Point, ...], axis: int) -> tuple[Point, ...]:
     return tuple((-x, y) if axis == 0 else (x, -y) for x, y in points)
 
@@ -98,38 +94,6 @@ def check_frames(layout: Layout, problem: LayoutProblem) -> None:
             assert i in members or not inside(rect, layout.positions[name]), name
 
 
-def check_mirror(layout: Layout, problem: LayoutProblem) -> None:
-    """Images to the last bit, those of routes as well (to the own image and back: each its own)."""
-    axis = across(problem)
-    image = {a: b for mirror in problem.mirrors for pair in mirror.pairs for a, b in (pair, pair[::-1])}
-    at = [layout.positions[name] for name in problem.neurons]
-    sums = {at[a][axis] + at[b][axis] for a, b in image.items()}
-    assert len(sums) <= 1
-    assert all(at[a][1 - axis] == at[b][1 - axis] for a, b in image.items())
-    if not sums:
-        return
-    twice = sums.pop()
-    keys: dict[tuple[int, int, int], str] = {}
-    times: dict[tuple[int, int], int] = {}
-    for edge in problem.edges:
-        number = times[edge.source, edge.target] = times.get((edge.source, edge.target), 0) + 1
-        keys[edge.source, edge.target, number] = edge.name
-    for (a, b, number), name in keys.items():
-        ends = [image.get(n, n if 2 * at[n][axis] == twice else -1) for n in (a, b)]
-        other = keys.get((ends[0], ends[1], number))
-        if other is None or other == name:
-            continue
-        if (ends[0], ends[1]) == (b, a) != (a, b):
-            # to the image and back: reflections of each other would share a line, so each is one of itself
-            route = layout.routes[name]
-            half = len(route) // 2
-            mates = tuple((twice - x, y) if axis == 0 else (x, twice - y) for x, y in route[:half])
-            assert route[: -half - 1 : -1] == mates, name
-            continue
-        expected = tuple((twice - x, y) if axis == 0 else (x, twice - y) for x, y in layout.routes[name])
-        assert layout.routes[other] == expected, name
-
-
 def attempt(problem: LayoutProblem) -> tuple[Layout | None, str]:
     try:
         return lay_out_problem(problem, "layered"), ""
@@ -143,7 +107,7 @@ def test_instances_of_one_make_are_one_drawing(problem: LayoutProblem) -> None:
     layout = suite.check(problem, "layered")
     assert layout is not None
     check_frames(layout, problem)
-    axis = across(problem)
+    axis = suite.across(problem)
     for one, other in combinations(range(len(problem.modules)), 2):
         if problem.modules[one].template != problem.modules[other].template:
             continue
@@ -157,7 +121,7 @@ def test_instances_of_one_make_are_one_drawing(problem: LayoutProblem) -> None:
 @given(problem=walkers(mirrored=True))
 def test_mirror_images_are_exact(problem: LayoutProblem) -> None:
     layout = lay_out_problem(problem, "layered")
-    check_mirror(layout, problem)
+    suite.check_mirror(layout, problem)
     check_frames(layout, problem)
     suite.check_positions(problem, layout)
     assert metrics(layout, problem)["symmetry"] == 1
@@ -172,7 +136,7 @@ def test_pins_hold_and_everything_else_gives_way(problem: LayoutProblem) -> None
         return
     suite.check_routes(problem, layout)
     check_frames(layout, problem)
-    check_mirror(layout, problem)
+    suite.check_mirror(layout, problem)
     points = [layout.positions[name] for name in problem.neurons]
     assert all(points[i] == pin for i, pin in problem.pins.items())
     assert all(distance(a, b) >= 0.6 - 1e-9 for a, b in combinations(points, 2))

@@ -1,5 +1,9 @@
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import combinations
+from random import Random
+
 import layout_conformance as suite
 import networkx as nx
 import numpy as np
@@ -8,8 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from neurovis_layouts.organic.paths import distances
 
-from neurovis_spec.layout import LayoutProblem
+from neurovis_spec.layout import Direction, LayoutProblem, LayoutRefusalError
 from neurovis_spec.layout.arrange import lay_out_problem
+from neurovis_spec.layout.frames import Frames, meet
 from neurovis_spec.layout.geometry import distance
 from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.problem import canonical
@@ -82,3 +87,64 @@ def test_parts_do_not_overlap_however_small_the_spacing(engine: str) -> None:
     names = suite.members("N", 12)
     edges = suite.named([("N1", "N2"), ("N3", "N4"), ("N4", "N5"), ("N5", "N3")])
     suite.check(canonical("parts", names, edges=edges, spacing=(0.2, 0.5)), engine)
+
+
+def two_sided(sides: int, middle: int, connections: int, *, seed: int, direction: Direction = "down") -> LayoutProblem:
+    """Pairs of neurons and some in the middle; of most connections the mirror image is there, too."""
+    random = Random(seed)
+    left, right = suite.members("L", sides), suite.members("R", sides)
+    image = {**dict(zip(left, right, strict=True)), **dict(zip(right, left, strict=True))}
+    names = [*left, *right, *suite.members("M", middle)]
+    pairs: dict[tuple[str, str], None] = {}
+    while len(pairs) < connections:
+        a, b = random.choice(names), random.choice(names)
+        pairs[a, b] = None
+        if random.random() < 0.7:
+            pairs[image.get(a, a), image.get(b, b)] = None
+    both = list(zip(left, right, strict=True))
+    return canonical("two-sided", names, edges=suite.named(pairs), direction=direction, mirrors=[("", both, [])])
+
+
+@pytest.mark.parametrize("direction", ["down", "left"])
+@pytest.mark.parametrize(("sides", "middle", "connections"), [(3, 1, 8), (12, 5, 80), (40, 20, 300)])
+def test_mirror_images_are_exact(sides: int, middle: int, connections: int, direction: Direction) -> None:
+    problem = two_sided(sides, middle, connections, seed=sides, direction=direction)
+    layout = suite.check(problem, "organic")
+    assert layout is not None
+    suite.check_mirror(layout, problem)
+    assert metrics(layout, problem)["symmetry"] == 1
+
+
+def test_mirror_images_are_exact_among_pins_and_in_boxes() -> None:
+    problem = two_sided(12, 5, 80, seed=1)
+    number = problem.neurons.index
+    boxes = [
+        ("both", tuple(number(f"{side}{i}") for side in "LR" for i in (1, 2, 3, 4))),
+        ("one", tuple(number(f"L{i}") for i in (5, 6, 7))),
+        ("other", tuple(number(f"R{i}") for i in (5, 6, 7))),
+        ("middle", tuple(number(f"M{i}") for i in (1, 2, 3))),
+    ]
+    for pins in ({}, {"L1": (-2.5, 0.25)}, {"L2": (-3.1, 2.2), "R2": (3.1, 2.2), "M1": (0.3, 9.0)}):
+        held = replace(problem, boxes=tuple(boxes), pins={number(name): point for name, point in pins.items()})
+        layout = suite.check(held, "organic")
+        assert layout is not None
+        suite.check_mirror(layout, held)
+        if not pins:
+            rects = Frames(held).rects({i: layout.positions[name] for i, name in enumerate(held.neurons)}, {})
+            assert not any(meet(*pair) for pair in combinations([rect for rect in rects if rect], 2))
+
+
+def test_sides_of_a_tangle_do_not_mix() -> None:
+    problem = two_sided(50, 0, 1200, seed=2)
+    own = replace(problem, edges=tuple(e for e in problem.edges if (e.source < 50) == (e.target < 50)))
+    layout = lay_out_problem(own, "auto")
+    assert layout.engine == "organic"
+    middle = np.mean([x for x, _ in layout.positions.values()])
+    assert sum(x < middle for name, (x, _) in layout.positions.items() if name.startswith("L")) in (0, 50)
+
+
+def test_mirror_images_within_an_instance_are_for_engines_with_frames() -> None:
+    problem = canonical("x", ["m.A", "m.B"], modules=[("m", "m")], mirrors=[("m", [("m.A", "m.B")], [])])
+    with pytest.raises(LayoutRefusalError) as found:
+        lay_out_problem(problem, "organic")
+    assert found.value.code == "layout-mirror-unsupported"

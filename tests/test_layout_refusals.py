@@ -82,7 +82,7 @@ FORESEEN = {"arranged-twice", "align-conflict", "position-missing", "pin-in-fram
             "layout-plan-unsupported"}  # fmt: skip
 MORE = [
     (f"{GROUPS}  engine: circular\n  arrange: {{A: row}}\n", "layout-arrange-unsupported", "A"),
-    (f"{GROUPS}  engine: organic\n  mirror: [[A1, A2]]\n", "layout-mirror-unsupported", "[A1, A2]"),
+    (f"{GROUPS}  engine: circular\n  mirror: [[A1, A2]]\n", "layout-mirror-unsupported", "[A1, A2]"),
     (f"{GROUPS}  direction: right\n  arrange: {{A: row}}\n  align: [[B, A3], [A1, A2]]\n", "align-conflict",
      "[A1, A2]"),
     (f"{GROUPS}  engine: manual\n  positions: {{B: [9, 9], {', '.join(f'A{i}: [{i}, 0]' for i in range(1, 5))}}}\n"

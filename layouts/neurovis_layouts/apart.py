@@ -6,6 +6,8 @@ ran along the direction still do. Where there is no room the whole grows.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from neurovis_spec.layout import FloatArray, IntArray
@@ -62,9 +64,11 @@ def apart(
     fixed: IntArray | None = None,
     arcs: tuple[IntArray, IntArray] | None = None,
     part: IntArray | None = None,
+    kept: Callable[[FloatArray], FloatArray] | None = None,
 ) -> FloatArray:
     """Places (n, 2), ``want`` apart where that is to be had, at least a disc. ``fixed`` ones stay. Of ``arcs``
-    (sources, targets) those that run to higher y keep doing so. ``part`` (n,) says what grows together, by itself."""
+    (sources, targets) those that run to higher y keep doing so. ``part`` (n,) says what grows together, by itself.
+    ``kept`` puts places so that they keep what they have to, such as a symmetry."""
     count = len(places)
     part = np.zeros(count, dtype=np.int64) if part is None else part
     want = max(want, LEAST + 0.02)
@@ -72,9 +76,10 @@ def apart(
     if fixed is not None:
         hold[fixed] = 0.0
     places = places + hold * jitter(count) / 1024
+    places = kept(places) if kept else places
     if arcs is not None:
-        kept = places[arcs[1], 1] > places[arcs[0], 1]
-        arcs = arcs[0][kept], arcs[1][kept]
+        running = places[arcs[1], 1] > places[arcs[0], 1]
+        arcs = arcs[0][running], arcs[1][running]
     for step in range(1, _ROUNDS):
         one, other, way, far = near_pairs(places, want)
         clear = not len(far) or far.min() >= LEAST
@@ -89,6 +94,7 @@ def apart(
             growing = np.bincount(part[one[far < LEAST]], minlength=int(part.max()) + 1)[part] > 0
             centre = _centres(places, part)
             places = np.where((hold > 0) & growing[:, None], centre + (places - centre) * _GROWTH, places)
+        places = kept(places) if kept else places
     return places
 
 

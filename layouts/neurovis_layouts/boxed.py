@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from neurovis_layouts.apart import apart
+from neurovis_layouts.symmetry import Symmetry
 from neurovis_spec.layout import BoolArray, FloatArray, IntArray
 from neurovis_spec.layout.frames import BOX_ACROSS, BOX_DOWN, TITLE
 from neurovis_spec.layout.model import RADIUS, LayoutProblem
@@ -43,8 +44,19 @@ class _Box:
     within: Sequence[_Box]
 
 
-def boxes_apart(problem: LayoutProblem, places: FloatArray, spacing: float) -> FloatArray:
-    """The places (n, 2) of a problem's neurons, each box by itself, discs ``spacing`` apart. Pinned neurons stay."""
+@dataclass(frozen=True, slots=True)
+class _Sizes:
+    """How far discs are kept apart, and neurons are from each other on the whole."""
+
+    apart: float
+    spacing: float
+
+
+def boxes_apart(
+    problem: LayoutProblem, places: FloatArray, spacing: float, symmetry: Symmetry | None = None
+) -> FloatArray:
+    """The places (n, 2) of a problem's neurons, each box by itself, discs ``spacing`` apart. Pinned neurons stay, and
+    mirror images are such all the time."""
     if not problem.boxes or len(problem.boxes) > _MOST_BOXES:
         return places
     count = len(problem.neurons)
@@ -52,7 +64,10 @@ def boxes_apart(problem: LayoutProblem, places: FloatArray, spacing: float) -> F
     pinned = np.zeros(count, dtype=np.bool_)
     pinned[list(problem.pins)] = True
     boxes = _within(_wholes([frozenset(members) for _, members in problem.boxes]))
-    _divided(places, _Box(np.arange(count), boxes), pinned, spacing, problem.neuron_spacing)
+    symmetry = symmetry or Symmetry(np.arange(count))
+    pinned |= pinned[symmetry.image]
+    sizes = _Sizes(spacing, problem.neuron_spacing)
+    _divided(places, _Box(np.arange(count), boxes), pinned, sizes, symmetry)
     return places
 
 
@@ -81,35 +96,110 @@ def _within(wholes: Sequence[frozenset[int]]) -> list[_Box]:
     return boxes
 
 
-def _divided(places: FloatArray, box: _Box, pinned: BoolArray, spacing: float, unit: float) -> None:
+def _divided(places: FloatArray, box: _Box, pinned: BoolArray, sizes: _Sizes, symmetry: Symmetry) -> None:
     """Move the neurons of a box: its boxes off each other, who is in none of them out of them."""
     for inner in box.within:
         own = inner.members
-        places[own] = _drawn_in(places[own], pinned[own], unit)
-        _divided(places, inner, pinned, spacing, unit)
+        places[own] = _drawn_in(places[own], pinned[own], sizes.spacing)
+    places[:] = symmetry.kept(places)
+    for number, inner in enumerate(box.within):
+        own = inner.members
+        if -1 < _image(box.within, inner, symmetry) < number and symmetry.paired[own].all():
+            places[own] = places[symmetry.image[own]] * (-1.0, 1.0) + (2 * symmetry.axis, 0.0)
+        else:
+            _divided(places, inner, pinned, sizes, symmetry)
     own, still = box.members, pinned.copy()
+    frames = _Frames(places, box, pinned, symmetry)
     if box.within:
-        boxed = np.concatenate([inner.members for inner in box.within])
-        alone = np.setdiff1d(own, boxed)
-        posts = alone[pinned[alone]]
-        low = np.array([*(places[inner.members].min(axis=0) for inner in box.within), *places[posts]])
-        high = np.array([*(places[inner.members].max(axis=0) for inner in box.within), *places[posts]])
-        held = np.array([*(pinned[inner.members].any() for inner in box.within), *pinned[posts]])
-        half = (high - low) / 2 + _LINE
-        half[len(box.within) :] = RADIUS
-        centres = _pushed((low + high) / 2, half + _GAP, held)
-        for inner, way in zip(box.within, centres - (low + high) / 2, strict=False):
+        for inner, way in zip(box.within, frames.pushed(), strict=True):
             places[inner.members] += way
-        still[boxed] = True
+        places[:] = symmetry.kept(places)
+        still[np.concatenate([inner.members for inner in box.within])] = True
     free = own[~still[own]]
+    inside = symmetry.within(own)
     for turn in range(_TURNS if len(free) else 0):
         before = places[free]
         if box.within:
-            frames = slice(0, len(box.within))
-            places[free] = _outside(before, centres[frames], half[frames] + RADIUS)
+            places[free] = _outside(before, frames.centres, frames.half + RADIUS)
+            places[:] = symmetry.kept(places)
         if turn and np.array_equal(places[free], before):
             break
-        places[own] = apart(places[own], spacing, np.flatnonzero(still[own]))
+        places[own] = apart(places[own], sizes.apart, np.flatnonzero(still[own]), kept=inside.kept)
+        places[:] = symmetry.kept(places)
+
+
+class _Frames:
+    """The frames of the boxes in a box, among the pins there: ``centres`` and ``half`` of their sizes (k, 2)."""
+
+    def __init__(self, places: FloatArray, box: _Box, pinned: BoolArray, symmetry: Symmetry) -> None:
+        self._axis = symmetry.axis
+        if not box.within:
+            return
+        alone = np.setdiff1d(box.members, np.concatenate([inner.members for inner in box.within]))
+        posts = places[alone[pinned[alone]]]
+        low = np.array([*(places[inner.members].min(axis=0) for inner in box.within), *posts])
+        high = np.array([*(places[inner.members].max(axis=0) for inner in box.within), *posts])
+        self._count = len(box.within)
+        self._held = np.array([*(pinned[inner.members].any() for inner in box.within), *(True for _ in posts)])
+        self._half = (high - low) / 2 + _LINE
+        self._half[self._count :] = RADIUS
+        self._all = (low + high) / 2
+        self._image = np.array([*(_image(box.within, inner, symmetry) for inner in box.within), *(-1 for _ in posts)])
+
+    @property
+    def centres(self) -> FloatArray:
+        """(k, 2) where the frames are."""
+        centres: FloatArray = self._all[: self._count]
+        return centres
+
+    @property
+    def half(self) -> FloatArray:
+        """(k, 2) half of their widths and heights."""
+        half: FloatArray = self._half[: self._count]
+        return half
+
+    def pushed(self) -> FloatArray:
+        """(k, 2) how far the frames have moved now that no two overlap, but for those held by pins. One that is its own
+        mirror image moves along the axis, others as their images do."""
+        centres, half, held = self._all.copy(), self._half + _GAP, self._held
+        one, other = np.triu_indices(len(centres), 1)
+        movable = ~(held[one] & held[other])
+        one, other = one[movable], other[movable]
+        # how much of a push each of two takes
+        share = np.where(held[one], 0.0, np.where(held[other], 1.0, 0.5))
+        on_axis = self._image == np.arange(len(centres))
+        along = on_axis[one] & (on_axis[other] | held[other]) | held[one] & on_axis[other]
+        for turn in range(_ROUNDS):
+            way = centres[other] - centres[one]
+            missing = half[one] + half[other] - np.abs(way)
+            close = np.flatnonzero((missing > 1e-6).all(axis=1))
+            if not len(close):
+                break
+            if turn >= _PATIENCE:
+                grown = centres.mean(axis=0) + _GROWTH * (centres - centres.mean(axis=0))
+                centres = np.where(held[:, None], centres, grown)
+            axis = np.where(along[close], 1, np.argmin(missing[close], axis=1))
+            step = 0.5 * missing[close, axis] + 1e-3
+            step *= np.where(way[close, axis] < 0, -1.0, 1.0)
+            np.add.at(centres, (other[close], axis), (1 - share[close]) * step)
+            np.add.at(centres, (one[close], axis), -share[close] * step)
+            centres = self._kept(centres)
+        moved: FloatArray = (centres - self._all)[: self._count]
+        self._all = centres
+        return moved
+
+    def _kept(self, centres: FloatArray) -> FloatArray:
+        images = self._image >= 0
+        theirs = centres[self._image] * (-1.0, 1.0) + (2 * self._axis, 0.0)
+        kept: FloatArray = np.where((images & ~self._held)[:, None], (centres + theirs) / 2, centres)
+        return kept
+
+
+def _image(boxes: Sequence[_Box], box: _Box, symmetry: Symmetry) -> int:
+    """Which of these boxes holds the images of one's neurons, −1 where that is none."""
+    paired = box.members[symmetry.image[box.members] != box.members]
+    images = set(symmetry.image[paired].tolist())
+    return next((i for i, other in enumerate(boxes) if images and images <= set(other.members.tolist())), -1)
 
 
 def _drawn_in(places: FloatArray, pinned: BoolArray, unit: float) -> FloatArray:
@@ -129,31 +219,6 @@ def _drawn_in(places: FloatArray, pinned: BoolArray, unit: float) -> FloatArray:
     about = places[pinned].mean(axis=0) if pinned.any() else middle
     drawn[~pinned] = about + free * min(1.0, float(np.sqrt(room)), long)
     return drawn
-
-
-def _pushed(centres: FloatArray, half: FloatArray, held: BoolArray) -> FloatArray:
-    """Centres (k, 2) of rectangles, so wide and high by half, moved until no two overlap, but for those ``held``."""
-    centres = centres.copy()
-    one, other = np.triu_indices(len(centres), 1)
-    movable = ~(held[one] & held[other])
-    one, other = one[movable], other[movable]
-    # how much of a push each of two takes
-    share = np.where(held[one], 0.0, np.where(held[other], 1.0, 0.5))
-    for turn in range(_ROUNDS):
-        way = centres[other] - centres[one]
-        missing = half[one] + half[other] - np.abs(way)
-        close = np.flatnonzero((missing > 1e-6).all(axis=1))
-        if not len(close):
-            break
-        if turn >= _PATIENCE:
-            grown = centres.mean(axis=0) + _GROWTH * (centres - centres.mean(axis=0))
-            centres = np.where(held[:, None], centres, grown)
-        axis = np.argmin(missing[close], axis=1)
-        step = 0.5 * missing[close, axis] + 1e-3
-        step *= np.where(way[close, axis] < 0, -1.0, 1.0)
-        np.add.at(centres, (other[close], axis), (1 - share[close]) * step)
-        np.add.at(centres, (one[close], axis), -share[close] * step)
-    return centres
 
 
 def _outside(points: FloatArray, centres: FloatArray, half: FloatArray) -> FloatArray:

@@ -17,6 +17,7 @@ from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.incremental import kept
 from neurovis_layouts.pins import fit, with_origins
 from neurovis_layouts.routing import route_all
+from neurovis_layouts.symmetry import Symmetry, exact, routed_alike
 from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.geometry import snap, straight
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point
@@ -34,15 +35,22 @@ def drawn(
     frames: bool = True,
     clear: Iterable[int] = (),
     highest: float = math.inf,
+    symmetry: Symmetry | None = None,
 ) -> Layout:
     """The layout with the neurons at the first of ``places`` (n, 2), where no pin says otherwise. Instances without a
     pin are kept off the ``frames`` of those that have one. The edges ``clear``, by index, run straight, as the caller
-    knows that nothing is in their way. The others bow at most ``highest`` times as high as they are long."""
+    knows that nothing is in their way. The others bow at most ``highest`` times as high as they are long. With a
+    ``symmetry`` images, and routes between them, are exact reflections."""
     flat: list[Point] = [(snap(x), snap(y)) for x, y in places[: len(problem.neurons)].tolist()]
     pins = with_origins(problem, [to_picture(point, problem.direction) for point in flat])
     centres, _, _ = fit(flat, {i: from_picture(point, problem.direction) for i, point in pins.items()})
+    mirrored = symmetry is not None and symmetry.paired.any()
+    if symmetry is not None and mirrored:
+        centres = exact(problem, symmetry, centres)
     there = {i: straight(centres[problem.edges[i].source], centres[problem.edges[i].target]) for i in clear}
     routes = route_all(problem.edges, centres, careful=_CAREFUL, there=there, highest=highest)
+    if symmetry is not None and mirrored:
+        routes = routed_alike(problem, symmetry, centres, routes)
     turned = problem.direction
     fresh = Layout(
         problem.network,

@@ -34,6 +34,8 @@ _MOST_PARTS = 500
 #: ranks. But at least this share of the neurons have one neighbour: what is mostly chains is long, and ranks it is.
 _MOST_TO_AND_FRO, _MOST_IN_ROW, _ENDS = 60, 120, 0.1
 
+_TANGLED = "its neurons drive one another in loops so densely that ranks would say nothing"
+
 
 def choose_engine(problem: LayoutProblem) -> tuple[str, str]:
     """The engine that ``auto`` stands for, and why, in words for ``inspect``. What is too large for the one that suits
@@ -71,6 +73,9 @@ def _most_suitable(problem: LayoutProblem) -> tuple[Suits, str]:
     edges = len(problem.edges)
     if problem.plan:
         return "flow", "it puts what the spec says into rows and columns of the page"
+    arranged = problem.arrange or problem.align or problem.pins or problem.modules
+    if problem.mirrors and not arranged and len(problem.neurons) <= _MOST_BY_DISTANCE and _tangled(problem):
+        return "nearness", _TANGLED
     if problem.arrange or problem.mirrors or problem.align:
         return "flow", "it can arrange, mirror and align as the spec says"
     if problem.neurons and len(problem.pins) == len(problem.neurons):
@@ -80,16 +85,15 @@ def _most_suitable(problem: LayoutProblem) -> tuple[Suits, str]:
     if problem.modules and edges <= _MOST_IN_LAYERS:
         return "flow", "it draws instances as frames"
     if not (problem.pins or problem.modules) and _tangled(problem):
-        why = "its neurons drive one another in loops so densely that ranks would say nothing"
         if (
             not problem.boxes
             and len(problem.neurons) <= _MOST_IN_RING
             and edges > _COMPLETE * len(problem.neurons) ** 2
         ):
-            return "tangle", why
+            return "tangle", _TANGLED
         if len(problem.neurons) <= _MOST_BY_DISTANCE:
-            return "nearness", why
-        return "clusters", why
+            return "nearness", _TANGLED
+        return "clusters", _TANGLED
     if not (problem.pins or problem.boxes or problem.modules) and _as_trees(problem):
         return "clusters", f"its {edges} connections form trees, which it draws without a crossing"
     if edges > _MOST_IN_RANKS and _in_branches(problem):

@@ -13,7 +13,7 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from itertools import combinations
 
-from neurovis_layouts.layered.axes import axes, imaged, shift_of
+from neurovis_layouts.axes import axes, imaged, shift_of
 from neurovis_layouts.layered.component_layout import ComponentLayout
 from neurovis_layouts.layered.drawing import Drawing, FrameMove, Piece
 from neurovis_layouts.layered.occupancy import Body, Ground

@@ -2,7 +2,7 @@
 
 In: a problem of a few hundred neurons whose ranks say little. Out: a layout whose distances are those in the network,
 as far as a plane allows: what is wired closely stands close. What runs from one loop to another runs down; modules and
-boxes are drawn together; pins are part of the whole from the start.
+boxes are drawn together; mirror images are such from the start, and pins part of the whole.
 """
 
 from __future__ import annotations
@@ -13,10 +13,11 @@ import numpy as np
 
 from neurovis_layouts.apart import LEAST, apart, jitter
 from neurovis_layouts.boxed import boxes_apart
-from neurovis_layouts.finish import drawn, nearest, pinned_places
+from neurovis_layouts.finish import drawn, nearest
 from neurovis_layouts.organic.paths import distances
 from neurovis_layouts.organic.stress import Arcs, least_stress
 from neurovis_layouts.packing import packed
+from neurovis_layouts.symmetry import Symmetry, about_pins, first_of_pairs, symmetry_of
 from neurovis_layouts.wiring import Wiring, loops_of, parts_of, wiring_of
 from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem
@@ -38,25 +39,43 @@ class OrganicEngine:
 
     name = "organic"
     capabilities = Capabilities(
-        pins=True, boxes=True, direction=True, memory=True, neurons=1000, edges=20_000, suits="nearness"
+        pins=True,
+        boxes=True,
+        direction=True,
+        mirrors=True,
+        memory=True,
+        checks=True,
+        neurons=1000,
+        edges=20_000,
+        suits="nearness",
     )
 
     def lay_out(self, problem: LayoutProblem) -> Layout:
         """Place the neurons by their distances in the network, route the edges round what is in the way."""
         wiring = _stacked(wiring_of(problem, hubs=False), loops_of(problem))
-        fixed, there = pinned_places(problem)
+        symmetry = symmetry_of(problem)
         part = _parts(problem, wiring)
         places = np.zeros((wiring.count, 2))
-        # what has pins is one part: it has its place, and the others stand beside it
-        part[np.isin(part, part[fixed])] = -1
+        # what has pins is one part: it has its place, and the others stand beside it; so is what has mirror images
+        whole = np.union1d(np.array(sorted(problem.pins), dtype=np.int64), np.flatnonzero(symmetry.paired))
+        part[np.isin(part, part[whole])] = -1
         numbers = np.unique(part).tolist()
         sizes: list[tuple[float, float]] = []
         for number in numbers:
             chosen = np.flatnonzero(part == number)
-            places[chosen] = _placed(problem, wiring, chosen, fixed, there)
+            places[chosen] = _placed(problem, wiring, chosen, symmetry)
+            if number < 0:
+                symmetry, places = _at_pins(problem, wiring, chosen, symmetry, places)
             sizes.append(tuple((places[chosen].max(axis=0) - places[chosen].min(axis=0)).tolist()))
         _pack(places, part, numbers, sizes, max(_GAP * problem.neuron_spacing, LEAST))
-        return drawn(problem, self.name, boxes_apart(problem, places, _APART * problem.neuron_spacing))
+        places = boxes_apart(problem, places, _APART * problem.neuron_spacing, symmetry)
+        return drawn(problem, self.name, places, symmetry=symmetry)
+
+    def check(self, problem: LayoutProblem) -> None:
+        """Raises LayoutRefusalError for mirror images that it cannot draw."""
+        symmetry = symmetry_of(problem)
+        if problem.pins:
+            about_pins(problem, symmetry, np.zeros((len(problem.neurons), 2)))
 
 
 def _stacked(wiring: Wiring, loops: IntArray) -> Wiring:
@@ -92,8 +111,49 @@ def _together(problem: LayoutProblem) -> list[tuple[int, ...]]:
     return [module.members for module in problem.modules] + [members for _, members in problem.boxes]
 
 
-def _placed(problem: LayoutProblem, wiring: Wiring, chosen: IntArray, fixed: IntArray, there: FloatArray) -> FloatArray:
+def _placed(problem: LayoutProblem, wiring: Wiring, chosen: IntArray, symmetry: Symmetry) -> FloatArray:
     """Places (k, 2) of the ``chosen`` neurons: of least stress, then scaled and kept apart."""
+    ways, press = _wishes(problem, wiring, chosen)
+    link, own = _LINK * problem.neuron_spacing, symmetry.within(chosen)
+    above, below = press.above, press.below
+    first = jitter(len(chosen)) * link * np.sqrt(len(chosen))
+    nobody = np.zeros(0, dtype=np.int64)
+    # the direction comes in once the rest has found its shape: springs would lock what begins the wrong way round
+    loose = least_stress(ways, first, Arcs(nobody, nobody, 0.0, 0.0), nobody, 60)
+    pairs = np.searchsorted(chosen, np.intersect1d(first_of_pairs(problem), chosen))
+    if len(pairs):
+        loose = own.turned(loose, pairs)
+        if len(above) and (loose[below, 1] - loose[above, 1]).sum() < 0:
+            loose = loose * (1.0, -1.0)
+    else:
+        loose = _upright(loose, above, below)
+    places = least_stress(ways, loose, press, nobody, symmetry=own)
+    places *= max(1.0, _NEXT * problem.neuron_spacing / max(_most(nearest(places, link)), 1e-3))
+    return apart(places, _APART * problem.neuron_spacing, None, (above, below), kept=own.kept)
+
+
+def _at_pins(
+    problem: LayoutProblem, wiring: Wiring, chosen: IntArray, symmetry: Symmetry, places: FloatArray
+) -> tuple[Symmetry, FloatArray]:
+    """The places with the ``chosen`` neurons moved to their pins and the rest of them pulled along; and the symmetry
+    with its axis where it stands then."""
+    symmetry, fixed, there = about_pins(problem, symmetry, places)
+    if not len(fixed):
+        return symmetry, places
+    ways, press = _wishes(problem, wiring, chosen)
+    held, own = np.searchsorted(chosen, fixed), symmetry.within(chosen)
+    moved = places[chosen] + (symmetry.axis, 0.0)
+    shift = (there - moved[held]).mean(axis=0)
+    moved += (0.0, shift[1]) if symmetry.paired.any() else shift
+    moved[held] = there
+    moved = least_stress(ways, moved, press, held, symmetry=own)
+    places = places.copy()
+    places[chosen] = apart(moved, _APART * problem.neuron_spacing, held, (press.above, press.below), kept=own.kept)
+    return symmetry, places
+
+
+def _wishes(problem: LayoutProblem, wiring: Wiring, chosen: IntArray) -> tuple[FloatArray, Arcs]:
+    """How far any two of the ``chosen`` are to be from each other (k, k), and which of them is to be below another."""
     number = np.full(wiring.count, -1, dtype=np.int64)
     number[chosen] = np.arange(len(chosen))
     links, arcs = number[wiring.a] >= 0, number[wiring.above] >= 0
@@ -105,21 +165,7 @@ def _placed(problem: LayoutProblem, wiring: Wiring, chosen: IntArray, fixed: Int
         block = np.ix_(mates, mates)
         ways[block] = np.minimum(ways[block], np.maximum(_MATES, _CLOSER * ways[block]))
     np.fill_diagonal(ways, 0.0)
-    above, below = number[wiring.above[arcs]], number[wiring.below[arcs]]
-    press = Arcs(above, below, _BELOW * link, _PRESS / link**2)
-    first = jitter(len(chosen)) * link * np.sqrt(len(chosen))
-    nobody = np.zeros(0, dtype=np.int64)
-    # the direction comes in once the rest has found its shape: springs would lock what begins the wrong way round
-    loose = least_stress(link * ways, first, Arcs(nobody, nobody, 0.0, 0.0), nobody, 60)
-    places = least_stress(link * ways, _upright(loose, above, below), press, nobody)
-    places *= max(1.0, _NEXT * problem.neuron_spacing / max(_most(nearest(places, link)), 1e-3))
-    here = np.isin(fixed, chosen)
-    held = number[fixed[here]]
-    if len(held):
-        places += (there[here] - places[held]).mean(axis=0)
-        places[held] = there[here]
-        places = least_stress(link * ways, places, press, held)
-    return apart(places, _APART * problem.neuron_spacing, held, (above, below))
+    return link * ways, Arcs(number[wiring.above[arcs]], number[wiring.below[arcs]], _BELOW * link, _PRESS / link**2)
 
 
 def _most(values: FloatArray) -> float:

@@ -1,0 +1,177 @@
+"""Symmetry: places and routes of neurons some of which are mirror images of others, about one axis.
+
+In: a problem, or places near those wanted. Out: whose image each neuron is; the places, symmetric; where the axis
+stands among pins; routes that are their image's reflections. Who has no image stands anywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from neurovis_layouts.axes import axes, imaged
+from neurovis_layouts.blocks import keys_of
+from neurovis_layouts.frame import from_picture
+from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
+from neurovis_layouts.wiring import BoolArray
+from neurovis_spec.layout import FloatArray, IntArray
+from neurovis_spec.layout.geometry import snap
+from neurovis_spec.layout.model import LayoutProblem, LayoutRefusalError, Point, Route
+
+#: How far from a pin the axis may stand, in neuron spacings, when it has to leave all pins on one side.
+_WIDE = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class Symmetry:
+    """``image`` (n,): the mirror image of each point, itself where it has none; ``axis`` is the x of the axis."""
+
+    image: IntArray
+    axis: float = 0.0
+
+    @property
+    def paired(self) -> BoolArray:
+        """(n,) who has an image."""
+        paired: BoolArray = self.image != np.arange(len(self.image))
+        return paired
+
+    def kept(self, places: FloatArray) -> FloatArray:
+        """Places (n, 2) made symmetric, each pair moved as little as that takes."""
+        paired = self.paired
+        if not paired.any():
+            return places
+        theirs = places[self.image] * (-1.0, 1.0) + (2 * self.axis, 0.0)
+        symmetric: FloatArray = np.where(paired[:, None], (places + theirs) / 2, places)
+        return symmetric
+
+    def folding(self, sign: float) -> FloatArray:
+        """(n, m): what gives all coordinates from those of one of each pair, whose images have them times ``sign``."""
+        chosen = np.flatnonzero(self.image >= np.arange(len(self.image)))
+        fold = np.zeros((len(self.image), len(chosen)))
+        column = np.arange(len(chosen))
+        other = self.image[chosen] != chosen
+        fold[self.image[chosen[other]], column[other]] = sign
+        fold[chosen, column] = 1.0
+        return fold
+
+    def within(self, chosen: IntArray) -> Symmetry:
+        """That of the chosen points alone, which are in order; who has the image elsewhere has none here."""
+        image = np.where(np.isin(self.image[chosen], chosen), self.image[chosen], chosen)
+        return Symmetry(np.searchsorted(chosen, image), self.axis)
+
+    def turned(self, places: FloatArray, first: IntArray) -> FloatArray:
+        """Places (n, 2) turned and moved so that the images of the ``first`` stand opposite them, across the axis, and
+        made symmetric."""
+        second = self.image[first]
+        x, y = (places[second] - places[first]).mean(axis=0).tolist()
+        length = float(np.hypot(x, y)) or 1.0
+        cosine, sine = (x / length, y / length) if x or y else (1.0, 0.0)
+        places = np.stack(
+            [cosine * places[:, 0] + sine * places[:, 1], cosine * places[:, 1] - sine * places[:, 0]], axis=1
+        )
+        places[:, 0] += self.axis - (places[first, 0] + places[second, 0]).mean() / 2
+        return self.kept(places)
+
+    def reflected(self, point: Point) -> Point:
+        """A point on the other side of the axis."""
+        return 2 * self.axis - point[0], point[1]
+
+
+def symmetry_of(problem: LayoutProblem) -> Symmetry:
+    """The mirror images that a problem asks for. Raises LayoutRefusalError where the axis is that of an instance, which
+    is drawn as a frame by others alone."""
+    image = np.arange(len(problem.neurons), dtype=np.int64)
+    for mirror in problem.mirrors:
+        if mirror.scope >= 0:
+            path = problem.modules[mirror.scope].path
+            names = tuple(problem.neurons[i] for pair in mirror.pairs for i in pair)
+            message = f"mirror images about the axis of '{path}' need a frame of it, which this engine does not draw"
+            raise LayoutRefusalError("layout-mirror-unsupported", message, "'layered' draws it", names)
+        for one, other in mirror.pairs:
+            image[one], image[other] = other, one
+    return Symmetry(image)
+
+
+def first_of_pairs(problem: LayoutProblem) -> IntArray:
+    """Those that were written first of their pairs."""
+    return np.array(sorted({one for mirror in problem.mirrors for one, _ in mirror.pairs}), dtype=np.int64)
+
+
+def about_pins(problem: LayoutProblem, symmetry: Symmetry, places: FloatArray) -> tuple[Symmetry, IntArray, FloatArray]:
+    """The symmetry with its axis where the images of pins have room, by ``places`` that are symmetric about 0; who is
+    held by a pin, or by that of its image (p,), in order, and where (p, 2), in the engine's frame."""
+    turned = replace(problem, pins={i: from_picture(point, problem.direction) for i, point in problem.pins.items()})
+    pair = {i: int(symmetry.image[i]) for i in np.flatnonzero(symmetry.paired).tolist()}
+    axis, held = 0.0, dict(turned.pins)
+    refusal: LayoutRefusalError | None = None
+    if pair and held:
+        free = [(float(x), float(y)) for x, y in places[: len(problem.neurons)].tolist()]
+        for axis in axes(turned, free, pair, _WIDE * problem.neuron_spacing):
+            try:
+                held = imaged(turned, pair, axis)
+                break
+            except LayoutRefusalError as found:
+                refusal = found
+        else:
+            assert refusal is not None
+            raise refusal
+    fixed = np.array(sorted(held), dtype=np.int64)
+    there = np.array([held[i] for i in fixed.tolist()], dtype=np.float64).reshape(-1, 2)
+    return replace(symmetry, axis=axis), fixed, there
+
+
+def exact(problem: LayoutProblem, symmetry: Symmetry, centres: Sequence[Point]) -> list[Point]:
+    """Centres near these of which images are reflections to the last bit: of what is pinned, and of what was written
+    first."""
+    found = list(centres)
+    for one in first_of_pairs(problem).tolist():
+        other = int(symmetry.image[one])
+        if one in problem.pins or other in problem.pins:
+            one, other = (one, other) if one in problem.pins else (other, one)
+        else:
+            offset = snap(found[one][0] - symmetry.axis)
+            found[one] = symmetry.axis + offset, found[one][1]
+        if other not in problem.pins:
+            found[other] = symmetry.reflected(found[one])
+    return found
+
+
+def routed_alike(
+    problem: LayoutProblem, symmetry: Symmetry, centres: Sequence[Point], routes: Sequence[Route]
+) -> list[Route]:
+    """The routes, all between two neurons drawn as reflections of those between their images: whichever of both have
+    a clear way on the other side. What runs to its own image and back is its own reflection."""
+    index = {key: i for i, key in enumerate(keys_of(problem.edges))}
+    on_axis = np.array([x == symmetry.axis for x, _ in centres], dtype=np.bool_)
+    mirrored = (symmetry.paired | on_axis).tolist()
+    image = symmetry.image.tolist()
+    between: dict[tuple[int, int], list[int]] = {}
+    other: dict[int, int] = {}
+    for (source, target, number), i in index.items():
+        if mirrored[source] and mirrored[target]:
+            between.setdefault((min(source, target), max(source, target)), []).append(i)
+            other[i] = index.get((image[source], image[target], number), i)
+    found, obstacles = list(routes), Obstacles(centres)
+    for ends, here in between.items():
+        images = min(image[ends[0]], image[ends[1]]), max(image[ends[0]], image[ends[1]])
+        if images == ends:
+            for i in here if ends[0] != ends[1] else ():
+                back = [symmetry.reflected(point) for point in reversed(found[i])]
+                found[i] = tuple(((a + c) / 2, (b + d) / 2) for (a, b), (c, d) in zip(found[i], back, strict=True))
+        elif ends < images:
+            pairs = [(i, other[i]) for i in here if other[i] != i]
+            over = _reflected(symmetry, [(found[i], k) for i, k in pairs])
+            under = _reflected(symmetry, [(found[k], i) for i, k in pairs])
+            clear = not any(obstacles.crowded(list(over.values()), [images] * len(over), TOUCH))
+            if clear or any(obstacles.crowded(list(under.values()), [ends] * len(under), TOUCH)):
+                under = over
+            for i, route in under.items():
+                found[i] = route
+    return found
+
+
+def _reflected(symmetry: Symmetry, routes: Sequence[tuple[Route, int]]) -> dict[int, Route]:
+    """By edge, the reflection of the route that it is given with."""
+    return {i: tuple(map(symmetry.reflected, route)) for route, i in routes}
