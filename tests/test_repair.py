@@ -109,7 +109,22 @@ def test_what_a_syntax_error_costs(text: str, names: list[str], places: list[str
     assert lost(text) == (names, places)
 
 
-@pytest.mark.parametrize("text", ["a: 1\nb 2\nc: @\n", "a:\n    b: 1\n  c: 2\n", "a: 1\n- b\nc: @\n", "  a: 1\nb: 2\n"])
+@pytest.mark.parametrize(
+    ("text", "names", "places"),
+    [
+        ("a: 1\nb 2\nc: @\n", ["a", "b?", "c?"], ["2:1", "3:4"]),
+        ("a: 1\n=b\nc: @\n", ["a", "c?"], ["2:1", "3:4"]),
+        ("a:\n    b: 1\n  c: 2\n  d: 3\ne: @\n", ["a", "e?"], ["3:3", "5:4"]),
+        ("a: 1\n- b\nc: @\n", ["a", "c?"], ["2:1", "3:4"]),
+        ("a: 1\n  b: 2\n  c: 3\nd: @\n", ["a?", "d?"], ["2:3", "4:4"]),
+        ("a: [1]\nb:\n  - [c]\n   - d\ne: 1\n", ["a", "b?", "e"], ["4:4"]),
+    ],
+)
+def test_lines_that_fit_nowhere_are_left_out(text: str, names: list[str], places: list[str]) -> None:
+    assert lost(text) == (names, places)
+
+
+@pytest.mark.parametrize("text", ["a:\n\tb: 1\nc: @\n", "  a: 1\nb: 2\n", "%YAML 1.2\na: @\n"])
 def test_where_nobody_can_tell_what_is_missing_that_alone_is_said(text: str) -> None:
     names, places = lost(text)
     assert (names, len(places)) == ([], 1)

@@ -36,10 +36,10 @@ class Words(NamedTuple):
 
 def read_keys(data: Mapping, known: Collection[str], findings: Findings, words: Words | None = None) -> Keys:
     """Report the unknown keys of a mapping."""
+    unknown = {name for name in known if data.entry(name) is None} if data.is_open else set[str]()
     if all(entry.name in known for entry in data.entries):
-        return Keys(data, frozenset())
-    unknown: set[str] = set()
-    mapping = Mapping(tuple(_read(data, known, findings, words or Words(), unknown)), data.span)
+        return Keys(data, frozenset(unknown))
+    mapping = Mapping(tuple(_read(data, known, findings, words or Words(), unknown)), data.span, data.is_open)
     return Keys(mapping, frozenset(unknown))
 
 
@@ -71,14 +71,12 @@ def _read(
         yield entry if right is None else Entry(entry.key._replace(value=right, inner=None, written=None), entry.value)
 
 
-def settings_of(
-    entries: tuple[Entry, ...], known: Collection[str], what: str, none: str, findings: Findings
-) -> Names[Entry]:
+def settings_of(settings: Mapping, known: Collection[str], what: str, none: str, findings: Findings) -> Names[Entry]:
     """The settings of a definition or a pattern by the names that it knows. An unknown one (of ``what``; ``none``
     is said where none are known) is reported, and taken for the one that it can only be meant for; those that it may
     be meant for are UNKNOWN."""
-    found: dict[str, Entry | Unknown] = {entry.name: entry for entry in entries if entry.name in known}
-    for entry in entries:
+    found: dict[str, Entry | Unknown] = {entry.name: entry for entry in settings.entries if entry.name in known}
+    for entry in settings.entries:
         if entry.name in known:
             continue
         hint = suggest(entry.name, known, "known here") or none
@@ -86,7 +84,7 @@ def settings_of(
         free = [name for name in known if found.get(name, UNKNOWN) is UNKNOWN]
         right = meant(entry.name, free)
         found.update(dict.fromkeys(nearest(entry.name, free), UNKNOWN) if right is None else {right: entry})
-    return Names(found)
+    return Names(found, settings.is_open)
 
 
 def _joined(name: str, known: Collection[str]) -> tuple[str, str] | None:

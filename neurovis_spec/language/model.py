@@ -128,7 +128,8 @@ class Model(BaseModel):
             return
         entries = {entry.name: entry for entry in data.entries}
         check_rules(rules, entries, unknown, findings)
-        if one_of is not None and entries.keys().isdisjoint(one_of.keys) and entries.keys() <= cls._fields().keys():
+        told = data.is_open or not entries.keys() <= cls._fields().keys()
+        if one_of is not None and entries.keys().isdisjoint(one_of.keys) and not told:
             findings.error(one_of.code, opening(data), one_of.why, one_of.hint)
 
     @cached_property
@@ -241,14 +242,15 @@ def opening(mapping: Mapping) -> Span:
 def names_of(model: Model, key: str, made: AnyMapping[str, V | Unknown]) -> Names[V]:
     """What the names mean that are declared under a key: what was ``made`` of each, UNKNOWN where it could not be read.
     The table is open where the whole of it could not be."""
-    return Names({**unread(model, key), **made}, key in model.unknown)
+    node = model.source.get(key)
+    return Names({**unread(model, key), **made}, key in model.unknown or (isinstance(node, Mapping) and node.is_open))
 
 
 def unread(model: Model, key: str) -> dict[str, Unknown]:
-    """The names under a key whose declarations could not be read."""
+    """The names under a key whose declarations could not be read; of ``A:{bias`` the name is A."""
     node, kept = model.source.get(key), getattr(model, key)
     entries = node.entries if isinstance(node, Mapping) else ()
-    return {entry.name: UNKNOWN for entry in entries if entry.name not in kept}
+    return {entry.name.partition(":")[0]: UNKNOWN for entry in entries if entry.name not in kept}
 
 
 def _named(node: Node, handler: Callable[[object], dict[str, V]], info: ValidationInfo) -> dict[str, V]:

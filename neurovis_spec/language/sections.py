@@ -371,7 +371,7 @@ def written(section: Mapping) -> int:
     if node is None:
         return 0
     parts = node.items if isinstance(node, (Sequence, Packed)) else (node,)
-    return sum(len(part.entries) if isinstance(part, Mapping) else 1 for part in parts)
+    return sum(len(part.entries) + part.is_open if isinstance(part, Mapping) else 1 for part in parts)
 
 
 def _body(entry: Entry, info: ValidationInfo) -> Mapping:

@@ -59,7 +59,7 @@ class Choice(NamedTuple):
     """``name`` or ``{name: {parameter: value, …}}``: an activation, a model or a rule with its settings."""
 
     name: Located[str]
-    settings: tuple[Entry, ...]
+    settings: Mapping
 
 
 def as_choice(node: Node, info: ValidationInfo) -> Choice:
@@ -67,13 +67,13 @@ def as_choice(node: Node, info: ValidationInfo) -> Choice:
     if isinstance(node, Scalar):
         if not isinstance(node.value, str):
             refuse(info, node, "a name, or {name: {parameter: value}}")
-        return Choice(as_text(node, info), ())
+        return Choice(as_text(node, info), Mapping((), node.span))
     if not isinstance(node, Mapping):
         refuse(info, node, "a name, or {name: {parameter: value}}")
     entry = sole(node, "name", "write name, or {name: {parameter: value}}", info)
     name = Located(entry.name, entry.key)
     if isinstance(entry.value, Scalar) and entry.value.value is None:
-        return Choice(name, ())
+        return Choice(name, Mapping((), entry.value.span))
     if not isinstance(entry.value, Mapping):
         refuse(
             info,
@@ -81,7 +81,7 @@ def as_choice(node: Node, info: ValidationInfo) -> Choice:
             f"a mapping of the settings of '{shorten(entry.name)}'",
             "write {name: {parameter: value}}",
         )
-    return Choice(name, entry.value.entries)
+    return Choice(name, entry.value)
 
 
 def sole(node: Mapping, what: str, hint: str, info: ValidationInfo) -> Entry:

@@ -81,7 +81,7 @@ def _check_signal(entry: WrittenEntry, signal: str, findings: Findings) -> None:
     rule = learning.rule
     if changes(rule, learning.parameters, (signal,)) or not changes(rule, learning.parameters):
         return
-    span = next(setting.value.span for setting in choice.settings if setting.name == signal)
+    span = next(setting.value.span for setting in choice.settings.entries if setting.name == signal)
     message = (
         f"'{shorten(learning.texts[signal])}' is this connection's own end: '{signal}' is then always 'post', and "
         f"'{rule.name}' changes no weight"
@@ -93,7 +93,7 @@ def _check_rate(entry: WrittenEntry, findings: Findings) -> None:
     """A rate of 0, which changes no weight. One that names a parameter can be set later."""
     choice = entry.body.plasticity
     assert choice is not None
-    written = next((setting.value for setting in choice.settings if setting.name == "rate"), None)
+    written = next((setting.value for setting in choice.settings.entries if setting.name == "rate"), None)
     if isinstance(written, Scalar) and isinstance(written.value, str):
         return
     for learning in (bundle.learning for bundle in entry.bundles):

@@ -122,7 +122,7 @@ def is_drawn(choice: Choice, constants: Constants) -> bool:
     """Whether chance decides which pairs a valid pattern makes."""
     if choice.name.value != "random":
         return False
-    formulas = [formula_of(entry.value, constants.findings) for entry in choice.settings]
+    formulas = [formula_of(entry.value, constants.findings) for entry in choice.settings.entries]
     return any(formula is not None and known(constants.scalar(formula), 0.0) for formula in formulas)
 
 

@@ -34,6 +34,7 @@ from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.values import Choice, FormulaList, Initial
+from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 from neurovis_spec.language.yaml.source import Packed, Scalar, Sequence
 
 T = TypeVar("T")
@@ -321,13 +322,13 @@ def _spikes(kind: Kind) -> bool:
 
 
 def _default(name: str, model: GroupModel) -> Choice:
-    return Choice(Located(name, Scalar(name, model.source.span)), ())
+    return Choice(Located(name, Scalar(name, model.source.span)), SourceMapping((), model.source.span))
 
 
 def _fixed(choice: Choice | None) -> bool:
     """Whether a choice means the same wherever it stands: what is set in it are numbers."""
     return choice is None or not any(
-        not isinstance(entry.value, Scalar) or isinstance(entry.value.value, str) for entry in choice.settings
+        not isinstance(entry.value, Scalar) or isinstance(entry.value.value, str) for entry in choice.settings.entries
     )
 
 

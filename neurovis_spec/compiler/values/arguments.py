@@ -79,7 +79,7 @@ def settle(choice: Choice, known: Collection[str], findings: Findings) -> Names[
 
 def check_settings(choice: Choice, constants: Constants, extra: Collection[str] = ()) -> None:
     """Evaluate the settings of a definition that is UNKNOWN, as far as they are no names: these may be signals."""
-    for entry in choice.settings:
+    for entry in choice.settings.entries:
         nodes = entry.value.items if isinstance(entry.value, (Sequence, Packed)) else (entry.value,)
         for node in nodes[:_MOST_CHECKED]:
             name = isinstance(node, Scalar) and isinstance(node.value, str) and IDENTIFIER.fullmatch(node.value.strip())

@@ -283,11 +283,11 @@ class Brackets(Scanner):
         entries[name] = Entry(key, scalar)
         return scalar
 
-    def _made(self, entries: dict[str, Entry], span: Span, *, empty: bool = False) -> Mapping:
+    def _made(self, entries: dict[str, Entry], span: Span, *, empty: bool = False, is_open: bool = False) -> Mapping:
         """A mapping. That it has no entries though it is not ``empty`` follows from what was refused."""
         if not entries and not empty:
             self._lost.append(span)
-        return Mapping(tuple(entries.values()), span)
+        return Mapping(tuple(entries.values()), span, is_open)
 
     def _deep(self, depth: int) -> None:
         """Refuse a collection below the deepest level; nothing more is read then."""

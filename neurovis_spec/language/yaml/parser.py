@@ -5,8 +5,10 @@ them lie blanks, comments and punctuation alone: with the text itself beside it,
 the language does not allow is reported, and reading goes on behind it.
 
 A syntax error costs the value of the innermost key or list item around it, up to the next line that is indented no
-further; a ``partial`` tree keeps what there is of such a value. A bracket or a quote may close on a line that is
-indented less; where reading it so ends in an error, it is read once more, up to the next line that is no part of it.
+further; a ``partial`` tree keeps what there is of such a value. Lines that fit nowhere, as a colon is missing or their
+indentation is another, are left out: the mapping that they may belong to is then open. A bracket or a quote may close
+on a line that is indented less; where reading it so ends in an error, it is read once more, up to the next line that is
+no part of it.
 """
 
 from __future__ import annotations
@@ -32,6 +34,9 @@ _MORE: Final = re.compile(_TEXT + "++", re.ASCII)
 _COLON: Final = re.compile(r"[ \t]*:" + _END)
 _DIRECTIVE: Final = re.compile(r"%YAML[ \t]+1\.2[ \t]*(#.*)?")
 _MARKER: Final = re.compile(r"(?<![^\r\n])(?:---|\.\.\.)" + _END)
+_COMMENT: Final = re.compile(r"[ \t]#.*")
+#: What a line without a colon begins with that seems to be meant for its key.
+_WORD: Final = re.compile(r"[A-Za-z_][\w.]*(?: (?:->|\+) [\w.]+)*(?=[ \t]|\Z)", re.ASCII)
 _TIGHT_COLON: Final = re.compile(r"[A-Za-z_][\w.]*:(?=\S)")
 #: A line that has a key and a colon.
 _KEYED: Final = re.compile(r":(?:\s|\Z)")
@@ -160,12 +165,13 @@ class Parser(Brackets):
 
     def _entry(self, column: int, depth: int, *, fresh: bool = False, dashes: bool = False) -> Node:
         """The value behind a colon or a dash that belongs to a block in a column, to the begin of the next line."""
-        cursor, whole, outer = self._mark(), self._whole, (self._trial, self._broken)
+        cursor, whole, is_open, outer = self._mark(), self._whole, self._open, (self._trial, self._broken)
         self._trial, self._broken = True, False
         try:
             node = self._value(column, depth, fresh=fresh, dashes=dashes)
         except UnsoundError as error:
             self._reset(cursor, whole)
+            self._open = is_open
             end, self._end = self._end, self._limit(column)
             self._trial = False
             node = self._value(column, depth, fresh=fresh, dashes=dashes)
@@ -224,9 +230,17 @@ class Parser(Brackets):
             if fresh and cursor.line == self._line:
                 return self._mapping(column, depth, self._behind_key(node, cursor))
             if cursor.line != self._line and isinstance(node, Scalar):
-                return self._key_in_text(node, cursor, column, depth, fresh=fresh)
+                return self._key_in_text(node, cursor, (indent, column), depth, fresh=fresh)
         self._finish()
+        if fresh and self._plain is not None and self._at - self._start == column > indent and self._at < self._end:
+            # the line below, in the same column, is an entry as well
+            return self._without_colon(self._no_colon(cursor.at), cursor, column, depth)
         return node
+
+    def _without_colon(self, key: _Key, cursor: _Cursor, column: int, depth: int) -> Node:
+        """A mapping whose first line, at the cursor, is no more than a text."""
+        self._at, self._line, self._start = cursor[:3]
+        return self._mapping(column, depth, key)
 
     def _inline(self, depth: int, indent: int | None) -> Node:
         """A scalar, or a collection in brackets. A text goes on in lines that are indented further than ``indent``;
@@ -258,23 +272,31 @@ class Parser(Brackets):
             return faults.SECOND_COLON if _COLON.match(self._text, self._at, self._end) else faults.NO_BLANK
         return faults.start(character) if character in "]}" else faults.BEHIND_VALUE
 
-    def _goes_on(self, column: int) -> bool:
-        """Whether the next line belongs to a block in a column; none that does may be indented further."""
+    def _goes_on(self, column: int, entries: dict[str, Entry] | None = None) -> bool:
+        """Whether the next line belongs to a block in a column, of which these are the entries so far. None that does
+        may be indented further: what is may be meant for the last of them."""
         if self._at < self._end and self._at - self._start > column:
             self._further_in(column)
+            if entries:
+                name, entry = entries.popitem()
+                entries[name] = entry._replace(value=self._opened(entry.value))
         return self._at < self._end and self._at - self._start == column
 
     def _further_in(self, column: int) -> None:
-        """Lines between two entries that are indented further than these."""
+        """Leave out lines between two entries that are indented further than these."""
         character = self._text[self._at]
         if character in "]}":
-            self._misplaced(faults.start(character))
+            self._left_out(faults.start(character))
         elif self._indicator("-"):
-            self._misplaced(faults.ITEM_IN_MAPPING)
+            self._left_out(faults.ITEM_IN_MAPPING)
         else:
             _, above = self._above(1)
             columns = {column + 1, len(above) - len(above.lstrip()) + 1} - {self._at - self._start + 1}
-            self._misplaced(faults.indentation(columns))
+            self._left_out(faults.indentation(columns))
+        self._leave_out(column)
+
+    def _leave_out(self, column: int) -> None:
+        """Pass what belongs to a line of a block in a column."""
         self._move(self._limit(column))
         self._next_line()
 
@@ -285,15 +307,24 @@ class Parser(Brackets):
             number -= 1
         return number, self._lines.line(number)
 
-    def _no_colon(self, at: int) -> None:
-        """Report that what begins at an index and fills its line is no key."""
-        line = self._lines.line(self._lines.place(at)[0])
-        written = line[self._lines.place(at)[1] - 1 :].rstrip()
-        tight = _TIGHT_COLON.match(written)
+    def _no_colon(self, at: int) -> _Key:
+        """Report that what begins at an index and fills its line is no key. Its first word seems to be meant for one;
+        where it has none, nobody knows what is left out."""
+        number, column = self._lines.place(at)
+        line = self._lines.line(number)
+        written = _COMMENT.sub("", line[column - 1 :]).rstrip()
+        tight, word = _TIGHT_COLON.match(written), _WORD.match(written)
+        is_open = self._open or word is None
         if tight:
-            self._misplaced(faults.NO_BLANK, at + tight.end() - 1)
+            self._left_out(faults.NO_BLANK, at + tight.end() - 1)
         else:
-            self._misplaced(faults.no_colon(written), at)
+            self._left_out(faults.no_colon(written), at)
+        self._open = is_open
+        text = _PLAIN.match(line, column - 1) if self._partial else word
+        if text is None:
+            return _Key(self._nothing(number, column).span, None, colon=False)
+        span = Span(self._file, number, column, number, column + len(text[0]))
+        return _Key(span, Scalar(text[0], span), colon=False)
 
     # Mappings
 
@@ -303,13 +334,29 @@ class Parser(Brackets):
         line, first = (self._line, column + 1) if key is None else (key.span.line, key.span.column)
         entries: dict[str, Entry] = {}
         last = line, first
-        while key is not None or self._goes_on(column):
+        outer, self._open = self._open, key is not None and not key.colon and key.name is None
+        while key is not None or self._goes_on(column, entries):
             if key is None and (passed := self._simple_entries(column, entries)):
                 last = passed
                 continue
             last = self._mapping_entry(key or self._key(column, depth), column, depth, entries)
             key = None
-        return self._made(entries, Span(self._file, line, first, *last))
+        is_open, self._open = self._open, outer
+        return self._made(entries, Span(self._file, line, first, *last), is_open=is_open)
+
+    def _opened(self, node: Node) -> Node:
+        """A value to which lines may belong that could not be read."""
+        begin = self._lines.starts[node.span.line - 1] + node.span.column - 1
+        if isinstance(node, Scalar) or self._text[begin] in "[{":
+            return node
+        if isinstance(node, Mapping):
+            last = tuple(entry._replace(value=self._opened(entry.value)) for entry in node.entries[-1:])
+            return Mapping((*node.entries[:-1], *last), node.span, is_open=True)
+        return self._lost_node(node)
+
+    def _lost_node(self, node: Node) -> Node:
+        """What stands for a value of which nobody knows what it was meant to be."""
+        return node if self._partial else self._loss(self._lines.starts[node.span.line - 1] + node.span.column - 1)
 
     def _simple_entries(self, column: int, entries: dict[str, Entry]) -> tuple[int, int] | None:
         """Take up lines that hold no more than a name and a value. Returns where the last of these values ends."""
@@ -333,8 +380,10 @@ class Parser(Brackets):
             if soon is not None and len(self._lost) > lost and self._lost[-1] == value.span and name is not None:
                 name = self._early(name, soon, found)
         elif not key.announced:
-            self._at = self._line_end()
-            self._next_line()
+            self._leave_out(column)
+            if name is not None and not self._partial:
+                value = self._lost_node(name)
+                self._lost.append(name.span)
         if name is not None:
             self._put(entries, name, value)
         return max((span.end_line, span.end_column), (value.span.end_line, value.span.end_column))
@@ -358,7 +407,7 @@ class Parser(Brackets):
             return _Key(announced.span, self._as_key(announced), colon, announced=True)
         if self._indicator(":") or self._indicator("-"):
             place = self._here()
-            self._misplaced(faults.NO_KEY if self._indicator(":") else faults.ITEM_IN_MAPPING)
+            self._left_out(faults.NO_KEY if self._indicator(":") else faults.ITEM_IN_MAPPING)
             self._at += 1
             self._entry(column, depth + 1, fresh=True)
             return _Key(self._nothing(*place).span, None, colon=False, announced=True)
@@ -371,43 +420,39 @@ class Parser(Brackets):
         if self._line == cursor.line:
             if _COLON.match(self._text, self._at, self._end):
                 return self._behind_key(node, cursor)
-            self._no_colon(cursor.at)
-        else:
-            self._misplaced(faults.KEY_OF_LINES, cursor.at)
-        return _Key(node.span, node if isinstance(node, Scalar) and isinstance(node.value, str) else None, colon=False)
+            return self._no_colon(cursor.at)
+        self._left_out(faults.KEY_OF_LINES, cursor.at)
+        key = node if self._partial and isinstance(node, Scalar) and isinstance(node.value, str) else None
+        return _Key(node.span, key, colon=False)
 
     def _behind_key(self, node: Node, cursor: _Cursor) -> _Key:
         """Pass the colon behind a key that begins at the cursor."""
         if self._at - cursor.at > LONGEST_KEY:
-            self._misplaced(faults.LONG_KEY, cursor.at)
+            self._left_out(faults.LONG_KEY, cursor.at)
         colon = _COLON.match(self._text, self._at, self._end)
         assert colon is not None
         self._at = colon.end()
         return _Key(node.span, self._as_key(node))
 
-    def _key_in_text(self, node: Scalar, cursor: _Cursor, column: int, depth: int, *, fresh: bool) -> Node:
-        """A text that goes on for several lines until there is a colon: its last line was meant to be a key."""
+    def _key_in_text(self, node: Scalar, cursor: _Cursor, columns: tuple[int, int], depth: int, *, fresh: bool) -> Node:
+        """A text that goes on for several lines until there is a colon: its last line was meant to be a key.
+        ``columns`` are those of the block around it and of its first line."""
+        indent, column = columns
         blanks = BLANKS.match(self._text, self._start)
         assert blanks is not None
         here = blanks.end() - self._start
+        if fresh and here == column and self._plain is not None:
+            return self._without_colon(self._no_colon(cursor.at), cursor, column, depth)
         number, above = self._above(node.span.line)
-        indent = len(above) - len(above.lstrip())
+        begin = len(above) - len(above.lstrip())
         if self._plain is None:
-            self._misplaced(faults.KEY_OF_LINES, cursor.at)
-        elif indent >= here and not _KEYED.search(above):
-            self._no_colon(self._lines.starts[number - 1] + indent)
+            self._left_out(faults.KEY_OF_LINES, cursor.at)
+        elif begin >= here and not _KEYED.search(above):
+            self._no_colon(self._lines.starts[number - 1] + begin)
         else:
-            self._misplaced(faults.LATE_KEY, blanks.end())
-        if not fresh or here != column or self._plain is None:
-            self._at = self._line_end()
-            self._next_line()
-            return node
-        self._at, self._line, self._start = cursor[:3]
-        match = _PLAIN.match(self._text, self._at, self._end)
-        assert match is not None
-        key = Scalar(match[0], self._span(match.end()))
-        self._at = match.end()
-        return self._mapping(column, depth, _Key(key.span, key, colon=False))
+            self._left_out(faults.LATE_KEY, blanks.end())
+        self._leave_out(indent)
+        return self._lost_node(node)
 
     # Lists
 
@@ -418,6 +463,7 @@ class Parser(Brackets):
         items: list[Node] = []
         packer: Packer | None = None
         last = line, first
+        outer, self._open = self._open, False
         while True:
             if len(items) == PACK_FROM + 1 and (packer := Packer.of(items, self._file)) is not None:
                 items = []
@@ -432,12 +478,13 @@ class Parser(Brackets):
             if not self._goes_on(column) or not self._indicator("-"):
                 break
         if self._at < self._end and self._at - self._start == column > indent:
-            self._misplaced(faults.KEY_IN_LIST)
-            self._move(self._limit(column))
-            self._next_line()
+            self._left_out(faults.KEY_IN_LIST)
+            self._leave_out(column)
+        node: Node = Sequence(tuple(items), Span(self._file, line, first, *max((line, first), last)))
         if packer is not None:
-            return packer.finish(Span(self._file, line, first, *packer.end()))
-        return Sequence(tuple(items), Span(self._file, line, first, *max((line, first), last)))
+            node = packer.finish(Span(self._file, line, first, *packer.end()))
+        is_open, self._open = self._open, outer
+        return self._lost_node(node) if is_open else node
 
     def _packed_line(self, packer: Packer) -> bool:
         """Take a whole item that holds nothing but texts and numbers straight into a packed list."""

@@ -78,6 +78,8 @@ class Scanner:
         self._plain: Plain | None = None
         #: where values stand that are lost to a syntax error
         self._lost: list[Span] = []
+        #: whether lines of the mapping or list that is being read are left out, as they fit nowhere
+        self._open = False
         #: whether it is known what every syntax error has cost
         self._whole = True
         #: Where comments begin.
@@ -164,11 +166,16 @@ class Scanner:
             self._told = len(self._refuse.found)
         self._broken = True
 
-    def _misplaced(self, words: Words, at: int | None = None) -> None:
-        """Report a syntax error between values: nobody can tell what is missing then."""
+    def _left_out(self, words: Words, at: int | None = None) -> None:
+        """Report a syntax error that costs lines of the mapping or list that is being read."""
+        self._open = True
         if not self._broken:
             self._note(words, self._at if at is None else at)
-            self._whole = False
+
+    def _misplaced(self, words: Words, at: int | None = None) -> None:
+        """Report a syntax error behind which nobody can tell what is missing."""
+        self._left_out(words, at)
+        self._whole = self._whole and self._broken
 
     def _note(self, words: Words, at: int) -> None:
         if self._whole:

@@ -71,10 +71,12 @@ class Entry(NamedTuple):
 
 @dataclass(frozen=True)
 class Mapping:
-    """Entries in the order written, keys unique."""
+    """Entries in the order written, keys unique. Where lines of it could not be read it ``is_open``: nobody knows which
+    other entries it has."""
 
     entries: tuple[Entry, ...]
     span: Span
+    is_open: bool = False
 
     @cached_property
     def _by_name(self) -> dict[str, Entry]:
