@@ -211,6 +211,16 @@ def test_a_control_loop_leaves_the_recording_of_the_run(suffix: str, body: bool,
     assert len(simulation.recording) == 300
 
 
+def test_the_loop_of_the_manual_leaves_its_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    root = Path(__file__).parent.parent
+    text = (root / "docs/language.md").read_text(encoding="utf-8")
+    code = text.partition("### Control loops")[2].partition("```python\n")[2].partition("```")[0]
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "specs").symlink_to(root / "specs")
+    exec(compile(code, "language.md", "exec"), {})
+    assert len(nv.load(tmp_path / "loop.npz")) == 2000
+
+
 def test_in_memory_a_loop_is_recorded_as_well() -> None:
     spec = SPEC.replace("A: {count: 2,", "A: {count: 2, model: leaky_integrator,")
     run = carted(spec=spec).run(300, neurons="O + A", states="A.v", weights="none")
