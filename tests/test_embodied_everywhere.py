@@ -24,6 +24,7 @@ from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import Reach, Seen, SourceError
 from neurovis_spec.live.turns import Set
 from neurovis_spec.runtime.recording import Recording
+from neurovis_spec.sweeps.grid import SweepError
 from neurovis_spec.sweeps.sweep import sweep
 
 BODY = """
@@ -171,6 +172,8 @@ def test_a_sweep_runs_each_point_with_its_body(tmp_path: Path) -> None:
         assert table["P"][row] == run["P"][-1]
     assert len(set(table["P"])) == 6
     assert set(bare["P"]) == {np.tanh(0.5)}
+    with pytest.raises(SweepError, match="a body is not sent to a cluster"):
+        sweep(spec_file(tmp_path), {"gain": "0,1"}, ["P"], scheduler="tcp://127.0.0.1:1")
     broken = sweep(spec_file(tmp_path, "stuck"), {"gain": "0,1"}, ["P"], steps=60)
     assert broken["error"] == ("body: at step 19: the cart is stuck",) * 2
 
@@ -287,12 +290,13 @@ def test_where_what_a_body_needs_is_missing_runs_say_so_and_pictures_are_drawn(b
     spec = tmp_path / "spec.yaml"
     spec.write_text(WITH_BODY.replace("toy: plain", "mujoco: cart.xml"))
     (tmp_path / "cart.xml").write_text("<mujoco/>")
-    for command in (["run", spec], ["render", spec, "--step", 3, "-o", tmp_path / "x.svg"]):
+    for command in (["run", spec], ["live", spec], ["render", spec, "--step", 3, "-o", tmp_path / "x.svg"]):
         refused = invoke(*command)
         assert refused.exit_code == 1
         assert "a body of MuJoCo needs what is not installed" in refused.output.splitlines()[-2]
         assert "pip install 'neurovis-spec[sim]'" in refused.output.splitlines()[-1]
-        assert invoke(*command, "--no-body").exit_code == 0
+        if command[0] != "live":
+            assert invoke(*command, "--no-body").exit_code == 0
     swept = invoke("sweep", spec, "--over", "gain=0,1", "--metric", "P", "--jobs", 1)
     assert "body: a body of MuJoCo needs what is not installed" in swept.output
     assert invoke("layout", spec, "-o", tmp_path / "l.json").exit_code == 0

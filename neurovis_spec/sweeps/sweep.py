@@ -194,8 +194,10 @@ def _by_itself(plan: CheckedSweep) -> Job:
     """The job with all included and data files written into the text of its spec, since other machines need not have
     these files. Raises SweepError; SpecError where a file is missing by now."""
     made = plan.network
-    if isinstance(plan.job.body, Path) or (made.network.body is not None and made.network.body.path is not None):
-        raise SweepError("the file of a body is not sent to a cluster", "run the sweep in processes of this machine")
+    if made.network.body is not None:
+        raise SweepError(
+            "a body is not sent to a cluster", "sweep in processes of this machine, or without it (--no-body)"
+        )
     text = whole_text(made.spec, replace(made.request, parameters={}, seed=None), made.sources)
     if text == plan.job.text:
         return plan.job
