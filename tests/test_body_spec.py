@@ -96,8 +96,17 @@ def test_nothing_outside_the_root_is_opened(tmp_path: Path, link: bool) -> None:
     part = "leg.xml" if link else "../leg.xml"
     if link:
         (inner / "leg.xml").symlink_to(tmp_path / "leg.xml")
-    (inner / "whole.xml").write_text(f'<mujoco><include file="{part}"/></mujoco>')
-    for name in ("whole.xml", part):
+    include = f'<include file="{part}"/>'
+    folders = '<asset><mesh file="leg.xml"/></asset><include file="folders.xml"/>'
+    (inner / "whole.xml").write_text(f"<mujoco>{include}</mujoco>")
+    (inner / "windows.xml").write_text(f"<mujoco>{include.replace('../', '..' + chr(92))}</mujoco>")
+    (inner / "folders.xml").write_text('<mujoco><compiler assetdir=".."/></mujoco>')
+    (inner / "later.xml").write_text(f"<mujoco>{include if link else folders}</mujoco>")
+    (inner / "a" / "b").mkdir(parents=True)
+    (inner / "far").symlink_to(inner / "a" / "b")
+    lexical = '<include file="far/../../leg.xml"/>'  # of which MuJoCo makes ../leg.xml
+    (inner / "reduced.xml").write_text(f"<mujoco>{include if link else lexical}</mujoco>")
+    for name in ("whole.xml", part, "windows.xml", "later.xml", "reduced.xml"):
         assert codes(SPEC + BODY.replace("leg.xml", name), inner) == [("path-outside", 10, 11)]
     (inner / "spec.yaml").write_text(SPEC + BODY.replace("leg.xml", "whole.xml"))
     assert nv.compile(inner / "spec.yaml", root=tmp_path).warnings == ()

@@ -6,7 +6,8 @@ far as it is XML that has no definitions of its own (no DOCTYPE), so that whoeve
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path, PureWindowsPath
 from typing import Final
@@ -26,55 +27,61 @@ _FOLDERS: Final = {"texture": ("texturedir", "assetdir"), "": ("meshdir", "asset
 
 @dataclass
 class _Text:
-    """What a file says: elements that name files, with these names; the folders that ``compiler`` names."""
+    """What a file says: the names of files by the kind of the element that names them, the folders that ``compiler``
+    names. MuJoCo takes a backslash for a slash, everywhere."""
 
-    named: list[tuple[str, str]] = field(default_factory=list)
+    files: dict[str, list[str]] = field(default_factory=dict)
     folders: dict[str, list[str]] = field(default_factory=dict)
 
     def begin(self, element: str, attributes: dict[str, str]) -> None:
         """An element begins."""
-        if element == "compiler":
-            for key in ("meshdir", "texturedir", "assetdir"):
-                if key in attributes:
-                    self.folders.setdefault(key, []).append(attributes[key])
+        kind = element if element in (*_MODELS, *_FOLDERS) else ""
         for key, value in attributes.items():
-            if key.startswith("file"):  # of a texture also fileright, fileup, …
-                self.named.append((element, value))
+            path = value.replace("\\", "/")
+            if element == "compiler" and key.endswith("dir"):
+                self.folders.setdefault(key, []).append(path)
+            elif key.startswith("file"):  # of a texture also fileright, fileup, …
+                self.files.setdefault(kind, []).append(path)
+
+    def named(self, kinds: Iterable[str]) -> list[str]:
+        """The names of files that elements of these kinds give."""
+        return [name for kind in kinds for name in self.files.get(kind, ())]
 
 
 def files_of(path: Path) -> Iterator[Path]:
     """Where the files may lie that a model names, those of the models in it, too; the model itself is left out.
 
-    A name is looked for beside the first model and beside the one that names it, in the folders that either gives for
-    files of its kind. Raises BodyError.
+    A name is looked for beside the first model and beside the one that names it, in the folders that any of them gives
+    for files of its kind. No file is opened before its place was given. Raises BodyError.
     """
-    first = _read(path)
-    seen = {path}
-    waiting = [(path, first)]
-    folders = {key: list(values) for key, values in first.folders.items()}
+    texts = {path: _read(path)}
+    read, waiting = {path.resolve()}, [path]
     while waiting:
-        own, text = waiting.pop()
-        for key, values in text.folders.items():
-            folders.setdefault(key, []).extend(values)
-        for element, name in text.named:
-            _check_relative(name, own)
-            keys = () if element in _MODELS else _FOLDERS.get(element, _FOLDERS[""])
-            within = [Path(), *(Path(folder) for key in keys for folder in folders.get(key, ()))]
-            for base in dict.fromkeys((path.parent, own.parent)):
-                for folder in within:
-                    place = base / folder / name
-                    yield place
-                    if element in _MODELS and place not in seen and place.is_file():
-                        seen.add(place)
-                        if len(seen) > MOST_FILES:
-                            raise BodyError(f"the model consists of more than {MOST_FILES:,} files")
-                        waiting.append((place, _read(place)))
+        own = waiting.pop()
+        for place in _places(path, own, texts[own].named(_MODELS), ()):
+            yield place
+            real = place.resolve()
+            if real not in read and real.is_file():
+                if len(texts) == MOST_FILES:
+                    raise BodyError(f"the model consists of more than {MOST_FILES:,} files")
+                texts[place] = _read(place)
+                read.add(real)
+                waiting.append(place)
+    for own, text in texts.items():
+        for kind, keys in _FOLDERS.items():
+            folders = [folder for one in texts.values() for key in keys for folder in one.folders.get(key, ())]
+            yield from _places(path, own, text.named((kind,)), folders)
 
 
-def _check_relative(name: str, own: Path) -> None:
-    """Whatever lies elsewhere on the machine is not the model's."""
-    if "\0" in name or Path(name).is_absolute() or PureWindowsPath(name).drive or name.startswith(("/", "\\")):
-        raise BodyError(f"'{own.name}' names the file '{name[:80]}', which is no path relative to the model")
+def _places(first: Path, own: Path, names: Iterable[str], folders: Iterable[str]) -> Iterator[Path]:
+    """Where files of these names may lie that a model names which is a part of the first."""
+    within = [Path(), *(Path(folder) for folder in folders)]
+    for name in names:
+        if "\0" in name or Path(name).is_absolute() or PureWindowsPath(name).drive:
+            raise BodyError(f"'{own.name}' names the file '{name[:80]}', which is no path relative to the model")
+        for place in (base / folder / name for base in (first.parent, own.parent) for folder in within):
+            yield place
+            yield Path(os.path.normpath(place))  # as MuJoCo does, which knows of no links
 
 
 def _read(path: Path) -> _Text:

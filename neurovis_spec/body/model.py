@@ -128,8 +128,8 @@ class BodyKind(Protocol):
     takes_file: bool
 
     def files(self, path: Path) -> Iterable[Path]:
-        """Where the files may lie that the one at a path names, of kinds that take files: none of them is opened
-        before the caller has made sure that each lies where a spec's data may lie. Raises BodyError."""
+        """Where the files may lie that the one at a path names, of kinds that take files; none is opened before its
+        place was given, so that the caller can make sure that it lies where a spec's data may lie. Raises BodyError."""
         ...
 
     def open(self, given: str, path: Path | None, dt: float, substeps: int | None) -> Body:

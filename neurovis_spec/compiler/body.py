@@ -93,7 +93,7 @@ def _found(kind: str, given: Located[str], place: Place, findings: Findings) -> 
         inside = place.root.resolve()
         for part in loaded.files(path):
             real = part.resolve()
-            if not real.is_relative_to(inside):
+            if not real.is_relative_to(inside) and real.exists():
                 message = f"'{shorten(given.value)}' names the file '{shorten(str(part.name))}', "
                 hint = "data lies in the folder of the main spec or below it (--root names another folder)"
                 findings.error("path-outside", given.span, f"{message}which lies outside the folder of the spec", hint)
