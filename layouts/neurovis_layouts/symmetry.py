@@ -15,8 +15,7 @@ from neurovis_layouts.axes import axes, imaged
 from neurovis_layouts.blocks import keys_of
 from neurovis_layouts.frame import from_picture
 from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
-from neurovis_layouts.wiring import BoolArray
-from neurovis_spec.layout import FloatArray, IntArray
+from neurovis_spec.layout import BoolArray, FloatArray, IntArray
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import LayoutProblem, LayoutRefusalError, Point, Route
 
