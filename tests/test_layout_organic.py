@@ -14,8 +14,8 @@ from neurovis_layouts.organic.paths import distances
 
 from neurovis_spec.layout import Direction, LayoutProblem, LayoutRefusalError
 from neurovis_spec.layout.arrange import lay_out_problem
-from neurovis_spec.layout.frames import Frames, meet
-from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.frames import Frames
+from neurovis_spec.layout.geometry import distance, meet
 from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.problem import canonical
 
