@@ -66,4 +66,7 @@ def gains_of(network: Network, recording: Recording) -> Gains:
     """The gains for a recording: what the spec states, else from all of its steps, so that each looks the same. Raises
     RecordingError for a partial one."""
     drawn = gathered(network, network.render.collapse)
-    return choose_gains(drawn.network, drawn.network.render, drawn.reached(recording))
+    reached = drawn.reached(recording)
+    return choose_gains(
+        drawn.network, drawn.network.render, reached if probe_steps(network) else nothing(drawn.network)
+    )
