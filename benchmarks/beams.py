@@ -6,7 +6,7 @@ the end. Run it with ``python benchmarks/beams.py``; it takes a minute.
 
 A beam lies in the way of a leg for a stride, so that one swing crosses it. Jitter moves each beam, for all legs, and
 its arrival at each pair of legs, evenly by up to so many steps. One memory holds one beam: where the next comes to the
-front legs before the last is behind the hind ones (a distance of 110 steps, 105 to the hind legs), its news replaces
+front legs before the last is behind the hind ones (a distance of 110 steps, 100 to the hind legs), its news replaces
 the last one's.
 """
 
@@ -27,7 +27,7 @@ from beams_across import WARNED, Arrangement, walk
 def grid() -> Iterator[Arrangement]:
     """Distances, positions, jitters, and places of the first beam in a stride."""
     for every, later, jitter, offset in product(
-        (110, 150, 180), ((40, 70), (45, 80), (60, 100), (70, 105)), (0, 4, 8), (0, 7)
+        (110, 150, 180), ((40, 70), (45, 80), (55, 90), (65, 100)), (0, 4, 8), (0, 7)
     ):
         yield Arrangement(every, later, jitter, offset)
 

@@ -425,7 +425,7 @@ def main() -> None:
     hexapod = nv.compile(HERE.parent / "specs" / "hexapod" / "hexapod.yaml").network
     cases = (
         Case("12/28, use case 1", cpg_rbf(), cpg_in_c, cpg_by_hand, 20000, False),
-        Case("148/205, hexapod", hexapod, hexapod_in_c, None, 10000, False, 2000),
+        Case("148/204, hexapod", hexapod, hexapod_in_c, None, 10000, False, 2000),
         Case("150/200", random_network(150, 200), tanh_in_c, random_by_hand, 10000),
         Case("302/7,000 plastic", learning(random_network(302, 7000)), tanh_in_c, None, 1000),
         Case("1,000/10,000", random_network(1000, 10000), tanh_in_c, random_by_hand, 1000),

@@ -1,4 +1,4 @@
-"""Beams across the hexapod's way, anywhere: what its input obstacle is, and who hits them."""
+"""Beams across the hexapod's way, anywhere: what its inputs are, and who hits them."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Arrangement:
 
 
 def obstacles(arrivals: npt.NDArray[np.int_]) -> npt.NDArray[np.float64]:
-    """What the input obstacle is at each step: steps × (front, middle, hind)."""
+    """What the inputs obstacle_left and obstacle_right are at each step: steps × (front, middle, hind)."""
     signal = np.zeros((int(arrivals.max()) + 2 * STRIDE, 3))
     for beam in arrivals:
         for leg, step in enumerate(beam):
@@ -50,7 +50,7 @@ def walk(arrangement: Arrangement, seed: int = 1) -> tuple[Hits, list[float]]:
     """Which of the WARNED legs hit which beam (beams × legs), and the weights at the end."""
     arrivals = arrangement.arrivals(seed)
     signal = obstacles(arrivals)
-    recording = nv.compile(SPEC).run(steps=len(signal), inputs={"obstacle": signal})
+    recording = nv.compile(SPEC).run(steps=len(signal), inputs={"obstacle_left": signal, "obstacle_right": signal})
     hits = [
         [recording[f"{leg}.T"][beam[int(leg[-1]) - 1] :][: STRIDE + 5].max() > 0.1 for leg in WARNED]
         for beam in arrivals

@@ -1,7 +1,7 @@
 """Makes the data of hexapod.yaml: what its legs meet on their way, as the body or a simulation would tell.
 
-obstacle.csv: 1 while a beam lies in the way of a leg. floor_left.csv, floor_right.csv: how soft the floor is below a
-leg, from 0 (rigid) to 1. One row a step of 0.025 s, one column a leg of a side: front, middle, hind. The last row
+obstacle.csv: 1 while a beam lies in the way of a leg. floor_left.csv, floor_right.csv: how firmly the floor bears a
+leg. One row a step of 0.025 s, one column a leg of a side: front, middle, hind. The last row
 stays. Run it in this folder: python make_data.py
 """
 
@@ -10,12 +10,14 @@ from pathlib import Path
 
 #: Beams across the way, the same for both sides: the step at which the front legs meet the first one, steps from one to
 #: the next, how many.
-FIRST, EVERY, BEAMS = 600, 180, 8
-#: Steps until the front, the middle and the hind leg are there; steps in which a leg is past.
-LATER, PASSING = (0, 70, 105), 20
+FIRST, EVERY, BEAMS = 603, 180, 8
+#: Steps until the front, the middle and the hind leg are there; steps in which a leg is past, a stride.
+LATER, PASSING = (0, 65, 100), 20
 
 #: From SOFT on the floor is soft for all legs but the right front one, from WHOLLY on for that one, too.
 SOFT, WHOLLY = 2100, 2500
+#: How firmly the two floors bear.
+RIGID_FLOOR, SOFT_FLOOR = 1, 0.67
 
 
 def obstacle(step, leg):
@@ -25,13 +27,13 @@ def obstacle(step, leg):
 
 
 def floor_left(step, leg):
-    """How soft the floor is below a left leg."""
-    return 0.6 if step >= SOFT else 1
+    """How firmly the floor bears a left leg."""
+    return SOFT_FLOOR if step >= SOFT else RIGID_FLOOR
 
 
 def floor_right(step, leg):
-    """How soft the floor is below a right leg."""
-    return 0.6 if step >= (WHOLLY if leg == 0 else SOFT) else 1
+    """How firmly the floor bears a right leg."""
+    return SOFT_FLOOR if step >= (WHOLLY if leg == 0 else SOFT) else RIGID_FLOOR
 
 
 def write(value, last):
