@@ -101,7 +101,7 @@ def test_an_installed_neurovis_draws_its_own_example(programs: Path, tmp_path: P
 
 def test_an_installed_neurovis_copies_an_example_with_what_it_includes(programs: Path, tmp_path: Path) -> None:
     call([programs / "neurovis", "new", "walk", "--from", "hexapod"], tmp_path)
-    assert "ok (148 neurons, 203 connections)" in call(
+    assert "ok (148 neurons, 204 connections)" in call(
         [programs / "neurovis", "validate", Path("walk", "walk.yaml")], tmp_path
     )
 
