@@ -22,6 +22,7 @@ from neurovis_spec import arguments, pipeline
 from neurovis_spec.compiler.drawing.drawing_settings import Panel, RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
+from neurovis_spec.language.views import TIMED
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.files import replacing
 
@@ -118,7 +119,7 @@ class Drawable(ABC):
             if recording is not None:
                 shown, glyphs = recording, seen._gains_of(panels, recording)
             else:
-                shown, glyphs = seen._ran(max(self.network.steps, (wanted or 0) + 1), inputs, panels, progress)
+                shown, glyphs = seen._ran(self._steps_of(panels, wanted), inputs, panels, progress)
             panels = self._posed(panels, view, shown)
             some = seen._whole_gains(panels, glyphs, shown)
             shots = pipeline.shot_of(self.network, shown, wanted, settings.window)
@@ -292,6 +293,12 @@ class Drawable(ABC):
         """The layout, where one of the views needs it."""
         return self.placed(engine, effort) if _shows(panels, "network", "matrix") else None
 
+    def _steps_of(self, panels: Sequence[Panel], step: int | None) -> int:
+        """How many steps a picture of a step takes: views over time show the whole run."""
+        wanted = self.network.steps if step is None else step + 1
+        timed = any(panel.view in TIMED for panel in panels)
+        return max(wanted, self.network.steps) if timed else wanted
+
     def _ran(
         self,
         steps: int,
@@ -375,10 +382,8 @@ class Drawable(ABC):
         view: View | Sequence[View] | None = None,
     ) -> int:
         """How many steps ``render`` will run: none with a recording, else those up to the step and those that the gains
-        take, in one run; of several views the whole default run."""
-        wanted = self.network.steps if step is None else step + 1
-        if self._panels(view):
-            wanted = max(wanted, self.network.steps)
+        take, in one run; with a view over time the whole default run."""
+        wanted = self._steps_of(self._panels(view), step)
         return 0 if recording is not None else max(wanted, self._gain_steps if inputs is None else self._probe_steps)
 
     def _repr_svg_(self) -> str:

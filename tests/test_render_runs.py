@@ -38,6 +38,12 @@ def test_a_picture_takes_one_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
         runs.clear()
         network.render(tmp_path / "y.svg", step=20)
         assert runs == [21]
+    for view, wanted in (("matrix", [21]), (["network", "body"], [21]), (["network", "traces"], [300])):
+        runs.clear()
+        network = nv.compile_text(stated)
+        assert network.steps_to_draw(20, view=view) == wanted[0]
+        network.render(tmp_path / "z.svg", step=20, view=view)
+        assert runs == wanted
     recording = nv.compile_text(text).run()
     runs.clear()
     again = nv.compile_text(text)
