@@ -440,13 +440,13 @@ def _excerpt(
 
 
 def _bounded(draw: Callable[[RenderSettings], tuple[Scene, bytes]], settings: RenderSettings, suffix: str) -> bytes:
-    """The file of a picture, an SVG with so many connections as make it no larger than 5 MB, unless all are asked for;
-    and a warning for each note in it."""
+    """The file of a picture, an SVG with so many connections as make it no larger than 5 MB, unless all are asked for,
+    or it is larger without any; and a warning for each note in it."""
     scene, content = draw(settings)
     if suffix.lower() == ".svg" and not settings.full and len(content) > _LARGEST_SVG:
         lines = sum("connection" in group.data for group in scene.groups)
-        bare = len(draw(replace(settings, most=0))[1]) if lines else 0
-        for _ in range(3):  # strong lines may take more room than weak ones
+        bare = len(draw(replace(settings, most=0))[1]) if lines else len(content)
+        for _ in range(3 if bare <= _LARGEST_SVG else 0):  # strong lines may take more room than weak ones
             if len(content) <= _LARGEST_SVG or not lines:
                 break
             lines = max(0, int(0.98 * lines * (_LARGEST_SVG - bare) / max(len(content) - bare, 1)))

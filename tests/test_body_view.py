@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -405,6 +406,18 @@ def test_a_page_of_a_stated_size_keeps_it_with_the_body_in_it() -> None:
         20.0,
     )
     assert made.scene.pixels == (1000, 900)
+
+
+def test_of_a_long_film_no_connection_is_left_out_for_the_room_that_the_body_takes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = tmp_path / "x.svg"
+    monkeypatch.setattr("neurovis_spec.pictures._LARGEST_SVG", 60_000)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        WALKER.animate(target, recording=walked())
+    assert target.stat().st_size > 60_000
+    assert len([e for e in ET.parse(target).iter() if "data-connection" in e.attrib]) == 4
 
 
 def test_the_command_names_the_view(tmp_path: Path) -> None:
