@@ -7,7 +7,7 @@
 #   make test-all   what needs Chromium, graphviz' dot, gcc and g++, node, or starts a cluster, and test-ros; fails without
 #   make test-ros   the tests with ROS: ROS 1 of Debian, and ROS 2 (Kilted, Jazzy) as wheels, installed into .ros
 #   make fuzz       20,000 broken specs and 5,000 expressions (FUZZ_ARGS=... for more), two or three minutes
-#   make layouts    layouts beside dot's, sfdp's and networkx' (LAYOUTS_ARGS="--all --graphs FOLDER" for more)
+#   make layouts    layouts beside dot's, ELK's, sfdp's and networkx' (LAYOUTS_ARGS="--all --graphs FOLDER" for more)
 #   make docs       writes the generated parts of docs/ anew
 #   make page       puts the page of the live view together from its modules; needs node and npm
 #   make page-check checks its JavaScript: types and lint, and that the page is up to date; needs node and npm

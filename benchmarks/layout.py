@@ -1,12 +1,13 @@
-"""What layouts are worth, ours beside dot, sfdp and networkx on the same graphs in one run.
+"""What layouts are worth, ours beside dot, ELK, sfdp and networkx on the same graphs in one run.
 
 In: nothing; ``--graphs FOLDER`` (see ``networks.py``), ``--sample SEED`` for thirty other Rome and North graphs (or
 ``1,2,3`` for several times thirty; constants were set on sample 11), ``--all`` for the large ones, ``--only WORD`` for
 rows whose name holds it, ``--peers "dot;sfdp"``, ``--engines layered,large``, ``--limit SECONDS`` for a peer. Out: a
 table, in Markdown, on standard output: crossings of the routes as drawn, discs that overlap, routes over foreign discs,
-the share of connections along the direction (of those in no loop), area, CPU seconds, and our crossings by the best
-peer's: of ``layered`` by the best of dot's, which draws ranks as well, of the others by the best of all. Sets of graphs
-are summed up, flow is averaged. Only ratios of one run can be compared.
+the share of connections along the direction (of those in no loop), area, area for each neuron, CPU seconds, our
+crossings by the best peer's: of ``layered`` by the best of dot's and ELK's, which draw ranks as well, of the others by
+the best of all; and our area by dot's with clusters. Sets of graphs are summed up, flow is averaged. Only ratios of one
+run can be compared. ELK needs node and what ``package.json`` names (``make node_modules/made``).
 """
 
 from __future__ import annotations
@@ -29,12 +30,23 @@ from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.problem import problem_of
 
-HEXAPOD = Path(__file__).resolve().parent.parent / "specs" / "hexapod"
+SPECS = Path(__file__).resolve().parent.parent / "specs"
 #: These draw ranks as `layered` does.
-_DOTS = ("dot", "dot, polylines", "dot, hurried", "dot, clusters")
-_HEAD = ("graph", "by", "crossings", "overlaps", "over discs", "flow", "area", "CPU", "ratio")
-
-
+_RANKED = ("dot", "dot, polylines", "dot, hurried", "dot, clusters", "elk", "elk, clusters")
+_HEAD = (
+    "graph",
+    "by",
+    "crossings",
+    "overlaps",
+    "over discs",
+    "flow",
+    "area",
+    "per neuron",
+    "CPU",
+    "ratio",
+    "area ratio",
+)
+_FRAMED = ("dot", "dot, clusters", "elk", "elk, clusters", "sfdp")
 _HURRIED = ("dot, hurried", "sfdp", "spring", "multipartite")
 
 
@@ -45,7 +57,7 @@ class Case:
     name: str
     problems: Sequence[LayoutProblem]
     engines: Sequence[str] = ("layered",)
-    peers: Sequence[str] = ("dot", "dot, polylines", "sfdp", "spring", "multipartite")
+    peers: Sequence[str] = ("dot", "dot, polylines", "elk", "sfdp", "spring", "multipartite")
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +69,7 @@ class Worth:
     over: int
     flow: float
     area: float
+    neurons: int
     seconds: float
 
 
@@ -68,13 +81,16 @@ def cases(folder: Path | None, slow: bool, seeds: Sequence[int | None] = (None,)
             yield Case(name, graphs)
             if slow:
                 yield Case(f"{name}, as one group", [_as_one_group(graph) for graph in graphs], peers=())
-    for path in sorted(HEXAPOD.glob("*.yaml")) if HEXAPOD.is_dir() else ():
-        problem = problem_of(nv.compile(path).network)
-        peers: tuple[str, ...] = ("dot", "dot, clusters", "sfdp")
-        yield Case(f"specs/hexapod/{path.name}", [problem], peers=peers)
-        # the peers know no page, no mirrors and no lines; without them ours, too, is free to let everything run along
-        plain = replace(problem, plan=(), mirrors=(), align=())
-        yield Case(f"{path.name}, without plan, mirror and align", [plain], peers=peers)
+    for path in sorted([*SPECS.glob("*.yaml"), *SPECS.glob("hexapod/*.yaml")]):
+        network = nv.compile(path).network
+        problem, engines = problem_of(network), (network.layout.engine,)
+        yield Case(f"specs/{path.relative_to(SPECS)}", [problem], engines, _FRAMED)
+        if problem.plan:
+            yield Case(f"{path.name}, without plan", [replace(problem, plan=())], engines, _FRAMED)
+        if problem.plan or problem.mirrors or problem.align:
+            # the peers know no page, no mirrors and no lines; without them ours, too, lets everything run along
+            plain = replace(problem, plan=(), mirrors=(), align=())
+            yield Case(f"{path.name}, without plan, mirror and align", [plain], engines, _FRAMED)
     yield Case("small worlds 300/2,500", [small_worlds(300, 2500)], ("layered", "large"), _HURRIED)
     if slow:
         worm, name = connectome(folder)
@@ -110,9 +126,10 @@ def by_us(case: Case, engine: str) -> Worth:
 
 
 def _worth(of: dict[str, float | int], seconds: float) -> Worth:
-    return Worth(
-        int(of["crossings"]), int(of["overlaps"]), int(of["edges_over_neurons"]), of["flow"], of["area"], seconds
+    crossings, overlaps, over, neurons = (
+        int(of[name]) for name in ("crossings", "overlaps", "edges_over_neurons", "neurons")
     )
+    return Worth(crossings, overlaps, over, of["flow"], of["area"], neurons, seconds)
 
 
 def _sum(found: Sequence[Worth]) -> Worth:
@@ -122,16 +139,18 @@ def _sum(found: Sequence[Worth]) -> Worth:
         sum(worth.over for worth in found),
         sum(worth.flow for worth in found) / len(found),
         sum(worth.area for worth in found),
+        sum(worth.neurons for worth in found),
         sum(worth.seconds for worth in found),
     )
 
 
-def row(name: str, by: str, worth: Worth | None, ratio: float | None, limit: float) -> None:
+def row(name: str, by: str, worth: Worth | None, ratio: float | None, area_ratio: float | None, limit: float) -> None:
     if worth is None:
-        print(f"| {name} | {by} | – | – | – | – | – | none in {limit:.0f} s | |", flush=True)
+        print(f"| {name} | {by} | – | – | – | – | – | – | none in {limit:.0f} s | | |", flush=True)
         return
     cells = [f"{worth.crossings:,}", f"{worth.overlaps:,}", f"{worth.over:,}", f"{worth.flow:.3f}"]
-    cells += [f"{worth.area:,.0f}", f"{worth.seconds:.2f} s", "" if ratio is None else f"{ratio:.2f}"]
+    cells += [f"{worth.area:,.0f}", f"{worth.area / worth.neurons:.1f}", f"{worth.seconds:.2f} s"]
+    cells += ["" if found is None else f"{found:.2f}" for found in (ratio, area_ratio)]
     print(f"| {name} | {by} | {' | '.join(cells)} |", flush=True)
 
 
@@ -153,18 +172,21 @@ def main() -> None:
         best: dict[str, Worth] = {}
         for peer in (peer for peer in case.peers if peer in asked.peers.split(";")):
             worth = by_peer(case, peer, asked.limit)
-            row(case.name, peer, worth, None, asked.limit)
+            row(case.name, peer, worth, None, None, asked.limit)
             if worth:
                 best[peer] = worth
         for engine in asked.engines.split(",") if asked.engines else case.engines:
             try:
                 worth = by_us(case, engine)
             except LayoutRefusalError as refusal:
-                print(f"| {case.name} | {engine}: {refusal} | | | | | | | |", flush=True)
+                print(f"| {case.name} | {engine}: {refusal} | | | | | | | | | |", flush=True)
                 continue
-            same = [w.crossings for peer, w in best.items() if peer in _DOTS or engine != "layered"]
+            same = [w.crossings for peer, w in best.items() if peer in _RANKED or engine != "layered"]
             least = min(same, default=0)
-            row(case.name, f"**{engine}**", worth, worth.crossings / least if least else None, asked.limit)
+            clusters = best.get("dot, clusters")
+            area_ratio = worth.area / clusters.area if clusters and clusters.area else None
+            ratio = worth.crossings / least if least else None
+            row(case.name, f"**{engine}**", worth, ratio, area_ratio, asked.limit)
 
 
 if __name__ == "__main__":
