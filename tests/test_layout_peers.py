@@ -7,8 +7,7 @@ from pathlib import Path
 import layout_conformance as suite
 import pytest
 
-from neurovis_spec.layout.frames import bounds
-from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.geometry import bounds, distance
 from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.problem import canonical
 

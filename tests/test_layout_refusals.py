@@ -53,6 +53,9 @@ REFUSED = [
      "layout-mirror-unsupported", "[S, K]"),
     (LEGS.replace("{bias: 1}, K: {}}", "{count: 1}, K: {}}\n    layout: {arrange: {S: row, S1: row}}")
      + "  direction: down\n", "arranged-twice", "S1"),
+    (LEGS.replace("{bias: 1}, K: {}}",
+                  "{count: 3}, K: {}}\n    layout: {arrange: {S: row}, mirror: [[S1, K], [S2, S3]]}")
+     + "  direction: down\n", "mirror-arrange", "S"),
 ]  # fmt: skip
 
 
@@ -79,7 +82,7 @@ def test_a_refusal_is_a_finding_with_its_place(text: str, code: str, marked: str
 #: what no engine has to begin for
 FORESEEN = {"arranged-twice", "align-conflict", "position-missing", "pin-in-frame", "mirror-pins",
             "layout-align-unsupported", "layout-mirror-unsupported", "layout-arrange-unsupported",
-            "layout-plan-unsupported"}  # fmt: skip
+            "layout-plan-unsupported", "mirror-frames", "mirror-arrange"}  # fmt: skip
 MORE = [
     (f"{GROUPS}  engine: circular\n  arrange: {{A: row}}\n", "layout-arrange-unsupported", "A"),
     (f"{GROUPS}  engine: circular\n  mirror: [[A1, A2]]\n", "layout-mirror-unsupported", "[A1, A2]"),
@@ -135,9 +138,13 @@ def test_pins_are_checked_where_there_are_any_and_nothing_is_routed_between_fram
         patch.object(LayeredEngine, "check", autospec=True, side_effect=LayeredEngine.check) as check,
         patch.object(hierarchy, "linked", side_effect=linked) as routed,
     ):
-        assert nv.compile_text(f"{LEGS}  mirror: [[left, right]]\n").refusal() is None
+        assert nv.compile_text(f"{LEGS}  direction: down\n").refusal() is None
         assert nv.compile_text(f"{GROUPS}  positions: {{B: [0, 5]}}\n").refusal() is None
         assert (check.call_count, routed.call_count) == (0, 0)
+        # mirror images are checked, too, but nothing is drawn for it
+        assert nv.compile_text(f"{LEGS}  mirror: [[left, right]]\n").refusal() is None
+        assert (check.call_count, routed.call_count) == (1, 0)
+        check.reset_mock()
         assert nv.compile_text(f"{LEGS}  positions: {{left1: [0, 0]}}\n").refusal() is None
         assert check.call_count == 1
         # within the instances, which are drawn alike

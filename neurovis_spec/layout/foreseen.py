@@ -1,8 +1,8 @@
 """Foreseen: what laying out a network would refuse, or not draw as it is meant, found without a layout being made.
 
 In: a network, what makes its LayoutProblem. Out: the LayoutRefusalError that ``arrange`` would raise before the engine
-begins, or, of pins, after; a warning where instances will not be drawn alike. What else an engine finds out while it
-draws is not foreseen, nor are pins in a network so large that this would take long.
+begins, or, of pins and mirror images, after; a warning where instances will not be drawn alike. What else an engine
+finds out while it draws is not foreseen, nor are these in a network so large that this would take long.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def foreseen(network: Network, problem: Callable[[], LayoutProblem], *, memory: 
     try:
         engine = engine_of(name)
         refuse(asked_of(network, memory), name, engine.capabilities)
-        if engine.capabilities.checks and _crowded(network):
+        if engine.capabilities.checks and (_crowded(network) or _mirrored(network)):
             cast(CheckingEngine, engine).check(problem())
     except LayoutRefusalError as refusal:
         return refusal
@@ -43,9 +43,18 @@ def foreseen(network: Network, problem: Callable[[], LayoutProblem], *, memory: 
     return None
 
 
+def _mirrored(network: Network) -> bool:
+    """Whether there are mirror images, which frames and arrangements may not allow."""
+    return bool(network.layout.mirrors) and not _too_large(network)
+
+
+def _too_large(network: Network) -> bool:
+    return max(len(network.neurons), len(network.connections)) > _MOST
+
+
 def _crowded(network: Network) -> bool:
     """Whether pins may leave no room for something: a frame, a mirror image, what is on a line."""
-    if max(len(network.neurons), len(network.connections)) > _MOST:
+    if _too_large(network):
         return False
     settings = network.layout
     if not (settings.positions or settings.origins or settings.relative):

@@ -37,9 +37,14 @@ def drawn(problem: LayoutProblem, engine: str) -> Layout:
 
 
 def checked(problem: LayoutProblem) -> None:
-    """Raises the LayoutRefusalError that ``drawn`` would: no connection between frames has to be routed for it."""
-    if problem.neurons:
-        Composer(_framed(problem)).whole(routed=False)
+    """Raises the LayoutRefusalError that ``drawn`` would. Only pins need places for it, and for these no connection
+    between frames has to be routed."""
+    if not problem.neurons:
+        return
+    composer = Composer(_framed(problem))
+    composer.check_mirrors()
+    if problem.pins or any(module.pins or module.origin is not None for module in problem.modules):
+        composer.whole(routed=False)
 
 
 def _framed(problem: LayoutProblem) -> LayoutProblem:

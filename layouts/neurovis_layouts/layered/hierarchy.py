@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from neurovis_layouts.layered.component_layout import ComponentLayout, planned
 from neurovis_layouts.layered.drawing import Drawing, FrameMove, Piece
 from neurovis_layouts.layered.frame_routing import linked
-from neurovis_layouts.layered.mirror_units import symmetric_units
+from neurovis_layouts.layered.mirror_units import arranged_on_axis, symmetric_units
 from neurovis_layouts.layered.page_plan import facing, in_direction, parts_by_cell
 from neurovis_layouts.layered.parts import Part, columns_of, firm, images_of, may_be_frame, parts_of
 from neurovis_layouts.layered.pinning import Settled, settled
@@ -43,6 +43,21 @@ class Composer:
         do with it. Raises LayoutRefusalError for what cannot be met."""
         problem = self._book.whole()
         return self.compose(replace(problem, pins=self._with_origins(problem)), routed)
+
+    def check_mirrors(self) -> None:
+        """Raises LayoutRefusalError where an arrangement cannot be symmetric, in the problem or in a kind of instance,
+        before anything is drawn."""
+        whole = self._book.whole()
+        problems, known = [whole], {int(module.template) for module in whole.modules}
+        waiting = sorted(known)
+        while waiting:
+            problems.append(self._book.problem_of(waiting.pop()))
+            found = {int(module.template) for module in problems[-1].modules} - known
+            known |= found
+            waiting += sorted(found)
+        for problem in problems:
+            pair = {a: b for mirror in problem.mirrors for one in mirror.pairs for a, b in (one, one[::-1])}
+            arranged_on_axis(problem, pair, {m for module in problem.modules for m in module.members})
 
     def _with_origins(self, problem: LayoutProblem) -> dict[int, Point]:
         """The pins, and for instances whose origin is pinned the places of all of their neurons that keep off these.

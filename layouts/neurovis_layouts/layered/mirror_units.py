@@ -6,6 +6,7 @@ In: a problem, its frames, whose mirror image each neuron is. Out: units of whic
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
 
 from neurovis_layouts.formations import offsets
@@ -23,7 +24,7 @@ def symmetric_units(problem: LayoutProblem, frames: Sequence[Unit], pair: Mappin
         return list(units_of(problem, frames))
     framed = {m for unit in frames for m in unit.members}
     second = {b for mirror in problem.mirrors for _, b in mirror.pairs} - framed
-    blocks = [block for members, how in problem.arrange if (block := _arranged(problem, members, how, pair, framed))]
+    blocks = arranged_on_axis(problem, pair, framed)
     done = {m for unit in blocks for m in unit.members}
     solid = [*frames, *blocks]
     found = list(units_of(problem, solid, frozenset(second - done)))
@@ -37,6 +38,14 @@ def symmetric_units(problem: LayoutProblem, frames: Sequence[Unit], pair: Mappin
             if piece.members[0] in pair:
                 result.append(_reflected(piece, pair))
     return sorted(result, key=lambda unit: min(unit.members))
+
+
+def arranged_on_axis(problem: LayoutProblem, pair: Mapping[int, int], framed: AbstractSet[int]) -> list[Unit]:
+    """The arrangements of neurons that are not ``framed`` in which mirror images stand opposite each other.
+
+    Raises LayoutRefusalError where one cannot be symmetric.
+    """
+    return [block for members, how in problem.arrange if (block := _arranged(problem, members, how, pair, framed))]
 
 
 def _pure(unit: Unit, pair: Mapping[int, int]) -> Iterator[Unit]:
@@ -58,7 +67,7 @@ def _reflected(unit: Unit, pair: Mapping[int, int]) -> Unit:
 
 
 def _arranged(
-    problem: LayoutProblem, members: Sequence[int], how: str, pair: Mapping[int, int], framed: set[int]
+    problem: LayoutProblem, members: Sequence[int], how: str, pair: Mapping[int, int], framed: AbstractSet[int]
 ) -> Unit | None:
     """An arrangement that holds mirror images of each other: a block on the axis, in which these stand opposite."""
     own = set(members)
