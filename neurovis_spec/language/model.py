@@ -108,7 +108,7 @@ class Model(BaseModel):
     ) -> JsonSchemaValue:
         """The schema of the keys, and of which of them go together."""
         result = handler.resolve_ref_schema(handler(schema))
-        result.update(schema_of(cls._rules(), cls.ONE_OF))
+        result.update({"additionalProperties": False, **schema_of(cls._rules(), cls.ONE_OF)})
         return result
 
     @classmethod
@@ -336,7 +336,8 @@ class Short:
         """The value of the key, or the mapping."""
         whole = handler(schema)
         key = handler.resolve_ref_schema(whole)["properties"][self.key]
-        return {"anyOf": [*(one for one in key["anyOf"] if one != {"type": "null"}), whole]}
+        bare = {name: item for name, item in key.items() if name not in ("title", "description")}
+        return {"anyOf": [*bare.get("anyOf", (bare,)), whole]}
 
     def _written_out(self, node: Node, info: ValidationInfo) -> Node:
         if isinstance(node, Mapping):

@@ -10,22 +10,16 @@ import re
 from collections.abc import Sequence
 from typing import Final
 
+from neurovis_spec.language.places import Path, role_of
 from neurovis_spec.language.references import Arrow, parse
 
 _NAMES: Final = re.compile(r"[A-Za-z0-9_.]+")
 
 
-def is_connections(path: Sequence[str]) -> bool:
-    """Whether the keys below this path name connections."""
-    match tuple(path):
-        case ("connections",) | ("modules", _, "connections") | ("events", "learning"):
-            return True
-    return False
-
-
-def names_connections(path: Sequence[str]) -> bool:
-    """Whether the texts at this path may name connections: those that an event lesions or mends."""
-    return tuple(path) in (("events", "lesion"), ("events", "mend"))
+def names_connections(path: Path, is_key: bool) -> bool:
+    """Whether the text at a path, a key or a value, may name connections."""
+    role = role_of(path, is_key)
+    return role is not None and role.use == "ends"
 
 
 def normal(key: str) -> str:

@@ -15,9 +15,10 @@ from typing import Final, NamedTuple, TypeAlias
 
 from neurovis_spec.language.format.align import aligned
 from neurovis_spec.language.format.blocks import Block, Lines, read_block, read_lines
-from neurovis_spec.language.format.connection_keys import is_connections, names_connections, normal, normal_all
+from neurovis_spec.language.format.connection_keys import names_connections, normal, normal_all
 from neurovis_spec.language.format.gaps import NONE, Comment, Gap, joined, read_gap
 from neurovis_spec.language.format.lines import LineWriter
+from neurovis_spec.language.places import Path
 from neurovis_spec.language.yaml.characters import Lines as Places
 from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
 
@@ -28,8 +29,6 @@ _COLON: Final = re.compile(r"(?:[ \t\n]+|#[^\n]*)*:")
 _DASH: Final = re.compile(r"(?:[ \t\n]+|#[^\n]*)*-")
 _START: Final = re.compile(r"(?<![^\n])---(?=[ \t\n])")
 
-#: The keys on the way to a node; items of lists leave no trace in it.
-_Path: TypeAlias = tuple[str, ...]
 #: A scalar as it is written: on one line, over several, or behind | or >.
 _Written: TypeAlias = str | Lines | Block
 
@@ -203,7 +202,7 @@ class _Printer:
 
     # Blocks
 
-    def _block(self, node: Node, indent: int, path: _Path, *, beside: bool) -> None:
+    def _block(self, node: Node, indent: int, path: Path, *, beside: bool) -> None:
         """A block; ``beside``: its first line may go on behind a dash."""
         level = _Level(node.span.column - 1, indent)
         if isinstance(node, Mapping):
@@ -218,7 +217,7 @@ class _Printer:
         else:
             self._before(gap, level, first=first)
 
-    def _mapping(self, node: Mapping, level: _Level, path: _Path, *, beside: bool) -> None:
+    def _mapping(self, node: Mapping, level: _Level, path: Path, *, beside: bool) -> None:
         names = self._names([entry.key for entry in node.entries], path)
         for index, (entry, name) in enumerate(zip(node.entries, names, strict=True)):
             gap = self._gap(self._source.begin(entry.key))
@@ -236,7 +235,7 @@ class _Printer:
                 self._out.write(":")
             self._value(entry.value, None, level, (*path, _bare(name)), beside=False)
 
-    def _listing(self, node: Sequence | Packed, level: _Level, path: _Path, *, beside: bool) -> None:
+    def _listing(self, node: Sequence | Packed, level: _Level, path: Path, *, beside: bool) -> None:
         items = node.items
         matrix = self._source.matrix(items)
         for index, item in enumerate(items):
@@ -244,9 +243,9 @@ class _Printer:
             assert dash is not None
             self._begin_entry(self._gap(dash.end()), level, first=index == 0, beside=beside)
             self._out.write("-")
-            self._value(item, matrix[index] if matrix else None, level, path, beside=True)
+            self._value(item, matrix[index] if matrix else None, level, (*path, 0), beside=True)
 
-    def _value(self, node: Node, row: str | None, level: _Level, path: _Path, *, beside: bool) -> None:
+    def _value(self, node: Node, row: str | None, level: _Level, path: Path, *, beside: bool) -> None:
         """What stands behind a colon or a dash; ``row``: as it is written in a matrix."""
         indent = level.indent + _STEP
         if self._source.is_block(node):
@@ -274,16 +273,18 @@ class _Printer:
 
     # Scalars and collections in brackets
 
-    def _node(self, node: Node, base: int, column: int, path: _Path) -> None:
+    def _node(self, node: Node, base: int, column: int, path: Path) -> None:
         """A scalar, or a collection in brackets, in a block that stood in ``column``; ``base`` is the column that lines
         behind the first are indented from."""
         end = self._source.end(node)
         if isinstance(node, Scalar):
             written = self._read(node, column)
-            self._scalar(normal(written) if isinstance(written, str) and names_connections(path) else written, base)
+            if isinstance(written, str) and names_connections(path, False):
+                written = normal(written)
+            self._scalar(written, base)
             end = written.end if isinstance(written, Block) else end
         elif (row := self._source.row(node)) is not None:
-            self._out.write(_row(list(map(normal, row)) if names_connections(path) else row))
+            self._out.write(_row(list(map(normal, row)) if names_connections((*path, 0), False) else row))
         else:
             self._flow(self._source.flow(node), base, path)
         self._at = end
@@ -315,14 +316,15 @@ class _Printer:
             else:
                 self._out.blank()
 
-    def _flow(self, flow: Flow, base: int, path: _Path) -> None:
+    def _flow(self, flow: Flow, base: int, path: Path) -> None:
         out = self._out
         opening, closing = flow.brackets[0], flow.brackets[1]
         out.write(opening)
         below = flow.items[0].gap.broken if flow.items else bool(flow.end.comments)
         column = base + _STEP if below else out.width
         keys = [item.key for item in flow.items if item.key is not None]
-        names = iter(self._names(keys, path))
+        inner = (*path, 0) if opening == "[" else path
+        names = iter(self._names(keys, inner))
         matrix = self._matrix(flow)
         for index, item in enumerate(flow.items):
             if index:
@@ -335,13 +337,13 @@ class _Printer:
                 out.write(matrix[index])
             else:
                 lone = opening == "[" and not item.colon
-                self._item(item, next(names) if item.key is not None else None, column, path, announced=lone)
+                self._item(item, next(names) if item.key is not None else None, column, inner, announced=lone)
         if below or flow.end.comments:
             self._comments(flow.end, _Level(0, column), first=False)
             out.begin(base if below else column - 1)
         out.write(closing)
 
-    def _item(self, item: Item, name: _Written | None, column: int, path: _Path, *, announced: bool) -> None:
+    def _item(self, item: Item, name: _Written | None, column: int, path: Path, *, announced: bool) -> None:
         """An item; ``announced`` by a question mark is a key without a colon that stands in a list."""
         if name is None:
             self._node(item.value, column, 0, path)
@@ -354,11 +356,11 @@ class _Printer:
         if not item.empty:
             self._node(item.value, column, 0, (*path, _bare(name)))
 
-    def _names(self, keys: list[Scalar], path: _Path) -> list[_Written]:
+    def _names(self, keys: list[Scalar], path: Path) -> list[_Written]:
         """The keys of a mapping as they are to be written."""
         written = [self._read(key) for key in keys]
         texts = [key for key in written if isinstance(key, str)]
-        if is_connections(path) and len(texts) == len(keys):
+        if texts and len(texts) == len(keys) and names_connections((*path, _bare(texts[0])), True):
             return list(normal_all(texts))
         return written
 
