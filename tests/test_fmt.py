@@ -97,6 +97,10 @@ PAIRS: dict[str, tuple[str, str]] = {
         'connections:\n  A->B: 1\n  K1+K3..K5  ->O: 2\n  "C->D": 3\nlayout: {boxes: {a->b: [A]}}\n',
         'connections:\n  A -> B: 1\n  K1 + K3..K5 -> O: 2\n  "C -> D": 3\nlayout: {boxes: {a->b: [A]}}\n',
     ),
+    "gains of connections": (
+        "render:\n  gain: {signal: {A->B: 1, 'A+B->B': 2}}\n",
+        "render:\n  gain: {signal: {A -> B: 1, 'A + B -> B': 2}}\n",
+    ),
     "connections that are lesioned": (
         "events:\n- {at: 1, lesion: [A1,A2->B , 'C+D->E']}\n- at: 2\n  lesion: A->B\n"
         "- at: 3\n  lesion:\n  - A  ->B  # c\n  - |\n    A->B\nlayout: {boxes: {b: a->b, lesion: [a->b]}}\n",

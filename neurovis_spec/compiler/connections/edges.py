@@ -6,7 +6,7 @@ an edge names none), in the order written. Long plain lists go from the reader's
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -119,12 +119,20 @@ class EdgeReader:
             findings.error("wrong-type", cells.node(cell).span, f"the {what} of an edge is the name of a neuron")
         which = which[cells.kinds[which] == TEXT]
         texts = cells.numbers[which].astype(np.int64)
-        positions = end.indices(cells.texts)[texts]
+        positions = self._positions(cells.texts, texts, end, what, lambda at: (cells.node(int(which[at])).span, ""))
+        return None if len(no_names) else positions
+
+    def _positions(
+        self, names: tuple[str, ...], which: IntArray, end: End, what: str, where: Callable[[int], tuple[Span, str]]
+    ) -> IntArray | None:
+        """The positions in an end of the neurons that edges name, by the numbers of these names. ``where`` says of an
+        edge where it stands, and what is to be added in words."""
+        positions = end.indices(names)[which]
         unknown = np.flatnonzero(positions < 0)
-        _, once = np.unique(texts[unknown], return_index=True)
-        for place in sorted(unknown[once].tolist())[:PATIENCE]:
-            self._outside(cells.texts[int(texts[place])], cells.node(int(which[place])).span, end, what)
-        return None if len(unknown) or len(no_names) or end.positions is UNKNOWN else positions
+        _, once = np.unique(which[unknown], return_index=True)
+        for edge in unknown[np.sort(once)].tolist()[:PATIENCE]:
+            self._outside(names[int(which[edge])], end, what, *where(edge))
+        return None if len(unknown) or end.positions is UNKNOWN else positions
 
     def _given(self, cells: Cells, which: IntArray, ends: tuple[IntArray, IntArray] | None) -> FloatArray | None:
         """The weights in these cells, 1 for a null; they are checked even if their ends are invalid."""
@@ -149,7 +157,7 @@ class EdgeReader:
             result[place] = found[key] or 0
         return None if None in found.values() else result
 
-    def _outside(self, name: str, span: Span, end: End, what: str, where: str = "") -> None:
+    def _outside(self, name: str, end: End, what: str, span: Span, where: str) -> None:
         if not name.strip():
             message = f"the {what} of an edge is the name of a neuron, this is empty"
             self.constants.findings.error("wrong-type", span, message)
@@ -166,8 +174,17 @@ class EdgeReader:
         if not table.sources and table.fault is None:
             self.constants.findings.error("wrong-size", span, "there is no edge in this file")
             return None
-        i = self._named(table.sources, table.rows, self.sources, "source", span)
-        j = self._named(table.targets, table.rows, self.targets, "target", span)
+        numbers = {name: number for number, name in enumerate(dict.fromkeys((*table.sources, *table.targets)))}
+        i, j = (
+            self._positions(
+                tuple(numbers),
+                np.array([numbers[name] for name in named], dtype=np.int64),
+                end,
+                what,
+                lambda edge: (span, f" (row {table.rows[edge]} of the file)"),
+            )
+            for named, end, what in ((table.sources, self.sources, "source"), (table.targets, self.targets, "target"))
+        )
         long = np.flatnonzero(table.delays > LONGEST_DELAY).tolist()
         for place in long[:PATIENCE]:
             message = f"row {table.rows[place]} of the file: a delay must be at most {LONGEST_DELAY:,}"
@@ -175,10 +192,3 @@ class EdgeReader:
         if i is None or j is None or long or table.fault is not None:
             return None
         return EdgeList(i, j, table.weights, table.delays)
-
-    def _named(self, names: tuple[str, ...], rows: IntArray, end: End, what: str, span: Span) -> IntArray | None:
-        positions = end.indices(names)
-        unknown = {names[place]: int(rows[place]) for place in reversed(np.flatnonzero(positions < 0).tolist())}
-        for name in sorted(unknown, key=unknown.__getitem__)[:PATIENCE]:
-            self._outside(name, span, end, what, f" (row {unknown[name]} of the file)")
-        return None if unknown or end.positions is UNKNOWN else positions
