@@ -73,8 +73,7 @@ def simplify(tree: Tree) -> Tree:
     Number(value=6.0, start=0, end=5)
     """
     parts = tuple(simplify(part) for part in children(tree))
-    if parts:
-        tree = _with_parts(tree, parts)
+    tree = with_values(tree, parts)
     if isinstance(tree, Chain):
         return _folded_chain(tree)
     constant = isinstance(tree, Unary | Binary | Conditional) or (isinstance(tree, Call) and tree.function in FUNCTIONS)
@@ -84,16 +83,13 @@ def simplify(tree: Tree) -> Tree:
     return Number(value, tree.start, tree.end) if math.isfinite(value) else tree
 
 
-def _with_parts(tree: Tree, parts: tuple[Tree, ...]) -> Tree:
-    """The node with simplified operands."""
-    exponent = None
-    if isinstance(tree, Binary) and tree.operator == "^":
-        exponent = tree.right
-    elif isinstance(tree, Call) and tree.function == "pow":
-        exponent = tree.arguments[1]
-    if exponent is not None and not isinstance(exponent, Number) and parts[1] == _two(parts[1]):
-        parts = (parts[0], exponent)
-    return rebuild(tree, parts)
+def with_values(tree: Tree, parts: tuple[Tree, ...]) -> Tree:
+    """The node with operands that have the same values; an exponent that only comes to 2 is a power, not a square: it
+    stays as it is written."""
+    made = rebuild(tree, parts)
+    if is_square(made) is not None and is_square(tree) is None:
+        made = rebuild(tree, (parts[0], children(tree)[1]))
+    return made
 
 
 def _folded_chain(tree: Chain) -> Tree:
@@ -107,10 +103,6 @@ def _folded_chain(tree: Chain) -> Tree:
         first = Number(value, tree.start, rest.pop(0).end)
         del operators[0]
     return Chain(tuple(operators), (first, *rest), tree.start, tree.end) if rest else first
-
-
-def _two(tree: Tree) -> Number:
-    return Number(2.0, tree.start, tree.end)
 
 
 class _Emitter:
@@ -151,16 +143,16 @@ class _Emitter:
                     raise ValueError("this expression draws, and no code to draw was given")
                 return self.draw(tree, self.loose(first), self.loose(second)), _ANY
             case _:
-                return f"{_wrapped(self.truth(tree), _ATOM)}*1.0", _MULTIPLY
+                return f"{wrapped(self.truth(tree), _ATOM)}*1.0", _MULTIPLY
 
     def truth(self, tree: Tree) -> _Code:
         match tree:
             case Binary(operator=operator, left=left, right=right) if operator in _COMPARISONS:
                 return f"{self.tight(left, _OR)} {operator} {self.tight(right, _OR)}", _COMPARE
             case Chain(operators=("and", *_), operands=operands):
-                return " & ".join(_wrapped(self.truth(operand), _AND + 1) for operand in operands), _AND
+                return " & ".join(wrapped(self.truth(operand), _AND + 1) for operand in operands), _AND
             case Chain(operators=("or", *_), operands=operands):
-                return " | ".join(_wrapped(self.truth(operand), _OR + 1) for operand in operands), _OR
+                return " | ".join(wrapped(self.truth(operand), _OR + 1) for operand in operands), _OR
             case Unary(operator="not", operand=operand):
                 return f"np.logical_not({self.truth(operand)[0]})", _ATOM
             case _:
@@ -173,9 +165,9 @@ class _Emitter:
             if operator in _ARITHMETIC:
                 level = _ARITHMETIC[operator]
                 joined = f" {operator} " if level == _ADD else operator
-                code = f"{_wrapped(code, level)}{joined}{self.tight(operand, level + 1)}", level
+                code = f"{wrapped(code, level)}{joined}{self.tight(operand, level + 1)}", level
             elif by_numpy or (operator == "/" and _divides(operand)):
-                code = f"{_wrapped(code, _MULTIPLY)}{operator}{self.tight(operand, _SIGN)}", _MULTIPLY
+                code = f"{wrapped(code, _MULTIPLY)}{operator}{self.tight(operand, _SIGN)}", _MULTIPLY
             else:
                 # the operators of Python raise where both operands are Python floats; the functions of NumPy never do,
                 # and what comes of them is no such float
@@ -195,14 +187,14 @@ class _Emitter:
         entry = FUNCTIONS[function]
         codes = [self.tight(argument, _SIGN if entry.signed else _ANY) for argument in arguments]
         if entry.most is None:
-            return _folded(entry.code, codes), _ATOM
+            return folded(entry.code.format, codes), _ATOM
         return entry.code.format(*codes), _ATOM
 
     def loose(self, tree: Tree) -> str:
         return self.value(tree)[0]
 
     def tight(self, tree: Tree, level: int) -> str:
-        return _wrapped(self.value(tree), level)
+        return wrapped(self.value(tree), level)
 
 
 def _divides(tree: Tree) -> bool:
@@ -210,7 +202,8 @@ def _divides(tree: Tree) -> bool:
     return isinstance(tree, Number) and tree.value != 0 and math.isfinite(tree.value)
 
 
-def _wrapped(code: _Code, level: int) -> str:
+def wrapped(code: _Code, level: int) -> str:
+    """Code, in parentheses where its operator binds less tight than is wanted."""
     return code[0] if code[1] >= level else f"({code[0]})"
 
 
@@ -222,9 +215,9 @@ def _number(value: float) -> _Code:
     return repr(float(value)), _ATOM if math.copysign(1.0, value) > 0 else _SIGN
 
 
-def _folded(template: str, arguments: list[str]) -> str:
+def folded(join: Callable[[str, str], str], arguments: list[str]) -> str:
     """min and max of many, halved again and again: few parentheses inside each other, however many there are."""
     if len(arguments) == 1:
         return arguments[0]
     middle = (len(arguments) + 1) // 2
-    return template.format(_folded(template, arguments[:middle]), _folded(template, arguments[middle:]))
+    return join(folded(join, arguments[:middle]), folded(join, arguments[middle:]))

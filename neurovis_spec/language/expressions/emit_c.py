@@ -13,7 +13,7 @@ from collections.abc import Callable, Container, Mapping
 from types import MappingProxyType
 from typing import TypeAlias
 
-from neurovis_spec.language.expressions.emit import simplify
+from neurovis_spec.language.expressions.emit import folded, simplify, with_values, wrapped
 from neurovis_spec.language.expressions.tree import (
     Binary,
     Call,
@@ -124,24 +124,7 @@ def _put(tree: Tree, names: Mapping[str, Value]) -> Tree:
     if isinstance(tree, Name):
         value = names.get(tree.name)
         return Number(value, tree.start, tree.end) if isinstance(value, float) else tree
-    parts = children(tree)
-    if not parts:
-        return tree
-    made = tuple(_put(part, names) for part in parts)
-    exponent = _exponent(tree)
-    if exponent is not None and not isinstance(exponent, Number) and _is_two(made[1]):
-        made = (made[0], exponent)  # an exponent that only comes to 2 is a power, not a square: it keeps its name
-    return rebuild(tree, made)
-
-
-def _is_two(tree: Tree) -> bool:
-    return isinstance(tree, Number) and tree.value == 2.0
-
-
-def _exponent(tree: Tree) -> Tree | None:
-    if isinstance(tree, Binary) and tree.operator == "^":
-        return tree.right
-    return tree.arguments[1] if isinstance(tree, Call) and tree.function == "pow" else None
+    return with_values(tree, tuple(_put(part, names) for part in children(tree)))
 
 
 class Emitter:
@@ -189,8 +172,7 @@ class Emitter:
                 name = f" {len(names)}"
                 names[name] = drawn(node, *(self.value(replaced(part), names) for part in children(node)))
                 return Name(name, node.start, node.end)
-            parts = children(node)
-            return rebuild(node, tuple(map(replaced, parts))) if parts else node
+            return rebuild(node, tuple(map(replaced, children(node))))
 
         return replaced(tree), names
 
@@ -238,12 +220,12 @@ class _Writer:
             case Binary(operator="^", left=left, right=right):
                 return self.power(left, right)
             case Conditional(condition=condition, then=then, otherwise=otherwise):
-                test = _wrapped(self.truth(condition), _OR)
+                test = wrapped(self.truth(condition), _OR)
                 return f"{test} ? {self.tight(then, _OR)} : {self.tight(otherwise, _CHOICE)}", _CHOICE
             case Call(function=function, arguments=arguments):
                 return self.call(function, arguments)
             case _:
-                return f"{_wrapped(self.truth(tree), _OR)} ? {self.number(1.0)} : {self.number(0.0)}", _CHOICE
+                return f"{wrapped(self.truth(tree), _OR)} ? {self.number(1.0)} : {self.number(0.0)}", _CHOICE
 
     def truth(self, tree: Tree) -> _Code:
         match tree:
@@ -251,12 +233,12 @@ class _Writer:
                 level = _COMPARISONS[operator]
                 return f"{self.tight(left, _ADD)} {operator} {self.tight(right, _ADD)}", level
             case Chain(operators=("and", *_), operands=operands):
-                return " && ".join(_wrapped(self.truth(operand), _EQUAL) for operand in operands), _AND
+                return " && ".join(wrapped(self.truth(operand), _EQUAL) for operand in operands), _AND
             case Chain(operators=("or", *_), operands=operands):
                 # compilers warn of && within ||
-                return " || ".join(_wrapped(self.truth(operand), _EQUAL) for operand in operands), _OR
+                return " || ".join(wrapped(self.truth(operand), _EQUAL) for operand in operands), _OR
             case Unary(operator="not", operand=operand):
-                return f"!{_wrapped(self.truth(operand), _ATOM)}", _SIGN
+                return f"!{wrapped(self.truth(operand), _ATOM)}", _SIGN
             case _:
                 return f"{self.tight(tree, _ADD)} != {self.number(0.0)}", _EQUAL
 
@@ -271,7 +253,7 @@ class _Writer:
             else:
                 level = _ARITHMETIC[operator]
                 joined = f" {operator} " if level == _ADD else operator
-                code = f"{_wrapped(code, level)}{joined}{self.tight(operand, level + 1)}", level
+                code = f"{wrapped(code, level)}{joined}{self.tight(operand, level + 1)}", level
         return code
 
     def power(self, base: Tree, exponent: Tree) -> _Code:
@@ -286,7 +268,7 @@ class _Writer:
             case "pow":
                 return self.power(*arguments)
             case "min" | "max":
-                return self.folded(f"nv_{function}", codes), _ATOM
+                return folded(f"nv_{function}({{}}, {{}})".format, codes), _ATOM
             case "clip":
                 greater = f"nv_max({codes[0]}, {codes[1]})"
                 return f"nv_min({greater}, {codes[2]})", _ATOM
@@ -295,13 +277,6 @@ class _Writer:
             case _:
                 return f"{_LIBRARY[function]}{self.emitter.suffix}({', '.join(codes)})", _ATOM
 
-    def folded(self, name: str, codes: list[str]) -> str:
-        """min and max of many, halved again and again: few parentheses inside each other."""
-        if len(codes) == 1:
-            return codes[0]
-        middle = (len(codes) + 1) // 2
-        return f"{name}({self.folded(name, codes[:middle])}, {self.folded(name, codes[middle:])})"
-
     def number(self, value: float) -> str:
         return self.emitter.literal(value)[0]
 
@@ -309,13 +284,9 @@ class _Writer:
         return self.value(tree)[0]
 
     def tight(self, tree: Tree, level: int) -> str:
-        return _wrapped(self.value(tree), level)
+        return wrapped(self.value(tree), level)
 
 
 def _is_zero(tree: Tree) -> bool:
     """Whether a tree is the number 0, not −0."""
     return isinstance(tree, Number) and tree.value == 0.0 and math.copysign(1.0, tree.value) > 0
-
-
-def _wrapped(code: _Code, level: int) -> str:
-    return code[0] if code[1] >= level else f"({code[0]})"
