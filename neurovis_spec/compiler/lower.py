@@ -90,7 +90,7 @@ def _cycle(prompt: list[int], sources: IntArray, targets: IntArray, waiting: lis
 def make_blocks(population: Population, sources: IntArray, targets: IntArray, levels: IntArray) -> tuple[Block, ...]:
     """Neurons of the same level, activation, model and combination, in the order of the levels."""
     parts: dict[_Key, list[_Part]] = {}
-    for group, kind in zip(population.neurons.groups, population.kinds, strict=True):
+    for group, kind in ((one.group, one.kind) for one in population.groups):
         own = levels[group.start : group.start + group.count]
         for level, rows in _by_level(own):
             key = (level, kind.activation.name, kind.model.name, group.combine)

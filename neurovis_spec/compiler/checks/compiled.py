@@ -74,7 +74,7 @@ class Compiled:
     @property
     def models(self) -> Iterator[tuple[Kind, GroupModel]]:
         """Every group of every scope: what its neurons are, and how it is written."""
-        return zip(self.population.kinds, self.population.models, strict=True)
+        return ((one.kind, one.model) for one in self.population.groups)
 
     @property
     def libraries(self) -> tuple[Definitions, ...]:

@@ -119,17 +119,16 @@ def _of_neurons(population: Population, blocks: tuple[Block, ...]) -> Iterator[_
     for number, block in enumerate(blocks):
         home[block.members] = number
         position[block.members] = np.arange(len(block.members))
-    for group, parts in zip(population.neurons.groups, population.parts, strict=True):
-        for part in parts:
-            if part.field == "bias":
-                yield _Found("bias", group.start + part.within(group.count), part)
-            elif part.field in ("activation", "model"):  # neurons of a group may belong to several blocks
-                members = group.start + part.within(group.count)
-                blocked = np.unique(home[members])
-                for number in blocked.tolist():
-                    inside = np.flatnonzero(home[members] == number)
-                    own = part if len(blocked) == 1 else part.some(inside)
-                    yield _Found(f"{part.field}/{number}/{part.name}", position[members[inside]], own)
+    for group, part in ((one.group, part) for one in population.groups for part in one.parts):
+        if part.field == "bias":
+            yield _Found("bias", group.start + part.within(group.count), part)
+        elif part.field in ("activation", "model"):  # neurons of a group may belong to several blocks
+            members = group.start + part.within(group.count)
+            blocked = np.unique(home[members])
+            for number in blocked.tolist():
+                inside = np.flatnonzero(home[members] == number)
+                own = part if len(blocked) == 1 else part.some(inside)
+                yield _Found(f"{part.field}/{number}/{part.name}", position[members[inside]], own)
 
 
 def _of_connections(

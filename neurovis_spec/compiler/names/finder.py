@@ -127,9 +127,10 @@ def finder_of(population: Population, made: Connected, findings: Findings) -> Fi
 def _models(population: Population) -> tuple[Holder, ...]:
     """The states of the models of groups; nothing is known of a group whose model is invalid."""
     result = []
-    for group, kind, written in zip(population.neurons.groups, population.kinds, population.models, strict=True):
-        if "model" in written.unknown or (written.model is not None and written.model.name.value != kind.model.name):
+    for one in population.groups:
+        written, model = one.model, one.kind.model
+        if "model" in written.unknown or (written.model is not None and written.model.name.value != model.name):
             continue
-        states = tuple(quantity.name for quantity in kind.model.state)
-        result.append(Holder(np.array(group.indices, dtype=np.int64), kind.model.name, states))
+        states = tuple(quantity.name for quantity in model.state)
+        result.append(Holder(np.array(one.group.indices, dtype=np.int64), model.name, states))
     return tuple(result)

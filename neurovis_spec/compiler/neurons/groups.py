@@ -67,6 +67,8 @@ class Built(NamedTuple):
     input: IntArray
     position: FloatArray | Unknown
     first: int | None
+    #: what its expressions may use
+    constants: Constants
     #: what states of its model begin with
     starts: Mapping[str, FloatArray]
     noise: Tree | Unknown
@@ -164,6 +166,7 @@ class Builder:
             input=_unsaid(n).input if input_index is UNKNOWN else input_index,
             position=position,
             first=first_number,
+            constants=self.constants,
             starts=starts,
             noise=noise,
             parts=(

@@ -32,11 +32,10 @@ def make_noises(population: Population, inputs: int) -> tuple[Noise, ...]:
     """The noise of every group that has some; ``inputs`` is the length of the vector of all inputs."""
     result: list[Noise] = []
     start = inputs
-    for number, group in enumerate(population.neurons.groups):
-        formula, tree = population.models[number].noise, population.noises[number]
+    for one in population.groups:
+        formula, tree, group, constants = one.model.noise, one.noise, one.group, one.constants
         if formula is None or tree is UNKNOWN:
             continue
-        constants = population.constants[population.owners[number]]
         widths = _check_deviations(tree, formula, group.count, constants)
         members = np.arange(group.start, group.start + group.count, dtype=np.int64)
         frozen(members)

@@ -17,18 +17,15 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, IntArray, frozen
-from neurovis_spec.compiler.events.settable import Assembled, Part
+from neurovis_spec.compiler.events.settable import Assembled
 from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.compiler.names.references import Directory, key_span
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import Group, Neurons
-from neurovis_spec.compiler.neurons.groups import Builder, Built, Kind, Kinds, unread_neurons
+from neurovis_spec.compiler.neurons.groups import Builder, Built, Kinds, unread_neurons
 from neurovis_spec.compiler.neurons.positions import depend_on_positions
-from neurovis_spec.compiler.values.constants import Constants
-from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.language.located import IDENTIFIER
 from neurovis_spec.language.model import names_of
-from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown, known
 
 #: Characters that no name has.
@@ -37,31 +34,20 @@ _NO_LETTERS = re.compile(r"[^A-Za-z0-9_]+")
 
 @dataclass(frozen=True)
 class Population:
-    """All neurons, what each group is and how it is written, and how everything is called in each scope
-    (``directories`` are in the order of the scopes, the network's own first)."""
+    """All neurons, the groups that they are made of, and how everything is called in each scope (``directories`` are in
+    the order of the scopes, the network's own first)."""
 
     neurons: Neurons
+    groups: tuple[Built, ...]
     directories: tuple[Directory, ...]
-    kinds: tuple[Kind, ...]
-    models: tuple[GroupModel, ...]
-    #: the place of each group's scope
-    owners: tuple[int, ...]
-    #: for each neuron whether what the spec says of its position is invalid
-    misplaced: npt.NDArray[np.bool_]
-    #: what each scope's expressions may use
-    constants: tuple[Constants, ...]
-    #: the expression of each group's noise, UNKNOWN where it has none
-    noises: tuple[Tree | Unknown, ...] = ()
-    #: what of each group follows parameters
-    parts: tuple[tuple[Part, ...], ...] = ()
 
     @cached_property
     def moving(self) -> Assembled:
         """The positions, x and y in turn, of which some may follow parameters."""
         parts = [
-            part._replace(places=2 * group.start + part.within(2 * group.count))
-            for group, own in zip(self.neurons.groups, self.parts, strict=True)
-            for part in own
+            part._replace(places=2 * one.group.start + part.within(2 * one.group.count))
+            for one in self.groups
+            for part in one.parts
             if part.field == "position"
         ]
         return Assembled(self.neurons.position.ravel(), tuple(parts))
@@ -69,19 +55,22 @@ class Population:
     @cached_property
     def by_distance(self) -> npt.NDArray[np.bool_]:
         """For each neuron whether it combines by distance, or may, where what the spec says of that is invalid."""
-        result = np.zeros(len(self.neurons), dtype=np.bool_)
-        for group, model in zip(self.neurons.groups, self.models, strict=True):
-            result[group.start : group.start + group.count] = group.combine == "distance" or "combine" in model.unknown
-        return result
+        return self._each([one.group.combine == "distance" or "combine" in one.model.unknown for one in self.groups])
+
+    @cached_property
+    def misplaced(self) -> npt.NDArray[np.bool_]:
+        """For each neuron whether what the spec says of its position is invalid."""
+        return self._each([one.position is UNKNOWN or "position" in one.model.unknown for one in self.groups])
+
+    def _each(self, values: list[bool]) -> npt.NDArray[np.bool_]:
+        """For each neuron what holds of its group."""
+        return np.repeat(np.array(values, dtype=np.bool_), [one.group.count for one in self.groups])
 
     def go_by_position(self, neurons: IntArray) -> None:
         """Mark the parameters that place these neurons as structural: which connections exist depends on them."""
-        for number in np.unique(np.searchsorted(self._starts, neurons, side="right") - 1).tolist():
-            depend_on_positions(self.models[number].position, self.constants[self.owners[number]])
-
-    @cached_property
-    def _starts(self) -> IntArray:
-        return np.array([group.start for group in self.neurons.groups], dtype=np.int64)
+        starts = [one.group.start for one in self.groups]
+        for number in np.unique(np.searchsorted(starts, neurons, side="right") - 1).tolist():
+            depend_on_positions(self.groups[number].model.position, self.groups[number].constants)
 
     @property
     def directory(self) -> Directory:
@@ -216,16 +205,7 @@ def _join(settled: list[_Settled]) -> Population:
     )
     for array in (neurons.bias, neurons.initial, neurons.input, neurons.position, *neurons.starts.values()):
         frozen(array)
-    directories = _directories(settled, len(names))
-    kinds, models = tuple(item.kind for item in built), tuple(item.model for item in built)
-    owners = tuple(place for place, one in enumerate(settled) for _ in one.built)
-    sizes = [item.group.count for item in built]
-    wrong = [item.position is UNKNOWN or "position" in item.model.unknown for item in built]
-    misplaced = np.repeat(np.array(wrong, dtype=np.bool_), sizes)
-    noises = tuple(item.noise for item in built)
-    constants = tuple(one.scope.constants for one in settled)
-    parts = tuple(item.parts for item in built)
-    return Population(neurons, directories, kinds, models, owners, misplaced, constants, noises, parts)
+    return Population(neurons, tuple(built), _directories(settled, len(names)))
 
 
 def _starts(built: list[Built], total: int) -> dict[str, FloatArray]:
