@@ -14,6 +14,7 @@ from toy_bodies import SKELETON, SPEC, carted, registered
 
 import neurovis_spec as nv
 from neurovis_spec import analysis, api
+from neurovis_spec.analysis import report
 from neurovis_spec.body import BodyError
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.diagnostics import SpecError
@@ -160,6 +161,17 @@ def test_trials_begin_with_the_body_where_it_was() -> None:
     assert lost["W", "lesion"] > 0
     with pytest.raises(BodyError, match="cannot be kept"):
         analysis.importance(carted("unkept"), start=50, steps=20)
+
+
+def test_trials_that_would_take_too_long_with_a_body_are_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(report, "_LONGEST", 10_000 * 10 * 40)
+    for body, left_out in ((True, 2), (False, 0)):
+        network = api.compile_text(WITH_BODY, body=body)
+        report.analyze(network, tmp_path / str(body), network.run(20), report.Wish(start=0, stop=40))
+        text = (tmp_path / str(body) / "index.html").read_text(encoding="utf-8")
+        assert text.count("take too long") == left_out
 
 
 def test_a_sweep_runs_each_point_with_its_body(tmp_path: Path) -> None:

@@ -46,6 +46,8 @@ _CURVES, _BARS, _ROWS, _LEGS = 24, 30, 2_000, 40
 _SEEN = 600
 #: Trials that take longer than so many updates of a neuron or a connection are left out.
 _LONGEST = 5_000_000_000
+#: A step of a body takes as long as about so many of them.
+_BODY = 50_000
 
 
 @dataclass(frozen=True)
@@ -286,7 +288,7 @@ class _Report:
             "importance": 2 * (len(network.neurons) + len(network.inputs)),
             "sensitivity": 4 * (len(network.inputs) + len(network.parameters) + len(network.connections)),
         }
-        size = len(network.neurons) + len(network.connections)
+        size = len(network.neurons) + len(network.connections) + (0 if network.body is None else _BODY)
         long = {key for key, number in runs.items() if number * count * size > _LONGEST}
         try:
             trials = Trials(self.network, first, count, self.wish.inputs or None) if len(long) < len(runs) else None
