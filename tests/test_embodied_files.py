@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import warnings
 import zipfile
 from dataclasses import replace
 from pathlib import Path
@@ -56,6 +57,17 @@ def test_a_table_holds_sensors_and_no_pose(tmp_path: Path) -> None:
     assert read.skeleton is None
     assert read.sensor("arm").tobytes() == recording.sensor("arm").tobytes()
     assert np.array_equal(read.weights, recording.weights)
+
+
+def test_a_bag_does_not_say_which_sensors_there_are(tmp_path: Path) -> None:
+    run, folder = carted().run(20), tmp_path / "bag"
+    folder.mkdir()
+    carted().run_to(folder / "bag_0.mcap", 20)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        read = nv.load(folder)
+    assert np.array_equal(read.activity, run.activity)
+    assert read.sensors is None
 
 
 @pytest.mark.parametrize(

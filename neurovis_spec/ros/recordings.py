@@ -43,7 +43,8 @@ class BagFormat:
             raise RecordingError(f"{path}: it does not say of which network it is: no topic 'spec' is in it")
         text, base = found
         compiled = compiled_from(text, str(path))
-        kinds = {f"{base}/{kind}": place for place, kind in enumerate(KINDS)}
+        # what a bag holds of a body it does not name: only a recording says which sensors these are
+        kinds = {f"{base}/{kind}": place for place, kind in enumerate(KINDS) if kind not in ("sensors", "pose")}
         arrived, left_out = Arrived(frame(compiled)), 0
         for message in bag.messages():
             kind = kinds.get(message.topic.name)
