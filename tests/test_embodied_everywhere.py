@@ -19,12 +19,14 @@ from neurovis_spec.body import BodyError
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.diagnostics import SpecError
 from neurovis_spec.live.carry import carried
+from neurovis_spec.live.past import Kept
 from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.saving import recording as saved
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import Reach, Seen, SourceError
 from neurovis_spec.live.turns import Set
 from neurovis_spec.runtime.recording import Recording
+from neurovis_spec.scene.fading import Fading
 from neurovis_spec.sweeps.grid import SweepError
 from neurovis_spec.sweeps.sweep import sweep
 
@@ -86,6 +88,16 @@ def test_a_turn_is_taken_again_with_the_body() -> None:
     source.go(120)
     assert same(source.seen(), after[-1])
     assert not same(after[-1], seen(SimulatedSource(carted().simulator()), 120)[-1])
+
+
+def test_states_of_bodies_that_nobody_can_measure_fill_the_past_as_well() -> None:
+    sizes = {}
+    for given in ("plain", "whole"):
+        simulation = carted(given).simulator()
+        simulation.step()
+        sizes[given] = Kept(simulation.state(), {}, Fading(simulation.network)).size
+    assert sizes["plain"] < 10_000
+    assert sizes["whole"] > 1_000_000
 
 
 def test_where_a_body_cannot_be_kept_there_is_no_going_back() -> None:

@@ -103,6 +103,8 @@ def test_a_sensor_is_had_by_its_name() -> None:
     assert np.array_equal(recording.sensor("x"), recording.sensors[:, 0])
     assert np.array_equal(recording.sensor("arm"), recording.sensors[:, 1:3])
     assert np.array_equal(recording.sensor("arm[1]"), recording.sensors[:, 2])
+    assert recording._repr_svg_().count("<title>sensor of ") == 4
+    assert "more" not in recording._repr_svg_()
     with pytest.raises(UnknownNameError, match="no sensor 'clok'; did you mean 'clock'"):
         recording.sensor("clok")
     assert "4 sensors" in repr(recording)
@@ -248,16 +250,17 @@ def test_in_memory_a_loop_is_recorded_as_well() -> None:
     assert same(simulation.recording, run)
 
 
-def test_ctrl_c_ends_a_loop_and_its_recording_is_there(tmp_path: Path) -> None:
+@pytest.mark.parametrize("ends", [KeyboardInterrupt, SystemExit])
+def test_ctrl_c_ends_a_loop_and_its_recording_is_there(ends: type[BaseException], tmp_path: Path) -> None:
     path = tmp_path / "walk.npz"
 
     def loop() -> None:
         with carted().simulator(record=path) as simulation:
             for _ in range(7):
                 simulation.step()
-            raise KeyboardInterrupt
+            raise ends
 
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(ends):
         loop()
     assert same(nv.load(path), carted().run(7))
 

@@ -22,6 +22,8 @@ ROOM = 256 << 20
 EVERY = 64
 #: what a state takes besides its numbers, in bytes
 _OVERHEAD = 4096
+#: what the state of a body is taken for that is no array, as nobody knows
+_UNKNOWN = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +47,10 @@ def _bytes(value: object) -> int:
         return int(value.nbytes)
     if isinstance(value, tuple):
         return sum(_bytes(part) for part in value)
-    if isinstance(value, State | Conditions | BodyState):
+    if isinstance(value, BodyState):
+        known = value.carried is None or isinstance(value.carried, np.ndarray)
+        return _bytes(value.carried) if known else _UNKNOWN
+    if isinstance(value, State | Conditions):
         return sum(_bytes(getattr(value, field.name)) for field in fields(value) if field.name != "conditions")
     return 0
 

@@ -1,7 +1,7 @@
 """The recorder: what a simulation does, step by step, in memory or in a file that is written meanwhile.
 
 In: the State before and after each step. Out: a Recording at any time; a file when it is closed. After an exception
-other than Ctrl-C there is a part in its place, as after a run that broke off.
+there is a part in its place, as after a run that broke off; Ctrl-C and ``sys.exit`` are ordinary ends of a loop.
 """
 
 from __future__ import annotations
@@ -123,12 +123,12 @@ class Recorder:
         return recording_of(self._network, self._columns, numbers, state.weights, after(self._network, state))
 
     def close(self, error: BaseException | None = None) -> None:
-        """End the recording; with an ``error`` other than Ctrl-C as that of a run that broke off. Raises what
+        """End the recording, as that of a run that broke off where there is an ``error``, an Exception. Raises what
         ``Recording.save`` raises."""
         if self._closed:
             return
         self._closed = True
-        broken = error is not None and not isinstance(error, KeyboardInterrupt)
+        broken = isinstance(error, Exception)
         if self._writer is not None:
             self._hand_on()
             found = error if broken else None

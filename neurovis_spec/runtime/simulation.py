@@ -112,8 +112,8 @@ class Simulation:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End the recording. After an exception other than Ctrl-C a part beside the file holds the steps until then, as
-        after a run that broke off."""
+        """End the recording. After an exception, but for Ctrl-C and ``sys.exit``, a part beside the file holds the
+        steps until then, as after a run that broke off."""
         self._close(error)
 
     def __reduce__(self) -> tuple[Callable[..., Simulation], tuple[object, ...]]:

@@ -22,17 +22,18 @@ MOST, COLUMNS = 24, 300
 
 
 def traces(recording: Recording) -> str:
-    """The activities, the changing weights and the states over the steps; every line has its own range, which is
-    written beside it."""
+    """The activities, the changing weights, the states and the sensors over the steps; every line has its own range,
+    which is written beside it."""
     plastic = recording.plastic if recording.weights.shape[1] else recording.plastic[:0]
     names = [recording.connection_names[index] for index in plastic[:MOST].tolist()]
     rows = [
         *_rows("activity", recording.columns[:MOST], recording.activity, "#0072b2"),
         *_rows("weight", names, recording.weights, "#b07d00"),
         *_rows("state", recording.state_names[:MOST], recording.states, "#009e73"),
+        *_rows("sensor", recording.sensor_names[:MOST], recording.rows.sensors, "#cc79a7"),
     ]
     height = TOP + ROW * len(rows) + 8
-    hidden = sum(max(0, width - MOST) for width in recording.widths)
+    hidden = sum(max(0, width - MOST) for width in recording.widths[:4])  # a pose is drawn, not traced
     span = f"steps {recording.step[0]} … {recording.step[-1]}" if len(recording) else "no steps"
     more = f" · {hidden} more" if hidden else ""
     title = escape(f"{recording.network or 'recording'} · {span}{more}")
