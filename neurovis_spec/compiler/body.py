@@ -31,6 +31,8 @@ from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.model import names_of
 from neurovis_spec.language.unknown import UNKNOWN
 
+#: More steps of a body within one of the network are a mistake.
+MOST_SUBSTEPS: Final = 1_000_000
 #: One number of a sensor, an actuator or an output: ``torso_up[2]``.
 _ONE: Final = re.compile(r"(.*)\[\s*([0-9]{1,9})\s*\]", re.DOTALL)
 
@@ -58,7 +60,7 @@ def body_settings(
     in order. Without a ``place`` the body is not opened, and its own names are not checked."""
     findings = constants.findings
     kind, given = next(iter(model.kinds.items()), ("", None))
-    substeps = None if model.substeps is None else constants.integer(model.substeps, "'substeps'", 1)
+    substeps = None if model.substeps is None else constants.integer(model.substeps, "'substeps'", 1, MOST_SUBSTEPS)
     path = body = None
     if given is not None and len(model.kinds) == 1 and place is not None:
         clock = None if substeps is UNKNOWN or not dt_known else Clock(constants.dt, substeps, model.substeps)
