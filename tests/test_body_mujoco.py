@@ -29,7 +29,7 @@ LEG = """\
         <geom type="capsule" fromto="0 0 0 0.1 0 -0.4" size="0.03"/>
         <site name="tip" pos="0.1 0 -0.4" size="0.04"/>
       </body>
-      <body name="prop" pos="-0.15 0 0">
+      <body name="prop" pos="-0.2 -0.02 -0.02">
         <geom name="left_foot" type="capsule" fromto="0 0 0 0 0 -0.45" size="0.02"/>
       </body>
     </body>
@@ -137,8 +137,8 @@ def test_the_skeleton_has_links_feet_and_solids(tmp_path: Path) -> None:
     assert ends(0) == ([-0.1, 0, 0.5], [0.1, 0, 0.5], 0.1), "a box is its longest axis, as thick as it is wide"
     assert sorted(ends(1)[:2]) == [[0.2, 0.3, 0.5], [0.3, 0.3, 0.1]]
     assert ends(3) == ([0, 0, 0.5], [0.2, 0.3, 0.5], 0.008), "the leg does not meet the box: a thin link leads there"
-    assert len(skeleton.links) == 4, "the prop begins within the box"
-    assert [places[foot].round(9).tolist() for foot in skeleton.feet] == [[0.3, 0.3, 0.1], [-0.15, 0, 0.05]]
+    assert len(skeleton.links) == 4, "the prop meets the box, if not the round end of what is drawn of it"
+    assert [places[foot].round(9).tolist() for foot in skeleton.feet] == [[0.3, 0.3, 0.1], [-0.2, -0.02, 0.03]]
     assert pose[-2:].tolist() == [0, 0]
     (wall,) = skeleton.solids
     assert wall.low == pytest.approx((0, -0.1, 0))

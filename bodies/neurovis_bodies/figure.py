@@ -150,12 +150,13 @@ def _axes(model: mujoco.MjModel, body: int) -> Iterator[_Axis]:
 
 
 def _is_apart(model: mujoco.MjModel, body: int, axes: dict[int, list[_Axis]]) -> bool:
-    """Whether nothing that is drawn of its parent leads to the origin of a body, of which something is drawn."""
+    """Whether nothing that is drawn of its parent meets what is drawn at the origin of a body."""
     parent = int(model.body_parentid[body])
     if parent not in axes or not _is_drawn(model, body, axes):
         return False
     origin = np.array(model.body_pos[body])
-    return all(_distance(origin, axis) > axis.radius * 1.01 for axis in axes[parent])
+    reach = max((axis.radius for axis in axes[body] if _distance(np.zeros(3), axis) <= axis.radius), default=0.0)
+    return all(_distance(origin, axis) > (axis.radius + reach) * 1.01 for axis in axes[parent])
 
 
 def _is_drawn(model: mujoco.MjModel, body: int, axes: dict[int, list[_Axis]]) -> bool:
