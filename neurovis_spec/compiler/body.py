@@ -38,11 +38,13 @@ _ONE: Final = re.compile(r"(.*)\[\s*([0-9]{1,9})\s*\]", re.DOTALL)
 
 
 class Clock(NamedTuple):
-    """The seconds of a step of the network, and how many steps of the body these are, as the spec says it."""
+    """The seconds of a step of the network, and how many steps of the body these are, as the spec says it; ``default``:
+    it does not say the seconds."""
 
     dt: float
     substeps: int | None = None
     written: Formula | None = None
+    default: bool = False
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,10 @@ def body_settings(
     substeps = None if model.substeps is None else constants.integer(model.substeps, "'substeps'", 1, MOST_SUBSTEPS)
     path = body = None
     if given is not None and len(model.kinds) == 1 and place is not None:
-        clock = None if substeps is UNKNOWN or not dt_known else Clock(constants.dt, substeps, model.substeps)
+        clock = None
+        if dt_known and substeps is not UNKNOWN:
+            time = around.spec.time
+            clock = Clock(constants.dt, substeps, model.substeps, time is None or time.dt is None)
         path, body = find_body(kind, given, place, clock, findings)
     sensed = tuple(_sensed(model, around, None if body is None else body.sensors, findings))
     moved = tuple(_moved(model, around, None if body is None else body.actuators, constants))
@@ -124,7 +129,11 @@ def _opened(kind: str, given: Located[str], path: Path | None, clock: Clock, fin
         return None
     except BodyError as error:
         at = clock.written if error.key == "substeps" and clock.written is not None else given
-        findings.error("bad-body", at.span, str(error), error.hint)
+        hint = error.hint
+        if error.fitting is not None and clock.default and clock.substeps is not None:
+            dt, count = error.fitting
+            hint = f"write time: {{dt: {dt / count * clock.substeps:.12g}}}"
+        findings.error("bad-body", at.span, str(error), hint)
         if error.fitting is None:
             return None
         return _opened(kind, given, path, Clock(*error.fitting), Findings())  # its names are what they are
