@@ -72,6 +72,7 @@ def test_the_wheel_holds_the_packages_the_library_and_the_examples(wheel: Path) 
         "neurovis_spec/examples/cpg_rbf.yaml",
         "neurovis_spec/examples/data/centres.csv",
         "neurovis_spec/examples/hexapod/hexapod.yaml",
+        "neurovis_spec/examples/walk/hexapod.xml",
         "neurovis_spec/examples/hexapod/modules/leg.yaml",
         "neurovis_spec/examples/hexapod/data/obstacle.csv",
     }
