@@ -197,7 +197,7 @@ PICTURES = (
     Picture(
         "hexapod",
         "hexapod/hexapod",
-        588,
+        586,
         "Use case 3, walking: three ripples on the line",
         "The rhythm enters the upper delay line at DL6 and passes over the right legs, from hind to front, then over "
         "the left ones. At this frequency every second neuron of DL6 to DL11 is active, and three legs are lifted: "
@@ -206,7 +206,7 @@ PICTURES = (
     Picture(
         "hexapod_legs",
         "hexapod/hexapod",
-        588,
+        586,
         "Use case 3, a leg a glyph",
         "The same step; each leg is one glyph of 22 neurons in the colour of their mean activity, with its connections "
         "added up. The three legs that are lifted, left2, right1 and right3, are the most active. Each takes from both "
@@ -216,17 +216,17 @@ PICTURES = (
     Picture(
         "hexapod_focus",
         "hexapod/hexapod",
-        588,
+        586,
         "Use case 3, one neuron and what it is connected to",
-        "The rhythm enters the upper delay line at DL6: at once, and later with the opposite sign (the line with a "
-        "bead). DL6 hands it on to DL7 and to B, from where it enters the lower line, and moves two joints of "
-        "right3. What it is not connected to is small.",
+        "The rhythm enters the upper delay line at DL6: at once, and twice later with the opposite sign (the lines "
+        "with a bead), so that a swing is over whatever the frequency. DL6 hands it on to DL7 and to B, from where it "
+        "enters the lower line, and moves two joints of right3. What it is not connected to is small.",
         focus="DL6",
     ),
     Picture(
         "hexapod_matrix",
         "hexapod/hexapod",
-        588,
+        586,
         "Use case 3 as a matrix: six legs of one make",
         "A row is what a neuron sends, a column what it takes in. The six blocks on the diagonal are the legs, all "
         "alike; above them the delay lines reach into each leg once or twice. What leads from leg to leg are the "
@@ -236,20 +236,20 @@ PICTURES = (
     Picture(
         "hexapod_obstacle",
         "hexapod/hexapod",
-        1189,
+        870,
         "Use case 3, learning to step over a beam",
-        "The front legs hit the fourth beam 49 steps ago, and d6 and d7 carry the news to the legs behind. The middle "
-        "legs stepped high too early and have just hit the beam, too (H is active): the connection that warned them "
-        "glows. Thicker, it keeps the news up for longer, and they will step later.",
+        "The front legs hit the second beam some 80 steps ago, and d6 and d7 carry the news to the legs behind. The "
+        "left middle leg stepped high too early and has just hit the beam, too (H is active): the connection that "
+        "warned it glows. Thicker, it keeps the news up for longer, and the leg will step high later.",
     ),
     Picture(
         "hexapod_floor",
         "hexapod/hexapod",
         2341,
         "Use case 3, remembering the floor",
-        "All legs but the right front one walk on the soft floor, where contact comes late: S is active in left2 and "
-        "right3, which have just come down, and K is high in all five. The S of right1 has been silenced for 31 steps; "
-        "its K, lower since its floor is rigid, is where it was.",
+        "All legs but the right front one walk on the soft floor, where contact comes late: S is active in left1, "
+        "left3 and right2, which have just come down, and K is high in all five. The S of right1 has been silenced "
+        "for 31 steps; its K, lower since its floor is rigid, is where it was.",
     ),
 )
 
