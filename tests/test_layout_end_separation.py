@@ -9,14 +9,15 @@ import layout_conformance as suite
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from neurovis_layouts.routing.end_separation import parted
-from neurovis_layouts.routing.obstacles import Obstacles
+from neurovis_layouts.routing.bows import bow
+from neurovis_layouts.routing.route_cost import Judge
+from neurovis_layouts.routing.simplify_routes import told_apart
 from test_layout_compound import attempt, walkers
 
 import neurovis_spec as nv
 from neurovis_spec.layout import Layout, LayoutEdge, LayoutProblem, Point
 from neurovis_spec.layout.arrange import lay_out_problem
-from neurovis_spec.layout.geometry import distance, sampled, straight, turn
+from neurovis_spec.layout.geometry import distance, sampled, turn
 from neurovis_spec.layout.model import Route
 from neurovis_spec.layout.problem import problem_of
 
@@ -97,10 +98,10 @@ def test_where_ends_are_few_none_arrives_where_another_leaves(problem: LayoutPro
 
 def test_where_ends_are_many_they_stay_as_even_as_they_are() -> None:
     """Such as those of a ring, whose lines are images of each other."""
-    for count, turned in ((3, True), (8, False)):
+    for count, high, turned in ((3, 0.4, True), (8, 0.8, False)):
         centres = [(6 * x, 6 * y) for x, y in (turn(i / count) for i in range(count))]
         pairs = [(a, b) for a in range(count) for b in range(count) if a != b]
         edges = [LayoutEdge(f"{a} -> {b}", a, b, 1) for a, b in pairs]
-        routes = {i: straight(centres[a], centres[b]) for i, (a, b) in enumerate(pairs)}
-        found = parted(edges, centres, routes, routes.keys(), [], Obstacles(centres), None)
+        routes = {i: bow(centres[a], centres[b], high) for i, (a, b) in enumerate(pairs)}
+        found = told_apart(Judge(edges, centres, routes), routes.keys())
         assert bool(found) == turned

@@ -12,12 +12,12 @@ from neurovis_layouts.layered.component_layout import ComponentLayout
 from neurovis_layouts.layered.pinning import Settled
 from neurovis_layouts.layered.templates import Key
 from neurovis_layouts.layered.units import Unit
-from neurovis_layouts.routing import Waypoint, route_all, told_apart
+from neurovis_layouts.routing import Waypoint, route_all
 from neurovis_layouts.routing.arcs import Arcs, even
 from neurovis_layouts.routing.channel_routing import channels
 from neurovis_layouts.routing.corners import reflected
 from neurovis_layouts.routing.route_cost import Judge
-from neurovis_layouts.routing.simplify_routes import MOST_EASED, eased
+from neurovis_layouts.routing.simplify_routes import MOST_EASED, eased, told_apart
 from neurovis_spec.layout.geometry import Rect, snap
 from neurovis_spec.layout.model import LayoutEdge, LayoutProblem, Point, Route
 
@@ -54,26 +54,20 @@ def linked(
         ways.update(firm)
     else:
         ways = planned
-    bowed, ease = _bowed(edges, units), not pair and not firm
-    routes = route_all(edges, rests.places, ways, bowed, lateral, frames=framed, drawn=drawn, ease=ease)
+    bowed = _bowed(edges, units)
+    routes = route_all(
+        edges, rests.places, ways, bowed, lateral, frames=framed, drawn=drawn, ease=not firm, improve=not pair
+    )
     found = {keys[i]: tuple(_snapped(route)) for i, route in zip(links, routes, strict=True)}
     if not pair:
         return found
     found = _reflected(found, rests, pair)
     if len(found) <= _MOST:
-        found.update(_mended(found, rests, pair, framed, drawn))
-    if len(found) <= MOST_EASED and not firm:
-        found.update(_eased(found, edges, [keys[i] for i in links], rests, pair, framed, drawn))
-    # what has no image may now meet the image of another
-    here = {i: found[keys[link]] for i, link in enumerate(links) if edges[i].source != edges[i].target}
-    single = {i for i in here if not _imaged(keys[links[i]], found, rests, pair)}
-    if len(here) <= _MOST:
-        moved = told_apart(edges, rests.places, here, single, framed, drawn)
-        found.update({keys[links[i]]: tuple(_snapped(route)) for i, route in moved.items()})
+        found.update(_improved(found, edges, [keys[i] for i in links], rests, pair, framed, drawn, not firm))
     return found
 
 
-def _eased(
+def _improved(
     routes: Mapping[Key, Route],
     edges: Sequence[LayoutEdge],
     keys: Sequence[Key],
@@ -81,8 +75,10 @@ def _eased(
     pair: Mapping[int, int],
     frames: Sequence[tuple[frozenset[int], Rect]],
     drawn: Sequence[Route],
+    ease: bool,
 ) -> dict[Key, Route]:
-    """Routes with fewer bends, those of mirror images reflections of each other."""
+    """Routes that are drawn better: those there and back between mirror images clear of obstacles and of each other
+    (``Arcs``), others with fewer bends and apart from others, those of mirror images reflections of each other."""
     number = {key: i for i, key in enumerate(keys)}
     image: dict[int, int] = {}
     free: set[int] = set()
@@ -98,18 +94,21 @@ def _eased(
     here = {i: routes[key] for key, i in number.items() if key[0] != key[1]}
     loops = [routes[key] for key in keys if key[0] == key[1]]
     judge = Judge(edges, rests.places, here, frames, [*drawn, *loops], image, 2 * rests.axis)
-    return {keys[i]: route for i, route in eased(judge, free).items()}
+    between: dict[tuple[int, ...], list[int]] = {}
+    for key, i in sorted(number.items()):
+        if pair.get(key[0]) == key[1] and (key[1], key[0], 0) in routes:
+            between.setdefault(tuple(sorted(key[:2])), []).append(i)
+    arcs = Arcs(judge, frames, pair) if between else None
+    mended = {i for own in between.values() if arcs is not None and arcs.mend(own) for i in own}
+    better = eased(judge, free) if ease and len(routes) <= MOST_EASED else {}
+    better.update(told_apart(judge, free))
+    return {keys[i]: tuple(_snapped(judge.routes[i])) for i in mended | better.keys()}
 
 
 def _through(places: Sequence[Point], edge: LayoutEdge, line: Sequence[Waypoint]) -> Route:
     """A route straight from waypoint to waypoint."""
     stops = [places[edge.source], *((way.x, way.y) for way in line), places[edge.target]]
     return (stops[0], *(point for a, b in pairwise(stops) for point in (a, b, b)))
-
-
-def _imaged(key: Key, routes: Mapping[Key, Route], rests: Settled, pair: Mapping[int, int]) -> bool:
-    """Whether a route is the reflection of another, or of itself."""
-    return _image_of(key, rests, pair) in routes or pair.get(key[0]) == key[1]
 
 
 def _snapped(route: Route) -> list[Point]:
@@ -152,28 +151,6 @@ def _reflected(routes: dict[Key, Route], rests: Settled, pair: Mapping[int, int]
             continue
         result[key] = route
         result[image] = reflected(route, twice, rests.places[image[0]], rests.places[image[1]])
-    return result
-
-
-def _mended(
-    routes: Mapping[Key, Route],
-    rests: Settled,
-    pair: Mapping[int, int],
-    frames: Sequence[tuple[frozenset[int], Rect]],
-    drawn: Sequence[Route],
-) -> dict[Key, Route]:
-    """The routes, those there and back between mirror images made clear of obstacles and of each other (``Arcs``)."""
-    between: dict[tuple[int, int], list[Key]] = {}
-    for source, target, number in sorted(routes):
-        if pair.get(source) == target and (target, source, 0) in routes:
-            between.setdefault((min(source, target), max(source, target)), []).append((source, target, number))
-    result = dict(routes)
-    arcs = Arcs(rests.places, frames, pair, 2 * rests.axis) if between else None
-    for keys in between.values():
-        if arcs is not None:
-            others = [*drawn, *(result[key] for key in sorted(result.keys() - set(keys)))]
-            mended = arcs.mended([key[:2] for key in keys], [result[key] for key in keys], others)
-            result.update(zip(keys, mended, strict=True))
     return result
 
 

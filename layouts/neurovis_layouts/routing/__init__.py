@@ -1,11 +1,11 @@
 """Routes: how connections run once neurons have their places.
 
-In: centres, edges, and what an engine knows about the way (waypoints). Out: a cubic spline for every edge. The
-modules: ``ports`` (who leaves and arrives where on a disc), ``curves`` (along the direction), ``bows`` (from anywhere
-to anywhere), ``loops`` (to itself), ``obstacles`` (which neurons are in the way), ``parallel_edges`` (those that
-share both ends), ``end_separation`` (which keep off departures).
+In: centres, edges, and what an engine knows about the way (waypoints). Out: a cubic spline for every edge. Routes are
+found, ``ports`` (who leaves and arrives where on a disc), ``curves`` (along the direction), ``bows`` (from anywhere to
+anywhere), ``detours`` (round frames and discs), ``arcs`` (between mirror images), ``loops`` (to itself), and then
+improved (``simplify_routes``) by what they cost among all that is drawn (``route_cost``).
 """
 
-from neurovis_layouts.routing.router import Waypoint, route_all, told_apart
+from neurovis_layouts.routing.router import Waypoint, route_all
 
-__all__ = ["Waypoint", "route_all", "told_apart"]
+__all__ = ["Waypoint", "route_all"]

@@ -9,29 +9,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise, product
+from itertools import product
 
 import numpy as np
 
 from neurovis_layouts.routing.bows import bow
 from neurovis_layouts.routing.detours import Detours
-from neurovis_layouts.routing.line_overlap import crossings, line_of, together, tolerable
-from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
-from neurovis_layouts.routing.polylines import polylines
+from neurovis_layouts.routing.polylines import Polylines, polylines
+from neurovis_layouts.routing.route_cost import Judge, Pen
 from neurovis_layouts.routing.walls import Frame, Walls
 from neurovis_spec.layout import FloatArray
 from neurovis_spec.layout.geometry import distance, snap
-from neurovis_spec.layout.model import Point, Route
+from neurovis_spec.layout.model import Route
 
-#: How much of an arc may run on another between the same ends, and how close to a disc it may come.
-_SHARE, _SLACK = 0.1, 0.02
 #: Bows that are tried on either side, their handles, how many ways round, and how many arcs are tried with each other.
 _BOWS, _HOLDS, _WAYS, _BEST = 10, (0.3, 0.15, 0.05), 4, 10
-#: What it costs to enter a frame or a disc, to come a unit closer to a disc than ``REACH``, to run on one between the
-#: same ends, to cross it, to bow to the other's side, to be longer by a whole straight way, to go a unit aside, to go a
-#: unit there and back besides, to run on what else is drawn, to cross a line of that, and to go round corners.
-_ENTERING, _NEARING, _SAME, _CROSSED, _SIDE, _LONGER = 40.0, 12.0, 30.0, 4.0, 5.0, 2.0
-_ASIDE, _WAVERING, _OTHER, _CROSSING, _CORNERS = 0.8, 1.5, 6.0, 0.5, 0.3
+#: What it costs to run on one between the same ends and to cross it, which makes two arcs one, and to bow to the
+#: other's side, by which there and back are told apart.
+_SAME, _CROSSED, _SIDE = 30.0, 4.0, 5.0
 #: A wall on the axis keeps a way to its side: how thick it is, how far off the straight way, how long.
 _THIN, _OFF, _LONG = 0.02, 0.1, 1e4
 #: What an arc may differ by from the way that it was folded from.
@@ -49,102 +44,70 @@ def even(route: Route, twice: float) -> Route:
     return route[0], *before, *middle, *((twice - x, y) for x, y in before[::-1]), route[-1]
 
 
-class _Drawn:
-    """What else is drawn: points on it, and how often routes cross it."""
-
-    def __init__(self, routes: Sequence[Route]) -> None:
-        self.points: FloatArray = np.concatenate([np.zeros((0, 2)), *(line_of(route) for route in routes)])
-        self._lines = polylines(routes) if routes else None
-
-    def crossed(self, routes: Sequence[Route]) -> list[int]:
-        """How often each of these crosses it."""
-        if self._lines is None:
-            return [0] * len(routes)
-        return [int(count) for count in polylines(routes).crossed(self._lines.a, self._lines.b)]
-
-
 class Arcs:
-    """Mends routes between mirror images among ``centres`` and ``frames``; ``pair`` says whose image a neuron is."""
+    """Mends routes between mirror images among ``centres`` and ``frames``; ``pair`` says whose image a neuron is, the
+    judge knows all that is drawn."""
 
-    def __init__(
-        self, centres: Sequence[Point], frames: Sequence[Frame], pair: Mapping[int, int], twice: float
-    ) -> None:
-        self._centres, self._twice = centres, twice
-        self._obstacles, self._walls = Obstacles(centres), Walls(frames, len(centres))
+    def __init__(self, judge: Judge, frames: Sequence[Frame], pair: Mapping[int, int]) -> None:
+        self._judge, self._centres, self._twice = judge, judge.centres, judge.twice
         # what an arc is to be clear of on both sides: all of it, and the reflections of what has no image
-        both, image = list(centres), dict(pair)
-        for i, (x, y) in enumerate(centres):
+        both, image = list(self._centres), dict(pair)
+        for i, (x, y) in enumerate(self._centres):
             if i not in image:
-                image[i] = i if 2 * x == twice else len(both)
+                image[i] = i if 2 * x == self._twice else len(both)
                 if image[i] != i:
-                    both.append((twice - x, y))
+                    both.append((self._twice - x, y))
         known = {rect: own for own, rect in frames}
         for own, (x0, y0, x1, y1) in frames:
-            known.setdefault((twice - x1, y0, twice - x0, y1), frozenset(image[member] for member in own))
+            known.setdefault((self._twice - x1, y0, self._twice - x0, y1), frozenset(image[member] for member in own))
         self._both, self._frames = both, [(own, rect) for rect, own in known.items()]
 
-    def mended(self, own: Sequence[tuple[int, int]], routes: Sequence[Route], others: Sequence[Route]) -> list[Route]:
-        """The routes, all between the two same neurons, each with the ends that it has; ``others`` are drawn, too."""
-        lines = [line_of(route) for route in routes]
-        if not self._wrong(own, routes, lines):
-            return list(routes)
-        drawn = _Drawn(others)
-        there = [route if ends == own[0] else route[::-1] for ends, route in zip(own, routes, strict=True)]
+    def mend(self, group: Sequence[int]) -> bool:
+        """Draw the routes of these edges, all between the two same neurons, anew where something is wrong with them."""
+        judge = self._judge
+        own = [(judge.edges[i].source, judge.edges[i].target) for i in group]
+        there = [judge.routes[i][:: 1 if ends == own[0] else -1] for i, ends in zip(group, own, strict=True)]
+        if not self._wrong(group, there):
+            return False
         tried = [*there, *self._candidates(*own[0])]
-        lines = [line_of(route) for route in tried]
-        costs = self._costs(tried, own[0], lines, drawn)
+        costs = Pen(judge, group[0], group).costs(tried)
+        above = [self._above(route) for route in tried]
         order = sorted(range(len(tried)), key=lambda k: (costs[k], k))
-        above = [self._above(own[0], line) for line in lines]
-        left = [self._centres[source][0] < self._centres[target][0] for source, target in own]
         # the best of either side for the first two, and then each farther one where there is room beside those
-        some = [*[k for k in order if above[k]][:_BEST], *[k for k in order if not above[k]][:_BEST]]
-
-        def cost(number: int, k: int, chosen: Sequence[int]) -> float:
-            shared = sum(_apart(lines[k], lines[other]) for other in chosen)
-            return costs[k] + _SIDE * (above[k] != left[number]) + shared
-
+        some = [k for side in (True, False) for k in [k for k in order if above[k] == side][:_BEST]]
+        lines = polylines([tried[k] for k in some])
+        shared = {k: _apart(lines, tried[k]) for k in some}
+        left = [self._centres[source][0] < self._centres[target][0] for source, target in own]
         first, second = min(
-            ((a, b) for a in some for b in some), key=lambda two: (cost(0, two[0], ()) + cost(1, two[1], two[:1]), two)
-        )
-        found = [first, second]
+            ((a, b) for a in range(len(some)) for b in range(len(some))),
+            key=lambda two: (
+                costs[some[two[0]]] + _SIDE * (above[some[two[0]]] != left[0])
+                + costs[some[two[1]]] + _SIDE * (above[some[two[1]]] != left[1]) + shared[some[two[0]]][two[1]],
+                two,
+            ),
+        )  # fmt: skip
+        chosen = [some[first], some[second]]
+        taken = sum(_apart(polylines(tried), tried[k]) for k in chosen) if len(own) > 2 else costs
         for number in range(2, len(own)):
-            found.append(min(order, key=lambda k: (cost(number, k, found), k)))
-        return [tried[k] if ends == own[0] else tried[k][::-1] for k, ends in zip(found, own, strict=True)]
+            cost = costs + taken + [_SIDE * (side != left[number]) for side in above]
+            chosen.append(int(np.argmin(cost)))
+            taken = taken + _apart(polylines(tried), tried[chosen[-1]])
+        for i, k, ends in zip(group, chosen, own, strict=True):
+            judge.draw(i, tried[k][:: 1 if ends == own[0] else -1])
+        return True
 
-    def _wrong(self, own: Sequence[tuple[int, int]], routes: Sequence[Route], lines: Sequence[FloatArray]) -> bool:
+    def _wrong(self, group: Sequence[int], there: Sequence[Route]) -> bool:
         """Whether any runs into something, on another of them, or all bow to one side."""
-        if min(self._obstacles.clearances(routes, own)) < TOUCH + _SLACK or any(self._walls.entered(routes, own)):
+        if any(Pen(self._judge, i, group).trespass(self._judge.routes[i]) != (0, 0.0) for i in group):
             return True
-        if any(_apart(one, other) > 0 for k, one in enumerate(lines) for other in lines[:k]):
+        if any(_apart(polylines(there[k + 1 :]), route).any() for k, route in enumerate(there[:-1])):
             return True
-        return len({self._above(ends, line) for ends, line in zip(own, lines, strict=True)}) < 2
+        return len({self._above(route) for route in there}) < 2
 
-    def _above(self, own: tuple[int, int], line: FloatArray) -> bool:
+    def _above(self, route: Route) -> bool:
         """Whether an arc bows to where the direction comes from."""
-        return bool(len(line)) and bool(line[len(line) // 2, 1] < self._centres[own[0]][1])
-
-    def _costs(
-        self,
-        routes: Sequence[Route],
-        own: tuple[int, int],
-        lines: Sequence[FloatArray],
-        drawn: _Drawn,
-    ) -> list[float]:
-        """The cost of each route, apart from what it costs beside another arc between the same ends (``_apart``)."""
-        ends = [own] * len(routes)
-        clear, enters = self._obstacles.clearances(routes, ends), self._walls.entered(routes, ends)
-        straight = distance(self._centres[own[0]], self._centres[own[1]])
-        crossed = drawn.crossed(routes)
-        result = []
-        for route, line, clearance, entering, crossing in zip(routes, lines, clear, enters, crossed, strict=True):
-            cost = _ENTERING * (entering + (clearance < TOUCH + _SLACK)) + _NEARING * (REACH - clearance)
-            cost += _LONGER * (_length(line) / straight - 1) + _CORNERS * (len(route) > 4)
-            height, wavering = _aside(route[0][1], line)
-            cost += _ASIDE * height + _WAVERING * wavering
-            if cost < _ENTERING:
-                cost += _OTHER * together(line, [drawn.points]) + _CROSSING * crossing
-            result.append(cost)
-        return result
+        heights = [y for _, y in route]
+        return math.fsum(heights) / len(heights) < route[0][1]
 
     def _candidates(self, source: int, target: int) -> Iterator[Route]:
         """Bows to either side, and ways round."""
@@ -165,19 +128,8 @@ class Arcs:
                     yield smooth
 
 
-def _apart(one: FloatArray, other: FloatArray) -> float:
-    """The cost of two arcs between the same ends that run on each other or cross."""
-    share = together(one, [other])
-    return _SAME * max(0.0, share - tolerable(one, _SHARE)) + _CROSSED * crossings(one, [other])
-
-
-def _aside(level: float, line: FloatArray) -> tuple[float, float]:
-    """How far a line goes off the straight way, and how much it goes there and back besides."""
-    heights = [y - level for _, y in line.tolist()]
-    most = max(map(abs, heights), default=0.0)
-    both = math.fsum(abs(b - a) for a, b in pairwise([0.0, *heights, 0.0]))
-    return most, both - 2 * most
-
-
-def _length(line: FloatArray) -> float:
-    return math.fsum(distance(p, q) for p, q in pairwise(line.tolist()))
+def _apart(lines: Polylines, other: Route) -> FloatArray:
+    """(n,) the cost of arcs between the same ends that run on another or cross it."""
+    line = polylines([other])
+    cost: FloatArray = _SAME * lines.on(line) + _CROSSED * lines.crossed(line.a, line.b)
+    return cost

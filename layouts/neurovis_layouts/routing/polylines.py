@@ -7,6 +7,7 @@ they cross segments; one figure a line.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -24,6 +25,9 @@ STEP, _CELL, END = 0.15, 0.16, 0.6
 #: On a line so many are checked, at most: memory has an end.
 _MOST = 2000
 _ROW = 1 << 31
+#: Closer than this two lines are one to the eye; how far apart points are that are checked for that, what disc and
+#: arrowhead hide, what share of a line may run on another, and how far.
+_CLOSE, _FINE, _DISC, _SHARE, _RUN = 0.12, 0.1, 0.4, 0.2, 0.4
 #: Crossings this close to an end of a line are how it meets others at a disc.
 _HIDDEN = 0.4
 #: A bend is no tighter than this for a turn of one.
@@ -100,19 +104,40 @@ class Polylines:
 
     def cells(self) -> tuple[IntArray, IntArray]:
         """(k,) and (k,) the cells that they run through, their ends apart, and which line does."""
+        places, owner = self.places(STEP, END)
+        place = np.floor(places / _CELL).astype(np.int64)
+        cells: IntArray = place[:, 0] * _ROW + place[:, 1]
+        return cells, owner
+
+    def on(self, mates: Polylines) -> FloatArray:
+        """(n,) the largest share of each that runs on one of these, beyond half of what may: a fifth, or less where
+        that would be a long way."""
+        places, owner = self.places(_FINE, _DISC)
+        share = np.zeros(len(self))
+        if not len(places):
+            return share
+        for first, last in pairwise(np.append(mates._segments, len(mates.a)).tolist()):
+            x, y = (places[:, None, :] - mates.a[first:last]).transpose(2, 0, 1)
+            near = squared_distances(x, y, *mates._way[first:last].T).min(axis=1) < _CLOSE * _CLOSE
+            share = np.maximum(share, np.bincount(owner, near, len(self)))
+        share /= np.maximum(np.bincount(owner, minlength=len(self)), 1)
+        most = np.minimum(1.0, _RUN / _SHARE / np.maximum(self.lengths() - 2 * _DISC, _FINE))
+        beyond: FloatArray = np.maximum(share / most - _SHARE / 2, 0.0)
+        return beyond
+
+    def places(self, apart: float, off: float) -> tuple[FloatArray, IntArray]:
+        """(k, 2) and (k,) points so far apart along them, no closer than ``off`` to an end, and of which line each."""
         total = self.lengths()
         before = np.concatenate([np.zeros(1), np.cumsum(self._lengths)])
         offset = before[self._segments]
-        step = np.maximum(STEP, total / _MOST)
-        counts = np.maximum(np.ceil((total - 2 * END) / step), 0).astype(np.int64)
+        step = np.maximum(apart, total / _MOST)
+        counts = np.maximum(np.ceil((total - 2 * off) / step), 0).astype(np.int64)
         owner = np.repeat(np.arange(len(self), dtype=np.int64), counts)
         number = np.arange(len(owner), dtype=np.int64) - np.repeat(np.cumsum(counts) - counts, counts)
-        at = offset[owner] + END + step[owner] * number
+        at = offset[owner] + off + step[owner] * number
         segment = np.clip(np.searchsorted(before, at, side="right") - 1, 0, len(self._lengths) - 1)
         share = (at - before[segment]) / np.maximum(self._lengths[segment], 1e-9)
-        place = np.floor((self.a[segment] + share[:, None] * self._way[segment]) / _CELL).astype(np.int64)
-        cells: IntArray = place[:, 0] * _ROW + place[:, 1]
-        return cells, owner
+        return self.a[segment] + share[:, None] * self._way[segment], owner
 
     def passed(self, rects: FloatArray, least: IntArray) -> IntArray:
         """(n,) how often they pass the borders of rectangles (f, 4) more than the ``least`` (f,) each."""
@@ -139,19 +164,21 @@ class Polylines:
         through: BoolArray = np.logical_or.reduceat(blocked(self.a, self.b, rects), self._segments)
         return through
 
-    def crossed(self, c: FloatArray, d: FloatArray) -> IntArray:
-        """(n,) how often they cross segments from ``c`` to ``d`` (k, 2), but for where lines meet at their ends."""
+    def crossed(self, c: FloatArray, d: FloatArray, weight: FloatArray | None = None) -> FloatArray:
+        """(n,) how often they cross segments from ``c`` to ``d`` (k, 2), but for where lines meet at their ends; each
+        counts 1, or its ``weight`` (k,)."""
         if not len(self.points) or not len(c):
-            return np.zeros(len(self), dtype=np.int64)
+            return np.zeros(len(self))
+        weight = np.ones(len(c)) if weight is None else weight
         low, high = self.points.min(axis=0), self.points.max(axis=0)
         near = ((np.maximum(c, d) >= low) & (np.minimum(c, d) <= high)).all(axis=1)
-        i, share = _meetings(self.a, self.b, c[near], d[near])
+        i, j, share = _meetings(self.a, self.b, c[near], d[near])
         where, line = self.a[i] + share[:, None] * self._way[i], self.owner[i]
         seen = np.ones(len(i), dtype=np.bool_)
         for end in (self.points[self.starts[:-1]], self.points[self.starts[1:] - 1]):
             x, y = (where - end[line]).T
             seen &= x * x + y * y >= _HIDDEN * _HIDDEN
-        return np.bincount(line[seen], minlength=len(self))
+        return self._sums(weight[near][j[seen]], line[seen])
 
 
 def polylines(routes: Sequence[Route]) -> Polylines:
@@ -194,13 +221,12 @@ def _left(points: FloatArray, starts: IntArray, lines: IntArray, ring: float) ->
     return left
 
 
-def _meetings(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Which segments from ``a`` to ``b`` cross one from ``c`` to ``d``, once for each, and at what share of their
-    way."""
+def _meetings(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
+    """Which segments from ``a`` to ``b`` cross which from ``c`` to ``d``, and at what share of their way."""
     low, high = np.minimum(a, b), np.maximum(a, b)
     least, most = np.minimum(c, d), np.maximum(c, d)
     near = (least[None, :, 0] <= high[:, None, 0]) & (most[None, :, 0] >= low[:, None, 0])
     near &= (least[None, :, 1] <= high[:, None, 1]) & (most[None, :, 1] >= low[:, None, 1])
     i, j = np.nonzero(near)
     share, hit = crossing(*a[i].T, *(b - a)[i].T, *c[j].T, *(d - c)[j].T)
-    return i[hit], share
+    return i[hit], j[hit], share

@@ -31,6 +31,16 @@ _LONGER, _RATIO, _BENDING, _TIGHT = 0.1, 1.0, 0.5, 0.25
 _BACK, _OUTSIDE, _BORDER = 3.0, 0.5, 0.8
 #: To leave where another arrives at the disc, or the other way round, and to do as it does.
 _MEETING, _BESIDE = 2.0, 1.0
+#: To run on another between the same ends, times the share of the line that does.
+_SAME = 12.0
+#: More connections between two neurons than this have no room to be told apart, nor have more ends at a disc.
+_MATES, _ENDS = 12, 12
+#: Where so much more of a route than may runs on another between the same ends, it is drawn anew.
+_RUN_ON = 0.1
+#: So does what runs on any others for this part of its way, and as far as this.
+_PART, _STRETCH = 0.4, 0.5
+#: Closer than this an arrival and a departure are one line, and two ends of a kind, where there are few at a disc.
+_CLOSE, _ONE, _FEW_ENDS = 0.13, 0.07, 8
 #: What is this close to a disc may be measured to run over it.
 _SLACK = 0.02
 #: How far off a foreign frame lines stay, at least: it may grow by what is drawn in it.
@@ -72,6 +82,7 @@ class Judge:
         self.high: FloatArray = np.concatenate([self.discs, self.walls.rects[:, 2:]]).max(axis=0) + _MARGIN
         self._borders = _border_cells(self.rects)
         self._number = {centre: k for k, centre in enumerate(centres)}
+        self._between = by_ends((i, edges[i]) for i in sorted(routes))
         self._look()
 
     def winding(self) -> dict[int, tuple[float, float]]:
@@ -99,8 +110,48 @@ class Judge:
 
     def in_fans(self, most: int) -> set[int]:
         """The edges of which more than so many share both ends, in either direction."""
-        fans = by_ends((i, self.edges[i]) for i in self.routes).values()
-        return {i for fan in fans if len(fan) > most for i in fan}
+        return {i for fan in self._between.values() if len(fan) > most for i in fan}
+
+    def on_others(self) -> set[int]:
+        """The edges whose routes run on one between the same ends, or for a good part of their way on any."""
+        number = {i: k for k, i in enumerate(sorted(self.routes))}
+        places = np.unique(np.stack([self.cells, self.cell_edges], axis=1), axis=0)
+        cell, edge = places[places[:, 1] >= 0].T
+        shared = np.zeros(len(cell), dtype=np.bool_)
+        shared[1:] |= cell[1:] == cell[:-1]
+        shared[:-1] |= cell[1:] == cell[:-1]
+        total, beside = np.bincount(edge), np.bincount(edge, shared)
+        along = np.flatnonzero((beside > _PART * total) & (beside * STEP > _STRETCH)).tolist()
+        full = {neuron for neuron, ends in self._ends.items() if len(ends) > _ENDS}
+        found = {i for i in along if full.isdisjoint((self.edges[i].source, self.edges[i].target))}
+        for mates in self._between.values():
+            for i in mates if len(mates) <= _MATES else ():
+                others = [number[k] for k in mates if k not in self.both(i)]
+                own, drawn = self._lines.some(np.array([number[i]])), self._lines.some(np.array(others, dtype=np.int64))
+                if others and own.on(drawn)[0] > _RUN_ON:
+                    found.add(i)
+        return found
+
+    def meeting(self) -> dict[int, set[bool]]:
+        """The edges whose routes arrive at a disc where another leaves it, or end where one does, each with which of
+        its ends does."""
+        found: dict[int, set[bool]] = {}
+        for ends in self._ends.values():
+            if len(ends) > _ENDS:
+                continue
+            places = np.array([place for _, _, place in ends])
+            leaves = np.array([leaving for _, leaving, _ in ends])
+            x, y = (places[:, None] - places).transpose(2, 0, 1)
+            least = np.where(leaves[:, None] != leaves, _CLOSE, _ONE if len(ends) <= _FEW_ENDS else 0.0)
+            for k, other in np.argwhere(x * x + y * y < least * least).tolist():
+                if ends[k][0] != ends[other][0]:
+                    found.setdefault(ends[k][0], set()).add(ends[k][1])
+        return found
+
+    def mates(self, i: int, but: Sequence[int]) -> list[Route]:
+        """The routes between the same ends as that of an edge, ``but`` for some."""
+        own = self._between[frozenset((self.edges[i].source, self.edges[i].target))]
+        return [self.routes[k] for k in own if k not in but] if len(own) <= _MATES else []
 
     def both(self, i: int) -> tuple[int, ...]:
         """An edge and its mirror image, if it has one."""
@@ -146,17 +197,25 @@ class Judge:
 class Pen:
     """Judges routes for one edge."""
 
-    def __init__(self, judge: Judge, edge: int) -> None:
+    def __init__(self, judge: Judge, edge: int, but: Sequence[int] = (), arriving: float = 0.0) -> None:
+        """What is drawn of edges ``but`` for this one does not matter. ``arriving`` is what it costs to be one line
+        with what arrives where it leaves, or leaves where it arrives."""
+        self._arriving = arriving
         self._judge, self.route = judge, judge.routes[edge]
         self._own = judge.edges[edge].source, judge.edges[edge].target
         self._far = max(distance(self.route[0], self.route[-1]), 1e-9)
-        self._onward = float(polylines([self.route]).backward()[0]) < _ONWARD
-        both = judge.both(edge)
-        self._reflect = len(both) > 1
+        # what leads to its own level runs back whatever way it takes
+        level = abs(self.route[0][1] - self.route[-1][1]) < _ONWARD
+        self._onward = not level and float(polylines([self.route]).backward()[0]) < _ONWARD
+        self._reflect = len(judge.both(edge)) > 1
+        both = [*judge.both(edge), *but]
         others = ~np.isin(judge.segment_edges, both)
         self._a, self._b = judge.a[others], judge.b[others]
-        self._kin = np.isin(judge.segment_ends[others], self._own).any(axis=1)
+        kin = np.isin(judge.segment_ends[others], self._own).any(axis=1)
+        self._weight: FloatArray = np.where(kin, _CROSSING + _KIN, _CROSSING)
         self._cells = judge.cells[~np.isin(judge.cell_edges, both)]
+        mates = judge.mates(edge, both)
+        self._mates = polylines(mates) if mates else None
         self._ends = [(leaves, *judge.ends(n, both)) for n, leaves in zip(self._own, (True, False), strict=True)]
         walls = judge.walls
         inside = walls.inside[self._own[0]].astype(np.int64) + walls.inside[self._own[1]]
@@ -178,6 +237,16 @@ class Pen:
         """The cost of the edge's present route."""
         found = self.cheapest([self.route], np.inf)
         return found[1] if found is not None else np.inf
+
+    def costs(self, routes: Sequence[Route]) -> FloatArray:
+        """(n,) the cost of each of these routes."""
+        lines = polylines(routes)
+        found = self._by_itself(lines)
+        for start in range(0, len(routes), _CLOSELY):
+            chosen = np.arange(start, min(start + _CLOSELY, len(routes)), dtype=np.int64)
+            for add in (self._in_the_way, self._beside, self._across):
+                found[chosen] += add(lines.some(chosen))
+        return found
 
     def cheapest(self, routes: Sequence[Route], limit: float, most: int | None = None) -> tuple[int, float] | None:
         """The cheapest of these routes and its cost, if that is below the limit; no more than so many are checked
@@ -228,9 +297,12 @@ class Pen:
         cost = np.zeros(len(lines))
         for (leaves, places, kinds), here in zip(self._ends, (lines.leave(_AT), lines.arrive(_AT)), strict=True):
             away = here[:, None, :] - places[None, :, :]
-            close = np.maximum(1 - np.sqrt((away * away).sum(axis=2)) / _APART, 0.0)
-            cost += (close * np.where(kinds == leaves, _BESIDE, _MEETING)).sum(axis=1)
+            far, alike = np.sqrt((away * away).sum(axis=2)), kinds == leaves
+            cost += (np.maximum(1 - far / _APART, 0.0) * np.where(alike, _BESIDE, _MEETING)).sum(axis=1)
+            cost += self._arriving * ((far < _CLOSE) & ~alike).sum(axis=1)
         cost += _BORDER * lines.passed(self._rects, self._least)
+        if self._mates is not None:
+            cost += _SAME * lines.on(self._mates)
         cells, owner = lines.cells()
         if len(self._cells):
             there = self._cells[np.minimum(np.searchsorted(self._cells, cells), len(self._cells) - 1)] == cells
@@ -239,10 +311,7 @@ class Pen:
 
     def _across(self, lines: Polylines) -> FloatArray:
         """(n,) what it costs to cross others."""
-        crossings = lines.crossed(self._a, self._b).astype(np.float64)
-        cost: FloatArray = _CROSSING * crossings
-        if self._kin.any():
-            cost += _KIN * lines.crossed(self._a[self._kin], self._b[self._kin])
+        cost = lines.crossed(self._a, self._b, self._weight)
         if self._reflect:
             (low, high), axis = lines.extents(), self._judge.twice / 2
             flip, shift = np.array([-1.0, 1.0]), np.array([self._judge.twice, 0.0])

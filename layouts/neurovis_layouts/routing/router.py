@@ -12,20 +12,17 @@ from collections.abc import Set as AbstractSet
 from neurovis_layouts.routing.bows import FEW_TRIES, MANY_TRIES, Wish, clear_bow, clear_bows
 from neurovis_layouts.routing.bypasses import round_discs, round_frames
 from neurovis_layouts.routing.curves import Waypoint, curve
-from neurovis_layouts.routing.end_separation import parted
 from neurovis_layouts.routing.ends import shared_ends
 from neurovis_layouts.routing.loops import Loops
-from neurovis_layouts.routing.nested_bows import nested
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
-from neurovis_layouts.routing.parallel_edges import spread_out
 from neurovis_layouts.routing.ports import Port, leanings
-from neurovis_layouts.routing.route_cost import OFF, Judge
-from neurovis_layouts.routing.simplify_routes import MOST_EASED, eased
+from neurovis_layouts.routing.route_cost import Judge
+from neurovis_layouts.routing.simplify_routes import MOST_EASED, eased, told_apart
 from neurovis_layouts.routing.walls import Frame, Walls
-from neurovis_spec.layout.geometry import distance, padded
+from neurovis_spec.layout.geometry import distance
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
-__all__ = ["Waypoint", "route_all", "told_apart"]
+__all__ = ["Waypoint", "route_all"]
 
 _NEAR = 3.0
 #: With more edges than this nobody can follow one: discs in the way are not gone round.
@@ -53,6 +50,7 @@ def route_all(
     drawn: Sequence[Route] = (),
     there: Mapping[int, Route] | None = None,
     ease: bool = True,
+    improve: bool = True,
     highest: float = math.inf,
 ) -> list[Route]:
     """Routes by edge index.
@@ -78,8 +76,6 @@ def route_all(
         routes.update(_curves(edges, centres, along, waypoints, obstacles))
     rest = [i for i, edge in enumerate(edges) if i not in routes and edge.source != edge.target]
     bowed_over = _bows(edges, centres, rest, obstacles, highest)
-    if len(edges) <= min(careful, _MOST_AT_LENGTH):
-        bowed_over.update(nested(edges, centres, bowed_over, obstacles))
     routes.update(bowed_over)
     walls = Walls(frames, len(centres)) if frames else None
     detoured = {} if walls is None else round_frames(edges, centres, routes, walls)
@@ -87,35 +83,16 @@ def route_all(
         detoured.update(round_discs(edges, centres, {**routes, **detoured}, obstacles, walls))
     routes.update(detoured)
     if len(edges) <= min(careful, _MOST_AT_LENGTH):
-        bows = frozenset(rest) - detoured.keys()
         if there:
             routes.update((i, route) for i, route in there.items() if i in routes)
-            bows = frozenset()
         free = routes.keys() - there.keys() if there else routes.keys()
-        if ease and free and len(edges) <= MOST_EASED:
-            gentle = eased(Judge(edges, centres, routes, frames, drawn), free)
-            routes.update(gentle)
-            bows -= gentle.keys()
-        routes.update(told_apart(edges, centres, routes, free, frames, drawn, bows))
+        if improve and free:
+            judge = Judge(edges, centres, routes, frames, drawn)
+            if ease and len(edges) <= MOST_EASED:
+                routes.update(eased(judge, free))
+            routes.update(told_apart(judge, free))
     routes.update(_loops(edges, centres, routes, near, walls, there or {}))
     return [routes[i] for i in range(len(edges))]
-
-
-def told_apart(
-    edges: Sequence[LayoutEdge],
-    centres: Sequence[Point],
-    routes: Mapping[int, Route],
-    free: AbstractSet[int],
-    frames: Sequence[Frame] = (),
-    drawn: Sequence[Route] = (),
-    bows: AbstractSet[int] = frozenset(),
-) -> dict[int, Route]:
-    """Routes by edge index for those that have to give way, of those that are ``free`` to, so that connections can be
-    told apart; ``routes`` are of edges between two neurons, ``bows`` those that are apart from each other."""
-    wide = [(own, padded(rect, OFF)) for own, rect in frames]
-    obstacles, walls = Obstacles(centres), Walls(wide, len(centres)) if wide else None
-    found = spread_out(edges, routes, free, bows, obstacles, walls)
-    return {**found, **parted(edges, centres, {**routes, **found}, free, drawn, obstacles, walls)}
 
 
 def _runs_along(edge: LayoutEdge, centres: Sequence[Point]) -> bool:

@@ -8,14 +8,14 @@ that makes a line hard to follow (``Judge``).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from itertools import pairwise, product
 
 from neurovis_layouts.routing.corners import corners, smooth
 from neurovis_layouts.routing.route_cost import Judge, Pen
-from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.geometry import distance, turn
 from neurovis_spec.layout.model import RADIUS, Point, Route
 
 #: A route is checked that bends by more than this (in chords of the unit circle) and is no single curve, or is longer
@@ -41,6 +41,16 @@ _ROUNDS, _PASSES = 2, 4
 _GAIN = 0.05
 #: Of all ways that are tried from there so many are checked closely.
 _SOME = 24
+#: How far routes are shifted to be told apart, to what parts of a full turn their ends are turned, and which pieces are
+#: too short for that.
+_SHIFTS = (0.16, 0.22, 0.3, 0.42, 0.6, 0.9)
+_TURNS = tuple(turn(step / 48) for step in (1, -1, 2, -2, 3, -3, 5, -5))
+_SHORT, _TURNS_ROUND = 1.0, 3
+#: So many are checked for that in a round, by how many routes there are, but always some.
+_UNCLEAR = 12_000
+#: What it costs there that an arrival and a departure are one line: more than a crossing, which can be followed. Where
+#: whole lines are searched it would keep them on long ways.
+_ARRIVING = 3.0
 #: With more routes than this none is drawn anew: they cross too much to be followed.
 MOST_EASED = 300
 _DIAGONAL = 0.7071067811865476
@@ -75,6 +85,72 @@ def eased(judge: Judge, free: AbstractSet[int]) -> dict[int, Route]:
         changed.update(looked)
         looked.sort()
     return {i: judge.routes[i] for k in sorted(changed) for i in judge.both(k)}
+
+
+def told_apart(judge: Judge, free: AbstractSet[int]) -> dict[int, Route]:
+    """Routes by edge index for those that are shifted to a side, or turned at an end, to be told apart from others, of
+    those that are ``free`` to be."""
+    changed: set[int] = set()
+    for _ in range(_TURNS_ROUND):
+        new: set[int] = set()
+        on_others, meeting = judge.on_others(), judge.meeting()
+        unclear = [*sorted(free & on_others), *sorted((free & meeting.keys()) - on_others)]
+        for i in unclear[: max(_MOST, _UNCLEAR // max(1, len(judge.routes)))]:
+            pen = Pen(judge, i, arriving=_ARRIVING)
+            tries = [*_shifted(pen.route)]
+            tries += [turned for leaves in sorted(meeting.get(i, ())) for turned in _turned(pen.route, leaves)]
+            found = _clearer(pen, tries)
+            if found is not None:
+                judge.draw(i, found)
+                new.add(i)
+        changed |= new
+        if not new:
+            break
+    return {i: judge.routes[i] for k in sorted(changed) for i in judge.both(k)}
+
+
+def _clearer(pen: Pen, tries: Sequence[Route]) -> Route | None:
+    """The best of these routes, where it is better; no closer to a disc or a frame than what is there."""
+    found = pen.cheapest(tries, pen.cost())
+    if found is None:
+        return None
+    now, before = pen.trespass(tries[found[0]]), pen.trespass(pen.route)
+    return tries[found[0]] if now[0] <= before[0] and now[1] <= before[1] else None
+
+
+def _shifted(route: Route) -> Iterator[Route]:
+    """The route this far to either side, but for its ends."""
+    for by in _SHIFTS:
+        for side in (by, -by):
+            yield _beside(route, side)
+
+
+def _beside(route: Route, by: float) -> Route:
+    result = [route[0]]
+    for number in range(1, len(route) - 1):
+        # a knot and what is before and behind it move as one, so that the line stays smooth
+        knot = (number + 1) // 3 * 3
+        around = (max(knot - 1, 0), min(knot + 1, len(route) - 1)), (max(knot - 3, 0), min(knot + 3, len(route) - 1))
+        for before, behind in around:
+            dx, dy = route[behind][0] - route[before][0], route[behind][1] - route[before][1]
+            length = math.sqrt(dx * dx + dy * dy)
+            if length > 0:
+                break
+        x, y = route[number]
+        result.append((x + by * dy / length, y - by * dx / length) if length > 0 else (x, y))
+    return *result, route[-1]
+
+
+def _turned(route: Route, leaves: bool) -> Iterator[Route]:
+    """The route turned about its first or its last point by some steps."""
+    line = route if leaves else route[::-1]
+    while len(line) > 4 and distance(line[0], line[3]) < _SHORT:
+        line = line[0], *line[4:]  # a piece too short to be turned
+    (x, y), (px, py) = line[:2]
+    for cosine, sine in _TURNS:
+        dx, dy = px - x, py - y
+        turned = (line[0], (x + cosine * dx - sine * dy, y + sine * dx + cosine * dy), *line[2:])
+        yield turned if leaves else turned[::-1]
 
 
 @dataclass(frozen=True, slots=True)
