@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 from toy_bodies import SPEC, Cart, carted, registered
 
+import neurovis_spec as nv
 from neurovis_spec.body import BodyError
+from neurovis_spec.body.kinds import open_body
 from neurovis_spec.compiler.body_settings import Moved
+from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.parser import parse
 from neurovis_spec.runtime.backend import available
 from neurovis_spec.runtime.embodied import Embodied, seed_of
@@ -60,6 +64,40 @@ def test_a_run_with_a_body_is_the_loop_that_one_would_write(given: str, backend:
     if not available(backend).available:
         pytest.fail("the tests need a compiler")
     assert same(carted(given).run(130, backend=backend), by_hand(130, given, backend))
+
+
+def test_the_walk_is_the_loop_of_its_network_and_its_model() -> None:
+    """Commands by the evaluator that the others are tested against, for an episode and a half."""
+    compiled = nv.compile(Path(__file__).parent.parent / "specs/walk/walk.yaml")
+    network, settings = compiled.network, compiled.network.body
+    assert settings is not None
+    assert network.episode is not None
+    body = open_body(settings.kind, settings.given, settings.path, network.dt, settings.substeps)
+    simulation, names = compiled.simulator(body=False), [port.name for port in body.sensors]
+    places = np.cumsum([0, *(port.size for port in body.sensors)])
+    wanted = compiled.run(100)
+    body.reset(seed_of(network, 0))
+    for k in range(100):
+        sensed = body.sense()
+        given = {}
+        for one in settings.sensed:
+            parts = [sensed[places[names.index(name)] : places[names.index(name) + 1]] for name in one.sensors]
+            given[network.inputs[one.input].name] = np.concatenate(parts)
+        assert np.array_equal(body.pose(), wanted.pose[k])  # type: ignore[index]
+        assert np.array_equal(sensed, wanted.sensors[k])  # type: ignore[index]
+        simulation.step(given)
+        assert np.array_equal(simulation.activity, wanted.activity[k])
+        if (k + 1) % network.episode == 0:
+            body.reset(seed_of(network, 1))
+            continue
+        commands = np.zeros(len(body.actuators))
+        for move in settings.moved:
+            known = {name: simulation.parameters[name] for name, _ in move.parameters}
+            for name, output, number in move.outputs:
+                known[name] = float(simulation.activity[network.outputs[output].neurons[number]])
+            index = [port.name for port in body.actuators].index(move.actuator)
+            commands[index] = evaluate(move.command, known)
+        body.advance(network.dt, commands)
 
 
 # ---- what is given wins over what is sensed ------------------------------------------------------------------------
