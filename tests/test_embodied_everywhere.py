@@ -159,6 +159,18 @@ def test_an_edited_spec_goes_on_with_its_body_and_another_body_begins_anew() -> 
     assert np.array_equal(anew.seen().snapshot.pose, run.pose[0])  # type: ignore[index,arg-type]
 
 
+def test_an_edit_with_which_the_body_cannot_go_on_leaves_the_old_run(tmp_path: Path) -> None:
+    source, whole = SimulatedSource(carted().simulator()), seen(SimulatedSource(carted().simulator()), 80)
+    seen(source, 50)
+    broken = api.compile_text(WITH_BODY.replace("gain * drive", "gain * drive / (drive - drive)"))
+    with pytest.raises(SourceError, match="at step 50: the command of 'push' is"):
+        carried(source, broken.simulator())
+    assert same(source.seen(), whole[50])
+    assert all(same(a, b) for a, b in zip(seen(source, 80), whole[50:], strict=True))
+    source.go(45)
+    assert same(source.seen(), whole[45])
+
+
 # ---- trials and sweeps ---------------------------------------------------------------------------------------------
 
 

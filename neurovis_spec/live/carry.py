@@ -27,7 +27,15 @@ from neurovis_spec.runtime.state import State
 
 def carried(old: SimulatedSource, simulation: Simulation) -> SimulatedSource:
     """A source of the new network at the step of ``old``, or at step 0 where the two have no neuron in common. ``old``
-    must not be used afterwards."""
+    must not be used afterwards. Raises SourceError where the body cannot make a step, and then ``old`` goes on."""
+    try:
+        return _carried(old, simulation)
+    except BodyError as error:
+        old.stay()
+        raise SourceError(str(error)) from None
+
+
+def _carried(old: SimulatedSource, simulation: Simulation) -> SimulatedSource:
     was, network, turned, step = old.network, simulation.network, old.turned, old.step
     if not set(was.neurons.names) & set(network.neurons.names):
         return SimulatedSource(simulation)

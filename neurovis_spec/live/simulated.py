@@ -115,6 +115,12 @@ class SimulatedSource:
                 self._make(None)
         return run.state()
 
+    def stay(self) -> None:
+        """After ``leave``, go on behind the current step all the same."""
+        if self._simulation.k == self.step:
+            self.history.cut(self.step - 1)
+            self._make(None)
+
     def seen(self) -> Seen:
         """What a picture of the current step is made from."""
         return self._seen
@@ -163,7 +169,10 @@ class SimulatedSource:
         kept = self._past.before(step - 1) or self._past.before(step)
         if step != self.step and kept is not None and (step < self.step or kept.state.k > self._simulation.k):
             self._take(kept)
-            self._next(None)
+            try:
+                self._next(None)
+            except BodyError as error:  # which went on before: it does not do the same again
+                raise SourceError(str(error)) from None
         while self.step < step and self.advance():
             pass
 
