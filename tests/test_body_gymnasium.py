@@ -180,6 +180,7 @@ def test_what_an_environment_raises_is_reported_on_one_line() -> None:
     ("name", "words", "hint"),
     [
         ("CartPole-v7", "has no environment 'CartPole-v7'", "did you mean 'CartPole-v1'"),
+        ("x" * 100_000, "an id of 100,000 characters", None),
         ("x y", "Malformed environment ID", None),
         ("os:Thing-v0", "no package of that name is installed", "MODULE:ID"),
         ("tests.test_body_gymnasium:Thing-v0", "no package of that name is installed", "MODULE:ID"),

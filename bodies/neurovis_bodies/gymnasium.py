@@ -23,6 +23,8 @@ from neurovis_bodies.steps import substeps_of
 from neurovis_spec.body import Body, BodyError, FloatArray, Port, Skeleton
 from neurovis_spec.body.kinds import BodyMissingError
 
+#: characters of an id
+_LONGEST: Final = 200
 #: steps by which a copy of an environment is compared with another
 _TRIED: Final = 3
 
@@ -38,6 +40,8 @@ class GymnasiumKind:
 
     def open(self, given: str, path: Path | None, dt: float, substeps: int | None) -> Body:
         """Open an environment by its id. Raises BodyError, BodyMissingError where what it needs is not installed."""
+        if len(given) > _LONGEST:
+            raise BodyError(f"an id of {len(given):,} characters is that of no environment", key="gymnasium")
         module, colon, _ = given.rpartition(":")
         if colon and not _is_installed(module):
             message = f"'{given}' asks for the module '{module}', and no package of that name is installed"
