@@ -146,7 +146,8 @@ def _axes(model: mujoco.MjModel, body: int) -> Iterator[_Axis]:
             radius = float(np.sort(box[3:])[1])
             centre = centre + turned @ box[:3]
             half = turned[:, longest] * (box[3 + longest] - radius)
-        yield _Axis(centre - half, centre + half, radius)
+        if np.isfinite([*centre, *half, radius]).all():
+            yield _Axis(centre - half, centre + half, radius)
 
 
 def _is_apart(model: mujoco.MjModel, body: int, axes: dict[int, list[_Axis]]) -> bool:
@@ -221,5 +222,7 @@ def _solids(model: mujoco.MjModel) -> Iterator[Solid]:
         turned = data.geom_xmat[geom].reshape(3, 3)
         box = model.geom_aabb[geom]
         centre, half = data.geom_xpos[geom] + turned @ box[:3], np.abs(turned) @ box[3:]
+        if not np.isfinite([*centre, *half]).all():
+            continue
         low, high = (tuple(np.round(corner, 9).tolist()) for corner in (centre - half, centre + half))
         yield Solid((low[0], low[1], low[2]), (high[0], high[1], high[2]))
