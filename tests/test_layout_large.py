@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from neurovis_layouts.apart import LEAST, apart, jitter, near_pairs
+from neurovis_layouts.apart import LEAST, apart, jitter
 from neurovis_layouts.large import LargeEngine
 from neurovis_layouts.large.field import GridField, PairField
 from neurovis_layouts.large.flow import downward, heights, in_flow
@@ -18,6 +18,7 @@ from neurovis_layouts.wiring import parts_of, wiring_of
 
 from neurovis_spec.layout import Direction, LayoutProblem
 from neurovis_spec.layout.arrange import lay_out_problem
+from neurovis_spec.layout.geometry import near_pairs
 from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.problem import canonical
 

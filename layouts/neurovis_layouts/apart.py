@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from neurovis_spec.layout import FloatArray, IntArray
+from neurovis_spec.layout.geometry import near_pairs
 from neurovis_spec.layout.model import GRID, RADIUS
 
 #: Centres are kept this far apart at least: rounding to the grid of coordinates takes some of it.
@@ -31,31 +32,6 @@ def jitter(count: int) -> FloatArray:
     steps = np.arange(1, count + 1, dtype=np.float64)[:, None] * np.array([0.7548776662466927, 0.5698402909980532])
     spread: FloatArray = steps % 1.0 - 0.5
     return spread
-
-
-def near_pairs(places: FloatArray, reach: float) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
-    """All pairs of places (n, 2) closer than ``reach``: both numbers, from the first to the second (k, 2), how far."""
-    cells = np.floor(places / reach).astype(np.int64)
-    cells -= cells.min(axis=0, initial=0)
-    width = np.int64(cells[:, 1].max(initial=0)) + 3
-    keys = cells[:, 0] * width + cells[:, 1]
-    order = np.argsort(keys, kind="stable")
-    keys = keys[order]
-    ones: list[IntArray] = []
-    others: list[IntArray] = []
-    at = np.arange(len(keys), dtype=np.int64)
-    for step in (0, 1, width - 1, width, width + 1):
-        begin = np.searchsorted(keys, keys + step) if step else at + 1
-        counts = np.maximum(np.searchsorted(keys, keys + step, side="right") - begin, 0)
-        first = np.repeat(at, counts)
-        place = np.arange(len(first), dtype=np.int64) - np.repeat(np.cumsum(counts) - counts, counts)
-        ones.append(order[first])
-        others.append(order[begin[first] + place])
-    one, other = np.concatenate(ones), np.concatenate(others)
-    way = places[other] - places[one]
-    squared = (way**2).sum(axis=1)
-    near = squared < reach * reach
-    return one[near], other[near], way[near], np.sqrt(squared[near])
 
 
 def apart(

@@ -14,12 +14,11 @@ from typing import TypeAlias
 from neurovis_layouts.packing import packed
 from neurovis_layouts.pins import fit
 from neurovis_layouts.routing import route_all
+from neurovis_layouts.routing.ends import Key, keys_of
 from neurovis_spec.layout.frames import PAD, PAD_FRAME, PAD_ROUTE, TITLE
 from neurovis_spec.layout.geometry import Rect, sampled, snap
 from neurovis_spec.layout.model import LayoutEdge, LayoutProblem, Point, Route
 
-#: A connection by its ends and its number among those that share them.
-Key: TypeAlias = tuple[int, int, int]
 #: Places for these neurons, around (0, 0).
 Formation: TypeAlias = Callable[[Sequence[int]], list[Point]]
 
@@ -146,16 +145,6 @@ def routed(drawing: Drawing, edges: Sequence[LayoutEdge]) -> Drawing:
     for i, route in zip(new, made, strict=True):
         routes[keys[i]] = (route[0], *((snap(x), snap(y)) for x, y in route[1:-1]), route[-1])
     return Drawing(drawing.places, routes, drawing.frames)
-
-
-def keys_of(edges: Sequence[LayoutEdge]) -> list[Key]:
-    """The key of each edge."""
-    times: dict[tuple[int, int], int] = {}
-    keys: list[Key] = []
-    for edge in edges:
-        number = times[edge.source, edge.target] = times.get((edge.source, edge.target), -1) + 1
-        keys.append((edge.source, edge.target, number))
-    return keys
 
 
 def _moved(point: Point, shift: Point) -> Point:

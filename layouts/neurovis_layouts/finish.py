@@ -11,7 +11,6 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from neurovis_layouts.apart import near_pairs
 from neurovis_layouts.around import around_pins, gives_way
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.incremental import kept
@@ -19,7 +18,7 @@ from neurovis_layouts.pins import fit, with_origins
 from neurovis_layouts.routing import route_all
 from neurovis_layouts.symmetry import Symmetry, exact, routed_alike
 from neurovis_spec.layout import FloatArray, IntArray
-from neurovis_spec.layout.geometry import snap, straight
+from neurovis_spec.layout.geometry import near_pairs, snap, straight
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point
 
 #: With more connections than this, going round discs only moves the crowd.

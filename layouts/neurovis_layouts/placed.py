@@ -8,11 +8,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from neurovis_layouts.around import around_pins, gives_way
-from neurovis_layouts.blocks import Blocks, Drawing, keys_of, routed
+from neurovis_layouts.blocks import Blocks, Drawing, routed
 from neurovis_layouts.formations import offsets
 from neurovis_layouts.frame import to_picture
 from neurovis_layouts.incremental import kept
 from neurovis_layouts.pins import fit, with_origins
+from neurovis_layouts.routing.ends import keys_of
 from neurovis_spec.layout.model import Arrangement, Layout, LayoutProblem, Point
 
 #: So many neurons are arranged around pins frame by frame.

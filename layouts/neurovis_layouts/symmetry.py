@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from neurovis_layouts.axes import axes, imaged
-from neurovis_layouts.blocks import keys_of
 from neurovis_layouts.frame import from_picture
+from neurovis_layouts.routing.ends import keys_of
 from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
 from neurovis_spec.layout import BoolArray, FloatArray, IntArray
 from neurovis_spec.layout.geometry import snap

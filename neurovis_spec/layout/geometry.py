@@ -119,6 +119,31 @@ def straight(a: Point, b: Point) -> Route:
     return (a, third, ((a[0] + 2 * b[0]) / 3, (a[1] + 2 * b[1]) / 3), b)
 
 
+def near_pairs(places: FloatArray, reach: float) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """All pairs of places (n, 2) closer than ``reach``: both numbers, from the first to the second (k, 2), how far."""
+    cells = np.floor(places / reach).astype(np.int64)
+    cells -= cells.min(axis=0, initial=0)
+    width = np.int64(cells[:, 1].max(initial=0)) + 3
+    keys = cells[:, 0] * width + cells[:, 1]
+    order = np.argsort(keys, kind="stable")
+    keys = keys[order]
+    ones: list[IntArray] = []
+    others: list[IntArray] = []
+    at = np.arange(len(keys), dtype=np.int64)
+    for step in (0, 1, width - 1, width, width + 1):
+        begin = np.searchsorted(keys, keys + step) if step else at + 1
+        counts = np.maximum(np.searchsorted(keys, keys + step, side="right") - begin, 0)
+        first = np.repeat(at, counts)
+        place = np.arange(len(first), dtype=np.int64) - np.repeat(np.cumsum(counts) - counts, counts)
+        ones.append(order[first])
+        others.append(order[begin[first] + place])
+    one, other = np.concatenate(ones), np.concatenate(others)
+    way = places[other] - places[one]
+    squared = (way**2).sum(axis=1)
+    near = squared < reach * reach
+    return one[near], other[near], way[near], np.sqrt(squared[near])
+
+
 def squared_distances(x: FloatArray, y: FloatArray, ux: FloatArray, uy: FloatArray) -> FloatArray:
     """How far points are from segments, squared: points (x, y) as seen from where their segments (ux, uy) begin."""
     t = np.clip((x * ux + y * uy) / np.maximum(ux * ux + uy * uy, 1e-12), 0.0, 1.0)

@@ -13,7 +13,7 @@ import networkx as nx
 import numpy as np
 
 from neurovis_spec.arrays import BoolArray, FloatArray, IntArray
-from neurovis_spec.layout.geometry import crossing, cubic, distance, pieces_of, squared_distances
+from neurovis_spec.layout.geometry import crossing, cubic, near_pairs, pieces_of, squared_distances
 from neurovis_spec.layout.model import RADIUS, Direction, Layout, LayoutProblem, Point, Route
 
 #: Crossings this close to a neuron that both routes have are how edges meet, not how they cross.
@@ -46,7 +46,7 @@ def metrics(layout: Layout, problem: LayoutProblem) -> dict[str, float | int]:
         "edges": len(problem.edges),
         "crossings": crossings,
         **estimated,
-        "overlaps": _overlaps(centres),
+        "overlaps": len(near_pairs(centres, 2 * RADIUS - _SLACK)[0]),
         "edges_over_neurons": _edges_over_neurons(segments, ends, centres),
         "flow": _flow(layout, problem),
         "symmetry": _symmetry(centres, problem),
@@ -155,17 +155,6 @@ def _outside(where: FloatArray, one: IntArray, two: IntArray, centres: FloatArra
         far = ((where - centres[one[:, i]]) ** 2).sum(axis=1) > _MEETING**2
         result &= ~shared | far
     return result
-
-
-def _overlaps(centres: FloatArray) -> int:
-    cells: dict[tuple[int, int], list[Point]] = {}
-    width, total = 2 * RADIUS, 0
-    for x, y in centres.tolist():
-        column, row = int(np.floor(x / width)), int(np.floor(y / width))
-        near = [p for i in (-1, 0, 1) for j in (-1, 0, 1) for p in cells.get((column + i, row + j), ())]
-        total += sum(distance(p, (x, y)) < width - _SLACK for p in near)
-        cells.setdefault((column, row), []).append((x, y))
-    return total
 
 
 def _edges_over_neurons(segments: _Segments, ends: IntArray, centres: FloatArray) -> int:

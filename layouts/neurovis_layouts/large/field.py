@@ -12,8 +12,8 @@ from typing import Protocol
 
 import numpy as np
 
-from neurovis_layouts.apart import near_pairs
 from neurovis_spec.layout import FloatArray, IntArray
+from neurovis_spec.layout.geometry import near_pairs
 
 #: Cells wider than this, in the distance that points of such a mass have from each other, are too wide; how far, in the
 #: same, pairs are added then.

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from neurovis_layouts.layered.parts import Part
-from neurovis_layouts.layered.templates import Key
+from neurovis_layouts.routing.ends import Key
 from neurovis_spec.layout.frames import PAD, PAD_FRAME, PAD_ROUTE, TITLE
 from neurovis_spec.layout.geometry import Rect, sampled
 from neurovis_spec.layout.model import GRID, Direction, Point, Route

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.layered.hierarchy import Composer
-from neurovis_layouts.layered.templates import keys_of
+from neurovis_layouts.routing.ends import keys_of
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point
 
 

@@ -20,8 +20,9 @@ from neurovis_layouts.layered.page_plan import facing, in_direction, parts_by_ce
 from neurovis_layouts.layered.parts import Part, columns_of, firm, images_of, may_be_frame, parts_of
 from neurovis_layouts.layered.pinning import Settled, settled
 from neurovis_layouts.layered.same_rank import bonded
-from neurovis_layouts.layered.templates import Book, Key, keys_of, restricted
+from neurovis_layouts.layered.templates import Book, restricted
 from neurovis_layouts.layered.units import Unit
+from neurovis_layouts.routing.ends import Key, keys_of
 from neurovis_spec.layout.frames import BOX_DOWN
 from neurovis_spec.layout.geometry import Rect, distance, snap
 from neurovis_spec.layout.model import Direction, LayoutMirror, LayoutProblem, Point, Route

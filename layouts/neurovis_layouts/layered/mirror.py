@@ -14,7 +14,7 @@ from itertools import pairwise
 
 from neurovis_layouts.layered.levels import Levels, Node, Segment
 from neurovis_layouts.layered.order import ordered
-from neurovis_layouts.layered.templates import keys_of
+from neurovis_layouts.routing.ends import keys_of
 from neurovis_spec.layout.model import LayoutProblem
 
 _ROUNDS = 6

@@ -7,10 +7,11 @@ of one kind, and so are two that are mirror images of each other.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeAlias
 
+from neurovis_layouts.routing.ends import Key, keys_of
 from neurovis_spec.layout.model import (
     LayoutCell,
     LayoutEdge,
@@ -21,21 +22,8 @@ from neurovis_spec.layout.model import (
     LayoutRefusalError,
 )
 
-#: A connection by its ends and its number among those that share them.
-Key: TypeAlias = tuple[int, int, int]
 _Pairs: TypeAlias = list[tuple[int, int]]
 _Lines: TypeAlias = list[tuple[int, ...]]
-
-
-def keys_of(edges: Iterable[LayoutEdge]) -> list[Key]:
-    """The key of each edge."""
-    times: dict[tuple[int, int], int] = {}
-    result: list[Key] = []
-    for edge in edges:
-        ends = edge.source, edge.target
-        times[ends] = number = times.get(ends, -1) + 1
-        result.append((*ends, number))
-    return result
 
 
 class Book:
