@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from itertools import combinations
 
 import numpy as np
 import pytest
 
 import neurovis_spec as nv
+from neurovis_spec import pipeline
 from neurovis_spec.layout.geometry import meet
+from neurovis_spec.layout.model import RADIUS
+from neurovis_spec.scene import Spline
 from neurovis_spec.scene.boxes import Box, boxes_of
+from neurovis_spec.scene.sectors import Sector, sector
 
 RING = """
 neurovis: 1
@@ -61,6 +66,60 @@ def test_no_two_frames_of_boxes_lie_on_each_other(engine: str, counts: tuple[int
     for name, count in zip("ABC", counts, strict=True):
         text = text.replace(f"{name}: {{count: 6", f"{name}: {{count: {count}")
     boxes = drawn(text)
-    assert not any(meet(one.rect, other.rect) for one, other in combinations(boxes, 2))
-    if engine not in ("circular", "grid"):
+    assert len({box.sector is None for box in boxes}) <= 1
+    for one, other in combinations(boxes, 2):
+        if one.sector is None or other.sector is None:
+            assert not meet(one.rect, other.rect)
+        else:
+            assert angles(one.sector).isdisjoint(angles(other.sector))
+    if engine != "grid":
         assert len(boxes) == len(counts)
+
+
+def angles(sector: Sector) -> set[int]:
+    """The tenths of degrees that a sector covers."""
+    first, last = (math.degrees(angle) * 10 for angle in (sector.first, sector.last))
+    return {number % 3600 for number in range(math.ceil(first), math.floor(last) + 1)}
+
+
+@pytest.mark.parametrize("direction", ["down", "left"])
+def test_boxes_on_a_ring_are_sectors_that_hold_their_neurons_alone(direction: str) -> None:
+    text = RING.replace("engine: ENGINE", f"engine: circular, direction: {direction}")
+    network = nv.compile_text(text)
+    positions = network.layout().positions
+    boxes = drawn(text)
+    assert {box.path for box in boxes} == {"one", "two", "three"}
+    for box in boxes:
+        assert box.sector is not None
+        (x, y), covered = box.sector.centre, angles(box.sector)
+        for number, name in enumerate(network.network.neurons.names):
+            at = math.degrees(math.atan2(positions[name][1] - y, positions[name][0] - x)) * 10
+            assert (round(at) % 3600 in covered) == (number in box.members)
+        border = box.sector.border(0.1)
+        rect = box.rect
+        assert (border >= np.array(rect[:2]) - 1e-9).all()
+        assert (border <= np.array(rect[2:]) + 1e-9).all()
+        nearest = min(np.hypot(*(border - positions[name]).T).min() for name in network.network.neurons.names)
+        assert nearest > RADIUS
+
+
+def test_neurons_that_do_not_follow_each_other_on_a_ring_have_no_sector() -> None:
+    turns = [math.tau * i / 8 for i in range(8)]
+    ring = np.array([(5 * math.cos(turn), 5 * math.sin(turn)) for turn in turns])
+    everybody = np.arange(8)
+    assert sector(ring, everybody, np.array([7, 0, 1])) is not None
+    assert sector(ring, everybody, np.array([0, 2])) is None
+    assert sector(ring, everybody, everybody) is None
+    assert sector(ring * (1.0, 1.1), everybody, np.array([0, 1])) is None
+
+
+def test_sectors_are_drawn_as_lines_around_their_neurons() -> None:
+    network = nv.compile_text(RING.replace("ENGINE", "circular"))
+    whole, snapshot = network.network, network.run(1).snapshot(0)
+    scene = pipeline.picture(whole, network.drawn().value, snapshot, network.gains, whole.render)
+    groups = {group.id: group for group in scene.groups}
+    for name in ("one", "two", "three"):
+        (shape,) = groups[f"box:{name}"].shapes
+        assert isinstance(shape, Spline)
+        assert shape.points[0] == shape.points[-1]
+        assert groups[f"title:{name}"].shapes

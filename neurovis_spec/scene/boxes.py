@@ -1,13 +1,16 @@
 """Named boxes: the frame around their neurons.
 
 In: the groups' ``box``, the layout section's ``boxes`` and the instances of modules. Out: rectangles in layout units,
-largest first. ``titles`` finds room for their titles.
+largest first; sectors where all stand on a ring and rectangles would hold others. ``titles`` finds room for their
+titles.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Group, Network
@@ -27,6 +30,7 @@ from neurovis_spec.layout.frames import (
 from neurovis_spec.layout.geometry import Rect, meet
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.geometry import bounds, sample
+from neurovis_spec.scene.sectors import Sector, sector
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +44,8 @@ class Box:
     rect: Rect
     kind: str = "box"
     path: str = ""
+    #: the stretch of a ring that it is drawn as, in ``rect``
+    sector: Sector | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +58,8 @@ class _Named:
 def boxes_of(network: Network, positions: FloatArray, routes: Sequence[FloatArray]) -> list[Box]:
     """All boxes, and the instances of modules, largest first. Boxes that would touch another's are drawn tighter, what
     holds another is drawn around it. What foreign neurons stand in has no frame: it would say that they belong to it;
-    nor has a box that would lie on the frame of others, where nobody could see what belongs to which. Layout units."""
+    nor has a box that would lie on the frame of others, where nobody could see what belongs to which. Of boxes on a
+    ring all are sectors where one of them would have no frame. Layout units."""
     named = _named(network)
     within = {n: frozenset(n.members) for n in named}
     inner = _routes_within(network, routes, [n for n in named if n.kind == "instance"])
@@ -69,11 +76,23 @@ def boxes_of(network: Network, positions: FloatArray, routes: Sequence[FloatArra
             ):
                 rects[item] = _around(network, positions, routes, item.members, held, tight)
     clean = [n for n in named if not _entered(positions, rects[n], n.members)]
-    boxes = [
-        Box(_titled(network, n), n.path.rpartition(".")[2], n.members, rects[n], n.kind, n.path)
+    framed = [
+        n
         for n in clean
         if n.kind == "instance"
         or not any(meet(_padded(rects[n], -SLACK), rects[o]) and within[n].isdisjoint(within[o]) for o in clean)
+    ]
+    sectors = _sectors(network, positions, named)
+    if sectors.keys() <= set(framed):
+        sectors = {}
+    boxes = [
+        Box(_titled(network, n), n.path.rpartition(".")[2], n.members, rects[n], n.kind, n.path)
+        for n in framed
+        if n not in sectors
+    ]
+    boxes += [
+        Box(_titled(network, n), n.path.rpartition(".")[2], n.members, one.rect(), n.kind, n.path, one)
+        for n, one in sectors.items()
     ]
     return sorted(boxes, key=lambda b: (-(b.rect[2] - b.rect[0]) * (b.rect[3] - b.rect[1]), b.kind, b.path))
 
@@ -89,6 +108,22 @@ def _named(network: Network) -> list[_Named]:
     found = [_Named("box", name, tuple(dict.fromkeys(indices))) for name, indices in members.items() if indices]
     found += [_Named("instance", i.path, tuple(i.indices)) for i in network.instances if i.count]
     return sorted(found, key=lambda n: (len(n.members), n.kind, n.path.count("."), n.path))
+
+
+def _sectors(network: Network, positions: FloatArray, named: Sequence[_Named]) -> dict[_Named, Sector]:
+    """The sectors of those boxes whose neurons follow each other on a ring, on which all stand that are in the same
+    instance, or in none."""
+    around = np.full(len(positions), -1, dtype=np.int64)
+    for number, instance in sorted(enumerate(network.instances), key=lambda each: each[1].path.count(".")):
+        around[list(instance.indices)] = number
+    found: dict[_Named, Sector] = {}
+    for item in named:
+        if item.kind == "box":
+            ring = np.flatnonzero(around == around[item.members[0]])
+            one = sector(positions, ring, np.array(item.members, dtype=np.int64))
+            if one is not None:
+                found[item] = one
+    return found
 
 
 def _routes_within(

@@ -35,7 +35,7 @@ from neurovis_spec.scene.legend_entry import LegendEntry
 from neurovis_spec.scene.lesions import Lesions, lesions_of
 from neurovis_spec.scene.line_labels import line_labels
 from neurovis_spec.scene.lines import Line, routes_of, trimmed
-from neurovis_spec.scene.model import Arrowhead, Group, Rectangle, Spline, Text, Theme, head_half_width
+from neurovis_spec.scene.model import Arrowhead, Group, Rectangle, Shape, Spline, Text, Theme, head_half_width
 from neurovis_spec.scene.obstacles import Obstacles
 from neurovis_spec.scene.scaling import at, scaled_group, scaled_label, scaled_line, scaled_rectangle, scaled_text
 from neurovis_spec.scene.shown import shown
@@ -143,14 +143,15 @@ def plan(
     for points in _dots([line for _, line in dots]):
         obstacles.add_line(points)
     for box in boxes:
-        obstacles.add_frame(outline(_mapped(box.rect, frame)))
+        sector = box.sector
+        obstacles.add_frame(outline(_mapped(box.rect, frame)) if sector is None else frame.map(sector.border(0.1)))
     header = _header(title, frame, theme) if title is not None else None
     notes = _noted(seen.notes, title is not None, frame, theme)
     spots: list[Point] = [(x, y) for x, y in centres.tolist()]
     sizes = {unit: size for unit, size in enumerate(drawn.sizes.tolist()) if drawn.glyph[unit]}
     labels: list[Label | None] = [None] * len(spots)
     if settings.labels:
-        around = [outline(box.rect, 4 / UNIT) for box in boxes]
+        around = [outline(box.rect, 4 / UNIT) if box.sector is None else box.sector.border(4 / UNIT) for box in boxes]
         inner = np.concatenate([np.zeros((0, 2)), *samples([routes[i] for i in kept], 24), *around])
         reach = margin_beside(network, RADIUS * frame.scale) if margin > MARGIN else 0.0
         ground = Ground(positions, factors, frame.scale, (frame.left, frame.top), inner, extent, reach)
@@ -411,8 +412,11 @@ def _box_frames(boxes: Sequence[Box], frame: Frame, theme: Theme) -> list[Group]
         x0, y0, x1, y1 = _mapped(box.rect, frame)
         radius = min(10.0, 0.2 * frame.scale)
         fill, line = tints.get(box.name if box.kind == "box" else "", (theme.box_fill, theme.box_line))
-        shape = Rectangle((x0, y0), x1 - x0, y1 - y0, radius, fill, line, 1.0)
-        groups.append(Group((shape,), id=f"{box.kind}:{box.path}", title=box.path))
+        shapes: tuple[Shape, ...] = (Rectangle((x0, y0), x1 - x0, y1 - y0, radius, fill, line, 1.0),)
+        if box.sector is not None:
+            line_around = tuple((x, y) for x, y in frame.map(np.array(box.sector.outline())).tolist())
+            shapes = (Spline(line_around, line, 1.0),)
+        groups.append(Group(shapes, id=f"{box.kind}:{box.path}", title=box.path))
     return groups
 
 
