@@ -10,9 +10,9 @@ import pytest
 
 import neurovis_spec as nv
 from neurovis_spec import pipeline
-from neurovis_spec.layout.geometry import meet
+from neurovis_spec.layout.geometry import meet, sampled
 from neurovis_spec.layout.model import RADIUS
-from neurovis_spec.scene import Spline
+from neurovis_spec.scene import Spline, Text
 from neurovis_spec.scene.boxes import Box, boxes_of
 from neurovis_spec.scene.sectors import Sector, sector
 
@@ -122,4 +122,8 @@ def test_sectors_are_drawn_as_lines_around_their_neurons() -> None:
         (shape,) = groups[f"box:{name}"].shapes
         assert isinstance(shape, Spline)
         assert shape.points[0] == shape.points[-1]
-        assert groups[f"title:{name}"].shapes
+        (title,) = groups[f"title:{name}"].shapes
+        assert isinstance(title, Text)
+        (x, y), size = title.point, title.size
+        where = np.array(sampled(shape.points, 1.0)) - (x, y)
+        assert np.hypot(*where.T).min() < 8 * size

@@ -422,8 +422,9 @@ def _box_frames(boxes: Sequence[Box], frame: Frame, theme: Theme) -> list[Group]
 
 def _box_titles(boxes: Sequence[Box], frame: Frame, obstacles: Obstacles, theme: Theme, picture: Rect) -> list[Group]:
     items = [
-        Titled(box, _mapped(box.rect, frame), _room(box, boxes, frame, picture), _foreign(box, boxes, frame))
+        Titled(box, _mapped(rect, frame), _room(box, boxes, frame, picture), _foreign(box, boxes, frame))
         for box in boxes
+        for rect in (box.rect if box.sector is None else box.sector.outmost(),)
     ]
     found = titles_of(items, obstacles, theme)
     return [Group((text,), id=f"title:{box.path}") for box, text in zip(boxes, found, strict=True) if text is not None]

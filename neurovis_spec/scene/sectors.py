@@ -60,6 +60,14 @@ class Sector:
         """The rectangle around it."""
         return bounds(sampled(self.outline(), 0.05))
 
+    def outmost(self) -> Rect:
+        """The place on its outer side where there is most room beyond, as a rectangle without extent, for a title
+        beside it: close to a diagonal, as a picture has room in its corners."""
+        quarter, inset = math.pi / 2, (self.last - self.first) / 8
+        diagonal = quarter * (math.floor((self.first + self.last) / 2 / quarter) + 0.5)
+        x, y = self._at(min(max(diagonal, self.first + inset), self.last - inset), self.radius + HALF)
+        return x, y, x, y
+
     def border(self, step: float) -> FloatArray:
         """(k, 2) points on its border, about so far apart."""
         return np.array(sampled(self.outline(), step))
