@@ -16,10 +16,11 @@ from neurovis_spec.language.values import Choice, as_choice
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A setting of a pattern, with a usual value."""
+    """A setting of a pattern, with a usual value: an integer from ``least`` on, or, without one, a probability."""
 
     usual: float
     about: str
+    least: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +39,7 @@ class Pattern:
 
 
 def _count(of: str) -> dict[str, Setting]:
-    return {"count": Setting(3, f"How many {of}.")}
+    return {"count": Setting(3, f"How many {of}.", 1)}
 
 
 PATTERNS: Final[Mapping[str, Pattern]] = {
@@ -73,14 +74,16 @@ PATTERNS: Final[Mapping[str, Pattern]] = {
             "A ring whose neurons reach as many neighbours as the degree says, each of these connections led elsewhere "
             "with the probability rewire; equal sizes (Watts and Strogatz 1998).",
             {
-                "degree": Setting(4, "How many neighbours on the ring each neuron is connected with; an even number."),
+                "degree": Setting(
+                    4, "How many neighbours on the ring each neuron is connected with; an even number.", least=2
+                ),
                 "rewire": Setting(0.1, "The probability with which a connection is led elsewhere, from 0 to 1."),
             },
         ),
         Pattern(
             "band",
             "All pairs with |i − j| up to the width.",
-            {"width": Setting(1, "The largest difference |i − j| of two neurons that are connected.")},
+            {"width": Setting(1, "The largest difference |i − j| of two neurons that are connected.", 0)},
         ),
     )
 }

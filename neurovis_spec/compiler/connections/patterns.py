@@ -152,21 +152,17 @@ class _Sized:
         return {setting: value for setting, value in found.items() if value is not UNKNOWN}
 
     def _value(self, setting: str, formula: Formula) -> float | Unknown:
-        if setting in ("probability", "rewire"):
-            return self._probability(formula)
-        least = {"width": 0, "degree": 2, "count": 1}[setting]
-        value = self.constants.integer(formula, f"a {setting}", least)
-        if setting != "degree" or value is UNKNOWN or not value % 2:
-            return value
-        self._too_many("degree", f"a degree is even, half of it on each side of the ring; this is {value}")
-        return UNKNOWN
-
-    def _probability(self, formula: Formula) -> float | Unknown:
-        value = self.constants.scalar(formula, structural=True)
-        if value is UNKNOWN or 0 <= value <= 1:
-            return value
-        message = f"a probability lies between 0 and 1, this is {value:g}"
-        self.constants.findings.error("out-of-range", formula.span, message)
+        least = PATTERNS[self.name].settings[setting].least
+        if least is not None:
+            value = self.constants.integer(formula, f"a {setting}", least)
+            if setting != "degree" or value is UNKNOWN or not value % 2:
+                return value
+            self._too_many("degree", f"a degree is even, half of it on each side of the ring; this is {value}")
+            return UNKNOWN
+        share = self.constants.scalar(formula, structural=True)
+        if share is UNKNOWN or 0 <= share <= 1:
+            return share
+        self._too_many(setting, f"a probability lies between 0 and 1, this is {share:g}")
         return UNKNOWN
 
     def _too_many(self, setting: str, message: str) -> None:
