@@ -88,9 +88,13 @@ DEFAULTS = {
     "delta": {"rate": 0.01}, "hebbian": {"rate": 0.01}, "anti_hebbian": {"rate": 0.01}, "oja": {"rate": 0.01},
     "bcm": {"rate": 0.01, "threshold_rate": 0.01}, "covariance": {"rate": 0.01, "average_rate": 0.01},
     "input_correlation": {"rate": 0.01}, "differential_hebbian": {"rate": 0.01},
-    "reward_modulated": {"rate": 0.01, "smoothing": 0.9}, "decay": {"rate": 0.01},
+    "reward_modulated": {"rate": 0.01, "smoothing": 0.9}, "policy_gradient": {"rate": 0.01, "smoothing": 0.9},
+    "decay": {"rate": 0.01},
 }  # fmt: skip
-SIGNALS = {"delta": ("target",), "input_correlation": ("reflex",), "reward_modulated": ("policy", "reward")}
+SIGNALS = {
+    "delta": ("target",), "input_correlation": ("reflex",),
+    "reward_modulated": ("policy", "reward"), "policy_gradient": ("noise", "reward"),
+}  # fmt: skip
 
 
 def test_the_built_in_ones_are_those_of_the_tables_with_their_parameters_and_signals() -> None:
