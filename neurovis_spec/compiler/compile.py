@@ -102,17 +102,12 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
     body = _body(spec, request, inputs, outputs, scopes[0], constants, dt_known=dt_known)
     noises = make_noises(population, sum(entry.size for entry in inputs))
     expansion.depend()
-    if not made.complete or findings.errors > before or not _under_way(bundles, findings):
-        _check_cycles(made, population, findings)
+    level = _levels(made, population, findings)
+    if level is None or not made.complete or findings.errors > before or not _under_way(bundles, findings):
         _read_events(spec, finder, constants)
         return None
     plasticity, rules = make_plasticity(bundles)
     connections = join(bundles, rules)
-    level = levels(len(population.neurons), connections.sources, connections.targets, connections.delays)
-    if isinstance(level, Cycle):
-        _report_cycle(level, population, connections.entry, bundles, findings)
-        _read_events(spec, finder, constants)
-        return None
     blocks = make_blocks(population, connections.sources, connections.targets, level)
     program = make_program(blocks, plasticity)
     ordered = canonical(population.neurons, inputs, outputs, blocks, plasticity)
@@ -275,14 +270,20 @@ def _report_no_neurons(spec: Spec, population: Population, findings: Findings) -
     findings.error("no-neurons", span, message, hint, key="neurons")  # also where the name is missing there
 
 
-def _check_cycles(made: Connected, population: Population, findings: Findings) -> None:
-    """A cycle of the connections that are not invalid is one whatever becomes of the others."""
-    sizes = [len(bundle.sources) for bundle in made.bundles]
+def _levels(made: Connected, population: Population, findings: Findings) -> IntArray | None:
+    """The level of each neuron; None where neurons wait for each other, which is reported: a cycle of connections that
+    are in order is one whatever becomes of the others."""
     delays = np.concatenate([bundle.delays for bundle in made.bundles] or [np.zeros(0, dtype=np.int64)])
     level = levels(len(population.neurons), made.sources, made.targets, delays)
-    if isinstance(level, Cycle):
-        entry = np.repeat(np.arange(len(sizes), dtype=np.int64), sizes)
-        _report_cycle(level, population, entry, made.bundles, findings)
+    if not isinstance(level, Cycle):
+        return level
+    path = [population.neurons.names[neuron] for neuron in level.neurons]
+    shown = path if len(path) <= 12 else [*path[:6], "…", *path[-5:]]
+    message = f"these neurons wait for each other within one step: {' -> '.join(shown)}"
+    ends = np.cumsum([len(bundle.sources) for bundle in made.bundles])
+    bundle = made.bundles[int(np.searchsorted(ends, level.connection, side="right"))]
+    findings.error("delay-0-cycle", bundle.key, message, "give one of these connections a delay of at least 1")
+    return None
 
 
 def _under_way(bundles: tuple[Bundle, ...], findings: Findings) -> bool:
@@ -334,13 +335,3 @@ def _clock(spec: Spec, constants: Constants) -> tuple[int, int | None]:
     if time is not None and time.episode is not None:
         episode = known(constants.integer(time.episode, "'episode'", 1), None)
     return steps, episode
-
-
-def _report_cycle(
-    cycle: Cycle, population: Population, entry: IntArray, bundles: tuple[Bundle, ...], findings: Findings
-) -> None:
-    path = [population.neurons.names[neuron] for neuron in cycle.neurons]
-    shown = path if len(path) <= 12 else [*path[:6], "…", *path[-5:]]
-    message = f"these neurons wait for each other within one step: {' -> '.join(shown)}"
-    hint = "give one of these connections a delay of at least 1"
-    findings.error("delay-0-cycle", bundles[int(entry[cycle.connection])].key, message, hint)
