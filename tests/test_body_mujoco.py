@@ -121,6 +121,15 @@ def test_what_falls_asleep_cannot_be_kept(tmp_path: Path) -> None:
         body.state()
 
 
+def test_of_several_touch_sensors_on_a_part_the_foot_is_at_its_end(tmp_path: Path) -> None:
+    text = LEG.replace('<site name="tip"', '<site name="shin" pos="0.05 0 -0.2" size="0.03"/><site name="tip"')
+    text = text.replace('<touch name="touch"', '<touch name="shin" site="shin"/><touch name="touch"')
+    plain, felt = opened(tmp_path).skeleton, opened(tmp_path, text).skeleton
+    assert plain is not None
+    assert felt is not None
+    assert len(felt.feet) == len(plain.feet)
+
+
 def test_the_skeleton_has_links_feet_and_solids(tmp_path: Path) -> None:
     body = opened(tmp_path)
     skeleton = body.skeleton

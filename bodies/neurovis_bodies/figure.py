@@ -180,14 +180,16 @@ def _distance(point: FloatArray, axis: _Axis) -> float:
 
 
 def _feet(model: mujoco.MjModel, moving: list[int]) -> Iterator[_Foot]:
-    """Touch sensors, in their order; then bodies without one that are called feet, or have geoms that are."""
-    felt: set[int] = set()
-    for sensor in range(model.nsensor):
-        if int(model.sensor_type[sensor]) == _TOUCH:
-            site = int(model.sensor_objid[sensor])
-            body = int(model.site_bodyid[site])
-            felt.add(body)
-            yield _Foot(body, np.array(model.site_pos[site]), int(model.sensor_adr[sensor]), ())
+    """Touch sensors, in their order, of a body that has several the one furthest from its joint (a shin may feel, too);
+    then bodies without one that are called feet, or have geoms that are."""
+    felt: dict[int, _Foot] = {}
+    for sensor in np.flatnonzero(np.asarray(model.sensor_type) == _TOUCH).tolist():
+        site = int(model.sensor_objid[sensor])
+        body = int(model.site_bodyid[site])
+        foot = _Foot(body, np.array(model.site_pos[site]), int(model.sensor_adr[sensor]), ())
+        if body not in felt or np.linalg.norm(foot.place) > np.linalg.norm(felt[body].place):
+            felt[body] = foot
+    yield from felt.values()
     for body in moving:
         start = int(model.body_geomadr[body])
         own = range(start, start + int(model.body_geomnum[body])) if start >= 0 else range(0)
