@@ -231,14 +231,6 @@ def test_cells_are_those_that_a_line_runs_through_but_near_its_ends() -> None:
     assert not set(cells.tolist()) & set(other.tolist())
 
 
-def test_borders_are_counted_beyond_those_that_have_to_be_passed() -> None:
-    rects = np.array([(2.0, -1.0, 4.0, 1.0), (6.0, -1.0, 12.0, 1.0)])
-    line = polylines([straight((0, 0), (10, 0)), kink((0, 0), (1, 3), (10, 3), (10, 0))])
-    assert line.passed(rects, np.array([0, 1]))[1] == 0
-    fine = polylines([kink((0, 0), (3, 0), (5, 0), (7, 0), (10, 0))])
-    assert fine.passed(rects, np.array([0, 1])).tolist() == [2]
-
-
 @given(st.lists(point, min_size=2, max_size=8, unique=True), st.sampled_from([0.2, 1.0, 4.0]))
 @settings(deadline=None)
 def test_a_smooth_line_stays_beside_its_corners(line: list[Point], cut: float) -> None:

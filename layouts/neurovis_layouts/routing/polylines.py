@@ -139,16 +139,6 @@ class Polylines:
         share = (at - before[segment]) / np.maximum(self._lengths[segment], 1e-9)
         return self.a[segment] + share[:, None] * self._way[segment], owner
 
-    def passed(self, rects: FloatArray, least: IntArray) -> IntArray:
-        """(n,) how often they pass the borders of rectangles (f, 4) more than the ``least`` (f,) each."""
-        x, y, (x0, y0, x1, y1) = self.points[:, 0, None], self.points[:, 1, None], rects.T
-        within = (x > x0) & (x < x1) & (y > y0) & (y < y1)
-        passing = (within[self._first] != within[self._first + 1]).astype(np.int64)
-        count = np.zeros((len(self), len(rects)), dtype=np.int64)
-        np.add.at(count, self.owner, passing)
-        more: IntArray = np.maximum(count - least, 0).sum(axis=1)
-        return more
-
     def clearances(self, centres: FloatArray, most: float) -> FloatArray:
         """(n,) how close they come to the nearest of centres (c, 2), at most so far."""
         near = ((centres > self.points.min(axis=0) - most) & (centres < self.points.max(axis=0) + most)).all(axis=1)
