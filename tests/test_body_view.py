@@ -143,9 +143,23 @@ def test_a_foot_that_touches_is_filled_and_one_in_the_air_hollow(theme: str, sid
         assert fills.count(colours.box_fill) == (~touching).sum()
         assert 0 < touching.sum() <= 6
         if side == "above":  # from the side those beyond the body are paler
-            assert fills == [colours.positive if one else colours.box_fill for one in touching]
+            assert fills == [colours.positive if one else colours.box_fill for one in sorted(touching)]
     said = words(made.scene)
     assert {"touching", "in the air", "from above, forward →"} <= set(said)
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_a_foot_that_touches_is_seen_where_another_of_its_leg_is_in_the_air(side: str) -> None:
+    """As one sensor at the foot, and one at the shin above it."""
+    run = walked()
+    assert run.pose is not None
+    assert run.skeleton is not None
+    twice = replace(run.skeleton, feet=run.skeleton.feet * 2)
+    pose = np.concatenate([run.pose, np.zeros((len(run), 6))], axis=1)
+    scene = still(film(replace(run, pose=pose, skeleton=twice)), 17)
+    uppermost = {foot.centre: foot for foot in feet(scene, side)}
+    hollow = THEMES["default"].box_fill
+    assert sorted(foot.fill != hollow for foot in uppermost.values()) == sorted(run.pose[17, -6:] > 0)
 
 
 def test_from_the_side_what_is_right_of_the_body_is_drawn_over_what_is_left_of_it_also_after_a_turn() -> None:

@@ -175,7 +175,8 @@ class _Drawn:
         return Rectangle((left, above), wide, high, 0.0, self.theme.box_line, self.theme.muted, edge)
 
     def links(self, frame: int) -> tuple[Shape, ...]:
-        """Links, the nearest last, then feet, so that it is seen at any time whether they touch something."""
+        """Links, the nearest last, then feet, those that touch something in front of those that do not, so that it is
+        seen at any time which do, also of two sensors of a leg."""
         poses, skeleton, theme = self.poses, self.poses.skeleton, self.theme
         places, shapes = self._places(frame), list[Shape]()
         order = self._order(frame)
@@ -185,7 +186,7 @@ class _Drawn:
             shapes.append(Polyline(line, theme.box_fill, thick + 2 * _CASING, round=True))
             shapes.append(Polyline(line, self._seen(theme.zero, order[number]), thick, round=True))
         order = self._layers([(foot,) for foot in skeleton.feet], frame) * (self.side == "side")
-        for number in np.argsort(order, kind="stable").tolist():
+        for number in np.lexsort((poses.touching[frame], order)).tolist():
             touches = poses.touching[frame, number]
             fill, edge = (theme.positive, theme.ink) if touches else (theme.box_fill, theme.muted)
             fill, edge = (self._seen(colour, order[number]) for colour in (fill, edge))

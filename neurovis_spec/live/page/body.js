@@ -308,12 +308,12 @@ export class Body {
     return [x, y];
   }
 
-  /** Feet, filled where they touch something. @param {CanvasRenderingContext2D} context @param {Frame} frame
+  /** Feet, filled where they touch something, and these in front of the others. @param {CanvasRenderingContext2D} context @param {Frame} frame
    * @param {Theme} theme @param {number[][]} points @param {boolean[]} touching */
   feet(context, frame, theme, points, touching) {
     const { feet = [], links = [] } = this.skeleton ?? {};
     const ordered = feet.map((point, at) => ({ point, at, order: frame.up === 1 ? 0 : this.layer(points, [point]) }));
-    ordered.sort((one, other) => one.order - other.order);
+    ordered.sort((one, other) => one.order - other.order || Number(touching[one.at]) - Number(touching[other.at]));
     for (const { point, at, order } of ordered) {
       const thick = Math.max(
         0,
