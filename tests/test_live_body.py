@@ -6,6 +6,7 @@ import asyncio
 import io
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -113,6 +114,20 @@ def test_the_pose_is_that_of_the_step_that_is_shown(tmp_path: Path, theme: str) 
             await opened.until(f"{STEP} == 49")
             await go(opened, 0)
             assert (await pixels(opened) != first).mean() < 0.2  # it may have reached further by now
+
+    asyncio.run(look())
+
+
+def test_a_foot_that_touches_is_seen_where_another_of_its_leg_is_in_the_air(tmp_path: Path) -> None:
+    skeleton, poses = hexapod(len(RUN), 0.0, SOLIDS)
+    skeleton = replace(skeleton, feet=skeleton.feet * 2)
+    source = RecordedSource(NETWORK.network, posed(RUN, skeleton, np.concatenate([poses, 0 * poses[:, -6:]], axis=1)))
+
+    async def look() -> None:
+        async with shown(source, tmp_path) as opened:
+            assert (await said(opened)).startswith("the body 0.00 m forward, 6 of 12 feet touching;")
+            seen = await pixels(opened)
+            assert (seen == channels(THEMES["default"].positive)).all(axis=2).sum() > 6 * 30
 
     asyncio.run(look())
 
