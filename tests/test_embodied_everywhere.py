@@ -268,6 +268,17 @@ def test_what_is_invalid_in_the_file_of_a_body_is_told_with_its_place(text: str,
         assert raised.value.diagnostics[0].span.file == str(file)
 
 
+def test_validate_checks_the_file_of_a_body_beside_the_spec(tmp_path: Path) -> None:
+    other = tmp_path / "other.yaml"
+    other.write_text("body: {toy: plain, sensors: {place: y}}")
+    checked = invoke("validate", spec_file(tmp_path), "--body", other)
+    assert checked.exit_code == 1
+    assert f"{other}:1:37: error[unknown-sensor]: the body has no sensor 'y'" in checked.output
+    gone = spec_file(tmp_path, "gone")
+    assert invoke("validate", gone).exit_code == 1
+    assert invoke("validate", gone, "--no-body").exit_code == 0
+
+
 def test_a_body_is_a_path_or_whether_there_is_one() -> None:
     with pytest.raises(TypeError, match="'body' is a path, not int"):
         api.compile_text(WITH_BODY, body=3)  # type: ignore[arg-type]
@@ -304,6 +315,11 @@ def test_the_commands_run_with_the_body_with_another_and_without(tmp_path: Path)
     assert invoke("sweep", spec, *metric, "--no-body").output.split()[-1] == f"1,{np.tanh(0.5)},"
     assert invoke("sweep", spec, *metric).output.split()[-1] != f"1,{np.tanh(0.5)},"
     assert invoke("render", spec, "--step", 3, "-o", tmp_path / "x.svg", "--no-body").exit_code == 0
+    assert '"lift"' in invoke("inspect", spec, "--format", "json").output
+    bare = invoke("inspect", spec, "--format", "json", "--no-body")
+    assert bare.exit_code == 0
+    assert '"lift"' not in bare.output
+    assert invoke("validate", spec, "--body", other).exit_code == 0
     both = invoke("run", spec, "--no-body", "--body", other)
     assert both.exit_code == 2
     assert "--body names a body, and --no-body asks for none" in both.output
@@ -326,14 +342,14 @@ def test_where_what_a_body_needs_is_missing_runs_say_so_and_pictures_are_drawn(b
     spec = tmp_path / "spec.yaml"
     spec.write_text(WITH_BODY.replace("toy: plain", "mujoco: cart.xml"))
     (tmp_path / "cart.xml").write_text("<mujoco/>")
-    for command in (["run", spec], ["live", spec], ["render", spec, "--step", 3, "-o", tmp_path / "x.svg"]):
+    sweeping = ["sweep", spec, "--over", "gain=0,1", "--metric", "P", "--jobs", 1, "-o", tmp_path / "x.csv"]
+    for command in (["run", spec], ["live", spec], ["render", spec, "--step", 3, "-o", tmp_path / "x.svg"], sweeping):
         refused = invoke(*command)
         assert refused.exit_code == 1
         assert "a body of MuJoCo needs what is not installed" in refused.output.splitlines()[-2]
         assert "pip install 'neurovis-spec[sim]'" in refused.output.splitlines()[-1]
         if command[0] != "live":
             assert invoke(*command, "--no-body").exit_code == 0
-    swept = invoke("sweep", spec, "--over", "gain=0,1", "--metric", "P", "--jobs", 1)
-    assert "body: a body of MuJoCo needs what is not installed" in swept.output
+    assert nv.sweep(spec, {"gain": "0,1"}, ["P"], path=tmp_path / "x.csv", body=False)["error"] == (None, None)
     assert invoke("layout", spec, "-o", tmp_path / "l.json").exit_code == 0
     api.compile(spec).drawn()._repr_svg_()

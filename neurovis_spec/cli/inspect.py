@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from neurovis_spec.cli.files import network_of
-from neurovis_spec.cli.options import examples, set_option, spec_argument
+from neurovis_spec.cli.options import body_options, examples, set_option, spec_argument
 
 
 @click.command(
@@ -20,6 +20,7 @@ from neurovis_spec.cli.options import examples, set_option, spec_argument
     "--format", "form", type=click.Choice(["text", "json"]), default="text", help="text (default) or a JSON object."
 )
 @set_option
+@body_options
 def command(spec: str, form: str, settings: dict[str, float]) -> None:
     """Show groups, connections, delays, rules and choices.
 

@@ -124,7 +124,7 @@ def compile_options(command: F) -> F:
 
 
 def body_options(command: F) -> F:
-    """Which body the network has in a run."""
+    """Which body the network has."""
     file = click.option(
         "--body",
         "body_file",
@@ -141,7 +141,7 @@ def body_options(command: F) -> F:
         is_flag=True,
         expose_value=False,
         callback=_noted,
-        help="Run without the spec's body: inputs are what their sources say.",
+        help="Leave out the spec's body: inputs are what their sources say.",
     )
     return file(none(command))
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import click
 
 from neurovis_spec.cli.files import STDIN, compiled, count
-from neurovis_spec.cli.options import compile_options, examples, specs_argument
+from neurovis_spec.cli.options import body_options, compile_options, examples, specs_argument
 from neurovis_spec.diagnostics import Diagnostic, SpecError
 from neurovis_spec.findings import printable, show_text, to_json
 
@@ -28,6 +28,7 @@ FORMATS = ("text", "json", "sarif", "github")
     "--format", "form", type=click.Choice(FORMATS), default="text", help="How findings are shown: text is the default."
 )
 @click.option("--strict", is_flag=True, help="Take warnings for errors.")
+@body_options
 @compile_options
 def command(specs: tuple[str, ...], form: str, strict: bool) -> None:
     """Show all errors and warnings of specs at once.

@@ -26,6 +26,7 @@ from neurovis_spec.plain import text_of
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.backend import BackendError, available
 from neurovis_spec.runtime.backend import load as load_backend
+from neurovis_spec.runtime.embodied import embodied
 from neurovis_spec.runtime.inputs import check_names
 from neurovis_spec.runtime.measures import parsed
 from neurovis_spec.sweeps.grid import SEED, Axis, Number, Point, SweepError, axes, points
@@ -90,7 +91,8 @@ def sweep(
     name; what they are after the last step is a column. ``parameters`` are the same at every point, ``body`` is as in
     ``compile``. Points run in ``jobs`` processes (in a script, call this under ``if __name__ == "__main__":``), or on
     the cluster of a ``scheduler``. With ``path`` rows are in that file as soon as they are there, and those that are in
-    it already are not run again. Raises SweepError, InputError, BackendError, OSError, and SpecError where the spec or
+    it already are not run again. Raises SweepError, InputError, BackendError, OSError, BodyError where
+    the body cannot be opened, and SpecError where the spec or
     a metric is invalid at both ends of the grid and without it; what is wrong with a single point is in its row.
     """
     for name, text in (("backend", backend), ("scheduler", scheduler)):
@@ -172,12 +174,12 @@ def carried_out(
     width, run = len(plan.job.names), _runner(jobs, scheduler)
     if path is None:
         rows: dict[Row, Row] = {}
-        _run(job, plan.points, run, rows, lambda row: rows.__setitem__(row[:width], row), progress)
+        _run(plan, job, run, rows, lambda row: rows.__setitem__(row[:width], row), progress)
         return Table(plan.columns, tuple(rows[point] for point in plan.points))
     journal = Journal(Path(path), plan.columns, width)
     rows = journal.rows
     try:
-        _run(job, plan.points, run, rows, journal.add, progress)
+        _run(plan, job, run, rows, journal.add, progress)
     except KeyboardInterrupt as error:
         journal.finish(plan.points)
         number = error.number if isinstance(error, Ended) else Ended().number
@@ -293,23 +295,26 @@ def _runner(jobs: int, scheduler: str | None) -> Runner:
 
 
 def _run(
+    plan: CheckedSweep,
     job: Job,
-    every: Sequence[Point],
     run: Runner,
     rows: Mapping[Row, Row],
     add: Callable[[Row], None],
     progress: Progress | None,
 ) -> None:
-    """Run the points that have no row yet."""
-    missing = [point for point in every if point not in rows]
-    done = len(every) - len(missing)
+    """Run the points that have no row yet. Raises BodyError where no point could open its body, since no row is run
+    again that says so."""
+    missing = [point for point in plan.points if point not in rows]
+    whole = len(plan.points)
+    done = whole - len(missing)
     if progress is not None:
-        progress(done, len(every))
+        progress(done, whole)
     if not missing:
         return
+    embodied(plan.network.network)
     with closing(run(job, missing)) as results:
         for place, result in results:
             add((*missing[place], *result.values, result.error))
             done += 1
             if progress is not None:
-                progress(done, len(every))
+                progress(done, whole)
