@@ -46,8 +46,8 @@ _SOME = 24
 _SHIFTS = (0.16, 0.22, 0.3, 0.42, 0.6, 0.9)
 _TURNS = tuple(turn(step / 48) for step in (1, -1, 2, -2, 3, -3, 5, -5))
 _SHORT, _TURNS_ROUND = 1.0, 3
-#: So many are checked for that in a round, by how many routes there are, but always some.
-_UNCLEAR = 12_000
+#: So many are checked for that in a round, by how many pairs of routes there are, but always some.
+_UNCLEAR = 1_200_000
 #: What it costs there that an arrival and a departure are one line: more than a crossing, which can be followed. Where
 #: whole lines are searched it would keep them on long ways.
 _ARRIVING = 3.0
@@ -95,7 +95,7 @@ def told_apart(judge: Judge, free: AbstractSet[int]) -> dict[int, Route]:
         new: set[int] = set()
         on_others, meeting = judge.on_others(), judge.meeting()
         unclear = [*sorted(free & on_others), *sorted((free & meeting.keys()) - on_others)]
-        for i in unclear[: max(_MOST, _UNCLEAR // max(1, len(judge.routes)))]:
+        for i in unclear[: max(_LEAST, _UNCLEAR // max(1, len(judge.routes) ** 2))]:
             pen = Pen(judge, i, arriving=_ARRIVING)
             tries = [*_shifted(pen.route)]
             tries += [turned for leaves in sorted(meeting.get(i, ())) for turned in _turned(pen.route, leaves)]
