@@ -352,4 +352,10 @@ def test_where_what_a_body_needs_is_missing_runs_say_so_and_pictures_are_drawn(b
             assert invoke(*command, "--no-body").exit_code == 0
     assert nv.sweep(spec, {"gain": "0,1"}, ["P"], path=tmp_path / "x.csv", body=False)["error"] == (None, None)
     assert invoke("layout", spec, "-o", tmp_path / "l.json").exit_code == 0
-    api.compile(spec).drawn()._repr_svg_()
+    network = api.compile(spec)
+    network.drawn()._repr_svg_()
+    with pytest.raises(BodyError) as raised:
+        network.run(3)
+    assert raised.value.__notes__ == ["pip install 'neurovis-spec[sim]'"]  # a traceback shows it
+    report.analyze(network, tmp_path / "page", network.run(20, body=False))
+    assert "pip install" in (tmp_path / "page" / "index.html").read_text(encoding="utf-8")

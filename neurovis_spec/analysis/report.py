@@ -293,7 +293,7 @@ class _Report:
         try:
             trials = Trials(self.network, first, count, self.wish.inputs or None) if len(long) < len(runs) else None
         except ValueError as error:
-            yield from (Reading(key, notes=(f"Left out: {error}.",)) for key in keys)
+            yield from (Reading(key, notes=(_why(error),)) for key in keys)
             return
         for key in keys:
             if key in long or trials is None:
@@ -335,7 +335,13 @@ def _left_out(key: str, make: Callable[[], Reading]) -> Reading:
     try:
         return make()
     except (RecordingError, LayoutRefusalError) as error:
-        return Reading(key, notes=(f"Left out: {error}.",))
+        return Reading(key, notes=(_why(error),))
+
+
+def _why(error: Exception) -> str:
+    """Why something is left out, and what would help."""
+    notes: list[str] = getattr(error, "__notes__", [])
+    return " ".join((f"Left out: {error}.", *(f"What helps: {note}." for note in notes)))
 
 
 def _thinned(table: NamedArray) -> tuple[NamedArray, tuple[str, ...]]:

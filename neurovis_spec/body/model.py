@@ -16,9 +16,9 @@ from neurovis_spec.arrays import FloatArray
 
 
 class BodyError(ValueError):
-    """A body cannot be opened, or cannot do what is asked of it; ``hint`` says what would help. ``key`` is the key of
-    the spec's ``body`` that the fault lies in (``mujoco``, ``substeps``), if it lies in one. Where the length of a step
-    does not fit, ``fitting`` are the seconds and the substeps of one that does."""
+    """A body cannot be opened, or cannot do what is asked of it; ``hint``, which a traceback shows, says what would
+    help. ``key`` is the key of the spec's ``body`` that the fault lies in (``mujoco``, ``substeps``), if it lies in
+    one. Where the length of a step does not fit, ``fitting`` are the seconds and the substeps of one that does."""
 
     def __init__(
         self,
@@ -29,6 +29,8 @@ class BodyError(ValueError):
     ) -> None:
         super().__init__(message)
         self.hint, self.key, self.fitting = hint, key, fitting
+        if hint is not None:
+            self.add_note(hint)
 
 
 @dataclass(frozen=True, slots=True)
