@@ -17,6 +17,7 @@ from toy_bodies import SKELETON, carted, registered
 import neurovis_spec as nv
 from neurovis_spec.body.model import Link, Skeleton
 from neurovis_spec.body.skeletons import skeleton_of
+from neurovis_spec.live.declared import declared
 from neurovis_spec.live.hub import Client, Hub
 from neurovis_spec.live.protocol import FRAME, SCENE, body_message
 from neurovis_spec.live.recorded import RecordedSource
@@ -121,6 +122,11 @@ def test_of_what_has_nothing_to_draw_nothing_is_said(given: str | None) -> None:
     messages = sent(shown(source, view_of(network, network.gains)))
     assert bodies(messages) == []
     assert list(poses(messages)) == [[]]
+
+
+def test_inputs_say_which_sensors_they_are_and_in_which_units() -> None:
+    assert declared(carted())["inputs"] == [{"name": "arms", "size": 2, "description": "senses arm (rad)"}]
+    assert declared(PLAIN)["inputs"] == []
 
 
 def test_a_recording_is_drawn_by_the_poses_of_its_rows() -> None:

@@ -1,7 +1,8 @@
 """Declared: what a user can change in a run (by ``turns``), as data for the page.
 
 In: a compiled network. Out: the parameters that can be set, each with its name, the value that it begins with, its
-bounds where it has some, and its description; the inputs without a source; and the rules that can be stopped.
+bounds where it has some, and its description; the inputs without a source, with the sensors that they are and the
+units of these; and the rules that can be stopped.
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ import math
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.events.settable import Dependent
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.describe import wired
 from neurovis_spec.live.rules import rules
 
 
@@ -18,15 +21,28 @@ def declared(compiled: CompiledNetwork) -> dict[str, list[dict[str, object]]]:
     """All that can be changed."""
     network, written = compiled.network, compiled.spec.inputs
     inputs = [entry for entry in network.inputs if entry.expression is None and entry.table is None]
+    sensed = _sensed(network)
     return {
         "parameters": parameters(compiled),
         "inputs": [
-            {"name": entry.name, "size": entry.size, "description": "" if about is None else about.value}
+            {"name": entry.name, "size": entry.size, "description": "; ".join(filter(None, texts))}
             for entry in inputs
             for about in (written[entry.name].description if entry.name in written else None,)
+            for texts in (("" if about is None else about.value, sensed.get(entry.name, "")),)
         ],
         "rules": [{"connections": rule.connections, "rule": rule.written} for rule in rules(network)],
     }
+
+
+def _sensed(network: Network) -> dict[str, str]:
+    """The sensors that inputs are, with their units, by the names of the inputs."""
+    found = None if network.body is None else wired(network)
+    result: dict[str, str] = {}
+    for port, inputs in () if found is None else found.sensors:
+        for name in inputs:
+            text = f"{port.name} ({port.unit})" if port.unit else port.name
+            result[name] = f"{result[name]}, {text}" if name in result else f"senses {text}"
+    return result
 
 
 def parameters(compiled: CompiledNetwork) -> list[dict[str, object]]:
