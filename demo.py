@@ -124,4 +124,6 @@ LEARN_TO_WALK = Job(
 )  # fmt: skip
 
 if __name__ == "__main__":
-    sys.exit(main(LEARN_TO_WALK if sys.argv[1:] == ["walk"] else LEARN))
+    if sys.argv[1:] not in ([], ["walk"]):
+        sys.exit("usage: demo.py [walk]")
+    sys.exit(main(LEARN_TO_WALK if sys.argv[1:] else LEARN))
