@@ -22,7 +22,7 @@ from neurovis_spec.compiler.names.state_references import StateOf, singles
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import suggest
-from neurovis_spec.language.expressions.emit import emit
+from neurovis_spec.language.expressions.emit import defined, emit
 from neurovis_spec.runtime.checkpoint import numbers_of
 from neurovis_spec.runtime.columns import Probe, probe_of
 from neurovis_spec.runtime.state import BodyState, State, constants
@@ -199,9 +199,8 @@ def _commands(network: Network, moved: Collection[Moved]) -> tuple[_Commands, Pr
             neurons = network.outputs[index].neurons
             known[name] = f"s[{begins[index] + number}]" if index in begins else f"a[{int(neurons[number])}]"
         lines.append(f"        {emit(one.command, known)},")
-    text = "\n".join(["def commands(a, p, s):", "    return (", *lines, "    )", ""])
-    exec(compile(text, "<commands of a network>", "exec"), namespace)
-    made = namespace["commands"]
+    text = ["def commands(a, p, s):", "    return (", *lines, "    )"]
+    made = defined("commands", text, "commands of a network", namespace)
     assert callable(made)
     return made, probe_of(network, states)
 

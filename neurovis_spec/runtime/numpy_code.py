@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.settable import Variable
-from neurovis_spec.language.expressions.emit import emit
+from neurovis_spec.language.expressions.emit import defined, emit
 from neurovis_spec.language.expressions.tree import Name, Tree, Unary, names
 from neurovis_spec.runtime.state import State, constants
 
@@ -145,8 +145,7 @@ class Code:
     def compiled(self) -> Steps:
         """The steps as a function. The text holds our own identifiers only."""
         namespace = {**self.namespace, "float64": np.float64}
-        exec(compile(self.text(), "<steps of a network>", "exec"), namespace)
-        made = namespace["steps"]
+        made = defined("steps", [self.text()], "steps of a network", namespace)
         assert callable(made)
         return made
 

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.events.settable import Binding, ParameterFormula, Settable
 from neurovis_spec.language.expressions.arrays import Value
-from neurovis_spec.language.expressions.emit import emit
+from neurovis_spec.language.expressions.emit import defined, emit
 
 #: What the arrays of a network are called in messages.
 _CALLED: Mapping[str, str] = {
@@ -152,8 +152,7 @@ class Patcher:
                 lines.append(f"    check(t{number}, b{number}, p)")
         results = "".join(f"b{number}, " for number in range(len(plan.bindings)))
         lines.append(f"    return ({results})")
-        exec(compile("\n".join(lines), "<setting of parameters>", "exec"), space)
-        made = space["values"]
+        made = defined("values", lines, "setting of parameters", space)
         assert callable(made)
         return made
 

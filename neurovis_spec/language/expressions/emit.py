@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import TypeAlias
 
@@ -221,3 +221,10 @@ def folded(join: Callable[[str, str], str], arguments: list[str]) -> str:
         return arguments[0]
     middle = (len(arguments) + 1) // 2
     return join(folded(join, arguments[:middle]), folded(join, arguments[middle:]))
+
+
+def defined(name: str, lines: Iterable[str], about: str, namespace: dict[str, object]) -> object:
+    """The function of this name that lines of code define; ``about`` stands for a file in tracebacks. The lines hold
+    what ``emit`` gives and identifiers of our own, never a text of an author."""
+    exec(compile("\n".join([*lines, ""]), f"<{about}>", "exec"), namespace)
+    return namespace[name]
