@@ -112,7 +112,7 @@ def _range(port: Port) -> dict[str, object]:
 
 def _is_of(name: str, port: Port) -> bool:
     """Whether a name is that of a sensor or an actuator, or of one number of it."""
-    return name == port.name or any(name == f"{port.name}[{i}]" for i in range(port.size))
+    return name == port.name or name in port.numbers
 
 
 def _source(expression: object, table: object) -> str:

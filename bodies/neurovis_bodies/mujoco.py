@@ -211,5 +211,4 @@ def _numbers(ports: Iterable[tuple[Port, range]]) -> np.ndarray[tuple[int, ...],
 
 def _owner(ports: Sequence[Port], place: int) -> str:
     """Which port a number belongs to."""
-    names = [port.name if port.size == 1 else f"{port.name}[{i}]" for port in ports for i in range(port.size)]
-    return names[place]
+    return [name for port in ports for name in port.numbers][place]

@@ -20,11 +20,6 @@ class BodyMissingError(BodyError):
     """What a kind of body needs is not installed."""
 
 
-def kinds() -> tuple[str, ...]:
-    """The kinds of bodies that are registered, by their names."""
-    return plugins.names(plugins.BODIES)
-
-
 def load_kind(name: str) -> BodyKind:
     """A kind of bodies by its name. Raises BodyError, BodyMissingError where what it needs is not installed."""
     try:

@@ -44,6 +44,11 @@ class Port:
     low: float = float("-inf")
     high: float = float("inf")
 
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """What each of its numbers is called: ``name[i]``; a single one by the name alone."""
+        return (self.name,) if self.size == 1 else tuple(f"{self.name}[{i}]" for i in range(self.size))
+
 
 @dataclass(frozen=True, slots=True)
 class Link:

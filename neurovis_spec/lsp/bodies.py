@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
-from neurovis_spec.body.kinds import kinds
+from neurovis_spec import plugins
 from neurovis_spec.body.model import Port
 from neurovis_spec.compiler.body import Clock, Place, find_body
 from neurovis_spec.compiler.limits import plural
@@ -20,7 +20,7 @@ from neurovis_spec.lsp.document import Document
 def ports_of(document: Document, use: Literal["sensor", "actuator"]) -> Sequence[Port]:
     """The sensors, or the actuators, of the body that a document names."""
     values = document.index.values
-    for kind in kinds():
+    for kind in plugins.names(plugins.BODIES):
         given = values.get(("body", kind))
         if given is not None and given.text:
             dt = values.get(("time", "dt"))

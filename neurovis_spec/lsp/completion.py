@@ -172,8 +172,8 @@ def _of_body(role: Role | None, document: Document) -> Iterator[_Offer]:
         return
     for port in ports_of(document, role.use):
         yield _Offer(port.name, "word", described(port))
-        several = range(port.size if 1 < port.size <= _FEW else 0)
-        yield from (_Offer(f"{port.name}[{i}]", "word", port.unit) for i in several)
+        if 1 < port.size <= _FEW:
+            yield from (_Offer(name, "word", port.unit) for name in port.numbers)
 
 
 def _in_braces(front: str) -> bool:

@@ -152,10 +152,7 @@ def embodied(network: Network) -> Embodied | None:
 
 def _names(ports: Collection[Port]) -> list[str]:
     """A name for each number of ports."""
-    found: list[str] = []
-    for port in ports:
-        found += [port.name] if port.size == 1 else [f"{port.name}[{i}]" for i in range(port.size)]
-    return found
+    return [name for port in ports for name in port.numbers]
 
 
 def _wired(network: Network, settings: BodySettings, body: Body) -> dict[str, tuple[IntArray, IntArray]]:
