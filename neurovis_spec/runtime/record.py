@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import isfinite
 from pathlib import Path
 from typing import Protocol
 
@@ -312,8 +311,7 @@ class _OneByOne:
                 weights[row] = state.weights[changing]
             if body is not None:
                 vector = body.sense(vector, self.given)
-                if not isfinite(vector.dot(vector)):
-                    watch.given(k, vector[None])
+                watch.given_at(k, vector)
                 if keep:
                     body.show(sensors[row], poses[row])
             step(state, vector)

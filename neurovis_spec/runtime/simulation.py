@@ -11,7 +11,6 @@ import os
 import reprlib
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from math import isfinite
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
@@ -244,8 +243,7 @@ class Simulation:
         vector = self._reader.at(state.k, given)
         if body is not None:
             vector = body.sense(vector, self._given.union(given))
-            if not isfinite(vector.dot(vector)):
-                self._watch.given(state.k, vector[None])
+            self._watch.given_at(state.k, vector)
         recorder = self._recorder if self._recorder is not None and self._recorder.going else None
         if recorder is not None:
             recorder.begin(state)

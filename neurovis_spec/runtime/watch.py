@@ -41,6 +41,11 @@ class Watch:
         if len(wrong):
             self._step, self._vector = first + int(wrong[0]), vectors[wrong[0]]
 
+    def given_at(self, k: int, vector: FloatArray) -> None:
+        """Take the inputs of step k alone, where they are known only then."""
+        if not all_finite([vector]):
+            self.given(k, vector[None])
+
     def until(self, k: int, stop: int) -> int:
         """How far steps from k on may be made, ``stop`` at most, before one must be checked: one behind the first
         whose inputs are not finite."""
