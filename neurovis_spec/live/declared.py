@@ -8,12 +8,14 @@ units of these; and the rules that can be stopped.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.events.settable import Dependent
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.describe import wired
+from neurovis_spec.language.sections import InputModel
 from neurovis_spec.live.rules import rules
 
 
@@ -25,13 +27,17 @@ def declared(compiled: CompiledNetwork) -> dict[str, list[dict[str, object]]]:
     return {
         "parameters": parameters(compiled),
         "inputs": [
-            {"name": entry.name, "size": entry.size, "description": "; ".join(filter(None, texts))}
+            {"name": entry.name, "size": entry.size, "description": _about(entry.name, written, sensed)}
             for entry in inputs
-            for about in (written[entry.name].description if entry.name in written else None,)
-            for texts in (("" if about is None else about.value, sensed.get(entry.name, "")),)
         ],
         "rules": [{"connections": rule.connections, "rule": rule.written} for rule in rules(network)],
     }
+
+
+def _about(name: str, written: Mapping[str, InputModel], sensed: Mapping[str, str]) -> str:
+    """The description of an input, and which sensors it is."""
+    own = written[name].description if name in written else None
+    return "; ".join(text for text in ("" if own is None else own.value, sensed.get(name, "")) if text)
 
 
 def _sensed(network: Network) -> dict[str, str]:
