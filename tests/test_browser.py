@@ -171,26 +171,23 @@ def test_svg_shows_what_the_pixels_show(browser: Browser, tmp_path: Path, kind: 
     assert {name for name, value in alike.items() if value < (0.95 if name == "texts" else ALIKE)} == set(), alike
 
 
-def test_frames_of_an_animated_svg_show_what_the_pixels_show(browser: Browser, tmp_path: Path) -> None:
-    made = short_film(8)
-    svg, chosen = AnimatedSvgRenderer().animate(made, ".svg"), (0, 3, 7)
+def assert_frames_alike(browser: Browser, folder: Path, made: Film, chosen: tuple[int, int, int]) -> None:
+    """Each of these frames of an animated SVG is in Chromium what the pixels show, and like no other frame so much."""
+    svg = AnimatedSvgRenderer().animate(made, ".svg")
     pictures = [at(svg, (frame + 0.02) / made.fps) for frame in chosen]
-    seen = shots(browser, tmp_path, pictures, [made.scene.pixels] * len(chosen))
+    seen = shots(browser, folder, pictures, [made.scene.pixels] * len(chosen))
     ours = [Image.fromarray(paint(still(made, frame))) for frame in chosen]
     alike = [[similarity(picture, other) for other in ours] for picture in seen]
     assert min(alike[k][k] for k in range(len(chosen))) >= ALIKE, alike
     assert [row.index(max(row)) for row in alike] == [0, 1, 2], alike
+
+
+def test_frames_of_an_animated_svg_show_what_the_pixels_show(browser: Browser, tmp_path: Path) -> None:
+    assert_frames_alike(browser, tmp_path, short_film(8), (0, 3, 7))
 
 
 def test_frames_of_a_body_that_walks_show_what_the_pixels_show(browser: Browser, tmp_path: Path) -> None:
-    made = body_film(walked(2.0), "dark", rows=12)
-    svg, chosen = AnimatedSvgRenderer().animate(made, ".svg"), (0, 5, 11)
-    pictures = [at(svg, (frame + 0.02) / made.fps) for frame in chosen]
-    seen = shots(browser, tmp_path, pictures, [made.scene.pixels] * len(chosen))
-    ours = [Image.fromarray(paint(still(made, frame))) for frame in chosen]
-    alike = [[similarity(picture, other) for other in ours] for picture in seen]
-    assert min(alike[k][k] for k in range(len(chosen))) >= ALIKE, alike
-    assert [row.index(max(row)) for row in alike] == [0, 1, 2], alike
+    assert_frames_alike(browser, tmp_path, body_film(walked(2.0), "dark", rows=12), (0, 5, 11))
 
 
 @pytest.mark.parametrize("theme", ["default", "dark"])
