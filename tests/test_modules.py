@@ -502,7 +502,7 @@ def test_a_file_to_be_included_is_no_spec(tmp_path: Path) -> None:
         assert "include: [FILE]" in (found.hint or "")
     with pytest.raises(nv.SpecError) as caught:
         nv.compile_text(f"neurovis: 1\n{LEGS}")
-    assert caught.value.diagnostics[0].hint is None
+    assert caught.value.diagnostics[0].hint == "add name: the name of the network, an identifier"
 
 
 # Limits

@@ -125,7 +125,7 @@ class RuleModel(Model):
     description: TextField | None = Field(None, description="What it is, its equation and its source.")
 
     @classmethod
-    def _without(cls, name: str, data: Mapping) -> str | None:
+    def _without(cls, name: str, data: Mapping) -> str:
         return "a rule says how the weight changes: add weight: {each_step: …}, or {each_episode: …}"
 
 

@@ -184,9 +184,10 @@ class Model(BaseModel):
         give_up()
 
     @classmethod
-    def _without(cls, name: str, data: Mapping) -> str | None:
-        """A help line for a required key that is missing."""
-        return None
+    def _without(cls, name: str, data: Mapping) -> str:
+        """A help line for a required key that is missing: by default what its row in the grammar says of it."""
+        described = (cls._fields()[name].description or "").rstrip(".")
+        return f"add {name}: {described[:1].lower()}{described[1:]}"
 
     @classmethod
     def _foreign(cls, name: str) -> tuple[str, str] | None:

@@ -60,12 +60,12 @@ class Spec(Library):
     ros: RosModel | None = Field(None, description="How it meets ROS.")
 
     @classmethod
-    def _without(cls, name: str, data: Mapping) -> str | None:
+    def _without(cls, name: str, data: Mapping) -> str:
         if name == "name" and is_library(data):
             return "this is a file to be included: a spec uses what it holds with include: [FILE]"
         if name == "neurovis":
             return f"add the version of the language: neurovis: {LANGUAGE_VERSION}"
-        return None
+        return super()._without(name, data)
 
 
 class IncludedModel(Library):
