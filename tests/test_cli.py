@@ -82,6 +82,7 @@ def test_version_is_one_line() -> None:
     ("arguments", "words"),
     [
         ("validat x.yaml", "no command 'validat'; did you mean 'validate'?"),
+        ("ros vew", "no command 'vew'; did you mean 'view'?"),
         ("zzz", "the commands are: new, validate"),
         ("run small.yaml --stpes 3", "--steps"),
         ("run", "SPEC"),

@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
-from typing import IO, Final, NoReturn
+from typing import IO, ClassVar, Final, NoReturn
 
 import click
 
@@ -53,37 +53,53 @@ Examples:
 SPEC is a path, or - for standard input. 'neurovis COMMAND --help' shows a command's options and examples."""
 
 
-class Commands(click.Group):
-    """Commands by name, imported when they are called; expected errors become one message and status 1."""
+class LateCommands(click.Group):
+    """Commands by name, imported when they are called: ``PREFIX`` + name is the module of each."""
+
+    #: what ``--help`` says of each
+    TABLE: ClassVar[Mapping[str, str]]
+    PREFIX: ClassVar[str] = "neurovis_spec.cli."
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """The names, in the order in which one needs them."""
-        return list(COMMANDS)
+        return list(self.TABLE)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """The command of this name, imported now."""
-        if cmd_name not in COMMANDS:
+        if cmd_name not in self.TABLE:
             return None
-        found: click.Command = import_module(f"neurovis_spec.cli.{cmd_name}").command
+        found: click.Command = import_module(f"{self.PREFIX}{cmd_name}").command
         return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """The lines of COMMANDS, without importing a command."""
+        """The lines of TABLE, without importing a command."""
         with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+            formatter.write_dl(list(self.TABLE.items()))
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """As click does it, but an unknown name is answered with the nearest."""
         name = args[0]
-        if name not in COMMANDS and not name.startswith("-"):
+        if name not in self.TABLE and not name.startswith("-"):
             from neurovis_spec.diagnostics import suggest
 
-            if name in LATER:
-                known = f"the commands are: {', '.join(COMMANDS)}"
-                raise click.UsageError(f"this version has no command '{name}' yet; {known}", ctx)
-            raise click.UsageError(f"no command '{name}'; {suggest(name, COMMANDS, 'the commands are')}", ctx)
+            raise click.UsageError(f"no command '{name}'; {suggest(name, self.TABLE, 'the commands are')}", ctx)
+        return super().resolve_command(ctx, args)
+
+
+class Commands(LateCommands):
+    """All commands; expected errors become one message and status 1."""
+
+    TABLE = COMMANDS
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """What there is not yet is said to be so."""
+        if args[0] in LATER:
+            known = f"the commands are: {', '.join(COMMANDS)}"
+            raise click.UsageError(f"this version has no command '{args[0]}' yet; {known}", ctx)
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> object:

@@ -7,10 +7,10 @@ recording, an array; or an error that ends the command.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypedDict
 
 import click
 
@@ -19,9 +19,9 @@ from neurovis_spec.cli.progress import progress
 
 if TYPE_CHECKING:
     from neurovis_spec.arrays import FloatArray
-    from neurovis_spec.compiled import CompiledNetwork, NetworkLayout
+    from neurovis_spec.compiled import CompiledNetwork
     from neurovis_spec.compiler.network import Network
-    from neurovis_spec.diagnostics import Findings
+    from neurovis_spec.diagnostics import Diagnostic
     from neurovis_spec.layout import Layout
     from neurovis_spec.runtime.recording import Recording
 
@@ -43,12 +43,10 @@ def compiler(spec: str, parameters: Mapping[str, float] | None = None) -> Callab
     """What compiles a SPEC so, also in another thread when the command has long begun. It raises SpecError."""
     from neurovis_spec import api
 
-    (root, limit), body = _options(), given_body()
+    how = how_to_compile()
     if spec != "-":
-        return lambda: api.compile(spec, parameters=parameters, root=root, limit=limit, body=body)
-    return lambda: api.compile_text(
-        standard_input(), file=STDIN, folder=Path.cwd(), parameters=parameters, root=root, limit=limit, body=body
-    )
+        return lambda: api.compile(spec, parameters=parameters, **how)
+    return lambda: api.compile_text(standard_input(), file=STDIN, folder=Path.cwd(), parameters=parameters, **how)
 
 
 def compiler_in_place(spec: str, parameters: Mapping[str, float]) -> Callable[[str], CompiledNetwork]:
@@ -56,50 +54,42 @@ def compiler_in_place(spec: str, parameters: Mapping[str, float]) -> Callable[[s
     SpecError."""
     from neurovis_spec import api
 
-    (root, limit), body, folder = _options(), given_body(), Path(spec).parent
-    return lambda text: api.compile_text(
-        text, file=spec, folder=folder, parameters=parameters, root=root, limit=limit, body=body
-    )
+    how, folder = how_to_compile(), Path(spec).parent
+    return lambda text: api.compile_text(text, file=spec, folder=folder, parameters=parameters, **how)
 
 
-def _options() -> tuple[Path | None, int | None]:
-    """The command's --root and --limit."""
-    context = click.get_current_context(silent=True)
-    given = {} if context is None else context.meta
-    return given.get("neurovis.root"), given.get("neurovis.limit")
+class Compiling(TypedDict):
+    """What the command line says of how a spec is compiled, as ``api.compile`` takes it."""
+
+    root: Path | None
+    limit: int | None
+    body: bool | Path
 
 
-def given_body() -> bool | Path:
-    """The command's --body and --no-body: the body of the spec, none, or that of a file. Raises UsageError."""
+def how_to_compile() -> Compiling:
+    """The command's --root, --limit, --body and --no-body. Raises UsageError."""
     context = click.get_current_context(silent=True)
     given = {} if context is None else context.meta
     path, without = given.get("neurovis.body_file"), given.get("neurovis.bodiless")
     if path is not None and without:
         raise click.UsageError("--body names a body, and --no-body asks for none: give one of them")
-    return not without if path is None else path
+    body = not without if path is None else path
+    return {"root": given.get("neurovis.root"), "limit": given.get("neurovis.limit"), "body": body}
 
 
 def network_of(spec: str, parameters: Mapping[str, float] | None = None) -> CompiledNetwork:
     """``compiled``, with the warnings shown on standard error."""
     network = compiled(spec, parameters)
-    show_findings(network)
+    show(network.warnings, network.sources)
     return network
 
 
-def show_findings(network: CompiledNetwork) -> None:
-    """Write the warnings about a spec to standard error."""
-    if network.warnings:
+def show(found: Sequence[Diagnostic], sources: Mapping[str, str]) -> None:
+    """Write findings to standard error, with the lines of these texts."""
+    if found:
         from neurovis_spec.findings import show_text
 
-        click.echo(show_text(network.warnings, network.sources), err=True)
-
-
-def show_warnings(layout: NetworkLayout) -> None:
-    """Write the warnings about a layout to standard error."""
-    if layout.warnings:
-        from neurovis_spec.findings import show_text
-
-        click.echo(show_text(layout.warnings, layout.compiled.sources), err=True)
+        click.echo(show_text(found, sources), err=True)
 
 
 def standard_input() -> str:
@@ -175,16 +165,8 @@ def tables(named: Mapping[str, str], network: Network) -> dict[str, FloatArray]:
             findings.warning("numbered-columns", place, NUMBERED, AS_TEXTS)
         arrays[name] = table.values
     findings.check()
-    _show(findings)
+    show(findings.sorted(), findings.sources)
     return arrays
-
-
-def _show(findings: Findings) -> None:
-    """Warnings on standard error."""
-    if findings.sorted():
-        from neurovis_spec.findings import show_text
-
-        click.echo(show_text(findings.sorted(), findings.sources), err=True)
 
 
 @contextmanager

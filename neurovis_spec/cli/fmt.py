@@ -9,12 +9,12 @@ from typing import Final
 import click
 
 from neurovis_spec.cli.failure import fault
-from neurovis_spec.cli.files import STDIN, standard_input, writing
+from neurovis_spec.cli.files import STDIN, show, standard_input, writing
 from neurovis_spec.cli.options import examples, specs_argument
 from neurovis_spec.cli.progress import progress
 from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError
 from neurovis_spec.differences import difference
-from neurovis_spec.findings import printable, show_text
+from neurovis_spec.findings import printable
 
 _BOM: Final = "\ufeff"
 
@@ -55,8 +55,7 @@ def command(specs: tuple[str, ...], check: bool, diff: bool) -> None:
         _show(spec, before, after, check=check, diff=diff)
         if not (check or diff):
             _write(spec, before, after)
-    if text := show_text(found, sources):
-        click.echo(text, err=True)
+    show(found, sources)
     if found or (check and changed):
         raise click.exceptions.Exit(1)
 

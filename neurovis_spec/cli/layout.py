@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from neurovis_spec.cli.files import count, earlier_layout, network_of, show_warnings, writing
+from neurovis_spec.cli.files import count, earlier_layout, network_of, show, writing
 from neurovis_spec.cli.options import effort_option, engine_option, examples, output_option, set_option, spec_argument
 from neurovis_spec.cli.progress import progress
 from neurovis_spec.cli.targets import check_files, check_target
@@ -74,7 +74,7 @@ def command(
     with progress("laying out") as bar:
         layout = network.layout(engine, effort=effort, earlier=earlier, progress=bar)
     seconds = perf_counter() - begun
-    show_warnings(layout)
+    show(layout.warnings, network.sources)
     if output is not None:
         with writing(output):
             layout.save(output)

@@ -6,10 +6,11 @@ known names where a name is wanted.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeAlias
 
 import click
 
@@ -17,8 +18,36 @@ from neurovis_spec import plugins
 from neurovis_spec.cli.completion import input_files, one_of, paths, settings
 from neurovis_spec.diagnostics import suggest
 
-F = TypeVar("F", bound=Callable[..., object])
+Command: TypeAlias = Callable[..., object]
+#: What gives a command an option, or several.
+Option: TypeAlias = Callable[[Command], Command]
 Callback = Callable[[click.Context, click.Parameter, str | None], str | None]
+
+
+def several(*options: Option) -> Option:
+    """Options in this order, as one decorator."""
+
+    def add(command: Command) -> Command:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return add
+
+
+def as_one(name: str, made: type, *options: Option) -> Option:
+    """Options that a command takes together, as the argument ``name``: an object of the class ``made``, whose
+    annotated fields they are called like."""
+
+    def add(command: Command) -> Command:
+        @functools.wraps(command)
+        def with_one(**values: object) -> object:
+            own = {field: values.pop(field) for field in made.__annotations__}
+            return command(**values, **{name: made(**own)})
+
+        return several(*options)(with_one)
+
+    return add
 
 
 def _pair(text: str, form: str) -> tuple[str, str]:
@@ -90,42 +119,34 @@ def _themes() -> Iterable[str]:
     return THEMES
 
 
-def _views() -> Iterable[str]:
-    from neurovis_spec.language.views import VIEWS
-
-    return VIEWS
-
-
 def _noted(ctx: click.Context, param: click.Parameter, value: object) -> object:
-    """Keep how the spec is to be compiled with the command: ``files.compiled`` asks for it."""
+    """Keep how the spec is to be compiled with the command: ``files.how_to_compile`` asks for it."""
     ctx.meta[f"neurovis.{param.name}"] = value
     return value
 
 
-def compile_options(command: F) -> F:
-    """Where the files of a spec may lie, and how large it may become."""
-    root = click.option(
+#: Where the files of a spec may lie, and how large it may become.
+compile_options = several(
+    click.option(
         "--root",
         type=click.Path(path_type=Path, exists=True, file_okay=False),
         metavar="DIR",
         expose_value=False,
         callback=_noted,
         help="Data files and included files may lie anywhere below; default: the folder of the spec.",
-    )
-    limit = click.option(
+    ),
+    click.option(
         "--limit",
         type=click.IntRange(min=1),
         metavar="N",
         expose_value=False,
         callback=_noted,
         help="The most connections, ten million by default, and the most neurons where N is above their million.",
-    )
-    return root(limit(command))
-
-
-def body_options(command: F) -> F:
-    """Which body the network has."""
-    file = click.option(
+    ),
+)
+#: Which body the network has.
+body_options = several(
+    click.option(
         "--body",
         "body_file",
         type=click.Path(path_type=Path),
@@ -134,23 +155,17 @@ def body_options(command: F) -> F:
         callback=_noted,
         shell_complete=paths,
         help="Give the network the body of this YAML file (body: {…}) in place of the spec's.",
-    )
-    none = click.option(
+    ),
+    click.option(
         "--no-body",
         "bodiless",
         is_flag=True,
         expose_value=False,
         callback=_noted,
         help="Leave out the spec's body: inputs are what their sources say.",
-    )
-    return file(none(command))
-
-
-def spec_argument(command: F) -> F:
-    """``SPEC``, with these options."""
-    return click.argument("spec", metavar="SPEC", shell_complete=paths)(compile_options(command))
-
-
+    ),
+)
+spec_argument = several(click.argument("spec", metavar="SPEC", shell_complete=paths), compile_options)
 specs_argument = click.argument("specs", metavar="SPEC...", nargs=-1, required=True, shell_complete=paths)
 
 
@@ -206,48 +221,12 @@ theme_option = click.option(
     shell_complete=one_of(_themes),
     help="default, dark, print or paper; else the spec's.",
 )
-view_option = click.option(
-    "--view",
-    "views",
-    metavar="V",
-    multiple=True,
-    shell_complete=one_of(_views),
-    help="network, matrix, traces, raster, weights or body; 'traces: C1, C2' or 'weights: K -> O' says of what. "
-    "Repeatable, from top to bottom; default: the spec's figure, else the network, with its body where there is one.",
-)
-recording_option = click.option(
-    "--recording",
-    metavar="FILE",
-    shell_complete=paths,
-    help="Show steps of this recording; without it the network is run.",
-)
 run_option = click.option(
     "--run",
     type=click.IntRange(min=1),
     metavar="N",
     help="Of a recording in which the network began anew, its N-th run; default: the last.",
 )
-
-
-def excerpt_options(command: F) -> F:
-    """What of the network is shown, for the commands that draw."""
-    collapse = click.option(
-        "--collapse",
-        metavar="REF",
-        multiple=True,
-        help="Draw a group or an instance as one glyph, its connections added up. Repeatable.",
-    )
-    focus = click.option("--focus", metavar="REFS", help="Show these neurons with all that they are connected to.")
-    paths_ = click.option("--path", "path", metavar="'A -> B'", help="Show the shortest directed paths from A to B.")
-    least = click.option(
-        "--min-weight",
-        type=click.FloatRange(min=0),
-        callback=finite,
-        metavar="X",
-        help="Leave out connections with |w| below X.",
-    )
-    full = click.option("--full", is_flag=True, help="Draw all connections, however many there are.")
-    return collapse(focus(paths_(least(full(command)))))
 
 
 def finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
@@ -257,7 +236,7 @@ def finite(ctx: click.Context, param: click.Parameter, value: float | None) -> f
     return value
 
 
-def output_option(text: str, *, required: bool = False) -> Callable[[F], F]:
+def output_option(text: str, *, required: bool = False) -> Option:
     """``-o FILE``."""
     kind = click.Path(path_type=Path)
     return click.option("-o", "--output", type=kind, metavar="FILE", required=required, help=text)

@@ -43,8 +43,8 @@ def command(output: str | None, namespace: str, network: str, desk: Desk, meetin
     from neurovis_spec.ros.summary import Summary
     from neurovis_spec.runtime.files import replacing
 
-    if not desk and output is None:
-        desk = desk.in_the_browser()
+    if output is None:
+        desk = desk or desk.in_the_browser()
     desk.check()
     check_target(None if output is None else Path(output))
     sys.setswitchinterval(0.0005)

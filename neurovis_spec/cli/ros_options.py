@@ -6,21 +6,20 @@ In: texts of the command line. Out: a Meeting, which opens the node and ends wit
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Literal, TypeVar
+from typing import TYPE_CHECKING, Final, Literal
 
 import click
 
-from neurovis_spec.cli.options import finite
+from neurovis_spec.cli.options import Option, as_one, finite
 from neurovis_spec.interrupts import deferred
 
 if TYPE_CHECKING:
     from neurovis_spec.ros.middleware import Node, Ros
     from neurovis_spec.ros.summary import Summary
 
-F = TypeVar("F", bound=Callable[..., object])
 #: where a command's context has the arguments for ROS itself
 _ARGUMENTS: Final = "neurovis.ros"
 _REMAPPING: Final = re.compile(r"[A-Za-z_~/][A-Za-z0-9_~/.]*:=.*", re.DOTALL)
@@ -87,48 +86,32 @@ def tell(text: str) -> None:
     click.echo(text, err=True)
 
 
-def meeting_options(wait: float) -> Callable[[F], F]:
+def _version(ctx: click.Context, param: click.Parameter, value: str | None) -> Ros | None:
+    return None if value is None else 1 if value == "1" else 2
+
+
+def meeting_options(wait: float) -> Option:
     """The options that all commands have, as one argument ``meeting``; ``wait`` is the default of ``--wait``."""
-
-    def add(command: F) -> F:
-        import functools
-
-        @functools.wraps(command)
-        def with_meeting(
-            *args: object,
-            ros: str | None,
-            remote: bool,
-            sim_time: bool,
-            seconds: float | None,
-            wait: float,
-            format_: Literal["text", "json"],
-            **rest: object,
-        ) -> object:
-            version: Ros | None = None if ros is None else 1 if ros == "1" else 2
-            return command(*args, meeting=Meeting(version, remote, sim_time, seconds, wait, format_), **rest)
-
-        positive = click.FloatRange(min=0)
-        options = (
-            click.option("--ros", type=click.Choice(["1", "2"]), help="Which ROS; default: the one that is there."),
-            click.option(
-                "--seconds", type=positive, callback=finite, metavar="S",
-                help="End after S seconds; what is waited for before (a master, a network that announces itself) has S "
-                "seconds to come.",
-            ),
-            click.option(
-                "--wait", type=positive, callback=finite, default=wait, show_default=True, metavar="S",
-                help="Begin when every topic has a subscriber, at the latest after S seconds.",
-            ),
-            click.option("--remote", is_flag=True, help="Meet other machines; else this one alone."),
-            click.option("--sim-time", is_flag=True, help="Take the time from /clock."),
-            click.option(
-                "--format", "format_", type=click.Choice(["text", "json"]), default="text",
-                help="How the summary is printed; json: one object on one line.",
-            ),
-        )  # fmt: skip
-        result: Callable[..., object] = with_meeting
-        for option in reversed(options):
-            result = option(result)
-        return result  # type: ignore[return-value]
-
-    return add
+    positive = click.FloatRange(min=0)
+    return as_one(
+        "meeting",
+        Meeting,
+        click.option(
+            "--ros", type=click.Choice(["1", "2"]), callback=_version, help="Which ROS; default: the one that is there."
+        ),
+        click.option(
+            "--seconds", type=positive, callback=finite, metavar="S",
+            help="End after S seconds; what is waited for before (a master, a network that announces itself) has S "
+            "seconds to come.",
+        ),
+        click.option(
+            "--wait", type=positive, callback=finite, default=wait, show_default=True, metavar="S",
+            help="Begin when every topic has a subscriber, at the latest after S seconds.",
+        ),
+        click.option("--remote", is_flag=True, help="Meet other machines; else this one alone."),
+        click.option("--sim-time", is_flag=True, help="Take the time from /clock."),
+        click.option(
+            "--format", type=click.Choice(["text", "json"]), default="text",
+            help="How the summary is printed; json: one object on one line.",
+        ),
+    )  # fmt: skip

@@ -5,20 +5,19 @@ In: texts of the command line. Out: a Desk, which opens them for a block.
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import datetime
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import click
 
 from neurovis_spec.cli.completion import paths
 from neurovis_spec.cli.failure import fault
-from neurovis_spec.cli.options import engine_option, finite, theme_option
+from neurovis_spec.cli.options import Option, as_one, engine_option, finite, theme_option
 from neurovis_spec.cli.ros_options import tell
 
 if TYPE_CHECKING:
@@ -29,8 +28,6 @@ if TYPE_CHECKING:
     from neurovis_spec.ros.listening import Listening
     from neurovis_spec.ros.middleware import Node, Ros
 
-F = TypeVar("F", bound=Callable[..., object])
-
 
 @dataclass(frozen=True)
 class Desk:
@@ -39,7 +36,7 @@ class Desk:
 
     live: int | None
     record: str | None
-    rotation: Rotation
+    rotate: Rotation
     force: bool
     theme: str | None
     engine: str | None
@@ -100,7 +97,7 @@ class Desk:
 
         path = None if self.record is None else self._path(self.record, node.ros)
         film = self._film(compiled)
-        wanted = Wanted(path, self.rotation, self.force, self.live is not None or film is not None)
+        wanted = Wanted(path, self.rotate, self.force, self.live is not None or film is not None)
         with _told_of_files():
             listening = Listening(compiled, node.ros, wanted, tell, node.definition, base)
         with self._page(listening), self._filmed(listening, film):
@@ -162,61 +159,48 @@ def _told_of_files() -> Iterator[None]:
         raise fault(f"{error.filename} exists", "--force overwrites it") from None
 
 
-def shown_options(always: bool) -> Callable[[F], F]:
+def _rotation(ctx: click.Context, param: click.Parameter, value: str | None) -> Rotation:
+    from neurovis_spec.ros.files import Rotation, rotation
+
+    found = Rotation() if value is None else rotation(value)
+    if found is None:
+        raise click.UsageError(f"--rotate takes a size or seconds (1GiB, 500MB, 60s, 10min), not '{value}'")
+    return found
+
+
+def _film(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    if value and Path(value).suffix.lower() != ".mp4":
+        raise click.UsageError(f"--video takes a file that ends in .mp4, not '{value}'")
+    return value
+
+
+def shown_options(always: bool) -> Option:
     """The options of the page and the recording, as one argument ``desk``; ``always``: what is not recorded is seen."""
-
-    def add(command: F) -> F:
-        @functools.wraps(command)
-        def with_desk(
-            *args: object,
-            live: int | None,
-            record: str | None,
-            rotate: str | None,
-            force: bool,
-            theme: str | None,
-            engine: str | None,
-            video: str | None,
-            fps: float,
-            **rest: object,
-        ) -> object:
-            from neurovis_spec.ros.files import Rotation, rotation
-
-            turns = Rotation() if rotate is None else rotation(rotate)
-            if turns is None:
-                raise click.UsageError(f"--rotate takes a size or seconds (1GiB, 500MB, 60s, 10min), not '{rotate}'")
-            if video and Path(video).suffix.lower() != ".mp4":
-                raise click.UsageError(f"--video takes a file that ends in .mp4, not '{video}'")
-            desk = Desk(live, record, turns, force, theme, engine, video, fps)
-            return command(*args, desk=desk if desk or not always else desk.in_the_browser(), **rest)
-
-        default = "; default without --record and --video: one that is free" if always else ""
-        options = (
-            click.option(
-                "--live", type=click.IntRange(0, 65535), metavar="PORT",
-                help=f"Show it in the browser, at this port; 0: one that is free{default}.",
-            ),
-            click.option(
-                "--record", metavar="FILE", shell_complete=paths,
-                help="Record: .mcap, .bag (ROS 1), or a folder without suffix (ROS 2).",
-            ),
-            click.option(
-                "--rotate", metavar="SIZE|SECONDS", help="Begin a new file at this size or time; default: 1GiB."
-            ),
-            click.option("--force", is_flag=True, help="Overwrite a recording or a film that is there."),
-            theme_option,
-            engine_option,
-            click.option(
-                "--video", metavar="[FILE]", is_flag=False, flag_value="", shell_complete=paths,
-                help="Film it, as .mp4; default: the network's name and the time.",
-            ),
-            click.option(
-                "--fps", type=click.FloatRange(1, 120), callback=finite, default=25.0, show_default=True, metavar="F",
-                help="Frames a second of the film.",
-            ),
-        )  # fmt: skip
-        result: Callable[..., object] = with_desk
-        for option in reversed(options):
-            result = option(result)
-        return result  # type: ignore[return-value]
-
-    return add
+    default = "; default without --record and --video: one that is free" if always else ""
+    return as_one(
+        "desk",
+        Desk,
+        click.option(
+            "--live", type=click.IntRange(0, 65535), metavar="PORT",
+            help=f"Show it in the browser, at this port; 0: one that is free{default}.",
+        ),
+        click.option(
+            "--record", metavar="FILE", shell_complete=paths,
+            help="Record: .mcap, .bag (ROS 1), or a folder without suffix (ROS 2).",
+        ),
+        click.option(
+            "--rotate", metavar="SIZE|SECONDS", callback=_rotation,
+            help="Begin a new file at this size or time; default: 1GiB.",
+        ),
+        click.option("--force", is_flag=True, help="Overwrite a recording or a film that is there."),
+        theme_option,
+        engine_option,
+        click.option(
+            "--video", metavar="[FILE]", is_flag=False, flag_value="", shell_complete=paths, callback=_film,
+            help="Film it, as .mp4; default: the network's name and the time.",
+        ),
+        click.option(
+            "--fps", type=click.FloatRange(1, 120), callback=finite, default=25.0, show_default=True, metavar="F",
+            help="Frames a second of the film.",
+        ),
+    )  # fmt: skip

@@ -10,7 +10,7 @@ import click
 
 from neurovis_spec.cli.completion import paths
 from neurovis_spec.cli.failure import fault
-from neurovis_spec.cli.files import network_of, show_findings
+from neurovis_spec.cli.files import network_of, show
 from neurovis_spec.cli.options import examples, set_option
 from neurovis_spec.cli.ros_options import Meeting, meeting_options, tell
 from neurovis_spec.cli.ros_shown import Desk, shown_options
@@ -45,6 +45,7 @@ def command(spec: str | None, network: str | None, settings: dict[str, float], d
     from neurovis_spec.ros.summary import Summary
     from neurovis_spec.ros.view_steering import ViewSteering
 
+    desk = desk or desk.in_the_browser()
     desk.check()
     begun = time.monotonic()
     base = None
@@ -62,7 +63,7 @@ def command(spec: str | None, network: str | None, settings: dict[str, float], d
             if found is None:
                 raise fault("no network has announced itself", "name its spec: neurovis ros view SPEC")
             compiled, base = found
-            show_findings(compiled)
+            show(compiled.warnings, compiled.sources)
         with desk.open(compiled, node, base) as listening:
             quality = DISPLAY if desk.record is None else RECORDER
             reconnects = node.reconnects

@@ -10,7 +10,7 @@ from time import perf_counter
 import click
 
 from neurovis_spec.cli.completion import axes, paths
-from neurovis_spec.cli.files import STDIN, count, given_body, show_findings, standard_input, tables, writing
+from neurovis_spec.cli.files import STDIN, count, how_to_compile, show, standard_input, tables, writing
 from neurovis_spec.cli.options import (
     backend_option,
     body_options,
@@ -97,13 +97,10 @@ def command(
     if output is not None:
         check_suffix(output)
     source = Source(standard_input(), STDIN, Path.cwd()) if spec == "-" else spec
-    root, limit = (click.get_current_context().meta.get(f"neurovis.{name}") for name in ("root", "limit"))
-    body = given_body()
+    how = how_to_compile()
     with progress("compiling"):
-        plan = planned(
-            source, over, metrics, steps=steps, parameters=settings, backend=backend, root=root, limit=limit, body=body
-        )
-    show_findings(plan.network)
+        plan = planned(source, over, metrics, steps=steps, parameters=settings, backend=backend, **how)
+    show(plan.network.warnings, plan.network.sources)
     check_files(output, plan.network)
     arrays = tables(inputs, plan.network.network)
     begun, many = perf_counter(), jobs or min(_processors(), len(plan.points))
