@@ -6,8 +6,7 @@ into numbers many at a time; they are checked one by one only among the few wher
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from itertools import chain
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -31,7 +30,7 @@ from neurovis_spec.language.data.cells import (
 from neurovis_spec.language.data.header import numbers_columns
 from neurovis_spec.language.data.table import CellError, Faults, Room, Table, check_cells
 
-#: cells among which one that is invalid is looked for
+#: cells of a row among which one that is invalid is searched
 _FEW: Final = 1 << 10
 
 
@@ -83,62 +82,37 @@ def _numbers(
         if quick is not None:
             yield quick
             return
-    for rows in _batches(rows_of(lines, number)):
-        even = [row for row in rows if len(row.cells) == width]
-        for row in rows if len(even) < len(rows) else ():
-            if len(row.cells) != width and _comment(header):  # the width of all rows is taken from it
-                raise _ragged(row, width, NO_COMMENT)
-            if len(row.cells) != width and not faults.many:
-                faults.note(_ragged(row, width, "rows of a table are equally long"))
-        cells = list(chain.from_iterable(row.cells for row in even))
-        for start in range(0, len(cells), _FEW):
-            yield _few_numbers(cells[start : start + _FEW], start, width, even, faults)
+    for row in rows_of(lines, number):
+        if len(row.cells) == width:
+            yield from _row_numbers(row, faults)
+        elif header is not None and header[0].startswith("#"):  # a comment, of which the width of all rows is taken
+            raise _ragged(row, width, NO_COMMENT)
+        else:
+            faults.note(_ragged(row, width, "rows of a table are equally long"))
+        if faults.many:
+            return
+
+
+def _row_numbers(row: Row, faults: Faults) -> Iterator[NDArray[np.float64]]:
+    """The numbers of a row, some at a time; among those where something is wrong one by one."""
+    for start in range(0, len(row.cells), _FEW):
+        cells = row.cells[start : start + _FEW]
+        quick = numbers_of(",".join(cells).encode())
+        if quick is not None and len(quick) == len(cells):
+            yield quick
+            continue
+        for column, cell in enumerate(cells, start + 1):
+            try:
+                yield np.array([number_of(cell.strip(), row.number, column)])
+            except CellError as error:
+                faults.note(error)
             if faults.many:
                 return
-
-
-def _batches(rows: Iterable[Row]) -> Iterator[list[Row]]:
-    """Rows, some together. Those before one that cannot be read come all the same. Raises CellError."""
-    batch: list[Row] = []
-    cells = 0
-    try:
-        for row in rows:
-            batch.append(row)
-            cells += len(row.cells)
-            if cells >= _FEW:
-                yield batch
-                batch, cells = [], 0
-    except CellError:
-        yield batch
-        raise
-    yield batch
-
-
-def _few_numbers(cells: list[str], start: int, width: int, rows: list[Row], faults: Faults) -> NDArray[np.float64]:
-    """The numbers of some cells, from the cell ``start`` of these rows on."""
-    quick = numbers_of(",".join(cells).encode())
-    if quick is not None and len(quick) == len(cells):
-        return quick
-    values = np.full(len(cells), np.nan)
-    for place, cell in enumerate(cells):
-        row, column = divmod(start + place, width)
-        try:
-            values[place] = number_of(cell.strip(), rows[row].number, column + 1)
-        except CellError as error:
-            faults.note(error)
-            if faults.many:
-                break
-    return values
 
 
 def _ragged(row: Row, width: int, hint: str) -> CellError:
     message = f"row {row.number} has {counted(len(row.cells))}, the first row {width}"
     return CellError("file-format", message, hint, (row.number, min(len(row.cells), width + 1)))
-
-
-def _comment(header: tuple[str, ...] | None) -> bool:
-    """Whether the first row was meant as a comment."""
-    return header is not None and header[0].startswith("#")
 
 
 def cell_at(data: bytes, file: str, at: tuple[int, int]) -> Span:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurovis_spec.diagnostics import nearest
+from neurovis_spec.language.data.cells import below
 from neurovis_spec.language.data.table import (
     MOST_FAULTS,
     SPARSER,
@@ -36,8 +37,6 @@ _LONGEST_SIZE: Final = 15
 _NUMBER: Final = re.compile(rb"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _NOT_FINITE: Final = re.compile(rb"[-+]?(?:nan|inf|infinity)", re.IGNORECASE)
 _PLAIN: Final = b"0123456789+-.eE \t\r\n"
-#: bytes of lines that are read together
-_STRETCH: Final = 1 << 18
 _WORDS: Final = (
     ("matrix",),
     ("coordinate", "array"),
@@ -75,7 +74,8 @@ def _in_line(line: int, message: str, code: str = "file-format", hint: str | Non
 
 def parse_mtx(data: bytes, room: Room | None = None) -> Table:
     """The matrix; in a pattern every entry is 1. Raises CellError."""
-    file = io.BytesIO(data.removeprefix(b"\xef\xbb\xbf"))
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    file = io.BytesIO(data)
     words = _banner(file.readline())
     line, sizes = 2, file.readline()
     while sizes and (not sizes.strip() or sizes.lstrip().startswith(b"%")):
@@ -84,7 +84,7 @@ def parse_mtx(data: bytes, room: Room | None = None) -> Table:
     if room is not None:
         room(head.rows * head.columns)
     faults = Faults()
-    lines, table = _numbers(file.read(), line + 1, head, faults)
+    lines, table = _numbers(data, line, head, faults)
     if len(table) != head.entries and not faults:
         there = "there are more" if len(table) > head.entries else f"there are {len(table)}"
         faults.note(CellError("file-format", f"line {line} promises {head.entries} entries, {there}", at=(line, 0)))
@@ -145,21 +145,22 @@ def _sizes(words: tuple[str, ...], text: bytes, line: int) -> _Head:
 
 
 def _numbers(data: bytes, number: int, head: _Head, faults: Faults) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """For each entry its line, the first of which has this number, and its numbers; no more than a few entries more
-    than are promised. What is wrong with lines is reported."""
+    """For each entry below the line of this number its line and its numbers; no more than a few entries more than are
+    promised. What is wrong with lines is reported."""
     numbers, tables = [np.zeros(0, dtype=np.int32)], [np.zeros((0, head.width))]
-    start, entries = 0, 0
-    while start <= len(data) and entries <= head.entries and not faults.many:
-        end = data.find(b"\n", start + _STRETCH) % (len(data) + 1)
-        lines = data[start:end].split(b"\n")
-        table = None if data[start:end].translate(None, _PLAIN) else _loaded(lines, head.width)
+    entries = 0
+    for first, part in below(data, number):
+        lines = part.split(b"\n")
+        table = None if part.translate(None, _PLAIN) else _loaded(lines, head.width)
         if table is not None:
-            places = np.arange(number, number + len(lines), dtype=np.int32)
+            places = np.arange(first, first + len(lines), dtype=np.int32)
         else:
-            places, table = _one_by_one(lines, number, head.width, faults)
+            places, table = _one_by_one(lines, first, head.width, faults)
         numbers.append(places)
         tables.append(table)
-        start, number, entries = end + 1, number + len(lines), entries + len(table)
+        entries += len(table)
+        if entries > head.entries or faults.many:
+            break
     return np.concatenate(numbers), np.concatenate(tables)
 
 
