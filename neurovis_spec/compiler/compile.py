@@ -37,6 +37,7 @@ from neurovis_spec.compiler.network import Input, Instance, Network, Output
 from neurovis_spec.compiler.neurons.noise import make_noises
 from neurovis_spec.compiler.neurons.populate import Population, populate, without_neurons
 from neurovis_spec.compiler.ros_settings import RosSettings
+from neurovis_spec.compiler.run_checks import with_checks
 from neurovis_spec.compiler.values.constants import Constants, parse_formula
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.parameters import make_parameters
@@ -158,7 +159,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
     if eventful is not None and not findings.failed:  # the shape may have been invalid
         files = tuple(file.model for file in request.includes.files)
         warn(Compiled(spec, scopes, library, expander.used, eventful, bundles, population, files), findings)
-    return eventful
+    return None if eventful is None else with_checks(eventful)
 
 
 def _ros(

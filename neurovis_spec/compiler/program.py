@@ -27,12 +27,40 @@ class Quantity:
 
 
 @dataclass(frozen=True, slots=True)
+class Check(Quantity):
+    """A state of ours, which nothing reads: an infinity after a step in which something undefined was computed that no
+    other number shows (``compiler/run_checks.py``), else 0. ``name`` says it: ``the model 'm' divides by 0``."""
+
+
+#: The function of a model's checks that says whether the neuron's activation is undefined for an argument.
+UNDEFINED_F = "f is undefined"
+
+
+@dataclass(frozen=True, slots=True)
 class Activation:
     """``value`` is an expression of ``x``, the combined input, and the parameters."""
 
     name: str
     parameters: tuple[str, ...]
     value: Tree
+
+    @property
+    def functions(self) -> Mapping[str, Tree]:
+        """What a model may call in its formulas, each with its formula, of x."""
+        return {"f": self.value}
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedActivation(Activation):
+    """An activation that a model checks: ``undefined`` is true where it computes something undefined that its value
+    does not show."""
+
+    undefined: Tree
+
+    @property
+    def functions(self) -> Mapping[str, Tree]:
+        """Beside ``f`` whether it is undefined."""
+        return {"f": self.value, UNDEFINED_F: self.undefined}
 
 
 @dataclass(frozen=True, slots=True)

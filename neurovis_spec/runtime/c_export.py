@@ -15,6 +15,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.changes import Change, Clamp
 from neurovis_spec.compiler.network import Input, Network, Noise
+from neurovis_spec.compiler.run_checks import without_checks
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.language.expressions.emit_c import Emitter, Value
 from neurovis_spec.language.expressions.tree import Draw
@@ -54,7 +55,7 @@ class Exported:
     """The C of one network."""
 
     def __init__(self, network: Network, start: State | None = None, real: str = "double") -> None:
-        self.network, self.real = network, real
+        self.network, self.real = without_checks(network), real
         self.name = prefix(network.name)
         self.macro = self.name.upper()
         self.state = (initial_state(network) if start is None else start).copy()
@@ -95,8 +96,13 @@ class Exported:
 
     def _members(self) -> list[Member]:
         network, state = self.network, self.state
-        cells = [array for block in state.cells for array in block]
-        traces = [array for rule in state.traces for array in rule]
+        # without the checks of a run, which are the last ones
+        blocks, rules = (
+            zip(network.blocks, state.cells, strict=True),
+            zip(network.plasticity, state.traces, strict=True),
+        )
+        cells = [array for block, own in blocks for array in own[: len(block.model.state)]]
+        traces = [array for one, own in rules for array in own[: len(one.rule.state)]]
         none = np.zeros(0)
         found = [
             Member("activity", state.activity, "a[k - 1] of all neurons"),

@@ -9,6 +9,7 @@ of a larger one, each block is a loop.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -161,17 +162,17 @@ class StepCode:
         cells = {q.name: f"cells{number}_{i}[{place}]" for i, q in enumerate(model.state)}
         steps = {q.name: q.each_step for q in model.state}
         known = self.let(model.let, own | cells, [*steps.values(), model.activity])
-        new: dict[str, Value] = {
-            name: code.let("n", code.value(tree, known)) for name, tree in steps.items() if tree is not None
-        }
 
-        def activation(x: Value) -> Value:
+        def activation(x: Value, formula: Tree) -> Value:
             parameters = code.parameters(f"activation/{number}", block.activation_parameters, place)
-            value = block.activation.value
-            known = parameters | ({"x": code.let("x", x)} if "x" in names(value) else {})
-            return code.let("y", code.value(value, known))
+            known = parameters | ({"x": code.let("x", x)} if "x" in names(formula) else {})
+            return code.let("y", code.value(formula, known))
 
-        activity = code.let("y", code.value(model.activity, known | new, {"f": activation}))
+        functions = {name: partial(activation, formula=tree) for name, tree in block.activation.functions.items()}
+        new: dict[str, Value] = {
+            name: code.let("n", code.value(tree, known, functions)) for name, tree in steps.items() if tree is not None
+        }
+        activity = code.let("y", code.value(model.activity, known | new, functions))
         ends = {q.name: q.each_episode for q in model.state}
         if self.network.episode is not None and any(tree is not None for tree in ends.values()):
             new = {name: code.variable("e", new.get(name, cell)) for name, cell in cells.items()}

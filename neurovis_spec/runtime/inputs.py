@@ -13,12 +13,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.arrays import FloatArray
+from neurovis_spec.arrays import BoolArray, FloatArray
 from neurovis_spec.compiler.network import Input, Network, Noise
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
-from neurovis_spec.language.expressions.tree import Draw
+from neurovis_spec.language.expressions.tree import Draw, Tree
+from neurovis_spec.language.expressions.undefined import either, hazards
 from neurovis_spec.runtime.state import State, constants
 
 #: steps of a stretch, a power of two
@@ -36,14 +37,15 @@ class InputReader:
 
     ``supplied`` maps names to whole arrays that replace their sources: (steps, size), (steps,) for size 1, or one
     number or (size,) for all steps; past its end the last row stays. ``made`` is called with rows of inputs as
-    soon as they are computed: the first step, and a row for each step from there on. Raises InputError.
+    soon as they are computed: the first step, a row for each step from there on, and which of these numbers hide that
+    something is undefined in their formula (None: none does). Raises InputError.
     """
 
     def __init__(
         self,
         network: Network,
         supplied: Mapping[str, npt.ArrayLike] | None = None,
-        made: Callable[[int, FloatArray], None] | None = None,
+        made: Callable[[int, FloatArray, BoolArray | None], None] | None = None,
     ) -> None:
         self.network, self._told = network, made
         self._supplied = {name: _whole(_entry(network, name), value) for name, value in (supplied or {}).items()}
@@ -57,6 +59,13 @@ class InputReader:
         self._steps = 1 << (together.bit_length() - 1)  # a power of two, too: no rows are of two stretches
         #: the values of expressions over a stretch, by input, and where the stretch begins
         self._expressions: dict[str, tuple[int, FloatArray]] = {}
+        #: where something is undefined, as a formula, by the number of the input or of the noise
+        self._undefined: dict[int, Tree] = {}
+        self._undefined_noise: dict[int, Tree] = {}
+        if made is not None:
+            formulas = (None if entry.name in self._supplied else entry.expression for entry in network.inputs)
+            self._undefined = dict(_undefined(formulas))
+            self._undefined_noise = dict(_undefined(noise.expression for noise in network.noises))
 
     def use(self, state: State) -> None:
         """Take parameters as a state has them by now."""
@@ -100,11 +109,25 @@ class InputReader:
         for entry in self.network.inputs:
             rows[:, entry.start : entry.start + entry.size] = self._source(entry, steps)
         for noise in self.network.noises:
-            rows[:, noise.start : noise.start + len(noise.members)] = self._drawn(noise, steps)
+            rows[:, noise.start : noise.start + len(noise.members)] = self._drawn(noise, noise.expression, steps)
         rows.flags.writeable = False
         self._first, self._rows = first, rows
         if self._told is not None:
-            self._told(first, rows)
+            self._told(first, rows, self._hidden(steps))
+
+    def _hidden(self, steps: npt.NDArray[np.int64]) -> BoolArray | None:
+        """Of the numbers of some steps those that hide that something is undefined in their formula."""
+        if not self._undefined and not self._undefined_noise:
+            return None
+        hidden = np.zeros((len(steps), self.network.vector_size), dtype=np.bool_)
+        for number, tree in self._undefined.items():
+            entry = self.network.inputs[number]
+            values = np.broadcast_to(self._evaluated(entry, tree, steps), len(steps))
+            hidden[:, entry.start : entry.start + entry.size] = values.reshape(-1, 1) != 0
+        for number, tree in self._undefined_noise.items():
+            noise = self.network.noises[number]
+            hidden[:, noise.start : noise.start + len(noise.members)] = np.not_equal(self._drawn(noise, tree, steps), 0)
+        return hidden
 
     def _source(self, entry: Input, steps: npt.NDArray[np.int64]) -> FloatArray | float:
         table = self._supplied.get(entry.name, self._table(entry))
@@ -117,17 +140,17 @@ class InputReader:
         begin = int(steps[0]) - within
         kept = self._expressions.get(entry.name)
         if kept is None or kept[0] != begin:
-            kept = self._expressions[entry.name] = begin, self._evaluated(entry, begin)
+            stretch = np.arange(begin, begin + STRETCH)
+            values = np.broadcast_to(self._evaluated(entry, entry.expression, stretch), (STRETCH,))
+            kept = self._expressions[entry.name] = begin, np.asarray(values, dtype=np.float64)
         return kept[1][within : within + len(steps)].reshape(-1, 1)
 
-    def _evaluated(self, entry: Input, begin: int) -> FloatArray:
-        """An expression over the stretch that begins here: (steps,)."""
-        assert entry.expression is not None
-        k = np.arange(begin, begin + STRETCH).astype(np.float64)
-        dt = self.network.dt
+    def _evaluated(self, entry: Input, tree: Tree, steps: npt.NDArray[np.int64]) -> FloatArray | float:
+        """A formula of an input over these steps."""
+        k, dt = steps.astype(np.float64), self.network.dt
         known: dict[str, float | FloatArray] = {**constants(dt), **self.network.parameters, "k": k, "t": k * dt}
         known |= self._set(entry.slots)
-        return np.asarray(np.broadcast_to(evaluate_array(entry.expression, known), (STRETCH,)), dtype=np.float64)
+        return evaluate_array(tree, known)
 
     def _set(self, slots: Mapping[str, int]) -> dict[str, float]:
         """The parameters of an expression that can be set, as they are by now."""
@@ -141,8 +164,8 @@ class InputReader:
         start, size = self.network.settable.variables[f"table/{number}"]
         return np.broadcast_to(self._variables[start : start + size], (entry.table.size,)).reshape(entry.table.shape)
 
-    def _drawn(self, noise: Noise, steps: npt.NDArray[np.int64]) -> FloatArray | float:
-        """The noise of a stretch of steps: the counter of a number is (i, 0, step, number of the draw)."""
+    def _drawn(self, noise: Noise, tree: Tree, steps: npt.NDArray[np.int64]) -> FloatArray | float:
+        """A formula of a noise over a stretch of steps: the counter of a number is (i, 0, step, number of the draw)."""
         stream = Stream(self.network.seed, "noise", noise.name)
         n = len(noise.members)
         i, step = np.arange(n).reshape(1, -1), steps.reshape(-1, 1)
@@ -155,7 +178,15 @@ class InputReader:
         def draw(node: Draw, first: float | FloatArray, second: float | FloatArray) -> FloatArray:
             return stream.drawn(node.kind, first, second, i, 0, step, node.index)
 
-        return evaluate_array(noise.expression, known, draw)
+        return evaluate_array(tree, known, draw)
+
+
+def _undefined(formulas: Iterable[Tree | None]) -> Iterator[tuple[int, Tree]]:
+    """Where something is undefined in formulas, and hidden, each with the number of the formula."""
+    for number, tree in enumerate(formulas):
+        found = [] if tree is None else hazards(tree).found
+        if found:
+            yield number, either(hazard.formula for hazard in found)
 
 
 def check_names(network: Network, names: Iterable[str]) -> None:

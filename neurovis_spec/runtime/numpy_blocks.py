@@ -118,11 +118,14 @@ def emit_update(code: Code, network: Network, operation: Update, drive: str) -> 
     block, number = network.blocks[operation.block], operation.block
     model = block.model
     own = code.parameters(f"model/{number}", block.model_parameters) | {"drive": drive}
-    functions = {"f": lambda argument: _activation(code, number, block, argument)}
+    functions = {
+        name: lambda argument, value=value: _activation(code, number, block, value, argument)
+        for name, value in block.activation.functions.items()
+    }
     old = {q.name: code.let("v", f"cells[{number}][{i}]") for i, q in enumerate(model.state)}
     known = emit_let(code, model.let, own | old, [q.each_step for q in model.state] + [model.activity])
     steps = {q.name: q.each_step for q in model.state}
-    new = {name: code.fresh("n", tree, known) for name, tree in steps.items() if tree is not None}
+    new = {name: code.fresh("n", tree, known, functions) for name, tree in steps.items() if tree is not None}
     activity = code.let("y", code.expression(model.activity, known | new, functions))
     _take_initial(code, network, block, activity, {old[name]: value for name, value in new.items()})
     for name, value in new.items():
@@ -175,12 +178,10 @@ def emit_let(
     return known
 
 
-def _activation(code: Code, number: int, block: Block, argument: str) -> str:
-    """f of an argument, which gets an identifier of its own so that it is computed once."""
+def _activation(code: Code, number: int, block: Block, value: Tree, argument: str) -> str:
+    """A function of an activation of an argument, which gets an identifier of its own so that it is computed once."""
     x = argument if argument.isidentifier() else code.let("x", argument)
-    return code.expression(
-        block.activation.value, code.parameters(f"activation/{number}", block.activation_parameters) | {"x": x}
-    )
+    return code.expression(value, code.parameters(f"activation/{number}", block.activation_parameters) | {"x": x})
 
 
 def emit_send(code: Code, network: Network, layout: SignalLayout) -> None:

@@ -7,7 +7,8 @@ right: every other backend is tested against it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
@@ -17,6 +18,8 @@ from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.backend import Availability, Capabilities
 from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.state import State, constants
+
+_NONE: Mapping[str, Callable[..., float]] = MappingProxyType({})
 
 
 class ReferenceBackend:
@@ -116,10 +119,13 @@ class ReferenceStepper:
         own["drive"] = drive
         shape = self.clock(state)
         shape |= self.numbers(f"activation/{number}", block.activation_parameters, position, state)
-        functions = {"f": lambda x: evaluate(block.activation.value, shape | {"x": x})}
+        functions = {
+            name: lambda x, value=value: evaluate(value, shape | {"x": x})
+            for name, value in block.activation.functions.items()
+        }
         old = {quantity.name: float(cells[i][position]) for i, quantity in enumerate(model.state)}
         known = with_let(own | old, model.let)
-        new = changed(old, {q.name: q.each_step for q in model.state}, known)
+        new = changed(old, {q.name: q.each_step for q in model.state}, known, functions)
         activity = evaluate(model.activity, known | new, functions)
         if self.ends_episode(state):
             known = with_let(own | new, model.let)
@@ -219,6 +225,14 @@ def with_let(known: dict[str, float], let: tuple[tuple[str, Tree], ...]) -> dict
     return known
 
 
-def changed(old: dict[str, float], trees: dict[str, Tree | None], known: dict[str, float]) -> dict[str, float]:
+def changed(
+    old: dict[str, float],
+    trees: dict[str, Tree | None],
+    known: dict[str, float],
+    functions: Mapping[str, Callable[..., float]] = _NONE,
+) -> dict[str, float]:
     """New values, all from ``known``; what has no expression stays."""
-    return {name: value if (tree := trees[name]) is None else evaluate(tree, known) for name, value in old.items()}
+    return {
+        name: value if (tree := trees[name]) is None else evaluate(tree, known, functions)
+        for name, value in old.items()
+    }

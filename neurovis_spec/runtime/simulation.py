@@ -71,8 +71,7 @@ class Simulation:
         self._stepper, self._watch = prepare(network, backend), Watch(network)
         self._body = embodied(network) if body is None else body
         self._given = frozenset(inputs or ())
-        told = None if self._body is not None else lambda first, rows: self._watch.given(first, rows)
-        self._reader = InputReader(network, inputs, told)
+        self._reader = InputReader(network, inputs, None if self._body is not None else self._watch.given)
         self._controls = Controls(network)
         self._begin = initial_state(network) if start is None else resumed_state(network, start)
         self._apply(self._begin)
@@ -243,6 +242,7 @@ class Simulation:
         vector = self._reader.at(state.k, given)
         if body is not None:
             vector = body.sense(vector, self._given.union(given))
+        if body is not None or given:
             self._watch.given_at(state.k, vector)
         recorder = self._recorder if self._recorder is not None and self._recorder.going else None
         if recorder is not None:
@@ -348,7 +348,7 @@ class Simulation:
     def reset(self) -> None:
         """Back to the beginning, with the parameters of the beginning. Raises RecordingError where it is recorded."""
         self._check_recorded(self._begin)
-        self._watch = Watch(self.network)
+        self._watch.warned = False
         self._state = self._begin.copy()
         self._reader.use(self._state)
         if self._body is not None:

@@ -13,15 +13,16 @@ from math import isfinite
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray
+from neurovis_spec.arrays import BoolArray, FloatArray
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Check
 from neurovis_spec.runtime.state import State
 
 #: Numbers of one product. More of them BLAS shares among threads, which takes a thousand times as long as the product
 #: where the processors have other work to do.
 _PIECE = 8192
-#: No step.
-_NEVER = -1
+#: What is said of an undefined operation that no number shows.
+_HIDDEN = "which the rest of the formula hides"
 
 
 class Watch:
@@ -29,33 +30,35 @@ class Watch:
 
     def __init__(self, network: Network) -> None:
         self._network = network
-        #: the first of the steps to come whose inputs are not all finite, and these inputs
-        self._step = _NEVER
-        self._vector: FloatArray = np.zeros(0)
+        #: the inputs of those steps to come at which something is wrong, and which of them hide it
+        self._odd: dict[int, tuple[FloatArray, BoolArray | None]] = {}
         self.warned = False
 
-    def given(self, first: int, vectors: FloatArray) -> None:
-        """Take the inputs of the steps from ``first`` on, a row a step; ``look`` warns of them at their step."""
-        self._step = _NEVER
-        wrong = np.flatnonzero(~np.isfinite(vectors).all(axis=1))
-        if len(wrong):
-            self._step, self._vector = first + int(wrong[0]), vectors[wrong[0]]
+    def given(self, first: int, vectors: FloatArray, hidden: BoolArray | None = None) -> None:
+        """Take the inputs of the steps from ``first`` on, a row a step; ``look`` warns of them at their step.
+        ``hidden`` are those in whose formulas something is undefined that their numbers do not show."""
+        wrong = ~np.isfinite(vectors).all(axis=1)
+        if hidden is not None:
+            wrong |= hidden.any(axis=1)
+        rows = np.flatnonzero(wrong).tolist()
+        self._odd = {first + row: (vectors[row], None if hidden is None else hidden[row]) for row in rows}
 
     def given_at(self, k: int, vector: FloatArray) -> None:
         """Take the inputs of step k alone, where they are known only then."""
+        self._odd.pop(k, None)
         if not all_finite([vector]):
-            self.given(k, vector[None])
+            self._odd[k] = vector, None
 
     def until(self, k: int, stop: int) -> int:
         """How far steps from k on may be made, ``stop`` at most, before one must be checked: one behind the first
         whose inputs are not finite."""
-        return self._step + 1 if not self.warned and k <= self._step < stop else stop
+        return stop if self.warned else min((step + 1 for step in self._odd if k <= step < stop), default=stop)
 
     def look(self, state: State) -> None:
         """Warn if something of the step just made is NaN or infinite."""
         if self.warned:
             return
-        if all_finite(carried_by(self._network, state)) and state.k - 1 != self._step:
+        if all_finite(carried_by(self._network, state)) and state.k - 1 not in self._odd:
             return
         message = next(self._found(state), None)
         if message is not None:
@@ -74,15 +77,23 @@ class Watch:
             for quantity, values in zip(block.model.state, cells, strict=True):
                 for index in _wrong(values):
                     name = names[block.members[index]]
-                    yield f"the state '{quantity.name}' of {name} is {values[index]} at step {step}"
+                    if isinstance(quantity, Check):
+                        yield f"{quantity.name} for {name} at step {step}, {_HIDDEN}"
+                    else:
+                        yield f"the state '{quantity.name}' of {name} is {values[index]} at step {step}"
         for plasticity, traces in zip(network.plasticity, state.traces, strict=True):
             for quantity, values in zip(plasticity.rule.state, traces, strict=True):
                 for index in _wrong(values):
                     name = network.connection_names[plasticity.members[index]]
-                    yield f"the state '{quantity.name}' of {name} is {values[index]} after step {step}"
-        if step == self._step:
-            for index in _wrong(self._vector):
-                yield f"the {self._called(index)} is {self._vector[index]} at step {step}"
+                    if isinstance(quantity, Check):
+                        yield f"{quantity.name} for {name} after step {step}, {_HIDDEN}"
+                    else:
+                        yield f"the state '{quantity.name}' of {name} is {values[index]} after step {step}"
+        vector, hidden = self._odd.get(step, (np.zeros(0), None))
+        for index in _wrong(vector):
+            yield f"the {self._called(index)} is {vector[index]} at step {step}"
+        for index in () if hidden is None else np.flatnonzero(hidden).tolist():
+            yield f"the {self._called(index)} has an undefined operation at step {step}, {_HIDDEN}"
 
     def _called(self, index: int) -> str:
         """What a number of the vector of all inputs is: whose noise, or whose input by its name."""
