@@ -112,6 +112,7 @@ def test_what_is_undefined_and_hidden_is_told_once(parts: dict[str, str], messag
         {"model": 'activity: "clip(exp(1000*drive), 0, 1)"'},
         {"model": 'activity: "tanh(drive/s) + clip(drive % 3, 0, 1) + exp(-drive^2)"'},
         {"rule": 'weight: {each_step: "weight + (min(1/pre, 0.01) if pre > 0 else 0)"}'},
+        {"model": 'activity: "tanh(1/drive)"', "more": "events: [{at: 3, lesion: [A, A -> B]}]"},
     ],
 )
 def test_what_is_not_computed_and_what_only_overflows_is_not_told(parts: dict[str, str], backend: str) -> None:

@@ -67,7 +67,7 @@ class Watch:
 
     def _found(self, state: State) -> Iterator[str]:
         """What is not finite: what shows it best comes first."""
-        step, network = state.k - 1, self._network
+        step, network, lesioned = state.k - 1, self._network, state.conditions.lesioned_neurons
         names = network.neurons.names
         for index in _wrong(state.activity):
             yield f"the activity of {names[index]} is {state.activity[index]} at step {step}"
@@ -77,10 +77,10 @@ class Watch:
             for quantity, values in zip(block.model.state, cells, strict=True):
                 for index in _wrong(values):
                     name = names[block.members[index]]
-                    if isinstance(quantity, Check):
-                        yield f"{quantity.name} for {name} at step {step}, {_HIDDEN}"
-                    else:
+                    if not isinstance(quantity, Check):
                         yield f"the state '{quantity.name}' of {name} is {values[index]} at step {step}"
+                    elif not lesioned[block.members[index]]:  # what a lesioned neuron computes is for nobody
+                        yield f"{quantity.name} for {name} at step {step}, {_HIDDEN}"
         for plasticity, traces in zip(network.plasticity, state.traces, strict=True):
             for quantity, values in zip(plasticity.rule.state, traces, strict=True):
                 for index in _wrong(values):
