@@ -7,8 +7,7 @@ from pathlib import Path
 import click
 
 from neurovis_spec.cli.completion import paths
-from neurovis_spec.cli.files import network_of, recording_of
-from neurovis_spec.cli.folders import folder_option, write_folder
+from neurovis_spec.cli.files import folder_option, network_of, recording_of, write_folder
 from neurovis_spec.cli.options import examples, set_option, spec_argument
 
 

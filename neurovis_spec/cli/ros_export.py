@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from neurovis_spec.cli.failure import fault
-from neurovis_spec.cli.files import network_of
-from neurovis_spec.cli.folders import folder_option, write_folder
+from neurovis_spec.cli.files import folder_option, network_of, write_folder
 from neurovis_spec.cli.options import examples, set_option, spec_argument
 
 if TYPE_CHECKING:

@@ -19,8 +19,8 @@ from neurovis_spec.compiler.body_settings import BodySettings, Moved, Sensed
 from neurovis_spec.compiler.events.settable import places_of
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.names.references import key_of, known_inputs
+from neurovis_spec.compiler.names.scope import Surroundings
 from neurovis_spec.compiler.network import Output
-from neurovis_spec.compiler.surroundings import Surroundings
 from neurovis_spec.compiler.values.constants import ALWAYS, Constants, is_constant, parse_formula
 from neurovis_spec.compiler.values.constants import Scope as Together
 from neurovis_spec.diagnostics import Findings, Span, shorten, suggest

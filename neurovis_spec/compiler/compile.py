@@ -31,7 +31,7 @@ from neurovis_spec.compiler.names.finder import Finder, finder_of
 from neurovis_spec.compiler.names.modules import library_of
 from neurovis_spec.compiler.names.outputs import make_outputs
 from neurovis_spec.compiler.names.references import other_parameter
-from neurovis_spec.compiler.names.scope import Scope
+from neurovis_spec.compiler.names.scope import Scope, Surroundings
 from neurovis_spec.compiler.names.state_references import singles
 from neurovis_spec.compiler.network import Input, Instance, Network, Output
 from neurovis_spec.compiler.neurons.noise import make_noises
@@ -169,7 +169,6 @@ def _ros(
     if spec.ros is None:
         return RosSettings(rate=1 / constants.dt)
     from neurovis_spec.compiler.ros import ros_settings
-    from neurovis_spec.compiler.surroundings import Surroundings
 
     return ros_settings(spec.ros, Surroundings(spec, root, inputs, outputs), constants)
 
@@ -189,7 +188,6 @@ def _body(
     if spec.body is None and isinstance(request.body, bool):
         return None
     from neurovis_spec.compiler.body import Place, body_settings
-    from neurovis_spec.compiler.surroundings import Surroundings
 
     around, made = Surroundings(spec, root, inputs, outputs), None
     if spec.body is not None:  # where it is not wanted it is not opened, but it reads parameters all the same
@@ -197,7 +195,7 @@ def _body(
         made = body_settings(spec.body, around, constants, place, dt_known=dt_known)
     if not isinstance(request.body, Path):
         return made if request.body else None
-    from neurovis_spec.language.body_file import read_body
+    from neurovis_spec.language.shape import read_body
 
     other, folder = read_body(request.body, constants.findings), request.body.parent
     if other is None:

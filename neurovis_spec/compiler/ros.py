@@ -12,6 +12,7 @@ from typing import Final, Literal, cast
 
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.names.references import key_of, known_inputs
+from neurovis_spec.compiler.names.scope import Surroundings
 from neurovis_spec.compiler.network import Input
 from neurovis_spec.compiler.ros_settings import (
     MOST_WAITING,
@@ -21,7 +22,6 @@ from neurovis_spec.compiler.ros_settings import (
     Subscription,
     absolute,
 )
-from neurovis_spec.compiler.surroundings import Surroundings
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, shorten, suggest
 from neurovis_spec.language.located import Formula

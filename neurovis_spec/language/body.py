@@ -96,3 +96,9 @@ class BodyModel(Model):
         ):
             message = "which body? its kind is missing"
             findings.error("missing-key", opening(data), message, f"give it one of {', '.join(kinds)}")
+
+
+class BodyFile(Model):
+    """A file with a body, which takes the place of that of a spec."""
+
+    body: BodyModel = Field(description="The body.")

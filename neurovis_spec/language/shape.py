@@ -7,15 +7,18 @@ that the compiler can look at the rest; None where nothing can be said, as in an
 from __future__ import annotations
 
 from contextlib import suppress
+from pathlib import Path
 from typing import TypeVar
 
 from pydantic import ValidationError
 
 from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.body import BodyFile, BodyModel
 from neurovis_spec.language.library import Library
 from neurovis_spec.language.located import REPORTED
 from neurovis_spec.language.model import Model, opening
 from neurovis_spec.language.spec import IncludedModel, Spec
+from neurovis_spec.language.yaml.reader import read_file
 from neurovis_spec.language.yaml.source import Mapping, SourceDocument
 
 M = TypeVar("M", bound=Model)
@@ -66,3 +69,20 @@ def read_included(document: SourceDocument, findings: Findings) -> IncludedModel
 def read_library(document: SourceDocument, findings: Findings) -> Library | None:
     """The definitions of a library file."""
     return read_shape(document, Library, findings)
+
+
+def read_body(path: Path, findings: Findings) -> BodyModel | None:
+    """The ``body`` section of a file, whatever else it holds: it may be another spec. What is invalid in it is
+    reported; None where that is too much."""
+    findings.files.add(path.resolve())
+    document = read_file(path, str(path), findings)
+    if document is None:
+        return None
+    entry = document.root.entry("body")
+    if entry is None:
+        where = opening(document.root)
+        findings.error("missing-key", where, "the file names no body", "write body: {mujoco: FILE, …}")
+        return None
+    alone = SourceDocument(document.file, Mapping((entry,), document.root.span))
+    found = read_shape(alone, BodyFile, findings)
+    return None if found is None else found.body

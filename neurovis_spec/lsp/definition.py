@@ -1,8 +1,8 @@
-"""Where something is declared.
+"""Where something is declared, and where it is used.
 
 In: a Document and a place in it. Out: the file and the span of the declaration: a group for ``K3`` or ``left1.K3``, a
 parameter for its name in an expression, a definition or a module here or in an included file, the YAML of a built-in, a
-file that is named.
+file that is named; and every place that leads to it, in the document and in the files that share it.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.names import Name
 from neurovis_spec.lsp.outline import Item, outline
 from neurovis_spec.lsp.outline import Path as Keys
+from neurovis_spec.lsp.rename import sharing
 from neurovis_spec.lsp.scopes import SECTIONS
 from neurovis_spec.lsp.text import Place
 
@@ -43,6 +44,17 @@ def definition(document: Document, place: Place) -> Location | None:
         span = found.declaration.span
         return Location(None if span.file == document.file else Path(span.file), span)
     return _shipped(name)
+
+
+def references(document: Document, place: Place, *, declaration: bool = True) -> tuple[Span, ...]:
+    """The places that lead to what stands at a place, with that of the ``declaration`` if it is wanted; none where
+    nothing is declared there. ``K3`` and ``left1.K`` are uses of the group ``K``."""
+    name = document.name_at(place)
+    found = None if name is None else document.index.find(name)
+    if found is None:
+        return ()
+    uses = (use for index in sharing(document, found.declaration) for use in index.uses(found.declaration))
+    return tuple(dict.fromkeys(span for name, span in uses if declaration or not name.declares))
 
 
 def _file(document: Document, item: Item) -> Location | None:

@@ -19,15 +19,15 @@ from pygls.exceptions import JsonRpcInvalidParams
 from pygls.lsp.server import LanguageServer
 from pygls.uris import from_fs_path, to_fs_path
 
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.format.canonical import format_text
 from neurovis_spec.lsp import protocol as wire
 from neurovis_spec.lsp.check import Checked, check, stumbled
 from neurovis_spec.lsp.completion import complete
-from neurovis_spec.lsp.definition import definition
+from neurovis_spec.lsp.definition import definition, references
 from neurovis_spec.lsp.document import Document
-from neurovis_spec.lsp.formatting import formatting
 from neurovis_spec.lsp.hover import hover
-from neurovis_spec.lsp.references import references
-from neurovis_spec.lsp.rename import RenameError, prepare, rename
+from neurovis_spec.lsp.rename import Edit, RenameError, prepare, rename
 from neurovis_spec.lsp.symbols import symbols
 from neurovis_spec.lsp.text import Text
 from neurovis_spec.lsp.workspace import Desk
@@ -294,7 +294,10 @@ def _edit(server: SpecServer) -> None:
     @server.feature(types.TEXT_DOCUMENT_FORMATTING)
     def on_formatting(params: types.DocumentFormattingParams) -> list[types.TextEdit]:
         document = server.document(params.text_document.uri)
-        return wire.text_edits(document.text, formatting(document))
+        text = document.text
+        written = format_text(text.text, document.file, Findings())
+        whole = text.span(document.file, 0, len(text.text))
+        return wire.text_edits(text, [] if written in (None, text.text) else [Edit(whole, written)])
 
 
 def serve() -> None:

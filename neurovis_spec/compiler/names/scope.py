@@ -1,4 +1,4 @@
-"""A scope: the spec itself or an instance of a module, with what the names in it mean.
+"""A scope: the spec itself or an instance of a module, with what the names in it mean; what its last sections may name.
 
 In: nothing; these are the values that ``expand`` makes and that everything which resolves a name reads.
 """
@@ -10,10 +10,11 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from neurovis_spec.compiler.names.references import Section
-from neurovis_spec.compiler.network import Input
+from neurovis_spec.compiler.network import Input, Output
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.definitions import Definitions
+from neurovis_spec.language.spec import Spec
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 
 
@@ -67,3 +68,13 @@ class Expansion(NamedTuple):
             for name, used in scope.settings.items():
                 if name in scope.constants.structural:
                     self.scopes[scope.parent].constants.depend(used)
+
+
+class Surroundings(NamedTuple):
+    """What the sections may name that say how a network meets the world, ``body`` and ``ros``: the inputs of the
+    network, or of the spec itself, and its outputs."""
+
+    spec: Spec
+    scope: Scope
+    inputs: tuple[Input, ...]
+    outputs: tuple[Output, ...]
