@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from small_specs import HEAD, codes, compiled
 
 import neurovis_spec as nv
-from neurovis_spec.compiler.connections.patterns import least_pairs
+from neurovis_spec.compiler.connections.patterns import RECIPES
 
 GROUPS = "parameters: {size: 10000}\nneurons: {A: {count: size, bias: 1}, B: {count: size, bias: 1}}\n"
 
@@ -90,5 +90,5 @@ def test_no_pattern_makes_fewer_than_are_counted(n: int, m: int, what: str, size
             network = compiled(f"{text}connections: {{A -> B: {{pattern: {written}}}}}\n").network
         except nv.SpecError:
             continue
-        assert least_pairs(name, n, m, settings) <= len(network.connections) + (name == "chain")
+        assert RECIPES[name].least(n, m, settings) <= len(network.connections) + (name == "chain")
         assert np.all(network.connections.sources < n)

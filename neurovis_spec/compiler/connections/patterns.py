@@ -7,7 +7,7 @@ the ends, row by row.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.values.arguments import check_settings
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.draws import Stream
-from neurovis_spec.diagnostics import Findings, Span, meant, shorten, suggest
+from neurovis_spec.diagnostics import Findings, meant, shorten, suggest
 from neurovis_spec.language.keys import settings_of
 from neurovis_spec.language.located import Formula, formula_of
 from neurovis_spec.language.patterns import PATTERNS
@@ -55,11 +55,96 @@ def random(ends: Ends, probability: float, stream: Stream) -> Pairs:
     return ends.pairs(*stream.random_pairs(len(ends.sources), len(ends.targets), probability))
 
 
-_FIXED: Mapping[str, Callable[[Ends], Pairs]] = {
-    "all_to_all": all_to_all,
-    "one_to_one": one_to_one,
-    "chain": chain,
-    "ring": ring,
+#: The settings of a pattern.
+Values: TypeAlias = Mapping[str, float]
+
+
+class _Misfit(NamedTuple):
+    """Why a pattern cannot be made between two ends: one of its settings, or (None) the pattern as such."""
+
+    message: str
+    setting: str | None = None
+    code: str = "out-of-range"
+    hint: str | None = None
+
+
+class _Recipe(NamedTuple):
+    """How a pattern is made: at ``least`` how many pairs it has of n sources and m targets (some of which may connect a
+    neuron to itself), the pairs themselves, whether its settings fit the ends, and whether these are ``equal`` in
+    size."""
+
+    least: Callable[[int, int, Values], int]
+    make: Callable[[Ends, Values, Stream], Pairs]
+    misfit: Callable[[Ends, Values], _Misfit | None] = lambda ends, values: None
+    equal: bool = False
+
+
+def _least_random(n: int, m: int, values: Values) -> int:
+    """In one case in a million there are fewer; once made, the pairs are counted again."""
+    probability = values["probability"]
+    return max(0, int(n * m * probability - 5 * (n * m * probability * (1 - probability)) ** 0.5))
+
+
+def _count_misfit(ends: Ends, values: Values, of: str, others: str) -> _Misfit | None:
+    """Each of the sources wants as many others as ``count`` says."""
+    count, there = int(values["count"]), len(ends.targets) - bool((ends.excluded() >= 0).any())
+    if count <= there:
+        return None
+    itself = " but itself" if there < len(ends.targets) else ""
+    return _Misfit(f"a count of {count} where a {of} has {plural(there, others)}{itself}", "count")
+
+
+def _nearest_misfit(ends: Ends, values: Values) -> _Misfit | None:
+    """All neurons have a position, or none."""
+    places = np.concatenate((ends.source_places, ends.target_places))
+    known = np.isfinite(places).all(axis=1)
+    if known.all() or not known.any():
+        return _count_misfit(ends, values, "source", "target")
+    message = "'nearest' goes by position, and some neurons of these ends have none"
+    return _Misfit(message, None, "no-position", "give all of them a 'position', or none")
+
+
+def _degree_misfit(ends: Ends, values: Values) -> _Misfit | None:
+    degree, others = int(values["degree"]), len(ends.sources) - 1
+    message = f"a degree of {degree} where each has {plural(others, 'neighbour')}"
+    return _Misfit(message, "degree") if degree > others else None
+
+
+def _width(n: int, m: int, values: Values) -> int:
+    return min(int(values["width"]), max(n, m))
+
+
+RECIPES: Final[Mapping[str, _Recipe]] = {
+    "all_to_all": _Recipe(lambda n, m, values: n * m, lambda ends, values, stream: all_to_all(ends)),
+    "one_to_one": _Recipe(lambda n, m, values: n, lambda ends, values, stream: one_to_one(ends), equal=True),
+    "chain": _Recipe(lambda n, m, values: n, lambda ends, values, stream: chain(ends), equal=True),
+    "ring": _Recipe(lambda n, m, values: n, lambda ends, values, stream: ring(ends), equal=True),
+    "random": _Recipe(_least_random, lambda ends, values, stream: random(ends, values["probability"], stream)),
+    "fixed_indegree": _Recipe(
+        lambda n, m, values: int(values["count"]) * m,
+        lambda ends, values, stream: fixed_indegree(ends, int(values["count"]), stream),
+        lambda ends, values: _count_misfit(ends.reversed(), values, "target", "source"),
+    ),
+    "fixed_outdegree": _Recipe(
+        lambda n, m, values: int(values["count"]) * n,
+        lambda ends, values, stream: fixed_outdegree(ends, int(values["count"]), stream),
+        lambda ends, values: _count_misfit(ends, values, "source", "target"),
+    ),
+    "nearest": _Recipe(
+        lambda n, m, values: int(values["count"]) * n,
+        lambda ends, values, stream: nearest(ends, int(values["count"])),
+        _nearest_misfit,
+    ),
+    "small_world": _Recipe(
+        lambda n, m, values: int(values["degree"]) * n,
+        lambda ends, values, stream: small_world(ends, int(values["degree"]), values["rewire"], stream),
+        _degree_misfit,
+        equal=True,
+    ),
+    "band": _Recipe(
+        lambda n, m, values: max(0, in_band(n, m, _width(n, m, values)) - min(n, m)),
+        lambda ends, values, stream: band(ends, _width(len(ends.sources), len(ends.targets), values)),
+    ),
 }
 
 
@@ -80,42 +165,24 @@ def pairs_of(
     if name is None:
         check_settings(choice, constants)
         return None
-    settings = _settings(name, choice, findings)
-    sized = _Sized(name, span, settings, constants)
-    values = sized.values()
+    recipe, formulas = RECIPES[name], _settings(name, choice, findings)
+    found = {setting: _value(name, setting, formula, constants) for setting, formula in formulas.items()}
+    values = {setting: value for setting, value in found.items() if value is not UNKNOWN}
     if ends is None:
         return None
     n, m = len(ends.sources), len(ends.targets)
-    if n != m and ((name in _FIXED and name != "all_to_all") or name == "small_world"):
+    if n != m and recipe.equal:
         message = f"'{name}' needs ends of equal size; these have {n} and {m} neurons"
         findings.error("wrong-size", span, message)
         return None
     if len(values) < len(PATTERNS[name].settings) or name != written:
         return None
-    if name in _FIXED:
-        return _FIXED[name](ends) if fits(least_pairs(name, n, m, {})) else None
-    return sized.pairs(values, ends, stream, fits)
-
-
-def least_pairs(name: str, n: int, m: int, values: Mapping[str, float]) -> int:
-    """A lower bound (but for one case in a million) of the pairs that a pattern makes of n sources and m targets.
-    It may include a neuron's connections to itself. 0 where the settings do not fit such ends."""
-    if name in _FIXED:
-        return n * m if name == "all_to_all" else n
-    if name not in PATTERNS or not PATTERNS[name].settings.keys() <= values.keys():
-        return 0
-    if name == "random":
-        probability = values["probability"]
-        if not 0 < probability <= 1:
-            return 0
-        # there are fewer in one case in a million; once made, the pairs are counted again
-        return max(0, int(n * m * probability - 5 * (n * m * probability * (1 - probability)) ** 0.5))
-    if name == "band":
-        return max(0, in_band(n, m, min(int(values["width"]), max(n, m))) - min(n, m))
-    each, ends, others = (values["count"], n, m) if name != "small_world" else (values["degree"], n, n)
-    if name == "fixed_indegree":
-        ends, others = m, n
-    return int(each) * ends if each <= others else 0
+    misfit = recipe.misfit(ends, values)
+    if misfit is not None:
+        place = span if misfit.setting is None else formulas[misfit.setting].span
+        findings.error(misfit.code, place, misfit.message, misfit.hint)
+        return None
+    return recipe.make(ends, values, stream) if fits(recipe.least(n, m, values)) else None
 
 
 def is_drawn(choice: Choice, constants: Constants) -> bool:
@@ -137,76 +204,17 @@ def _settings(name: str, choice: Choice, findings: Findings) -> dict[str, Formul
     return {setting: formula for setting, formula in formulas.items() if formula is not None}
 
 
-@dataclass(frozen=True)
-class _Sized:
-    """A pattern with settings, which are checked before anything is made."""
-
-    name: str
-    span: Span
-    settings: Mapping[str, Formula]
-    constants: Constants
-
-    def values(self) -> dict[str, float]:
-        """What the settings are, without those invalid."""
-        found = {setting: self._value(setting, formula) for setting, formula in self.settings.items()}
-        return {setting: value for setting, value in found.items() if value is not UNKNOWN}
-
-    def _value(self, setting: str, formula: Formula) -> float | Unknown:
-        least = PATTERNS[self.name].settings[setting].least
-        if least is not None:
-            value = self.constants.integer(formula, f"a {setting}", least)
-            if setting != "degree" or value is UNKNOWN or not value % 2:
-                return value
-            self._too_many("degree", f"a degree is even, half of it on each side of the ring; this is {value}")
-            return UNKNOWN
-        share = self.constants.scalar(formula, structural=True)
-        if share is UNKNOWN or 0 <= share <= 1:
-            return share
-        self._too_many(setting, f"a probability lies between 0 and 1, this is {share:g}")
-        return UNKNOWN
-
-    def _too_many(self, setting: str, message: str) -> None:
-        self.constants.findings.error("out-of-range", self.settings[setting].span, message)
-
-    def pairs(
-        self, values: Mapping[str, float], ends: Ends, stream: Stream, fits: Callable[[int], bool]
-    ) -> Pairs | None:
-        """The pairs; None, and a finding, where the settings do not fit the ends."""
-        n, m = len(ends.sources), len(ends.targets)
-        least = least_pairs(self.name, n, m, values)
-        if self.name == "random":
-            return random(ends, values["probability"], stream) if fits(least) else None
-        if self.name == "band":
-            return band(ends, min(int(values["width"]), max(n, m))) if fits(least) else None
-        if self.name == "small_world":
-            degree = int(values["degree"])
-            if degree > n - 1:
-                self._too_many("degree", f"a degree of {degree} where each has {plural(n - 1, 'neighbour')}")
-                return None
-            return small_world(ends, degree, values["rewire"], stream) if fits(least) else None
-        return self._counted(int(values["count"]), ends, stream, fits)
-
-    def _counted(self, count: int, ends: Ends, stream: Stream, fits: Callable[[int], bool]) -> Pairs | None:
-        by_target = self.name == "fixed_indegree"
-        turned = ends.reversed() if by_target else ends
-        there = len(turned.targets) - bool((turned.excluded() >= 0).any())
-        if count > there:
-            from_, to = ("target", "source") if by_target else ("source", "target")
-            itself = " but itself" if there < len(turned.targets) else ""
-            self._too_many("count", f"a count of {count} where a {from_} has {plural(there, to)}{itself}")
-            return None
-        if not fits(count * len(turned.sources)):
-            return None
-        if self.name == "nearest":
-            return nearest(ends, count) if self._placed(ends) else None
-        return (fixed_indegree if by_target else fixed_outdegree)(ends, count, stream)
-
-    def _placed(self, ends: Ends) -> bool:
-        """Whether all neurons have a position, or none; a finding where some have."""
-        places = np.concatenate((ends.source_places, ends.target_places))
-        known = np.isfinite(places).all(axis=1)
-        if known.all() or not known.any():
-            return True
-        message = "'nearest' goes by position, and some neurons of these ends have none"
-        self.constants.findings.error("no-position", self.span, message, "give all of them a 'position', or none")
-        return False
+def _value(name: str, setting: str, formula: Formula, constants: Constants) -> float | Unknown:
+    """What a setting is; UNKNOWN where it is invalid, which is reported."""
+    least = PATTERNS[name].settings[setting].least
+    if least is None:
+        value = constants.scalar(formula, structural=True)
+        message = "a probability lies between 0 and 1, this is {:g}"
+        valid = value is UNKNOWN or 0 <= value <= 1
+    else:
+        value = constants.integer(formula, f"a {setting}", least)
+        message = "a degree is even, half of it on each side of the ring; this is {}"
+        valid = value is UNKNOWN or setting != "degree" or not value % 2
+    if not valid:
+        constants.findings.error("out-of-range", formula.span, message.format(value))
+    return value if valid else UNKNOWN
