@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 
 import layout_conformance as suite
@@ -10,8 +11,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from neurovis_layouts.routing import route_cost
 from neurovis_layouts.routing.corners import corners, smooth
-from neurovis_layouts.routing.polylines import polylines
+from neurovis_layouts.routing.polylines import Polylines, close_segments, polylines
 from neurovis_layouts.routing.route_cost import Judge, Pen
 from neurovis_layouts.routing.simplify_routes import eased
 from neurovis_layouts.routing.walls import Frame
@@ -181,10 +183,10 @@ def test_no_coupling_runs_along_the_border_of_a_frame(inner: str, couplings: str
 def test_a_route_through_a_loop_is_led_around_it() -> None:
     """Though it does not wind."""
     through, loop = straight((-3.0, 0.0), (0.0, 0.0)), ((0.0, 0.0), (-1.05, -0.62), (-1.05, 0.62), (0.0, 0.0))
-    before = Judge([edge(0, 1)], [(-3.0, 0.0), (0.0, 0.0)], {0: through}, drawn=[loop])
+    before, drawn = Judge([edge(0, 1)], [(-3.0, 0.0), (0.0, 0.0)], {0: through}, drawn=[loop]), polylines([loop])
     assert before.through_loops() == {0}
     route = eased(before, {0})[0]
-    assert polylines([route]).crossed(before.a, before.b).tolist() == [0]
+    assert polylines([route]).crossed(drawn.a, drawn.b).tolist() == [0]
 
 
 @given(st.lists(routes(), min_size=1, max_size=5), st.lists(point, max_size=6), st.tuples(point, point))
@@ -431,3 +433,55 @@ def test_in_a_fan_of_many_each_stays_where_it_is() -> None:
     judge_of_all = Judge(edges, [(0, 0), (0, 8)], dict(enumerate(fan)))
     assert eased(judge_of_all, {0, 1, 2, 3}) == {}
     assert eased(Judge(edges[:2], [(0, 0), (0, 8)], dict(enumerate(fan[:2]))), {0, 1}).keys() == {1}
+
+
+@given(st.lists(routes(), min_size=2, max_size=5), st.data())
+@settings(deadline=None)
+def test_a_route_that_is_drawn_anew_is_known_as_if_it_had_been_there(drawn: list[Route], data: st.DataObject) -> None:
+    ends = sorted({end for route in drawn for end in (route[0], route[-1])})
+    edges = [edge(ends.index(route[0]), ends.index(route[-1])) for route in drawn]
+    judge = Judge(edges, ends, dict(enumerate(drawn[:-1])), drawn=drawn[-1:])
+    for k in range(len(drawn) - 1):
+        middle = data.draw(st.lists(point, max_size=2, unique=True))
+        judge.draw(k, kink(drawn[k][0], *middle, drawn[k][-1]))
+    anew = Judge(edges, ends, judge.routes, drawn=drawn[-1:])
+    for k in judge.routes:
+        assert Pen(judge, k).cost() == pytest.approx(Pen(anew, k).cost(), abs=1e-9)
+    assert (judge.winding(), judge.on_others(), judge.meeting()) == (anew.winding(), anew.on_others(), anew.meeting())
+
+
+def test_only_what_is_drawn_anew_is_measured_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    measured: list[int] = []
+
+    def counted(routes: Sequence[Route]) -> Polylines:
+        measured.append(len(routes))
+        return polylines(routes)
+
+    monkeypatch.setattr(route_cost, "polylines", counted)
+    centres: list[Point] = [(float(x), 4.0 * y) for x in range(20) for y in range(2)]
+    edges = [edge(2 * k, 2 * k + 1) for k in range(20)]
+    judge = Judge(edges, centres, {k: straight(centres[2 * k], centres[2 * k + 1]) for k in range(20)})
+    measured.clear()
+    for k in range(20):
+        judge.draw(k, kink(centres[2 * k], (k + 0.5, 2.0), centres[2 * k + 1]))
+    assert sum(measured) == 20
+
+
+@given(st.lists(st.tuples(point, point), max_size=8), st.lists(st.tuples(point, point), min_size=1, max_size=8))
+def test_segments_are_close_whose_rectangles_are(
+    ones: list[tuple[Point, Point]], others: list[tuple[Point, Point]]
+) -> None:
+    a, b = np.array(ones, dtype=np.float64).reshape(-1, 2, 2).transpose(1, 0, 2)
+    c, d = np.array(others, dtype=np.float64).reshape(-1, 2, 2).transpose(1, 0, 2)
+    i, j = close_segments(a, b, c, d, 0.5)
+    found = list(zip(i.tolist(), j.tolist(), strict=True))
+    assert found == [
+        (i, j)
+        for i, one in enumerate(ones)
+        for j, other in enumerate(others)
+        if all(
+            min(p[axis] for p in other) <= max(p[axis] for p in one) + 0.5
+            and max(p[axis] for p in other) >= min(p[axis] for p in one) - 0.5
+            for axis in (0, 1)
+        )
+    ]

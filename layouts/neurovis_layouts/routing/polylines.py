@@ -28,6 +28,8 @@ _ROW = 1 << 31
 #: Closer than this two lines are one to the eye; how far apart points are that are checked for that, what disc and
 #: arrowhead hide, what share of a line may run on another, and how far.
 _CLOSE, _FINE, _DISC, _SHARE, _RUN = 0.12, 0.1, 0.4, 0.2, 0.4
+#: What is farther apart than this on any axis need not be measured to be told farther apart than ``_CLOSE``.
+_NEAR = 0.13
 #: Crossings this close to an end of a line are how it meets others at a disc.
 _HIDDEN = 0.4
 #: A bend is no tighter than this for a turn of one.
@@ -62,6 +64,13 @@ class Polylines:
             self.points[place + np.repeat(self.starts[chosen] - ends + counts, counts)],
             np.concatenate([np.zeros(1, dtype=np.int64), ends]),
         )
+
+    def replaced(self, number: int, line: Polylines) -> Polylines:
+        """The same with another line in place of one."""
+        first, last = self.starts[number : number + 2].tolist()
+        starts = self.starts.copy()
+        starts[number + 1 :] += len(line.points) - (last - first)
+        return Polylines(np.concatenate([self.points[:first], line.points, self.points[last:]]), starts)
 
     def lengths(self) -> FloatArray:
         """(n,) how long they are."""
@@ -117,9 +126,12 @@ class Polylines:
         if not len(places):
             return share
         for first, last in pairwise(np.append(mates._segments, len(mates.a)).tolist()):
-            x, y = (places[:, None, :] - mates.a[first:last]).transpose(2, 0, 1)
-            near = squared_distances(x, y, *mates._way[first:last].T).min(axis=1) < _CLOSE * _CLOSE
-            share = np.maximum(share, np.bincount(owner, near, len(self)))
+            # few are near: how far exactly is worked out for these alone
+            i, j = close_segments(places, places, mates.a[first:last], mates.b[first:last], _NEAR)
+            j += first
+            (x, y), (ux, uy) = (places[i] - mates.a[j]).T, mates._way[j].T
+            near = np.unique(i[squared_distances(x, y, ux, uy) < _CLOSE * _CLOSE])
+            share = np.maximum(share, np.bincount(owner[near], minlength=len(self)))
         share /= np.maximum(np.bincount(owner, minlength=len(self)), 1)
         most = np.minimum(1.0, _RUN / _SHARE / np.maximum(self.lengths() - 2 * _DISC, _FINE))
         beyond: FloatArray = np.maximum(share / most - _SHARE / 2, 0.0)
@@ -213,10 +225,41 @@ def _left(points: FloatArray, starts: IntArray, lines: IntArray, ring: float) ->
 
 def _meetings(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
     """Which segments from ``a`` to ``b`` cross which from ``c`` to ``d``, and at what share of their way."""
-    low, high = np.minimum(a, b), np.maximum(a, b)
-    least, most = np.minimum(c, d), np.maximum(c, d)
-    near = (least[None, :, 0] <= high[:, None, 0]) & (most[None, :, 0] >= low[:, None, 0])
-    near &= (least[None, :, 1] <= high[:, None, 1]) & (most[None, :, 1] >= low[:, None, 1])
-    i, j = np.nonzero(near)
+    i, j = close_segments(a, b, c, d, 0.0)
     share, hit = crossing(*a[i].T, *(b - a)[i].T, *c[j].T, *(d - c)[j].T)
     return i[hit], j[hit], share
+
+
+def close_segments(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, by: float) -> tuple[IntArray, IntArray]:
+    """Which segments from ``a`` to ``b`` and which from ``c`` to ``d`` have rectangles around them that come as close
+    to each other as this, or closer, in order."""
+    low, high = np.minimum(a, b) - by, np.maximum(a, b) + by
+    least, most = np.minimum(c, d), np.maximum(c, d)
+    wide = (high - low).sum(axis=0) * len(c) + (most - least).sum(axis=0) * len(a)
+    reach = np.concatenate([high, most]).max(axis=0) - np.concatenate([low, least]).min(axis=0)
+    # the axis on which fewer share anything
+    one = int(wide[0] * reach[1] > wide[1] * reach[0])
+    i, j = _overlapping(low[:, one], high[:, one], least[:, one], most[:, one])
+    both = (least[j, 1 - one] <= high[i, 1 - one]) & (most[j, 1 - one] >= low[i, 1 - one])
+    i, j = i[both], j[both]
+    order = np.argsort(i * len(c) + j)
+    return i[order], j[order]
+
+
+def _overlapping(low: FloatArray, high: FloatArray, least: FloatArray, most: FloatArray) -> tuple[IntArray, IntArray]:
+    """Which intervals from ``low`` to ``high`` and which from ``least`` to ``most`` share a point: either the second
+    begins within the first, or the first within the second."""
+    firsts, seconds = np.argsort(low), np.argsort(least)
+    i, begun = _ranges(np.searchsorted(least[seconds], low), np.searchsorted(least[seconds], high, side="right"))
+    j, within = _ranges(
+        np.searchsorted(low[firsts], least, side="right"), np.searchsorted(low[firsts], most, side="right")
+    )
+    return np.concatenate([i, firsts[within]]), np.concatenate([seconds[begun], j])
+
+
+def _ranges(begin: IntArray, end: IntArray) -> tuple[IntArray, IntArray]:
+    """All numbers of ranges, and the ranges that they are of."""
+    counts = end - begin
+    owner = np.repeat(np.arange(len(begin), dtype=np.int64), counts)
+    number = np.arange(len(owner), dtype=np.int64) + np.repeat(begin - np.cumsum(counts) + counts, counts)
+    return owner, number

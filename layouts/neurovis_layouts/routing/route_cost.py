@@ -15,7 +15,7 @@ from neurovis_layouts.routing.ends import by_ends
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
 from neurovis_layouts.routing.polylines import END, STEP, Polylines, polylines
 from neurovis_layouts.routing.walls import Frame, Walls, meet
-from neurovis_spec.layout import FloatArray, IntArray
+from neurovis_spec.layout import BoolArray, FloatArray, IntArray
 from neurovis_spec.layout.geometry import distance, padded, straight
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
@@ -100,7 +100,7 @@ class Judge:
     ) -> None:
         self.edges, self.centres, self.twice = edges, centres, twice
         self.routes: dict[int, Route] = dict(routes)
-        self._drawn, self._image = list(drawn), dict(image or {})
+        self._image = dict(image or {})
         wide = [(own, padded(rect, OFF)) for own, rect in frames]
         self.rects: FloatArray = np.array([rect for _, rect in frames], dtype=np.float64).reshape(-1, 4)
         self.obstacles, self.walls = Obstacles(centres), Walls(wide, len(centres))
@@ -108,23 +108,42 @@ class Judge:
         self.low: FloatArray = np.concatenate([self.discs, self.walls.rects[:, :2]]).min(axis=0) - _MARGIN
         self.high: FloatArray = np.concatenate([self.discs, self.walls.rects[:, 2:]]).max(axis=0) + _MARGIN
         self._borders = _border_cells(self.rects)
-        self._number = {centre: k for k, centre in enumerate(centres)}
         self._between = by_ends((i, edges[i]) for i in sorted(routes))
-        self._look()
+        #: the number of the line of an edge among all, and of each line its edge and the neurons that it leads from and
+        #: to; −1 where there is none
+        self._line = {i: k for k, i in enumerate(sorted(routes))}
+        lines = [*(routes[i] for i in self._line), *drawn]
+        number = {centre: k for k, centre in enumerate(centres)}
+        self._edge_of: IntArray = np.array([*self._line, *([-1] * len(drawn))], dtype=np.int64)
+        ends = [(number.get(route[0], -1), number.get(route[-1], -1)) for route in lines]
+        self._ends_of: IntArray = np.array(ends, dtype=np.int64).reshape(-1, 2)
+        #: by neuron the lines that leave it (1) and that arrive there (0)
+        self._at: dict[int, list[tuple[int, bool]]] = {}
+        for leaves in (True, False):
+            for line, neuron in enumerate(self._ends_of[:, 0 if leaves else 1].tolist()):
+                if neuron >= 0:
+                    self._at.setdefault(neuron, []).append((line, leaves))
+        self._lines = polylines(lines)
+        #: (2, n, 2) where each is seen to arrive at a disc (0), and to leave one (1)
+        self._seen: FloatArray = np.stack([self._lines.arrive(_AT), self._lines.leave(_AT)])
+        cells, owner = self._lines.cells()
+        borders = np.full(len(self._borders), -1, dtype=np.int64)
+        self._enter(np.concatenate([cells, self._borders]), np.concatenate([self._edge_of[owner], borders]))
 
     def winding(self) -> dict[int, tuple[float, float]]:
         """How much each route bends, and by which factor it is longer than the straight way."""
         lengths, (bends, _) = self._lines.lengths().tolist(), self._lines.bends()
         return {
             i: (bend, length / max(distance(self.routes[i][0], self.routes[i][-1]), 1e-9))
-            for i, bend, length in zip(sorted(self.routes), bends.tolist(), lengths, strict=False)
+            for i, bend, length in zip(self._line, bends.tolist(), lengths, strict=False)
         }
 
     def through_loops(self) -> set[int]:
         """The edges whose routes run through a connection of a neuron to itself."""
-        loops = (self.segment_ends[:, 0] == self.segment_ends[:, 1]) & (self.segment_ends[:, 0] >= 0)
-        crossed = self._lines.crossed(self.a[loops], self.b[loops])
-        return {i for i, times in zip(sorted(self.routes), crossed.tolist(), strict=False) if times}
+        first, last = self._ends_of[self._lines.owner].T
+        loops = (first == last) & (first >= 0)
+        crossed = self._lines.crossed(self._lines.a[loops], self._lines.b[loops])
+        return {i for i, times in zip(self._line, crossed.tolist(), strict=False) if times}
 
     def along_borders(self) -> set[int]:
         """The edges whose routes run along the border of a frame, so that both are one line."""
@@ -133,7 +152,7 @@ class Judge:
         cells, owner = self._lines.cells()
         along = self._borders[np.minimum(np.searchsorted(self._borders, cells), len(self._borders) - 1)] == cells
         far = STEP * np.bincount(owner[along], minlength=len(self._lines))
-        return {i for i, by in zip(sorted(self.routes), far.tolist(), strict=False) if by > _RUN}
+        return {i for i, by in zip(self._line, far.tolist(), strict=False) if by > _RUN}
 
     def in_fans(self, most: int) -> set[int]:
         """The edges of which more than so many share both ends, in either direction."""
@@ -141,21 +160,22 @@ class Judge:
 
     def on_others(self) -> set[int]:
         """The edges whose routes run on one between the same ends, or for a good part of their way on any."""
-        number = {i: k for k, i in enumerate(sorted(self.routes))}
-        places = np.unique(np.stack([self.cells, self.cell_edges], axis=1), axis=0)
-        cell, edge = places[places[:, 1] >= 0].T
+        drawn = self.cell_edges >= 0
+        cells, many = self.cells[drawn], max(self.routes, default=0) + 1
+        number = np.cumsum(np.append(False, cells[1:] != cells[:-1]))[: len(cells)]
+        cell, edge = np.divmod(np.unique(number * many + self.cell_edges[drawn]), many)
         shared = np.zeros(len(cell), dtype=np.bool_)
         shared[1:] |= cell[1:] == cell[:-1]
         shared[:-1] |= cell[1:] == cell[:-1]
         total, beside = np.bincount(edge), np.bincount(edge, shared)
         along = np.flatnonzero((beside > _PART * total) & (beside * STEP > _STRETCH)).tolist()
-        full = {neuron for neuron, ends in self._ends.items() if len(ends) > _ENDS}
+        full = {neuron for neuron, ends in self._at.items() if len(ends) > _ENDS}
         found = {i for i in along if full.isdisjoint((self.edges[i].source, self.edges[i].target))}
         for mates in self._between.values():
             for i in mates if len(mates) <= _MATES else ():
-                others = [number[k] for k in mates if k not in self.both(i)]
-                own, drawn = self._lines.some(np.array([number[i]])), self._lines.some(np.array(others, dtype=np.int64))
-                if others and own.on(drawn)[0] > _RUN_ON:
+                others = [self._line[k] for k in mates if k not in self.both(i)]
+                own = self._lines.some(np.array([self._line[i]]))
+                if others and own.on(self._lines.some(np.array(others)))[0] > _RUN_ON:
                     found.add(i)
         return found
 
@@ -163,16 +183,16 @@ class Judge:
         """The edges whose routes arrive at a disc where another leaves it, or end where one does, each with which of
         its ends does."""
         found: dict[int, set[bool]] = {}
-        for ends in self._ends.values():
+        for ends in self._at.values():
             if len(ends) > _ENDS:
                 continue
-            places = np.array([place for _, _, place in ends])
-            leaves = np.array([leaving for _, leaving, _ in ends])
+            lines, leaves = np.array(ends, dtype=np.int64).T
+            places, edges = self._seen[leaves, lines], self._edge_of[lines].tolist()
             x, y = (places[:, None] - places).transpose(2, 0, 1)
             least = np.where(leaves[:, None] != leaves, _CLOSE, _ONE if len(ends) <= _FEW_ENDS else 0.0)
             for k, other in np.argwhere(x * x + y * y < least * least).tolist():
-                if ends[k][0] != ends[other][0]:
-                    found.setdefault(ends[k][0], set()).add(ends[k][1])
+                if edges[k] != edges[other]:
+                    found.setdefault(edges[k], set()).add(ends[k][1])
         return found
 
     def mates(self, i: int, but: Sequence[int]) -> list[Route]:
@@ -187,38 +207,44 @@ class Judge:
 
     def draw(self, i: int, route: Route) -> None:
         """Give an edge another route, and its mirror image the reflection of it."""
-        self.routes[i] = route
+        self._draw(i, route)
         for other in self.both(i)[1:]:
             ends = self.centres[self.edges[other].source], self.centres[self.edges[other].target]
-            self.routes[other] = reflected(route, self.twice, *ends)
-        self._look()
+            self._draw(other, reflected(route, self.twice, *ends))
 
-    def _look(self) -> None:
-        chosen = sorted(self.routes)
-        routes = [*(self.routes[i] for i in chosen), *self._drawn]
-        edges = np.array([*chosen, *([-1] * len(self._drawn))], dtype=np.int64)
-        self._lines = lines = polylines(routes)
-        self.a, self.b, self.segment_edges = lines.a, lines.b, edges[lines.owner]
-        # which neurons a segment's line leads from and to; −1 where none is there
-        ends = [(self._number.get(route[0], -1), self._number.get(route[-1], -1)) for route in routes]
-        self.segment_ends: IntArray = np.array(ends, dtype=np.int64).reshape(-1, 2)[lines.owner]
-        cells, owner = lines.cells()
-        borders = np.full(len(self._borders), -1, dtype=np.int64)
-        cells, owners = np.concatenate([cells, self._borders]), np.concatenate([edges[owner], borders])
+    def _draw(self, i: int, route: Route) -> None:
+        self.routes[i], line = route, polylines([route])
+        self._lines = self._lines.replaced(self._line[i], line)
+        self._seen[:, self._line[i]] = line.arrive(_AT)[0], line.leave(_AT)[0]
+        (cells, _), others = line.cells(), self.cell_edges != i
+        edges = np.full(len(cells), i, dtype=np.int64)
+        self._enter(np.append(self.cells[others], cells), np.append(self.cell_edges[others], edges))
+
+    def _enter(self, cells: IntArray, edges: IntArray) -> None:
+        """Note which cells are taken, and by which edges, in order."""
         order = np.argsort(cells, kind="stable")
-        self.cells, self.cell_edges = cells[order], owners[order]
-        self._ends: dict[int, list[tuple[int, bool, Point]]] = {}
-        for leaves, places in ((True, lines.leave(_AT)), (False, lines.arrive(_AT))):
-            for edge, route, (x, y) in zip(edges.tolist(), routes, places.tolist(), strict=True):
-                neuron = self._number.get(route[0 if leaves else -1])
-                if neuron is not None:
-                    self._ends.setdefault(neuron, []).append((edge, leaves, (x, y)))
+        self.cells, self.cell_edges = cells[order], edges[order]
+
+    def others(self, edges: Sequence[int], own: tuple[int, int]) -> tuple[FloatArray, FloatArray, BoolArray]:
+        """(k, 2) and (k, 2) the segments of all lines but those of some edges, and which of them (k,) belong to lines
+        from or to either of two neurons."""
+        lines, foreign = self._lines, ~np.isin(self._edge_of, edges)
+        chosen = np.flatnonzero(foreign[lines.owner])
+        kin: BoolArray = np.any(np.isin(self._ends_of, own), axis=1).repeat(np.diff(lines.starts) - 1)
+        return lines.a[chosen], lines.b[chosen], kin[chosen]
+
+    def free_cells(self, edges: Sequence[int]) -> IntArray:
+        """The cells that are taken by others than these edges, in order."""
+        others = np.ones(len(self.cells), dtype=np.bool_)
+        for edge in edges:
+            others &= self.cell_edges != edge
+        return self.cells[others]
 
     def ends(self, neuron: int, but: Sequence[int]) -> tuple[FloatArray, FloatArray]:
         """(k, 2) and (k,) where the ends at a neuron are seen, and which of them leave (1) or arrive (0)."""
-        found = [(place, leaves) for edge, leaves, place in self._ends.get(neuron, ()) if edge not in but]
-        places = np.array([place for place, _ in found], dtype=np.float64).reshape(-1, 2)
-        return places, np.array([leaves for _, leaves in found], dtype=np.float64)
+        found = [(line, leaves) for line, leaves in self._at.get(neuron, ()) if self._edge_of[line] not in but]
+        lines, leaves = np.array(found, dtype=np.int64).reshape(-1, 2).T
+        return self._seen[leaves, lines], leaves.astype(np.float64)
 
 
 class Pen:
@@ -236,11 +262,9 @@ class Pen:
         self._onward = not level and float(polylines([self.route]).backward()[0]) < _ONWARD
         self._reflect = len(judge.both(edge)) > 1
         both = [*judge.both(edge), *but]
-        others = ~np.isin(judge.segment_edges, both)
-        self._a, self._b = judge.a[others], judge.b[others]
-        kin = np.isin(judge.segment_ends[others], self._own).any(axis=1)
+        self._a, self._b, kin = judge.others(both, self._own)
         self._weight: FloatArray = np.where(kin, _CROSSING + _KIN, _CROSSING)
-        self._cells = judge.cells[~np.isin(judge.cell_edges, both)]
+        self._cells = judge.free_cells(both)
         mates = judge.mates(edge, both)
         self._mates = polylines(mates) if mates else None
         self._ends = [(leaves, *judge.ends(n, both)) for n, leaves in zip(self._own, (True, False), strict=True)]
