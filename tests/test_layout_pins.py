@@ -49,9 +49,34 @@ def test_an_axis_is_found_at_which_no_frames_lie_on_each_other(x: float, y: floa
 
 def test_a_refusal_speaks_of_what_is_pinned_itself() -> None:
     with pytest.raises(LayoutRefusalError) as caught:
-        legs("{mirror: [[left, right]], positions: {left1.T: [0, 0], right2.S1: [-1, -2]}}").layout("layered")
+        legs("{mirror: [[left, right]], positions: {left1.S1: [0, 0], left1.T: [0, 4], right2.S1: [0, 2]}}").layout(
+            "layered"
+        )
     assert caught.value.code == "pin-in-frame"
     assert {name.partition(".")[0] for name in caught.value.about} == {"left1", "right2"}
+
+
+@pytest.mark.parametrize("direction", ["down", "up", "right", "left"])
+@pytest.mark.parametrize(
+    ("pins", "mirror", "apart"),
+    [
+        ("left1.S1: [0, 0], right1.T: [1, 1]", False, False),
+        ("left1.S2: [0, 0], right1.T: [1, 1], left2.T: [-1, 1.5]", False, False),
+        ("left1.S2: [0, 0], right1.T: [1.75, 0], left2.T: [-1.75, 0], right2.S1: [0, 2.25]", False, True),
+        ("left1.T: [0, 0], right2.S1: [-1, -2]", True, True),
+    ],
+)
+def test_instances_whose_drawings_lie_on_each_other_are_bent_so_that_both_have_room(
+    pins: str, mirror: bool, apart: bool, direction: str
+) -> None:
+    """Pins that are not in the frames around each other are kept; these frames lie on each other only if they must."""
+    mirrored = "mirror: [[left, right]], " if mirror else ""
+    network = legs(f"{{{mirrored}direction: {direction}, positions: {{{pins}}}}}")
+    assert network.refusal() is None
+    layout, problem = network.layout("layered").value, problem_of(network.network)
+    check_pins(problem, layout)
+    assert not any("stands in" in clash.message for clash in clashes(problem, layout))
+    assert not (apart and clashes(problem, layout))
 
 
 def corner(layout: Layout, path: str) -> Point:

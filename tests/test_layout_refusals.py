@@ -118,6 +118,7 @@ def test_validate_says_what_would_be_refused(text: str, code: str, marked: str, 
         ("mirror: [[left, right]]\n  positions: {left1: [0, 0], right2: [0.5, 0.5]}", "pin-in-frame"),
         ("mirror: [[left, right]]\n  positions: {left1: [0, 0], right2: [6, 0.5]}", None),
         ("positions: {left1.S: [0, 0], left1.K: [0, 4], right1.S: [6, 0], right1.K: [6, 4]}", None),
+        ("positions: {left1.S: [0, 0], right1.K: [0.5, 1]}", None),
         ("engine: grid\n  positions: {left1: [0, 0], left2: [0.5, 0.5]}", None),
     ],
 )

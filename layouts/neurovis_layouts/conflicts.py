@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 
-from neurovis_layouts.pins import CentreCells
+from neurovis_layouts.occupancy import CentreCells
 from neurovis_spec.layout.model import RADIUS, LayoutMirror, LayoutModule, LayoutProblem, Point
 
 #: Differences up to this are rounding.

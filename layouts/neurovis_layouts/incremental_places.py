@@ -3,8 +3,8 @@
 In: a problem with an earlier layout (``memory``), and a fresh layout of the whole as if there were none. Out: positions
 in which every neuron that the earlier layout knew stands exactly where it stood, unless it has to follow another
 (``conflicts``), and a new one near where the fresh layout puts it in relation to what it is connected with, in a free
-place (``room``). What is to be drawn alike is placed together: the same new neuron in all instances of one make, both
-of a mirrored pair.
+place (``occupancy``). What is to be drawn alike is placed together: the same new neuron in all instances of one make,
+both of a mirrored pair.
 """
 
 from __future__ import annotations
@@ -13,9 +13,8 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from neurovis_layouts.alike import Alike, Move
 from neurovis_layouts.conflicts import resolved, whole
-from neurovis_layouts.free_space import Copy, Room, Side
 from neurovis_layouts.manual_edits import by_hand, giving_way, moved_routes
-from neurovis_layouts.pins import CentreCells
+from neurovis_layouts.occupancy import Body, CentreCells, Occupancy, Side, Wish
 from neurovis_layouts.rows import GroupRows
 from neurovis_spec.layout.frames import Frames
 from neurovis_spec.layout.geometry import Rect, bounds, snap
@@ -44,18 +43,19 @@ def remembered(problem: LayoutProblem, fresh: Sequence[Point], routes: Mapping[i
             wanted.setdefault(i, before[i])
     placed = _apart(problem, {i: point for i, point in before.items() if i not in wanted})
     shapes = _Shapes(problem, frames, fresh, routes, before, old)
-    room = Room(frames, placed, frames.rects(placed, old), _sides(problem, fresh, before), old.values())
+    there = Occupancy(frames, placed, frames.rects(placed, old), _sides(problem, fresh, before), old.values())
     wishes = _Wishes(problem, fresh, placed)
     for piece in _pieces(problem, shapes, before, frozenset(placed), frozenset(wanted)):
         first = piece[0].offsets[0]
-        wish, row = wanted.get(first[0]), wishes.row(piece[0], room.placed)
+        wish, row = wanted.get(first[0]), wishes.row(piece[0], there.placed)
         if wish is None:
-            room.put(piece, wishes.wish(piece[0], room.placed) if row is None else row, in_row=row is not None)
+            anchor = wishes.wish(piece[0], there.placed) if row is None else row
+            there.put(Wish(piece, anchor), in_row=row is not None)
         else:
-            room.put(piece, wish, stay=True)
+            there.put(Wish(piece, wish), stay=True)
         for neuron in (i for copy in piece for i in copy.members):
-            wishes.note(neuron, room.placed[neuron])
-    return [room.placed[i] for i in range(len(problem.neurons))]
+            wishes.note(neuron, there.placed[neuron])
+    return [there.placed[i] for i in range(len(problem.neurons))]
 
 
 def _apart(problem: LayoutProblem, placed: dict[int, Point]) -> dict[int, Point]:
@@ -104,16 +104,16 @@ class _Wishes:
             lines.add(point[axis])
             self._ranks[axis, self._fresh[neuron][axis]] = count + 1, lines
 
-    def row(self, copy: Copy, placed: Mapping[int, Point]) -> Point | None:
+    def row(self, copy: Body, placed: Mapping[int, Point]) -> Point | None:
         """Where a new member of a group continues the row of the others; None where there is no such row."""
         row = self._rows.next(copy.offsets[0][0], placed) if len(copy.offsets) == 1 else None
         return None if row is None else (snap(row[0]), snap(row[1]))
 
-    def wish(self, copy: Copy, placed: Mapping[int, Point]) -> Point:
+    def wish(self, copy: Body, placed: Mapping[int, Point]) -> Point:
         """Where the fresh layout puts the anchor, moved as the neighbours have been moved, or, without any, all
         others."""
         mates = sorted({mate for neuron, _ in copy.offsets for mate in self._near.get(neuron, ()) if mate in placed})
-        if copy.instance < 0 and copy.offsets[0][0] in self._own:
+        if copy.frame < 0 and copy.offsets[0][0] in self._own:
             # what its instance is drawn like goes before what is outside
             own = sorted(i for i in self._own[copy.offsets[0][0]].members if i in placed)
             mates = sorted(set(mates).intersection(own)) or own or mates
@@ -207,15 +207,15 @@ def _pieces(
     before: Mapping[int, Point],
     placed: frozenset[int],
     wanted: frozenset[int],
-) -> Iterator[tuple[Copy, ...]]:
+) -> Iterator[tuple[Body, ...]]:
     """What is placed together, each with its copies: instances as a piece, then neurons one by one; what has been
     there before comes first, then what instances lack of which a part is there."""
     done = set(placed)
     alike = Alike(problem, before)
 
-    def single(neuron: int) -> tuple[Copy, ...]:
+    def single(neuron: int) -> tuple[Body, ...]:
         found = [(mate, move) for mate, move in alike.of(neuron) if mate not in done]
-        singles = [Copy(((mate, (0.0, 0.0)),), flip=move.flip, origin=move.shift) for mate, move in found]
+        singles = [Body(((mate, (0.0, 0.0)),), flip=move.flip, origin=move.shift) for mate, move in found]
         done.update(i for copy in singles for i in copy.members)
         return tuple(singles)
 
@@ -230,11 +230,11 @@ def _pieces(
             if again and not all(i in wanted for i in module.members):
                 continue
             offsets, rect = shapes.of(number)
-            copies = [Copy(offsets, number, rect)]
+            copies = [Body(offsets, number, rect)]
             for mates, move in _copies(alike, module):
                 if not any(i in done for i in mates) and not any(set(mates) & set(c.members) for c in copies):
                     mirrored = tuple((i, offset) for i, (_, offset) in zip(mates, offsets, strict=True))
-                    copies.append(Copy(mirrored, _number(problem, number, mates), rect, move.flip, move.shift))
+                    copies.append(Body(mirrored, _number(problem, number, mates), rect, move.flip, move.shift))
             done.update(i for copy in copies for i in copy.members)
             yield tuple(copies)
         for neuron in range(len(problem.neurons)):

@@ -5,15 +5,12 @@ In: a free layout and the pins. Out: positions in which every pin is exact and n
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
-from neurovis_spec.layout.geometry import distance, snap
+from neurovis_layouts.axes import shift_of
+from neurovis_layouts.occupancy import CentreCells, Occupancy, Wish, lone
+from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import RADIUS, LayoutProblem, Point
-
-#: How far a neuron that has to give way keeps off, at least.
-_CLEAR = 0.75
-_STEP = 0.25
 
 
 def fit(free: Sequence[Point], pins: Mapping[int, Point]) -> tuple[list[Point], Point, frozenset[int]]:
@@ -23,33 +20,13 @@ def fit(free: Sequence[Point], pins: Mapping[int, Point]) -> tuple[list[Point], 
     """
     if not pins:
         return list(free), (0.0, 0.0), frozenset()
-    count = len(pins)
-    shift = (
-        snap(math.fsum(x - free[i][0] for i, (x, _) in sorted(pins.items())) / count),
-        snap(math.fsum(y - free[i][1] for i, (_, y) in sorted(pins.items())) / count),
-    )
-    cells = CentreCells()
-    placed: dict[int, Point] = dict(pins)
-    for point in pins.values():
-        cells.add(point)
-    moved = set(pins)
-    waiting: list[int] = []
-    for i, (x, y) in enumerate(free):
-        if i in pins:
-            continue
-        wish = (snap(x) + shift[0], snap(y) + shift[1])
-        if cells.free(wish, 2 * RADIUS):
-            placed[i] = wish
-        else:
-            waiting.append(i)
-    for i in range(len(free)):
-        if i in placed and i not in pins:
-            cells.add(placed[i])
-    for i in waiting:
-        placed[i] = cells.nearest_free((snap(free[i][0]) + shift[0], snap(free[i][1]) + shift[1]))
-        cells.add(placed[i])
-        moved.add(i)
-    return [placed[i] for i in range(len(free))], shift, frozenset(moved)
+    shift = shift_of(free, pins)
+    occupancy = Occupancy(placed=pins)
+    places = [(snap(x) + shift[0], snap(y) + shift[1]) for x, y in free]
+    occupancy.settle([Wish((lone(i),), place) for i, place in enumerate(places) if i not in pins])
+    found = [occupancy.placed[i] for i in range(len(free))]
+    moved = {i for i, (one, other) in enumerate(zip(found, places, strict=True)) if one != other}
+    return found, shift, frozenset(moved | pins.keys())
 
 
 def with_origins(problem: LayoutProblem, free: Sequence[Point]) -> dict[int, Point]:
@@ -75,38 +52,3 @@ def with_origins(problem: LayoutProblem, free: Sequence[Point]) -> dict[int, Poi
             taken.add(place)
         found.update(places)
     return dict(sorted({**found, **problem.pins}.items()))
-
-
-class CentreCells:
-    """Centres in square cells, to ask whether a place is free."""
-
-    def __init__(self) -> None:
-        self._cells: dict[tuple[int, int], list[Point]] = {}
-
-    def add(self, point: Point) -> None:
-        """Add a centre."""
-        self._cells.setdefault((math.floor(point[0]), math.floor(point[1])), []).append(point)
-
-    def free(self, point: Point, clear: float) -> bool:
-        """Whether no centre is closer than ``clear``, at most 1."""
-        column, row = math.floor(point[0]), math.floor(point[1])
-        return all(
-            distance(point, other) >= clear
-            for i in (-1, 0, 1)
-            for j in (-1, 0, 1)
-            for other in self._cells.get((column + i, row + j), ())
-        )
-
-    def nearest_free(self, wish: Point) -> Point:
-        """The nearest free place on a lattice around the wish; sideways first."""
-        reach = 4
-        while True:
-            steps = range(-reach, reach + 1)
-            around = sorted((i * i + j * j, abs(j), -i, -j) for i in steps for j in steps)
-            for squared, _, i, j in around:
-                if squared > reach * reach:
-                    break
-                place = (wish[0] - i * _STEP, wish[1] - j * _STEP)
-                if self.free(place, _CLEAR):
-                    return place
-            reach *= 2
