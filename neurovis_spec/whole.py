@@ -18,6 +18,7 @@ from neurovis_spec.language.data.edge_list import EdgeTable
 from neurovis_spec.language.data.files import read_edges, read_table
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.spec import Spec
+from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 from neurovis_spec.language.yaml.source import Node, Packed, Scalar, Sequence
 
@@ -100,7 +101,7 @@ class _Reader:
     def _table(self, node: SourceMapping, folder: Path) -> Plain:
         file, key = self._named(node)
         table = read_table(str(file.value), self._root, folder, file.span, self._findings, key)
-        if table is None:
+        if table is UNKNOWN:
             return None
         return [
             [value if there else None for value, there in zip(row, present, strict=True)]
@@ -110,7 +111,7 @@ class _Reader:
     def _edges(self, node: SourceMapping, folder: Path) -> Plain:
         file, key = self._named(node)
         edges = read_edges(str(file.value), self._root, folder, file.span, self._findings, key)
-        return None if edges is None else list(_rows(edges))
+        return None if edges is UNKNOWN else list(_rows(edges))
 
 
 def _rows(edges: EdgeTable) -> Iterable[Plain]:

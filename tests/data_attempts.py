@@ -15,6 +15,7 @@ import numpy as np
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span
 from neurovis_spec.language.data.files import Table, read_table
 from neurovis_spec.language.located import Located
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.yaml.source import Scalar
 
 #: where the path stands in the spec, and where the key does
@@ -24,7 +25,7 @@ THERE = Span("net.yaml", 4, 37, 4, 38)
 
 def attempt(
     folder: Path, name: str, data: str | bytes, key: str | None = None
-) -> tuple[Table | None, tuple[Diagnostic, ...]]:
+) -> tuple[Table | Unknown, tuple[Diagnostic, ...]]:
     """The table, if there is one, and all findings."""
     (folder / name).write_bytes(data.encode() if isinstance(data, str) else data)
     findings = Findings()
@@ -36,7 +37,7 @@ def table(folder: Path, name: str, data: str | bytes, key: str | None = None) ->
     """The table of a file that has no fault."""
     found, findings = attempt(folder, name, data, key)
     assert findings == ()
-    assert found is not None
+    assert found is not UNKNOWN
     np.testing.assert_array_equal(np.isnan(found.values), ~found.present)
     assert found.values.dtype == np.float64
     return found
@@ -45,7 +46,7 @@ def table(folder: Path, name: str, data: str | bytes, key: str | None = None) ->
 def fault(folder: Path, name: str, data: str | bytes) -> Diagnostic:
     """The one finding of a file that has one, at its path."""
     found, findings = attempt(folder, name, data)
-    assert found is None
+    assert found is UNKNOWN
     assert [finding.span for finding in findings] == [HERE]
     assert len(findings[0].message) < 300
     return findings[0]

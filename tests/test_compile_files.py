@@ -12,6 +12,7 @@ from small_specs import compiled, network_of, wires
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.data.files import Room, Table, read_table
 from neurovis_spec.language.located import Located
+from neurovis_spec.language.unknown import Unknown
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
 
 NEURONS = "neurons: {A: {count: 2, bias: 1}, B: {count: 3}, D: {count: 3, combine: distance, activation: gaussian}}\n"
@@ -82,7 +83,7 @@ def test_a_file_is_read_once_for_each_key(folder: Path, monkeypatch: pytest.Monk
         keyed: bool,
         gaps: bool,
         room: Room,
-    ) -> Table | None:
+    ) -> Table | Unknown:
         read.append((path, None if key is None else key.value))
         return read_table(path, root, base, span, findings, key, keyed=keyed, gaps=gaps, room=room)
 

@@ -22,6 +22,7 @@ from neurovis_spec.language.data.edge_list import EdgeTable, parse_edges
 from neurovis_spec.language.data.files import read_edges, read_table
 from neurovis_spec.language.data.npy import parse_npy
 from neurovis_spec.language.data.table import CellError
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 
 
 def npy_header(text: str, data: bytes = b"", version: int = 1) -> bytes:
@@ -238,7 +239,7 @@ def test_faults_of_an_npy(tmp_path: Path, data: bytes, code: str, words: str, mo
     monkeypatch.chdir(tmp_path)
     found, findings = attempt(tmp_path, "a.npy", data)
     assert not (tmp_path / "exploded").exists()
-    assert found is None
+    assert found is UNKNOWN
     assert [finding.code for finding in findings] == [code]
     assert words in findings[0].message
     assert findings[0].span == HERE
@@ -260,7 +261,7 @@ def test_nothing_but_its_own_error_leaves_a_parser(noise: bytes, at: int, patch:
                 parse(data)
 
 
-def edges(folder: Path, data: str) -> tuple[EdgeTable | None, tuple[Diagnostic, ...]]:
+def edges(folder: Path, data: str) -> tuple[EdgeTable | Unknown, tuple[Diagnostic, ...]]:
     (folder / "e.csv").write_text(data, encoding="utf-8", newline="")
     findings = Findings()
     return read_edges("e.csv", folder, folder, HERE, findings), findings.sorted()
@@ -269,7 +270,7 @@ def edges(folder: Path, data: str) -> tuple[EdgeTable | None, tuple[Diagnostic, 
 def test_edges_by_the_names_of_the_columns(tmp_path: Path) -> None:
     got, findings = edges(tmp_path, "Weight,to,delay,from\n0.5,O1,,K1\n,O2,3,K2\n")
     assert findings == ()
-    assert got is not None
+    assert got is not UNKNOWN
     assert got.sources == ("K1", "K2")
     assert got.targets == ("O1", "O2")
     assert got.weights.tolist() == [0.5, 1.0]
@@ -279,14 +280,14 @@ def test_edges_by_the_names_of_the_columns(tmp_path: Path) -> None:
 
 def test_edges_without_delays(tmp_path: Path) -> None:
     got, _ = edges(tmp_path, "from,to,weight\nK1,O1,-2\n")
-    assert got is not None
+    assert got is not UNKNOWN
     assert (got.weights.tolist(), got.delays.tolist()) == ([-2.0], [-1])
 
 
 def test_edges_without_weights_have_weight_1(tmp_path: Path) -> None:
     for data in ("to,from\nO1,K1\nO1,K2\n", 'from,to\n"K1",O1\nK2,O1\n'):
         got, _ = edges(tmp_path, data)
-        assert got is not None
+        assert got is not UNKNOWN
         assert got.weights.tolist() == [1, 1]
         assert (got.sources, got.fault) == (("K1", "K2"), None)
 
@@ -310,7 +311,7 @@ def test_edges_without_weights_have_weight_1(tmp_path: Path) -> None:
 )
 def test_faults_of_edges(tmp_path: Path, data: str, code: str, words: str, hint: str | None) -> None:
     got, findings = edges(tmp_path, data)
-    assert got is None or got.fault is not None
+    assert got is UNKNOWN or got.fault is not None
     assert [finding.code for finding in findings] == [code]
     assert words in findings[0].message
     assert (hint or "") in (findings[0].hint or "")
@@ -320,7 +321,7 @@ def told(name: str, data: str, folder: Path) -> list[str]:
     """What is said of a table, in order, without the name of the file."""
     (folder / name).write_text(data)
     findings = Findings()
-    assert read_table(name, folder, folder, HERE, findings) is None
+    assert read_table(name, folder, folder, HERE, findings) is UNKNOWN
     return [finding.message.partition(": ")[2] for finding in findings.sorted()]
 
 
@@ -348,7 +349,7 @@ def test_no_more_than_twenty_faults_of_a_file_are_told(tmp_path: Path) -> None:
     assert len(told("a.csv", many, tmp_path)) == 20
     assert len(told("a.csv", many.replace("1,2", '"1",2'), tmp_path)) == 20
     got, findings = edges(tmp_path, "from,to,weight\n" + ",B,x\n" * 100)
-    assert got is not None
+    assert got is not UNKNOWN
     assert not got.sources
     assert len(findings) == 20
 
@@ -364,7 +365,7 @@ def test_all_faults_of_edges_are_told_and_those_in_order_are_kept(tmp_path: Path
         "row 6, column 3: 'nan' is not finite",
         "row 6, column 4: '0.5' is no delay (0, 1, 2, … steps)",
     ]
-    assert got is not None
+    assert got is not UNKNOWN
     assert got.targets == ("B", "C", "B")
     assert got.rows.tolist() == [2, 5, 6]
 
@@ -388,7 +389,7 @@ def test_all_faults_of_an_mtx_are_told_by_line(tmp_path: Path) -> None:
 
 def refused(path: str, root: Path, base: Path) -> Diagnostic:
     findings = Findings()
-    assert read_table(path, root, base, HERE, findings) is None
+    assert read_table(path, root, base, HERE, findings) is UNKNOWN
     (finding,) = findings.sorted()
     return finding
 
@@ -398,7 +399,7 @@ def test_paths_are_relative_to_the_file_that_names_them(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("1\n")
     findings = Findings()
     got = read_table("../a.csv", tmp_path, tmp_path / "library", HERE, findings)
-    assert got is not None
+    assert got is not UNKNOWN
     assert refused("a.csv", tmp_path, tmp_path / "library").code == "file-missing"
 
 
@@ -426,7 +427,7 @@ def test_no_path_leaves_the_root(tmp_path: Path) -> None:
     ):
         assert refused(path, root, root).code == "path-outside", path
     assert table(root, "inner.csv", "7\n").values[0, 0] == 7
-    assert read_table("fine.csv", root, root, HERE, Findings()) is not None
+    assert read_table("fine.csv", root, root, HERE, Findings()) is not UNKNOWN
 
 
 def test_what_is_no_regular_file_is_never_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 
 from neurovis_spec.language.data.npz import MOST_MEMBERS, parse_npz
 from neurovis_spec.language.data.table import CellError
+from neurovis_spec.language.unknown import UNKNOWN
 
 MATRIX = np.array([[1.0, -2.5, 0.0], [4.0, 5.0, 1e-300]])
 
@@ -53,7 +54,7 @@ def test_several_arrays_ask_for_a_key_and_an_unknown_one_is_answered_with_the_ne
     assert finding.hint == "name one of them with 'key'"
     for key, hint in (("wieghts", "did you mean 'weights'?"), ("x", "its arrays: weights, bias")):
         found, (finding,) = attempt(tmp_path, "a.npz", data, key)
-        assert found is None
+        assert found is UNKNOWN
         assert (finding.code, finding.span, finding.hint) == ("unknown-array", THERE, hint)
     (finding,) = attempt(tmp_path, "b.npz", zipped({"readme.txt": b""}), "x")[1]
     assert finding.hint == "it holds none"
@@ -62,7 +63,7 @@ def test_several_arrays_ask_for_a_key_and_an_unknown_one_is_answered_with_the_ne
 @pytest.mark.parametrize("name", ["a.csv", "a.npy", "a.mtx"])
 def test_a_key_beside_a_file_of_one_table(tmp_path: Path, name: str) -> None:
     found, (finding,) = attempt(tmp_path, name, "1\n", "x")
-    assert found is None
+    assert found is UNKNOWN
     assert (finding.code, finding.span) == ("useless-key", THERE)
 
 

@@ -148,6 +148,7 @@ def tables(named: Mapping[str, str], network: Network) -> dict[str, FloatArray]:
         return {}
     from neurovis_spec.diagnostics import Findings, Span
     from neurovis_spec.language.data.files import read_table
+    from neurovis_spec.language.unknown import UNKNOWN
     from neurovis_spec.runtime.inputs import check_names
 
     check_names(network, named)
@@ -157,7 +158,7 @@ def tables(named: Mapping[str, str], network: Network) -> dict[str, FloatArray]:
         place = Span(text, 1, 1, 1, 1)
         folder = Path(text).resolve().parent
         table = read_table(Path(text).resolve().name, folder, folder, place, findings, inside=True, kinds=_INPUTS)
-        if table is None:
+        if table is UNKNOWN:
             continue
         if table.numbered:
             from neurovis_spec.language.data.header import AS_TEXTS, NUMBERED

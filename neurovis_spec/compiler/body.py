@@ -94,7 +94,7 @@ def _found(kind: str, given: Located[str], place: Place, findings: Findings) -> 
         if not loaded.takes_file:
             return None, True
         where = (given.value, place.root, place.base, given.span, findings)
-        if read_data(*where) is None:
+        if read_data(*where) is UNKNOWN:
             return None, False
         path = (place.base / given.value).resolve()
         inside = place.root.resolve()

@@ -18,6 +18,7 @@ from neurovis_spec.language.data.files import locate
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.shape import read_included
 from neurovis_spec.language.spec import IncludedModel, Spec
+from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
 from neurovis_spec.language.yaml.reader import LARGEST, read_content
 
@@ -73,7 +74,7 @@ class _Reader:
     def _one(self, path: Located[str], file: str, folder: Path, way: tuple[Path, ...]) -> bool:
         """Read one file; whether it could be read."""
         place = locate(path.value, self.root, folder, path.span, self.findings)
-        if place is None:
+        if place is UNKNOWN:
             return False
         if place in way:
             names = [step.name for step in (*way[way.index(place) :], place)]

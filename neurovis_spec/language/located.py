@@ -148,8 +148,8 @@ def as_bool(node: Node, info: ValidationInfo) -> Located[bool]:
     refuse(info, node, "true or false", hint)
 
 
-def formula_of(node: Node, findings: Findings, hint: str | None = None) -> Formula | None:
-    """A finite number, or the text of an expression; None where it is neither (that is reported, with the hint)."""
+def formula_of(node: Node, findings: Findings, hint: str | None = None) -> Formula | Unknown:
+    """A finite number, or the text of an expression; UNKNOWN where it is neither (that is reported, with the hint)."""
     if isinstance(node, Scalar):
         value = node.value
         if isinstance(value, str) and value.strip():
@@ -159,17 +159,17 @@ def formula_of(node: Node, findings: Findings, hint: str | None = None) -> Formu
                 return Located(value, node)
             bound = "a spec has finite numbers alone; a bound that there is not is left out"
             findings.error("not-finite", node.span, "a finite number is wanted here", bound)
-            return None
+            return UNKNOWN
     message = f"expected a number or an expression, found {describe(node)}"
     findings.error("wrong-type", node.span, message, hint)
-    return None
+    return UNKNOWN
 
 
 def as_formula(node: Node, info: ValidationInfo) -> Formula:
     """A finite number, or the text of an expression."""
     rows = info.field_name == "weight" and isinstance(node, (Sequence, Packed))
     formula = formula_of(node, findings_of(info), "rows of weights stand under 'matrix'" if rows else None)
-    if formula is None:
+    if formula is UNKNOWN:
         give_up()
     return formula
 

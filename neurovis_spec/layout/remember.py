@@ -12,6 +12,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.data.files import locate
 from neurovis_spec.language.located import Located
+from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
 from neurovis_spec.language.yaml.reader import LARGEST
 from neurovis_spec.layout.file import parse_bytes
@@ -24,7 +25,7 @@ def read_memory(path: Located[str], folder: Path, root: Path, network: Network, 
     Codes: those of data files, those of layout files, ``layout-file-missing`` and ``forgotten-neuron`` (warnings).
     """
     place = locate(path.value, root, folder, path.span, findings)
-    if place is None:
+    if place is UNKNOWN:
         return None
     data = read_bytes(place, LARGEST)
     if isinstance(data, FileFault):

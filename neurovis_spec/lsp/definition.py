@@ -15,6 +15,7 @@ from pathlib import Path
 from neurovis_spec import plugins
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.data.files import locate
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.yaml.reader import read_file
 from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.names import Name
@@ -62,10 +63,10 @@ def _file(document: Document, item: Item) -> Location | None:
     if item.is_key or not (item.path[-1:] == ("file",) or item.path[:1] == ("include",)):
         return None
     path = _located(document, item)
-    return None if path is None or not path.is_file() else Location(path, Span(str(path), 1, 1, 1, 1))
+    return None if path is UNKNOWN or not path.is_file() else Location(path, Span(str(path), 1, 1, 1, 1))
 
 
-def _located(document: Document, item: Item) -> Path | None:
+def _located(document: Document, item: Item) -> Path | Unknown:
     return locate(item.text, document.root, document.folder, item.span, Findings())
 
 

@@ -16,6 +16,7 @@ from typing import Final, TypeAlias
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.data.files import locate
 from neurovis_spec.language.includes import MOST
+from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
 from neurovis_spec.language.yaml.reader import LARGEST
 from neurovis_spec.lsp.page import Page
@@ -100,8 +101,8 @@ class Files:
         while waiting and len(found) < MOST:
             folder, item = waiting.popleft()
             place = locate(item.text, root, folder, item.span, Findings())
-            other = None if place is None or place in found or place == path else self.page(place)
-            if place is not None and other is not None:
+            other = None if place is UNKNOWN or place in found or place == path else self.page(place)
+            if place is not UNKNOWN and other is not None:
                 found[place] = other
                 waiting.extend((place.parent, below) for below in other.includes)
         return tuple(found.values())

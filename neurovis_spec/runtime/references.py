@@ -19,6 +19,7 @@ from neurovis_spec.compiler.names.state_references import (
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.references import Arrow, Part, parse, parse_sum, state_of
+from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.recording import UnknownNameError
 
@@ -69,7 +70,7 @@ def _state(network: Network, part: Part, names: Names) -> StateOf:
         one = connections_state(name, _between(network, name.owner, names), wiring_of(network))
     else:
         one = model_state(name, find_neurons(name.owner.text, names), holders_of(network))
-    assert one is not None  # no connection of a network is invalid
+    assert one is not UNKNOWN  # no connection of a network is invalid
     if isinstance(one, Refusal):
         raise UnknownNameError(f"'{text}': {one.message}" + (f"; {one.hint}" if one.hint else ""))
     return one

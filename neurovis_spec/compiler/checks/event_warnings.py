@@ -88,7 +88,7 @@ class _Reader:
     def _of(self, end: Sum, text: Located[str]) -> IntArray:
         """The neurons of an end of a connection."""
         if end.text not in self.known:
-            found = resolve_sum(end, text, self.directory, self.constants.findings) or ()
+            found = known(resolve_sum(end, text, self.directory, self.constants.findings), ())
             self.known[end.text] = np.array(found, dtype=np.int64)
         return self.known[end.text]
 

@@ -21,6 +21,7 @@ from neurovis_spec.compiler.neurons.populate import Population
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.sections import written
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 
 
 class Connected(NamedTuple):
@@ -63,10 +64,10 @@ def connect(scopes: tuple[Scope, ...], population: Population, limits: Limits, s
             if number[name] > 1:
                 name = f"{name} ({number[name]})"
             if body.contradictory:  # which key is meant is not known: nothing is held against the sizes of the ends
-                sources = targets = None
+                sources = targets = UNKNOWN
             around = EntryContext(scope, directory, population, limits, seed, limits.connections - total)
             bundle = EntryBuilder(around, key, body, name, sources, targets).build()
-            if bundle is None or findings.errors > before:
+            if bundle is UNKNOWN or findings.errors > before:
                 failed.add(scope.module)
             else:
                 total += len(bundle.sources)
@@ -74,13 +75,15 @@ def connect(scopes: tuple[Scope, ...], population: Population, limits: Limits, s
     return Connected(tuple(result), not failed)
 
 
-def _ends(key: Located[str], directory: Directory, findings: Findings) -> tuple[str, IntArray | None, IntArray | None]:
-    """What an entry is called, and the neurons of its ends, None where an end is invalid."""
+def _ends(
+    key: Located[str], directory: Directory, findings: Findings
+) -> tuple[str, IntArray | Unknown, IntArray | Unknown]:
+    """What an entry is called, and the neurons of its ends, UNKNOWN where an end is invalid."""
     arrow = arrow_of(key, findings)
-    if arrow is None:
-        return key.value, None, None
+    if arrow is UNKNOWN:
+        return key.value, UNKNOWN, UNKNOWN
     ends = [resolve_sum(end, key, directory, findings) for end in (arrow.sources, arrow.targets)]
-    sources, targets = (None if end is None else np.array(end, dtype=np.int64) for end in ends)
+    sources, targets = (UNKNOWN if end is UNKNOWN else np.array(end, dtype=np.int64) for end in ends)
     return arrow.normal, sources, targets
 
 

@@ -74,17 +74,17 @@ class EdgeReader:
     #: how many connections may be made; None where that is not known
     most: int | None = None
 
-    def read(self, edges: EdgeRows | FileReference) -> EdgeList | None:
-        """All edges; None where one is invalid."""
+    def read(self, edges: EdgeRows | FileReference) -> EdgeList | Unknown:
+        """All edges; UNKNOWN where one is invalid."""
         if isinstance(edges, FileReference):
             return self._from_file(edges)
         if len(edges.node) == 0:
             self.constants.findings.error("wrong-size", edges.node.span, "there is no edge in this list")
-            return None
+            return UNKNOWN
         cells = cells_of(edges.node, self.constants.findings, _AN_EDGE, named=True)
-        return None if cells is None else self._written(cells)
+        return UNKNOWN if cells is UNKNOWN else self._written(cells)
 
-    def _written(self, cells: Cells) -> EdgeList | None:
+    def _written(self, cells: Cells) -> EdgeList | Unknown:
         findings = self.constants.findings
         widths = cells.widths
         right = (widths >= 2) & (widths <= 4)
@@ -96,20 +96,20 @@ class EdgeReader:
         i = self._ends(cells, first[right], self.sources, "source")
         j = self._ends(cells, first[right] + 1, self.targets, "target")
         weighted, delayed = np.flatnonzero(right & (widths >= 3)), np.flatnonzero(right & (widths == 4))
-        ends = None if i is None or j is None or len(wrong) else (i[weighted], j[weighted])
+        ends = UNKNOWN if i is UNKNOWN or j is UNKNOWN or len(wrong) else (i[weighted], j[weighted])
         with self.constants.following() as parts:
             given = self._given(cells, first[weighted] + 2, ends)
         self.constants.follow(part._replace(places=weighted[part.within(len(weighted))]) for part in parts)
         later = self._delays(cells, first[delayed] + 3)
-        if i is None or j is None or given is None or later is None or len(wrong) or cells.failed:
-            return None
+        if i is UNKNOWN or j is UNKNOWN or given is UNKNOWN or later is UNKNOWN or len(wrong) or cells.failed:
+            return UNKNOWN
         weights = np.ones(len(widths))
         weights[weighted] = given
         delays = np.full(len(widths), -1, dtype=np.int64)
         delays[delayed] = later
         return EdgeList(i, j, weights, delays)
 
-    def _ends(self, cells: Cells, which: IntArray, end: End, what: str) -> IntArray | None:
+    def _ends(self, cells: Cells, which: IntArray, end: End, what: str) -> IntArray | Unknown:
         """The positions of the neurons that these cells name."""
         findings = self.constants.findings
         no_names = which[cells.kinds[which] != TEXT]
@@ -120,11 +120,11 @@ class EdgeReader:
         which = which[cells.kinds[which] == TEXT]
         texts = cells.numbers[which].astype(np.int64)
         positions = self._positions(cells.texts, texts, end, what, lambda at: (cells.node(int(which[at])).span, ""))
-        return None if len(no_names) else positions
+        return UNKNOWN if len(no_names) else positions
 
     def _positions(
         self, names: tuple[str, ...], which: IntArray, end: End, what: str, where: Callable[[int], tuple[Span, str]]
-    ) -> IntArray | None:
+    ) -> IntArray | Unknown:
         """The positions in an end of the neurons that edges name, by the numbers of these names. ``where`` says of an
         edge where it stands, and what is to be added in words."""
         positions = end.indices(names)[which]
@@ -132,30 +132,28 @@ class EdgeReader:
         _, once = np.unique(which[unknown], return_index=True)
         for edge in unknown[np.sort(once)].tolist()[:PATIENCE]:
             self._outside(names[int(which[edge])], end, what, *where(edge))
-        return None if len(unknown) or end.positions is UNKNOWN else positions
+        return UNKNOWN if len(unknown) or end.positions is UNKNOWN else positions
 
-    def _given(self, cells: Cells, which: IntArray, ends: tuple[IntArray, IntArray] | None) -> FloatArray | None:
+    def _given(self, cells: Cells, which: IntArray, ends: tuple[IntArray, IntArray] | Unknown) -> FloatArray | Unknown:
         """The weights in these cells, 1 for a null; they are checked even if their ends are invalid."""
-        i, j = ends or (UNKNOWN, UNKNOWN)
+        i, j = known(ends, (UNKNOWN, UNKNOWN))
         seen = seen_by_pairs(i, j, (self.sources.size, self.targets.size), self.stream)
         values = values_of(cells, which, self.constants, *seen)
-        return None if values is UNKNOWN else np.where(cells.kinds[which] == NULL, 1.0, values)
+        return UNKNOWN if values is UNKNOWN else np.where(cells.kinds[which] == NULL, 1.0, values)
 
-    def _delays(self, cells: Cells, which: IntArray) -> IntArray | None:
+    def _delays(self, cells: Cells, which: IntArray) -> IntArray | Unknown:
         """The delays in these cells: few distinct ones, each evaluated once."""
-        found: dict[tuple[int, float], int | None] = {}
+        found: dict[tuple[int, float], int | Unknown] = {}
         result = np.zeros(len(which), dtype=np.int64)
         for place, cell in enumerate(which.tolist()):
             key = int(cells.kinds[cell]), float(cells.numbers[cell]) if cells.kinds[cell] != NULL else 0.0
             if key not in found:
                 formula = formula_of(cells.node(cell), self.constants.findings)
                 found[key] = (
-                    None
-                    if formula is None
-                    else known(self.constants.integer(formula, "a delay", 0, LONGEST_DELAY), None)
+                    UNKNOWN if formula is UNKNOWN else self.constants.integer(formula, "a delay", 0, LONGEST_DELAY)
                 )
-            result[place] = found[key] or 0
-        return None if None in found.values() else result
+            result[place] = known(found[key], 0)
+        return UNKNOWN if UNKNOWN in found.values() else result
 
     def _outside(self, name: str, end: End, what: str, span: Span, where: str) -> None:
         if not name.strip():
@@ -166,14 +164,14 @@ class EdgeReader:
         message = f"'{shorten(name)}'{where} is not among the {what}s of this entry"
         self.constants.findings.error("edge-outside", span, message, hint, key=(what, where) if where else None)
 
-    def _from_file(self, reference: FileReference) -> EdgeList | None:
+    def _from_file(self, reference: FileReference) -> EdgeList | Unknown:
         table = self.files.edges(reference, self.most)
         if table is UNKNOWN:
-            return None
+            return UNKNOWN
         span = reference.path.span
         if not table.sources and table.fault is None:
             self.constants.findings.error("wrong-size", span, "there is no edge in this file")
-            return None
+            return UNKNOWN
         numbers = {name: number for number, name in enumerate(dict.fromkeys((*table.sources, *table.targets)))}
         i, j = (
             self._positions(
@@ -189,6 +187,6 @@ class EdgeReader:
         for place in long[:PATIENCE]:
             message = f"row {table.rows[place]} of the file: a delay must be at most {LONGEST_DELAY:,}"
             self.constants.findings.error("out-of-range", span, message, key=("delay", place))
-        if i is None or j is None or long or table.fault is not None:
-            return None
+        if i is UNKNOWN or j is UNKNOWN or long or table.fault is not None:
+            return UNKNOWN
         return EdgeList(i, j, table.weights, table.delays)

@@ -1,7 +1,7 @@
 """Entries: one entry of ``connections``, from its ends and its body to arrays.
 
-In: the neurons of both ends, where these are known, and the body. Out: a Bundle, or None: of an entry that is invalid
-every part is still checked, whatever is wrong with the others.
+In: the neurons of both ends, where these are known, and the body. Out: a Bundle, or UNKNOWN: of an entry that is
+invalid every part is still checked, whatever is wrong with the others.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import ConnectionModel
-from neurovis_spec.language.unknown import UNKNOWN, known
+from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
 from neurovis_spec.language.values import FileReference, MatrixRows
 from neurovis_spec.language.yaml.source import Scalar
 
@@ -85,7 +85,7 @@ class EntryContext(NamedTuple):
 
 @dataclass(frozen=True)
 class EntryBuilder:
-    """Builds one entry, step by step: its shape, its weights, its rule. An end that is invalid is None.
+    """Builds one entry, step by step: its shape, its weights, its rule. An end that is invalid is UNKNOWN.
 
     ``name`` is what it is called in its scope.
     """
@@ -94,8 +94,8 @@ class EntryBuilder:
     key: Located[str]
     body: ConnectionModel
     name: str
-    sources: IntArray | None
-    targets: IntArray | None
+    sources: IntArray | Unknown
+    targets: IntArray | Unknown
 
     @property
     def constants(self) -> Constants:
@@ -109,8 +109,8 @@ class EntryBuilder:
         """Whether nothing was lost that these keys may have said."""
         return self.body.unknown.isdisjoint(keys)
 
-    def build(self) -> Bundle | None:
-        """The connections; None where anything of the entry is invalid, which is reported."""
+    def build(self) -> Bundle | Unknown:
+        """The connections; UNKNOWN where anything of the entry is invalid, which is reported."""
         body, findings = self.body, self.constants.findings
         before = findings.errors
         delay = 1 if body.delay is None else self.constants.integer(body.delay, "a delay", 0, LONGEST_DELAY)
@@ -118,10 +118,10 @@ class EntryBuilder:
         with self.constants.following() as centre_cells:
             centre = self._grid(body.centre, "centre") if isinstance(body.centre, (MatrixRows, FileReference)) else None
         shape = self._shape(centre)
-        if shape is not None and findings.errors == sound and not len(shape.i):
+        if shape is not UNKNOWN and findings.errors == sound and not len(shape.i):
             self._report_empty()
-        if findings.errors > sound or (shape is not None and not self._fits(len(shape.i))):
-            shape = None
+        if findings.errors > sound or (shape is not UNKNOWN and not self._fits(len(shape.i))):
+            shape = UNKNOWN
         with self.constants.following() as weighted:
             weights = self._weights(shape)
         with self.constants.following() as centred:
@@ -131,10 +131,10 @@ class EntryBuilder:
             bounds = self._bounds(weights)
         with self.constants.following() as ruled:
             learning = self._learning(shape)
-        if shape is None or weights is None or centres is None or bounds is None or findings.errors > before:
-            return None
-        if self.sources is None or self.targets is None or not body.sound:
-            return None
+        if shape is UNKNOWN or weights is UNKNOWN or centres is UNKNOWN or bounds is UNKNOWN or learning is UNKNOWN:
+            return UNKNOWN
+        if self.sources is UNKNOWN or self.targets is UNKNOWN or not body.sound or findings.errors > before:
+            return UNKNOWN
         if not len(shape.i):  # there is nothing that a rule would change
             learning = None
         delays = np.full(len(shape.i), known(delay, 0), dtype=np.int64)
@@ -180,15 +180,15 @@ class EntryBuilder:
         self.constants.findings.error("too-many", self.key.span, message, "raise it with --limit")
         return False
 
-    def _grid(self, matrix: MatrixRows | FileReference, purpose: str) -> Grid | None:
+    def _grid(self, matrix: MatrixRows | FileReference, purpose: str) -> Grid | Unknown:
         by_target = self.body.rows is not None and self.body.rows.value == "to"
-        n = None if self.sources is None or not self._kept("rows") else len(self.sources)
-        m = None if self.targets is None or not self._kept("rows") else len(self.targets)
+        n = UNKNOWN if self.sources is UNKNOWN or not self._kept("rows") else len(self.sources)
+        m = UNKNOWN if self.targets is UNKNOWN or not self._kept("rows") else len(self.targets)
         return grid_of(matrix, n, m, by_target, self.constants, self.around.scope.files, self._stream(purpose))
 
-    def _cells(self, grid: Grid | None, parts: list[Part], shape: _Shape | None) -> tuple[Part, ...]:
+    def _cells(self, grid: Grid | Unknown | None, parts: list[Part], shape: _Shape | Unknown) -> tuple[Part, ...]:
         """What of a matrix follows parameters, by connections instead of by cells as they are written."""
-        if grid is None or shape is None or not parts:
+        if grid is None or grid is UNKNOWN or shape is UNKNOWN or not parts:
             return ()
         by_target = self.body.rows is not None and self.body.rows.value == "to"
         order = np.full(grid.shape, -1, dtype=np.int64)
@@ -196,60 +196,60 @@ class EntryBuilder:
         cells = (order.T if by_target else order).ravel()
         return tuple(_present(part, cells[part.within(cells.size)]) for part in parts)
 
-    def _shape(self, centre: Grid | None) -> _Shape | None:
+    def _shape(self, centre: Grid | Unknown | None) -> _Shape | Unknown:
         """The pairs; every key that may say which they are is checked."""
         body = self.body
         with self.constants.following() as cells:
-            grid = None if body.matrix is None else self._grid(body.matrix, "weight")
-        edges = None if body.edges is None else self._edges()
-        pattern = None if body.pattern is None else self._pattern()
-        if self.sources is None or self.targets is None or not self._kept(*_SHAPING):
-            return None
+            grid = UNKNOWN if body.matrix is None else self._grid(body.matrix, "weight")
+        edges = UNKNOWN if body.edges is None else self._edges()
+        pattern = UNKNOWN if body.pattern is None else self._pattern()
+        if self.sources is UNKNOWN or self.targets is UNKNOWN or not self._kept(*_SHAPING):
+            return UNKNOWN
         if body.edges is not None:
             return edges
         if body.matrix is not None:
-            if grid is None:
-                return None
+            if grid is UNKNOWN or centre is UNKNOWN:
+                return UNKNOWN
             present = grid.present if centre is None else grid.present & centre.present
             i, j = np.nonzero(present)
             shape = _Shape(i, j, np.ascontiguousarray(grid.values[i, j]))
             return shape._replace(parts=self._cells(grid, cells, shape))
         if isinstance(body.centre, (MatrixRows, FileReference)):
-            if centre is None:
-                return None
+            if centre is None or centre is UNKNOWN:
+                return UNKNOWN
             i, j = np.nonzero(centre.present)
             return _Shape(i, j)
         return pattern if body.pattern is not None else self._all()
 
-    def _ends(self) -> Ends | None:
-        if self.sources is None or self.targets is None or not self._kept("self"):
-            return None
+    def _ends(self) -> Ends | Unknown:
+        if self.sources is UNKNOWN or self.targets is UNKNOWN or not self._kept("self"):
+            return UNKNOWN
         loops: bool | None = True if len(self.sources) == len(self.targets) == 1 else None
         loops = loops if self.body.self is None else self.body.self.value
         position = self.around.population.neurons.position
         return Ends(self.sources, self.targets, loops, position[self.sources], position[self.targets])
 
-    def _pattern(self) -> _Shape | None:
+    def _pattern(self) -> _Shape | Unknown:
         assert self.body.pattern is not None
-        ends = None if self._misplaced() else self._ends()
+        ends = UNKNOWN if self._misplaced() else self._ends()
         pairs = pairs_of(self.body.pattern, ends, self.constants, self._stream("edges"), self._fits)
-        if ends is not None and self.body.pattern.name.value == "nearest":
+        if ends is not UNKNOWN and self.body.pattern.name.value == "nearest":
             self.around.population.go_by_position(np.concatenate((ends.sources, ends.targets)))
-        return None if pairs is None else _Shape(*pairs)
+        return UNKNOWN if pairs is UNKNOWN else _Shape(*pairs)
 
-    def _all(self) -> _Shape | None:
+    def _all(self) -> _Shape | Unknown:
         """All pairs, where nothing says which."""
         ends = self._ends()
-        if ends is None:
-            return None
+        if ends is UNKNOWN:
+            return UNKNOWN
         n, m = len(ends.sources), len(ends.targets)
         if n > 1 and m > 1 and self._may_be_a_matrix():
-            return None
+            return UNKNOWN
         if n > 1 and m > 1:
             message = f"{n} neurons to {m} neurons: how are they connected?"
             hint = "add pattern: all_to_all, or pattern: one_to_one, or a matrix"
             self.constants.findings.error("pattern-missing", self.key.span, message, hint)
-            return None
+            return UNKNOWN
         return _Shape(*all_to_all(ends))
 
     def _may_be_a_matrix(self) -> bool:
@@ -257,27 +257,27 @@ class EntryBuilder:
         weight = self.body.source.get("weight")
         return not self._kept("weight") and not (isinstance(weight, Scalar) and isinstance(weight.value, str))
 
-    def _edges(self) -> _Shape | None:
+    def _edges(self) -> _Shape | Unknown:
         assert self.body.edges is not None
         ends = (self._named(self.sources), self._named(self.targets))
         reader = EdgeReader(*ends, self.constants, self.around.scope.files, self._stream("weight"), self.around.room)
         with self.constants.following() as parts:
             edges = reader.read(self.body.edges)
-        return None if edges is None else _Shape(edges.i, edges.j, edges.weights, edges.delays, tuple(parts))
+        return UNKNOWN if edges is UNKNOWN else _Shape(edges.i, edges.j, edges.weights, edges.delays, tuple(parts))
 
-    def _named(self, neurons: IntArray | None) -> End:
+    def _named(self, neurons: IntArray | Unknown) -> End:
         """The places of an end's neurons by the names that they have in the scope."""
-        if neurons is None:
+        if neurons is UNKNOWN:
             return End(UNKNOWN, self.around.directory)
         called, own = self.around.population.neurons.names, len(self.around.scope.called(""))
         places = {called[neuron][own:]: place for place, neuron in enumerate(neurons.tolist())}
         return End(places, self.around.directory)
 
-    def _values(self, formula: Formula, shape: _Shape | None, purpose: str) -> FloatArray | None:
+    def _values(self, formula: Formula, shape: _Shape | Unknown, purpose: str) -> FloatArray | Unknown:
         """A formula of i, j, n_from, n_to (and distance) for every pair."""
-        if shape is None or self.sources is None or self.targets is None:
+        if shape is UNKNOWN or self.sources is UNKNOWN or self.targets is UNKNOWN:
             self.constants.value(formula, dict.fromkeys(_WEIGHT.sees, UNKNOWN), UNKNOWN)
-            return None
+            return UNKNOWN
         extra: dict[str, Value] = {
             "i": shape.i.astype(np.float64),
             "j": shape.j.astype(np.float64),
@@ -286,7 +286,7 @@ class EntryBuilder:
         }
         tree = self.constants.tree(formula, _WEIGHT)
         if tree is UNKNOWN:
-            return None
+            return UNKNOWN
         if "distance" in names(tree):
             position = self.around.population.neurons.position
             ends = position[self.sources[shape.i]], position[self.targets[shape.j]]
@@ -294,7 +294,7 @@ class EntryBuilder:
                 if not self._misplaced():
                     message = "'distance' needs a position of every neuron of both ends"
                     self.constants.findings.error("no-position", formula.span, message, "give the groups a 'position'")
-                return None
+                return UNKNOWN
             with np.errstate(over="ignore"):  # what is then infinite is found where it matters
                 apart = ends[0] - ends[1]
                 extra["distance"] = np.hypot(apart[:, 0], apart[:, 1])
@@ -307,22 +307,24 @@ class EntryBuilder:
             if distance.slots:
                 parts = [Part(self.constants.bound(tree, {**extra, "distance": distance}, randomness))]
         self.constants.follow(parts)
-        return None if value is UNKNOWN else np.broadcast_to(np.asarray(value, dtype=np.float64), shape.i.shape).copy()
+        if value is UNKNOWN:
+            return UNKNOWN
+        return np.broadcast_to(np.asarray(value, dtype=np.float64), shape.i.shape).copy()
 
     def _misplaced(self) -> bool:
         """Whether what the spec says of a position of these neurons is invalid."""
         misplaced = self.around.population.misplaced
-        return any(end is not None and bool(misplaced[end].any()) for end in (self.sources, self.targets))
+        return any(end is not UNKNOWN and bool(misplaced[end].any()) for end in (self.sources, self.targets))
 
-    def _weights(self, shape: _Shape | None) -> FloatArray | None:
+    def _weights(self, shape: _Shape | Unknown) -> FloatArray | Unknown:
         if self.body.scale is None:
             weights = self._plain_weights(shape)
-            return weights if self._kept("scale") else None
+            return weights if self._kept("scale") else UNKNOWN
         with self.constants.following() as parts:
             weights = self._plain_weights(shape)
-        if weights is None or shape is None or self.sources is None or self.targets is None:
+        if weights is UNKNOWN or shape is UNKNOWN or self.sources is UNKNOWN or self.targets is UNKNOWN:
             check_scale(self.body.scale, self.constants)
-            return None
+            return UNKNOWN
         ends, pairs = (self.sources, self.targets), (shape.i, shape.j)
         scale = Scaled(Assembled(weights, tuple(parts)), self.body.scale, ends, pairs, self.constants)
         if scale.slots:
@@ -330,21 +332,21 @@ class EntryBuilder:
         with self.constants.following():  # followed as a whole
             return scaled(self.body.scale, weights, ends, pairs, self.constants)
 
-    def _plain_weights(self, shape: _Shape | None) -> FloatArray | None:
+    def _plain_weights(self, shape: _Shape | Unknown) -> FloatArray | Unknown:
         """The weights before they are scaled."""
-        weights = None if shape is None else shape.weights
         if self.body.weight is not None:
             return self._values(self.body.weight, shape, "weight")
-        if weights is None and shape is not None and self._kept("weight"):
-            return np.ones(len(shape.i))
-        if shape is not None:
-            self.constants.follow(shape.parts)
-        return weights
+        if shape is UNKNOWN:
+            return UNKNOWN
+        if shape.weights is None:
+            return np.ones(len(shape.i)) if self._kept("weight") else UNKNOWN
+        self.constants.follow(shape.parts)
+        return shape.weights
 
-    def _centres(self, grid: Grid | None, shape: _Shape | None) -> FloatArray | None:
+    def _centres(self, grid: Grid | Unknown | None, shape: _Shape | Unknown) -> FloatArray | Unknown:
         centre = self.body.centre
         if centre is None:
-            return None if shape is None else np.zeros(len(shape.i))
+            return UNKNOWN if shape is UNKNOWN else np.zeros(len(shape.i))
         if not self._measures_distance():
             entry = self.body.source.entry("centre")
             span = self.key.span if entry is None else entry.key.span
@@ -352,15 +354,15 @@ class EntryBuilder:
             self.constants.findings.error("useless-key", span, message, "give the targets combine: distance")
         if isinstance(centre, Located):
             return self._values(centre, shape, "centre")
-        if grid is None or shape is None:
-            return None
+        if grid is None or grid is UNKNOWN or shape is UNKNOWN:
+            return UNKNOWN
         return np.ascontiguousarray(grid.values[shape.i, shape.j])
 
     def _measures_distance(self) -> bool:
         """Whether any of the targets combines by distance, or may, where what it says of that is invalid."""
-        return self.targets is None or bool(self.around.population.by_distance[self.targets].any())
+        return self.targets is UNKNOWN or bool(self.around.population.by_distance[self.targets].any())
 
-    def _bounds(self, weights: FloatArray | None) -> tuple[float, float] | None:
+    def _bounds(self, weights: FloatArray | Unknown) -> tuple[float, float] | Unknown:
         bounds = self.body.bounds
         if bounds is None:
             return (-np.inf, np.inf)
@@ -370,7 +372,7 @@ class EntryBuilder:
         with self.constants.following() as upper:
             high = self.constants.scalar(bounds.second)
         if low is UNKNOWN or high is UNKNOWN:
-            return None
+            return UNKNOWN
         if lower or upper:  # what is below the other one must stay there
             above = Assembled(np.array(high), tuple(upper))
             lower = lower or [Part(Assembled(np.array(low), ()))]
@@ -378,24 +380,24 @@ class EntryBuilder:
             self.constants.follow(part._replace(field="high") for part in upper)
         if low > high:
             findings.error("out-of-range", bounds.span, f"the lower bound {low:g} is above the upper one {high:g}")
-            return None
-        if weights is not None and ((weights < low) | (weights > high)).any():
+            return UNKNOWN
+        if weights is not UNKNOWN and ((weights < low) | (weights > high)).any():
             first = weights[(weights < low) | (weights > high)][0]
             message = f"the first weight {first:g} lies outside the bounds {low:g} to {high:g}"
             findings.error("weight-outside", bounds.span, message)
-            return None
+            return UNKNOWN
         return (low, high)
 
-    def _learning(self, shape: _Shape | None) -> Learning | None:
+    def _learning(self, shape: _Shape | Unknown) -> Learning | Unknown | None:
         if self.body.plasticity is None:
             return None
-        wired = None
-        if shape is not None and self.sources is not None and self.targets is not None:
+        wired: Wired | Unknown = UNKNOWN
+        if shape is not UNKNOWN and self.sources is not UNKNOWN and self.targets is not UNKNOWN:
             wired = Wired(shape.i, shape.j, len(self.sources), len(self.targets))
         return learning_of(
             self.body.plasticity,
             wired,
-            None if self.targets is None else len(self.targets),
+            UNKNOWN if self.targets is UNKNOWN else len(self.targets),
             self.around.scope,
             self.around.directory,
             len(self.around.population.neurons),

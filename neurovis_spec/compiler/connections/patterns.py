@@ -149,10 +149,10 @@ RECIPES: Final[Mapping[str, _Recipe]] = {
 
 
 def pairs_of(
-    choice: Choice, ends: Ends | None, constants: Constants, stream: Stream, fits: Callable[[int], bool]
-) -> Pairs | None:
-    """The pairs of a pattern as the author wrote it; None where it is invalid, which is reported, or where the ends are
-    not known.
+    choice: Choice, ends: Ends | Unknown, constants: Constants, stream: Stream, fits: Callable[[int], bool]
+) -> Pairs | Unknown:
+    """The pairs of a pattern as the author wrote it; UNKNOWN where it is invalid, which is reported, or where
+    the ends are not known.
 
     ``fits`` says, before they are made, whether there is room for so many.
     """
@@ -164,25 +164,25 @@ def pairs_of(
         findings.error("unknown-pattern", span, f"there is no pattern '{shorten(written)}'", hint)
     if name is None:
         check_settings(choice, constants)
-        return None
+        return UNKNOWN
     recipe, formulas = RECIPES[name], _settings(name, choice, findings)
     found = {setting: _value(name, setting, formula, constants) for setting, formula in formulas.items()}
     values = {setting: value for setting, value in found.items() if value is not UNKNOWN}
-    if ends is None:
-        return None
+    if ends is UNKNOWN:
+        return UNKNOWN
     n, m = len(ends.sources), len(ends.targets)
     if n != m and recipe.equal:
         message = f"'{name}' needs ends of equal size; these have {n} and {m} neurons"
         findings.error("wrong-size", span, message)
-        return None
+        return UNKNOWN
     if len(values) < len(PATTERNS[name].settings) or name != written:
-        return None
+        return UNKNOWN
     misfit = recipe.misfit(ends, values)
     if misfit is not None:
         place = span if misfit.setting is None else formulas[misfit.setting].span
         findings.error(misfit.code, place, misfit.message, misfit.hint)
-        return None
-    return recipe.make(ends, values, stream) if fits(recipe.least(n, m, values)) else None
+        return UNKNOWN
+    return recipe.make(ends, values, stream) if fits(recipe.least(n, m, values)) else UNKNOWN
 
 
 def is_drawn(choice: Choice, constants: Constants) -> bool:
@@ -190,7 +190,7 @@ def is_drawn(choice: Choice, constants: Constants) -> bool:
     if choice.name.value != "random":
         return False
     formulas = [formula_of(entry.value, constants.findings) for entry in choice.settings.entries]
-    return any(formula is not None and known(constants.scalar(formula), 0.0) for formula in formulas)
+    return any(formula is not UNKNOWN and known(constants.scalar(formula), 0.0) for formula in formulas)
 
 
 def _settings(name: str, choice: Choice, findings: Findings) -> dict[str, Formula]:
@@ -201,7 +201,7 @@ def _settings(name: str, choice: Choice, findings: Findings) -> dict[str, Formul
         message = f"'{name}' needs a {missing}"
         findings.error("missing-key", choice.name.span, message, f"write {PATTERNS[name].use}")
     formulas = {setting: formula_of(entry.value, findings) for setting, entry in entries.known().items()}
-    return {setting: formula for setting, formula in formulas.items() if formula is not None}
+    return {setting: formula for setting, formula in formulas.items() if formula is not UNKNOWN}
 
 
 def _value(name: str, setting: str, formula: Formula, constants: Constants) -> float | Unknown:

@@ -22,7 +22,7 @@ from neurovis_spec.diagnostics import shorten, suggest
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import ConnectionModel
-from neurovis_spec.language.unknown import UNKNOWN
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.values import Choice
 from neurovis_spec.language.yaml.source import Entry, Node, Packed, Scalar, Sequence
 
@@ -54,13 +54,13 @@ _SHOWN = 3
 
 def learning_of(
     choice: Choice,
-    wired: Wired | None,
-    target_count: int | None,
+    wired: Wired | Unknown,
+    target_count: int | Unknown,
     scope: Scope,
     directory: Directory,
     neurons: int,
-) -> Learning | None:
-    """The rule of an entry with these connections; None where they are not known: the entry is invalid, and its rule
+) -> Learning | Unknown:
+    """The rule of an entry with these connections; UNKNOWN where they are not known: the entry is invalid, and its rule
     is checked only.
 
     ``directory`` says what the names of the scope mean, ``neurons`` is how many the network has.
@@ -69,13 +69,13 @@ def learning_of(
     found = choose(choice, definitions.rules, "rule", constants.findings)
     if found is UNKNOWN:
         check_settings(choice, constants, _SETTING.sees)
-        return None
+        return UNKNOWN
     rule, defaults = found
     known = (*(default.name for default in defaults), *rule.signals)
     settled = settle(choice, known, constants.findings)
-    targets = None if wired is None else wired.j
-    each = Each("connection", dict.fromkeys(_SETTING.sees, UNKNOWN) if wired is None else wired._asdict())
-    values = parameters(choice, defaults, UNKNOWN if targets is None else len(targets), constants, settled, each)
+    targets = UNKNOWN if wired is UNKNOWN else wired.j
+    each = Each("connection", dict.fromkeys(_SETTING.sees, UNKNOWN) if wired is UNKNOWN else wired._asdict())
+    values = parameters(choice, defaults, UNKNOWN if targets is UNKNOWN else len(targets), constants, settled, each)
     signals: dict[str, IntArray] = {}
     failed = values is UNKNOWN
     told = constants.findings.is_invalid(choice.name.span)
@@ -89,73 +89,73 @@ def learning_of(
                 constants.findings.error("missing-signal", choice.name.span, message, hint, key=signal)
             continue
         where = _signal(entry, targets, target_count, scope, directory, neurons)
-        if where is None:
+        if where is UNKNOWN:
             failed = True
         else:
             signals[signal] = where
     if failed or values is UNKNOWN or not check_initials(rule.state, values, choice, constants):
-        return None
+        return UNKNOWN
     return Learning(rule, values, signals, {name: _text(settled.known()[name].value) for name in rule.signals})
 
 
 def _signal(
     entry: Entry,
-    targets: IntArray | None,
-    target_count: int | None,
+    targets: IntArray | Unknown,
+    target_count: int | Unknown,
     scope: Scope,
     directory: Directory,
     neurons: int,
-) -> IntArray | None:
+) -> IntArray | Unknown:
     """Where a signal comes from, for each connection; one name, or a list of names that are taken together."""
     node, before = entry.value, scope.constants.findings.errors
     items = node.items if isinstance(node, (Sequence, Packed)) else (node,)
-    parts: list[IntArray | None] = []
+    parts: list[IntArray | Unknown] = []
     for item in items:
         parts.append(_place(entry.name, item, scope, directory, neurons))
         if scope.constants.findings.errors - before >= PATIENCE:
-            return None
+            return UNKNOWN
     if not parts:
         message = f"the signal '{entry.name}' names no neuron, group or input"
         scope.constants.findings.error("wrong-type", node.span, message)
-    found = [part for part in parts if part is not None]
+    found = [part for part in parts if part is not UNKNOWN]
     if not found or len(found) < len(parts):
-        return None
+        return UNKNOWN
     where = np.concatenate(found)
-    if len(where) == 1 and targets is not None:
+    if len(where) == 1 and targets is not UNKNOWN:
         return np.repeat(where, len(targets))
-    if len(where) == target_count and targets is not None:
+    if len(where) == target_count and targets is not UNKNOWN:
         return where[targets]
-    if target_count is None or len(where) in (1, target_count):
-        return None
+    if target_count is UNKNOWN or len(where) in (1, target_count):
+        return UNKNOWN
     called = f"'{_text(node)}'" if isinstance(node, Scalar) else f"'{entry.name}'"
     message = f"the signal {called} has {len(where)} components; 1 or {target_count}, one for each target, are wanted"
     scope.constants.findings.error("wrong-size", node.span, message)
-    return None
+    return UNKNOWN
 
 
-def _place(signal: str, node: Node, scope: Scope, directory: Directory, neurons: int) -> IntArray | None:
+def _place(signal: str, node: Node, scope: Scope, directory: Directory, neurons: int) -> IntArray | Unknown:
     """Where a name of a signal is found, in all activities followed by all inputs."""
     findings = scope.constants.findings
     if not isinstance(node, Scalar) or not isinstance(node.value, str):
         message = f"the signal '{signal}' is the name of a neuron, a group or an input, or a list of these"
         findings.error("wrong-type", node.span, message)
-        return None
+        return UNKNOWN
     name = node.value.strip()
     source = scope.input(name)
     if isinstance(source, Input):
         first = neurons + source.start
         return np.arange(first, first + source.size, dtype=np.int64)
     if source is UNKNOWN or directory.find(name) is UNKNOWN:
-        return None
+        return UNKNOWN
     if directory.find(name) is None and not any(mark in name for mark in (".", "+")):
         names = (*scope.section.inputs, *directory.known)
         message = f"there is no neuron, group or input '{shorten(name)}'"
         findings.error(
             "unknown-signal", node.span, message, lambda: suggest(name, few(name, names), "inputs and neurons")
         )
-        return None
+        return UNKNOWN
     found = resolve_end(Located(node.value, node), directory, findings)
-    return None if found is None else np.array(found, dtype=np.int64)
+    return UNKNOWN if found is UNKNOWN else np.array(found, dtype=np.int64)
 
 
 def _text(node: Node) -> str:

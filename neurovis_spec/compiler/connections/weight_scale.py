@@ -17,7 +17,7 @@ from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.located import Formula
 from neurovis_spec.language.sections import ScaleModel
-from neurovis_spec.language.unknown import Names, known
+from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 
 #: Most neurons whose spectral radius is computed: all eigenvalues of a dense matrix are found.
 MOST = 3000
@@ -48,8 +48,8 @@ class Scaled:
         values = given.parameters | {name: float(parameters[slot]) for name, slot in given.settable.items()}
         quiet = Constants(Names(values), given.dt, Findings())
         weights = self.weights.values(parameters)
-        result = scaled(self.model, weights, self.ends, self.pairs, quiet) if np.isfinite(weights).all() else None
-        return np.full(len(weights), np.nan) if result is None else result
+        result = scaled(self.model, weights, self.ends, self.pairs, quiet) if np.isfinite(weights).all() else UNKNOWN
+        return np.full(len(weights), np.nan) if result is UNKNOWN else result
 
 
 def scaled(
@@ -58,44 +58,44 @@ def scaled(
     ends: tuple[IntArray, IntArray],
     pairs: tuple[IntArray, IntArray],
     constants: Constants,
-) -> FloatArray | None:
-    """The weights (one a connection), scaled as the author asks; None where that cannot be, which is reported.
+) -> FloatArray | Unknown:
+    """The weights (one a connection), scaled as the author asks; UNKNOWN where that cannot be, which is reported.
 
     ``ends`` are the neurons of both ends, ``pairs`` the positions in them of each connection's source and target.
     """
     wanted = check_scale(model, constants)
     i, j = pairs
-    if model.indegree is not None and wanted is not None:
+    if model.indegree is not None and wanted is not UNKNOWN:
         return weights / np.bincount(j)[j] if wanted else weights
     exponent = _exponent(weights)
     scopes = _times(weights, -exponent)
-    if model.norm is not None and wanted is not None:
+    if model.norm is not None and wanted is not UNKNOWN:
         cells = i * len(ends[1]) + j
         _, place = np.unique(cells, return_inverse=True)
         norm = float(np.linalg.norm(np.bincount(place, scopes)))
         return _to(model.norm, wanted, weights, (norm, exponent), "norm", constants)
-    if model.spectral_radius is None or wanted is None:
-        return None
+    if model.spectral_radius is None or wanted is UNKNOWN:
+        return UNKNOWN
     radius = _radius(model.spectral_radius, scopes, ends, pairs, constants)
-    if radius is None:
-        return None
+    if radius is UNKNOWN:
+        return UNKNOWN
     return _to(model.spectral_radius, wanted, weights, (radius, exponent), "spectral radius", constants)
 
 
-def check_scale(model: ScaleModel, constants: Constants) -> float | None:
-    """The number that a ``scale`` asks for, whatever the weights are; None where it is invalid."""
-    result: list[float | None] = [] if model.indegree is None else [float(model.indegree.value)]
+def check_scale(model: ScaleModel, constants: Constants) -> float | Unknown:
+    """The number that a ``scale`` asks for, whatever the weights are; UNKNOWN where it is invalid."""
+    result: list[float | Unknown] = [] if model.indegree is None else [float(model.indegree.value)]
     for formula, what in ((model.spectral_radius, "spectral radius"), (model.norm, "norm")):
         if formula is None:
             continue
-        value = known(constants.scalar(formula), None)
-        if value is not None and value < 0:
+        value = constants.scalar(formula)
+        if value is not UNKNOWN and value < 0:
             constants.findings.error("out-of-range", formula.span, f"a {what} is not negative, this is {value:g}")
-            value = None
+            value = UNKNOWN
         result.append(value)
     if not model.sound or model.contradictory:  # without what is invalid in it, it would be another one
-        return None
-    return result[0] if result else None
+        return UNKNOWN
+    return result[0] if result else UNKNOWN
 
 
 def _exponent(weights: FloatArray) -> int:
@@ -111,14 +111,14 @@ def _times(weights: FloatArray, exponent: int) -> FloatArray:
 
 def _to(
     wanted: Formula, value: float, weights: FloatArray, found: tuple[float, int], what: str, constants: Constants
-) -> FloatArray | None:
+) -> FloatArray | Unknown:
     """The weights times what makes a measure of theirs the wanted one; ``found`` is that of the weights times
     2^-exponent, and the exponent. Digits and exponents are computed apart, so that only the result may overflow."""
     measure, exponent = found
     if measure <= _NOTHING * float(np.abs(_times(weights, -exponent)).sum()):
         message = f"the {what} of these weights is 0: there is nothing to scale"
         constants.findings.error("out-of-range", wanted.span, message)
-        return None
+        return UNKNOWN
     (digits, power), (least, shift) = math.frexp(value), math.frexp(measure)
     mantissas, exponents = np.frexp(weights)
     with np.errstate(over="ignore", under="ignore"):
@@ -126,7 +126,7 @@ def _to(
     if not np.isfinite(result).all():
         message = f"with a {what} of {value:g} some of these weights are larger than any number"
         constants.findings.error("not-finite", wanted.span, message)
-        return None
+        return UNKNOWN
     return result
 
 
@@ -136,18 +136,18 @@ def _radius(
     ends: tuple[IntArray, IntArray],
     pairs: tuple[IntArray, IntArray],
     constants: Constants,
-) -> float | None:
+) -> float | Unknown:
     """The largest magnitude of an eigenvalue of the matrix of the entry, whose ends must be the same neurons."""
     sources, targets = ends
     n = len(sources)
     if not np.array_equal(np.sort(sources), np.sort(targets)):
         message = "a spectral radius is that of a matrix from neurons to the same neurons; these ends differ"
         constants.findings.error("wrong-size", wanted.span, message, "use norm or indegree")
-        return None
+        return UNKNOWN
     if n > MOST:
         message = f"a spectral radius is computed for {MOST:,} neurons at most, these are {n:,}"
         constants.findings.error("too-many", wanted.span, message, "use norm or indegree")
-        return None
+        return UNKNOWN
     column = np.argsort(sources)[np.searchsorted(np.sort(sources), targets)]
     matrix = np.zeros((n, n))
     np.add.at(matrix, (pairs[0], column[pairs[1]]), weights)

@@ -20,6 +20,7 @@ from neurovis_spec.language.drawing import PanelModel
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.references import Part, Sum, parse
 from neurovis_spec.language.spec import Spec
+from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
 
 
 def figure_of(
@@ -32,7 +33,7 @@ def figure_of(
     models = () if spec.render is None else spec.render.figure
     reader = _Reader(population, {output.name: output for output in outputs}, frozenset(spec.outputs), finder)
     panels = [reader.panel(model) for model in models]
-    return tuple(panel for panel in panels if panel is not None)
+    return tuple(panel for panel in panels if panel is not UNKNOWN)
 
 
 @dataclass(frozen=True)
@@ -48,14 +49,14 @@ class _Reader:
         """The names of groups and neurons."""
         return self.population.directory
 
-    def panel(self, model: PanelModel) -> Panel | None:
-        """A view with what it shows; None where something of it is invalid."""
+    def panel(self, model: PanelModel) -> Panel | Unknown:
+        """A view with what it shows; UNKNOWN where something of it is invalid."""
         if model.shown is None:
             return Panel(model.view.value)
         findings = self.finder.findings
         before = findings.errors
         curves = [curve for text in model.shown.parts for curve in self._curves(model.view.value, text)]
-        return None if findings.errors > before else Panel(model.view.value, tuple(dict.fromkeys(curves)))
+        return UNKNOWN if findings.errors > before else Panel(model.view.value, tuple(dict.fromkeys(curves)))
 
     def _curves(self, view: str, text: Located[str]) -> Iterator[Curve]:
         """What a reference names, where the view can show it."""
@@ -65,7 +66,8 @@ class _Reader:
                 self._refuse(text.value, text.span, "a raster shows neurons", "show it as weights")
                 return
             connections = self.finder.connections(text)
-            yield from (Curve("connection", index) for index in ([] if connections is None else connections.tolist()))
+            indices = [] if connections is UNKNOWN else connections.tolist()
+            yield from (Curve("connection", index) for index in indices)
             return
         for part in found.parts:
             if view in ("weights", "matrix"):
@@ -85,7 +87,7 @@ class _Reader:
             states: tuple[StateOf, ...] = output.states
         elif state is not None and not (output is not None or self._fed(name)):
             one = self.finder.state(state, part, text)
-            states = () if one is None else (one,)
+            states = () if one is UNKNOWN else (one,)
         else:
             yield from (Curve("neuron", index) for index in self._neurons(part, text, output))
             return
@@ -108,7 +110,7 @@ class _Reader:
             if self._fed(name):
                 groups = self.population.neurons.groups
                 return tuple(index for group in groups if group.input == name for index in group.indices)
-        return resolve_part(part, text, directory, self.finder.findings) or ()
+        return known(resolve_part(part, text, directory, self.finder.findings), ())
 
     def _fed(self, name: str) -> bool:
         """Whether it is an input that neurons take in."""

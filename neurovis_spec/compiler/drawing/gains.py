@@ -16,7 +16,7 @@ from neurovis_spec.diagnostics import Span, shorten
 from neurovis_spec.language.drawing import GainValue, Range
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.references import Sum, parse
-from neurovis_spec.language.unknown import UNKNOWN
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 
 Sort = Literal["activity", "signal", "thickness", "change"]
 
@@ -29,50 +29,50 @@ def stated_gains(
     for one in written:
         value = _value(one, constants)
         members = None if one.key is None else _members(one.key, sort, finder)
-        if value is None:
+        if value is UNKNOWN:
             continue
         if one.key is None:
             found.append((StatedGain(value[0], None, "", value[1]), one.span))
-        elif members is not None:
+        elif members is not UNKNOWN:
             found.append((StatedGain(value[0], members, parse(one.key.value).normal, value[1]), one.key.span))
     found.sort(key=lambda item: math.inf if item[0].members is None else len(item[0].members))
     _check_ties(found, constants)
     return tuple(stated for stated, _ in reversed(found))
 
 
-def _value(one: GainValue, constants: Constants) -> tuple[float, float] | None:
+def _value(one: GainValue, constants: Constants) -> tuple[float, float] | Unknown:
     """The gain, and what is drawn as 0."""
     findings = constants.findings
     if isinstance(one.value, Range):
         low, high = (constants.scalar(end) for end in (one.value.low, one.value.high))
         if low is UNKNOWN or high is UNKNOWN:
-            return None
+            return UNKNOWN
         gain = 2 / (high - low) if high > low else math.inf
         if not math.isfinite(gain):
             message = f"a range goes from low to high, this one from {low:g} to {high:g}"
             findings.error("out-of-range", one.span, message, "write [low, high]")
-            return None
+            return UNKNOWN
         return gain, low / 2 + high / 2
     value = UNKNOWN if one.value is None else constants.scalar(one.value)
     if value is UNKNOWN:
-        return None
+        return UNKNOWN
     if value < 0:
         findings.error("out-of-range", one.span, f"a gain is not negative, this is {value:g}")
-        return None
+        return UNKNOWN
     return value, 0.0
 
 
-def _members(key: Located[str], sort: Sort, finder: Finder) -> tuple[int, ...] | None:
+def _members(key: Located[str], sort: Sort, finder: Finder) -> tuple[int, ...] | Unknown:
     """What a reference names: neurons, or connections."""
     if sort == "activity":
         if not isinstance(parse(key.value), Sum):
             message = f"'{shorten(key.value)}' is a connection; 'activity' is the colour of neurons"
             finder.findings.error("wrong-type", key.span, message, "the colour of connections is 'signal'")
-            return None
+            return UNKNOWN
         found = finder.neurons(key)
     else:
         found = finder.connections(key)
-    return None if found is None else tuple(found.tolist())
+    return UNKNOWN if found is UNKNOWN else tuple(found.tolist())
 
 
 def _check_ties(found: list[tuple[StatedGain, Span]], constants: Constants) -> None:

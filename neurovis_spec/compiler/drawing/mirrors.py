@@ -18,6 +18,7 @@ from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.neurons.populate import Population
 from neurovis_spec.diagnostics import Findings, shorten
 from neurovis_spec.language.located import Located
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.values import Reference
 
 #: Coordinates of pins that differ by less are the same.
@@ -34,7 +35,7 @@ def mirrors_of(scopes: tuple[Scope, ...], population: Population, findings: Find
         layout = scope.section.layout
         for reference in () if layout is None else layout.mirror:
             mirror = _mirror(scope, reference, directory, population.neurons.names, paths, findings)
-            if mirror is None:
+            if mirror is UNKNOWN:
                 continue
             names = population.neurons.names
             sides = [(_frame(names[a], names[b]), m) for a, b in mirror.pairs for m in (a, b)]
@@ -67,28 +68,28 @@ def _mirror(
     names: tuple[str, ...],
     paths: Sequence[str],
     findings: Findings,
-) -> Mirror | None:
+) -> Mirror | Unknown:
     left, right = reference.parts
     sides = directory.instance(left.value), directory.instance(right.value)
     if bool(sides[0]) != bool(sides[1]) and directory.holds((right if sides[0] else left).value):
         message = "a mirror pairs instances with instances, and neurons with neurons"
         findings.error("bad-mirror", reference.span, message)
-        return None
+        return UNKNOWN
     if sides[0] and sides[1]:
         return _of_instances(scope, reference, sides, names, paths, findings)
     pair = _members(left, directory, findings), _members(right, directory, findings)
-    if pair[0] is None or pair[1] is None:
-        return None
+    if pair[0] is UNKNOWN or pair[1] is UNKNOWN:
+        return UNKNOWN
     if len(pair[0]) != len(pair[1]):
         message = (
             f"'{shorten(left.value)}' is {plural(len(pair[0]), 'neuron')}, '{shorten(right.value)}' {len(pair[1])}"
         )
         findings.error("unequal-mirror", reference.span, f"{message}; a mirror needs sides of equal make")
-        return None
+        return UNKNOWN
     return Mirror(scope.path, tuple(zip(pair[0], pair[1], strict=True)))
 
 
-def _members(side: Located[str], directory: Directory, findings: Findings) -> tuple[int, ...] | None:
+def _members(side: Located[str], directory: Directory, findings: Findings) -> tuple[int, ...] | Unknown:
     return () if directory.instance(side.value) else resolve_end(side, directory, findings)
 
 
@@ -99,14 +100,14 @@ def _of_instances(
     names: tuple[str, ...],
     paths: Sequence[str],
     findings: Findings,
-) -> Mirror | None:
+) -> Mirror | Unknown:
     left, right = reference.parts
     if len(sides[0]) != len(sides[1]):
         message = (
             f"'{shorten(left.value)}' is {plural(len(sides[0]), 'instance')}, '{shorten(right.value)}' {len(sides[1])}"
         )
         findings.error("unequal-mirror", reference.span, f"{message}; instances pair by number")
-        return None
+        return UNKNOWN
     pairs: list[tuple[int, int]] = []
     instances: list[tuple[str, str]] = []
     for one, other in zip(*sides, strict=True):
@@ -117,7 +118,7 @@ def _of_instances(
             odd = min(mates.keys() ^ there.keys())
             message = f"'{own}' and '{theirs}' are not of equal make: only one of them has '{odd[1:]}'"
             findings.error("unequal-mirror", reference.span, message)
-            return None
+            return UNKNOWN
         pairs += [(index, mates[name]) for name, index in there.items()]
         instances.append((own, theirs))
     return Mirror(scope.path, tuple(pairs), tuple(instances))
@@ -130,9 +131,9 @@ def lines_of(scopes: tuple[Scope, ...], population: Population, findings: Findin
         layout = scope.section.layout
         for reference in () if layout is None else layout.align:
             members = resolve(reference.parts, directory, findings)
-            if members is not None and len(members) < 2:
+            if members is not UNKNOWN and len(members) < 2:
                 findings.error("wrong-size", reference.span, "a line needs at least two neurons")
-            elif members is not None:
+            elif members is not UNKNOWN:
                 result.append(members)
     return tuple(result)
 

@@ -18,7 +18,7 @@ from neurovis_spec.compiler.neurons.populate import Population
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel
 from neurovis_spec.language.located import Located
-from neurovis_spec.language.unknown import UNKNOWN
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.values import Pair
 
 Place: TypeAlias = tuple[float, float]
@@ -146,7 +146,7 @@ def _said(scope: Scope, directory: Directory, findings: Findings) -> _Said:
             findings.error("bad-pin", key.span, message, f"pin {key.value}1 and the others one by one")
             continue
         found = instances[0].scope if instances else _neuron(key, directory, findings)
-        if found is None:
+        if found is UNKNOWN:
             continue
         known = result.origins if instances else result.neurons
         if found in known:
@@ -162,13 +162,13 @@ def _points(model: LayoutModel | ModuleLayoutModel) -> Iterator[tuple[Located[st
         yield key_of(model.source, "positions", name), point
 
 
-def _neuron(key: Located[str], directory: Directory, findings: Findings) -> int | None:
+def _neuron(key: Located[str], directory: Directory, findings: Findings) -> int | Unknown:
     members = resolve_end(key, directory, findings)
-    if members is not None and len(members) != 1:
+    if members is not UNKNOWN and len(members) != 1:
         message = f"'{shorten(key.value)}' is {len(members)} neurons; a pin names one"
         findings.error("bad-pin", key.span, message, "pin its neurons one by one, or use 'arrange'")
-        return None
-    return None if members is None else members[0]
+        return UNKNOWN
+    return UNKNOWN if members is UNKNOWN else members[0]
 
 
 def _check_apart(pins: Mapping[int, _Pin], names: tuple[str, ...], skip: int, findings: Findings) -> None:

@@ -24,7 +24,7 @@ from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, Rende
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.references import Sum, parse
 from neurovis_spec.language.theme import ThemeModel
-from neurovis_spec.language.unknown import UNKNOWN, known
+from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
 from neurovis_spec.language.values import Reference
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 from neurovis_spec.themes import COLOURS
@@ -120,7 +120,7 @@ def _arranged(
     check_keys(model.source, "arrange", model.arrange, directory, findings)
     for name, how in model.arrange.items():
         members = resolve_end(key_of(model.source, "arrange", name), directory, findings)
-        if members is not None:
+        if members is not UNKNOWN:
             yield members, how.value
 
 
@@ -130,7 +130,7 @@ def _boxed(
     """The named boxes; a reference in them may name an instance, which stands for all of its neurons."""
     for name, reference in model.boxes.items():
         members = resolve(reference.parts, directory, findings, instances=True)
-        if members is not None:
+        if members is not UNKNOWN:
             yield scope.called(name), members
 
 
@@ -149,11 +149,11 @@ def _collapsed(
 ) -> Iterator[tuple[str, tuple[int, ...]]]:
     """What is drawn as one glyph each: no neuron is in two."""
     texts = () if reference is None else reference.parts
-    if resolve(texts, directory, findings, instances=True) is None:
+    if resolve(texts, directory, findings, instances=True) is UNKNOWN:
         return
     for text in texts:
         found = resolve((text,), directory, findings, instances=True)
-        if found:
+        if found is not UNKNOWN and found:
             yield text.value.strip(), found
 
 
@@ -165,7 +165,7 @@ def render_settings(model: RenderModel | None, finder: Finder, constants: Consta
     size = None
     if model.size is not None:
         width, height = (_side(side, constants) for side in model.size[:2])
-        size = None if width is None or height is None else (width, height)
+        size = None if width is UNKNOWN or height is UNKNOWN else (width, height)
         if size is not None and size[0] * size[1] > _MOST_PIXELS:
             message = f"a picture has at most {_MOST_PIXELS:,} pixels, this one {size[0] * size[1]:,}"
             hint = "an '.svg' can be shown as large as one likes"
@@ -207,7 +207,7 @@ def _traces(model: RenderModel, finder: Finder, constants: Constants) -> tuple[S
         if seconds < 0:
             message = f"a trace lasts for 0 seconds or more, this is {seconds:g}"
             constants.findings.error("out-of-range", formula.span, message)
-        elif members is not None:
+        elif members is not UNKNOWN:
             found.append(StatedTrace(seconds, tuple(members.tolist())))
     return tuple(sorted(found, key=lambda one: -len(one.members)))
 
@@ -222,17 +222,17 @@ def _changes(theme: ThemeModel) -> tuple[tuple[str, str], ...]:
     return tuple(result)
 
 
-def _side(formula: Formula, constants: Constants) -> int | None:
+def _side(formula: Formula, constants: Constants) -> int | Unknown:
     """The width or the height of a picture, in pixels."""
     value = constants.scalar(formula)
     if value is UNKNOWN:
-        return None
+        return UNKNOWN
     if not value.is_integer():
         message = f"a side of a picture must be an integer, this is {value:g}"
         constants.findings.error("not-an-integer", formula.span, message)
-        return None
+        return UNKNOWN
     if not 64 <= value <= 16384:
         message = f"a side of a picture has 64 to 16384 pixels, this is {value:.15g}"
         constants.findings.error("out-of-range", formula.span, message)
-        return None
+        return UNKNOWN
     return int(value)

@@ -18,7 +18,7 @@ from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.model import names_of
 from neurovis_spec.language.references import Sum, parse
 from neurovis_spec.language.sections import EventModel
-from neurovis_spec.language.unknown import UNKNOWN
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,9 @@ class EventReader:
     def read(self, models: tuple[EventModel, ...]) -> tuple[Event, ...]:
         """All events, in the order written; those that are invalid are left out, and reported."""
         events = [self._event(model) for model in models]
-        return tuple(event for event in events if event is not None)
+        return tuple(event for event in events if event is not UNKNOWN)
 
-    def _event(self, model: EventModel) -> Event | None:
+    def _event(self, model: EventModel) -> Event | Unknown:
         before = self.findings.errors
         begin = model.at if model.at is not None else model.from_
         at = None if begin is None else self.constants.integer(begin, "the step of an event", 0)
@@ -79,7 +79,7 @@ class EventReader:
             for one in self._learning(key_of(model.source, "learning", name), on.value)
         ]
         if at is None or at is UNKNOWN or to is UNKNOWN or model.contradictory or self.findings.errors > before:
-            return None
+            return UNKNOWN
         keys = {name: key_of(model.source, "set", name).span for name in model.set}
         return Event(at, to, model.set, tuple(clamps), neurons, connections, mended, joined, tuple(learning), keys)
 
@@ -97,7 +97,7 @@ class EventReader:
     def _clamp(self, model: EventModel, name: str, formula: Formula) -> list[tuple[IntArray, Formula]]:
         neurons = self.finder.neurons(key_of(model.source, "clamp", name))
         value = self.constants.scalar(formula)
-        return [] if neurons is None or value is UNKNOWN else [(neurons, formula)]
+        return [] if neurons is UNKNOWN or value is UNKNOWN else [(neurons, formula)]
 
     def _parts(self, texts: Iterable[Located[str]]) -> tuple[tuple[IntArray, ...], tuple[IntArray, ...]]:
         """The neurons and the connections that are lesioned or mended."""
@@ -106,14 +106,14 @@ class EventReader:
         for text in texts:
             joined = not isinstance(parse(text.value), Sum)
             found = self.finder.connections(text) if joined else self.finder.neurons(text)
-            if found is not None:
+            if found is not UNKNOWN:
                 (connections if joined else neurons).append(found)
         return tuple(neurons), tuple(connections)
 
     def _learning(self, name: Located[str], on: bool) -> list[tuple[IntArray, bool]]:
         """The connections whose rules are stopped or started."""
         found = self.finder.connections(name)
-        if found is None:
+        if found is UNKNOWN:
             return []
         if not self.finder.learns(found):
             message = f"nothing learns at '{shorten(name.value)}'"

@@ -25,6 +25,7 @@ from neurovis_spec.compiler.neurons.populate import Population
 from neurovis_spec.diagnostics import Findings, shorten, suggest
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.references import Arrow, Part, StateName, state_of
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 
 
 @dataclass(frozen=True)
@@ -39,36 +40,36 @@ class Finder:
     known_neurons: dict[str, IntArray] = field(default_factory=dict)
     known_connections: dict[str, IntArray] = field(default_factory=dict)
 
-    def neurons(self, text: Located[str]) -> IntArray | None:
-        """The neurons of a reference; None where it is invalid."""
+    def neurons(self, text: Located[str]) -> IntArray | Unknown:
+        """The neurons of a reference; UNKNOWN where it is invalid."""
         if text.value not in self.known_neurons:
             found = resolve_end(text, self.directory, self.findings)
-            if found is None:
-                return None
+            if found is UNKNOWN:
+                return UNKNOWN
             self.known_neurons[text.value] = np.unique(np.array(found, dtype=np.int64))
             frozen(self.known_neurons[text.value])
         return self.known_neurons[text.value]
 
-    def connections(self, text: Located[str]) -> IntArray | None:
-        """The connections between two ends; None, and a finding, where there is none."""
+    def connections(self, text: Located[str]) -> IntArray | Unknown:
+        """The connections between two ends; UNKNOWN, and a finding, where there is none."""
         if text.value not in self.known_connections:
             arrow = arrow_of(text, self.findings)
-            found = None if arrow is None else self._between(arrow, text)
-            if arrow is None or found is None or not self.wiring.complete:
-                return None
+            found = UNKNOWN if arrow is UNKNOWN else self._between(arrow, text)
+            if arrow is UNKNOWN or found is UNKNOWN or not self.wiring.complete:
+                return UNKNOWN
             if not len(found):
                 message = f"there is no connection '{shorten(text.value)}'"
                 self.findings.error("no-connection", text.span, message, lambda: self._other(arrow, text))
-                return None
+                return UNKNOWN
             frozen(found)
             self.known_connections[text.value] = found
         return self.known_connections[text.value]
 
-    def _between(self, arrow: Arrow, text: Located[str], back: bool = False) -> IntArray | None:
+    def _between(self, arrow: Arrow, text: Located[str], back: bool = False) -> IntArray | Unknown:
         sources = resolve_sum(arrow.sources, text, self.directory, self.findings)
         targets = resolve_sum(arrow.targets, text, self.directory, self.findings)
-        if sources is None or targets is None:
-            return None
+        if sources is UNKNOWN or targets is UNKNOWN:
+            return UNKNOWN
         return self.wiring.between(targets, sources) if back else self.wiring.between(sources, targets)
 
     def learns(self, connections: IntArray) -> bool:
@@ -79,7 +80,7 @@ class Finder:
         """Which connection may be meant: the one the other way, those that are called alike, those of either end."""
         source, target = arrow.sources.text, arrow.targets.text
         back = self._between(arrow, text, back=True)
-        if back is not None and len(back):
+        if back is not UNKNOWN and len(back):
             return f"there is '{shorten(target)} -> {shorten(source)}', the other way"
         names = self.wiring.names
         near = [name for name in names if source in name.split(" -> ")[0] or target in name.split(" -> ")[-1]]
@@ -95,18 +96,18 @@ class Finder:
         owner = name.owner.text
         return None if self.directory.instance(owner) or owner in self.directory.instances else name
 
-    def state(self, name: StateName, part: Part, text: Located[str]) -> StateOf | None:
-        """The state that a part of a text names; None where there is none, which is reported."""
-        one: StateOf | Refusal | None
+    def state(self, name: StateName, part: Part, text: Located[str]) -> StateOf | Unknown:
+        """The state that a part of a text names; UNKNOWN where there is none, which is reported."""
+        one: StateOf | Refusal | Unknown
         if isinstance(name.owner, Arrow):
             connections = self._between(name.owner, text)
-            one = None if connections is None else connections_state(name, connections, self.wiring)
+            one = UNKNOWN if connections is UNKNOWN else connections_state(name, connections, self.wiring)
         else:
             neurons = resolve_part(name.owner, text, self.directory, self.findings)
-            one = None if neurons is None else model_state(name, neurons, self.models)
+            one = UNKNOWN if neurons is UNKNOWN else model_state(name, neurons, self.models)
         if isinstance(one, Refusal):
             self.findings.error("unknown-state", text.node.at(part.start, part.end), one.message, one.hint)
-            return None
+            return UNKNOWN
         return one
 
 

@@ -20,6 +20,7 @@ from neurovis_spec.diagnostics import Findings, shorten
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.references import Part, StateName, parse_sum
 from neurovis_spec.language.spec import Spec
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.values import Reference
 
 
@@ -45,25 +46,25 @@ class _Reader:
                 output = self._of_states(name, named)
             else:
                 output = self._of_neurons(name, reference)
-            if output is not None:
+            if output is not UNKNOWN:
                 yield output
 
-    def _of_neurons(self, name: str, reference: Reference) -> Output | None:
+    def _of_neurons(self, name: str, reference: Reference) -> Output | Unknown:
         neurons = resolve(reference.parts, self.finder.directory, self.findings)
-        if neurons is None:
-            return None
+        if neurons is UNKNOWN:
+            return UNKNOWN
         array = np.array(neurons, dtype=np.int64)
         frozen(array)
         return Output(name, array, len(neurons) == 1)
 
-    def _of_states(self, name: str, named: list[tuple[Part, Located[str], StateName | None]]) -> Output | None:
+    def _of_states(self, name: str, named: list[tuple[Part, Located[str], StateName | None]]) -> Output | Unknown:
         found: list[StateOf] = []
         failed = False
         seen: set[tuple[str, str, int]] = set()
         before = self.findings.errors
         for part, text, state in named:
             if self.findings.errors - before >= PATIENCE:
-                return None
+                return UNKNOWN
             span = text.node.at(part.start, part.end)
             if state is None:
                 message = f"'{shorten(part.text)}' is no state, and the output '{name}' is of states"
@@ -71,7 +72,7 @@ class _Reader:
                 failed = True
                 continue
             one = self.finder.state(state, part, text)
-            if one is None:
+            if one is UNKNOWN:
                 failed = True
                 continue
             own = set(singles([one]))
@@ -82,7 +83,7 @@ class _Reader:
             seen |= own
             found.append(one)
         if failed:
-            return None
+            return UNKNOWN
         neurons = np.unique(np.concatenate([one.neurons for one in found]))
         frozen(neurons)
         return Output(name, neurons, sum(one.size for one in found) == 1, tuple(found))

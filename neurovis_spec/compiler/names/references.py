@@ -204,23 +204,23 @@ def check_keys(
             resolve_end(Located(entry.name, entry.key), directory, findings)
 
 
-def resolve_part(part: Part, text: Located[str], directory: Directory, findings: Findings) -> tuple[int, ...] | None:
+def resolve_part(part: Part, text: Located[str], directory: Directory, findings: Findings) -> tuple[int, ...] | Unknown:
     """One reference within a text: a group, a neuron or a range."""
     span = text.node.at(part.start, part.end)
     if isinstance(part, NoReference):
         findings.error(part.code, span, part.message, part.hint)
-        return None
+        return UNKNOWN
     if isinstance(part, NeuronRange):
         found = directory.range(part.low.text, part.high.text)
         if isinstance(found, str):
             findings.error("bad-range", span, f"'{shorten(part.text)}' is no range: {found}")
-        return found if isinstance(found, tuple) else None
+        return UNKNOWN if isinstance(found, str) else found
     result = directory.find(part.text)
     if result is None:
         right = None if findings.many else directory.meant(part.text)
         _unknown(part.text, span, directory, findings)
         result = None if right is None else directory.find(right)
-    return result if isinstance(result, tuple) else None
+    return UNKNOWN if result is None else result
 
 
 def _unknown(name: str, span: Span, directory: Directory, findings: Findings) -> None:
@@ -241,47 +241,47 @@ def _unknown(name: str, span: Span, directory: Directory, findings: Findings) ->
 
 def resolve(
     texts: Iterable[Located[str]], directory: Directory, findings: Findings, *, instances: bool = False
-) -> tuple[int, ...] | None:
+) -> tuple[int, ...] | Unknown:
     """Several references, in the order written; a neuron named twice is a finding. With ``instances`` the name of an
     instance stands for all of its neurons."""
     return _resolve([(part, text) for text in texts for part in parse_sum(text.value)], directory, findings, instances)
 
 
-def resolve_end(text: Located[str], directory: Directory, findings: Findings) -> tuple[int, ...] | None:
+def resolve_end(text: Located[str], directory: Directory, findings: Findings) -> tuple[int, ...] | Unknown:
     """References joined with ``+``."""
     return resolve((text,), directory, findings)
 
 
-def resolve_sum(found: Sum, text: Located[str], directory: Directory, findings: Findings) -> tuple[int, ...] | None:
+def resolve_sum(found: Sum, text: Located[str], directory: Directory, findings: Findings) -> tuple[int, ...] | Unknown:
     """References joined with ``+`` within a text: an end of a connection."""
     return _resolve([(part, text) for part in found.parts], directory, findings)
 
 
-def arrow_of(text: Located[str], findings: Findings) -> Arrow | None:
-    """A text that is to name connections, taken apart; None, and a finding, where it is no ``FROM -> TO``."""
+def arrow_of(text: Located[str], findings: Findings) -> Arrow | Unknown:
+    """A text that is to name connections, taken apart; UNKNOWN, and a finding, where it is no ``FROM -> TO``."""
     found = parse(text.value)
     if isinstance(found, Arrow):
         return found
     message = f"'{shorten(text.value)}' is no connection"
     findings.error("bad-connection", text.span, message, "write FROM -> TO")
-    return None
+    return UNKNOWN
 
 
 def _resolve(
     written: Iterable[tuple[Part, Located[str]]], directory: Directory, findings: Findings, instances: bool = False
-) -> tuple[int, ...] | None:
+) -> tuple[int, ...] | Unknown:
     result: list[int] = []
     seen: set[int] = set()
     before = findings.errors
     failed = False
     for part, text in written:
         if findings.errors - before >= PATIENCE:
-            return None
+            return UNKNOWN
         inside = directory.instance(part.text) if instances else ()
-        found: tuple[int, ...] | None = tuple(index for one in inside for index in one.members)
+        found: tuple[int, ...] | Unknown = tuple(index for one in inside for index in one.members)
         if not inside:
             found = resolve_part(part, text, directory, findings)
-        if found is None:
+        if found is UNKNOWN:
             failed = True
             continue
         if not seen.isdisjoint(found):
@@ -290,4 +290,4 @@ def _resolve(
             failed = True
         seen.update(found)
         result.extend(found)
-    return None if failed else tuple(result)
+    return UNKNOWN if failed else tuple(result)

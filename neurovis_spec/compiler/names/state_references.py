@@ -14,6 +14,7 @@ import numpy as np
 from neurovis_spec.arrays import IntArray
 from neurovis_spec.diagnostics import shorten, suggest
 from neurovis_spec.language.references import StateName
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 
 if TYPE_CHECKING:
     from neurovis_spec.compiler.network import Network
@@ -73,15 +74,15 @@ def model_state(name: StateName, neurons: Sequence[int], models: Iterable[Holder
     return StateOf(name.state, wanted, _NONE)
 
 
-def connections_state(name: StateName, connections: IntArray, wiring: Wiring) -> StateOf | Refusal | None:
-    """A state of those of these connections whose rule has it; None where the connection that has it may be one that is
-    invalid."""
+def connections_state(name: StateName, connections: IntArray, wiring: Wiring) -> StateOf | Refusal | Unknown:
+    """A state of those of these connections whose rule has it; UNKNOWN where the connection that has it may be one
+    that is invalid."""
     holders = [holder for holder in wiring.rules if np.isin(connections, holder.members).any()]
     having = [holder.members for holder in holders if name.state in holder.states]
     if having:
         return StateOf(name.state, _NONE, connections[np.isin(connections, np.concatenate(having))])
     if not wiring.complete:
-        return None
+        return UNKNOWN
     if not len(connections):
         return Refusal(f"there is no connection '{shorten(name.owner.text)}'")
     if not holders:

@@ -93,7 +93,7 @@ def _inline(node: Sequence | Packed, constants: Constants) -> FloatArray | Unkno
     """Rows of numbers; a bare number is a row of one."""
     findings = constants.findings
     cells = cells_of(node, findings, "", gaps=False)
-    if cells is None:
+    if cells is UNKNOWN:
         return UNKNOWN
     widths = cells.widths
     if not len(widths):

@@ -60,7 +60,7 @@ def _written(node: Sequence | Packed, n: int | Unknown, constants: Constants) ->
         return UNKNOWN
     row = "" if n is UNKNOWN else f"{_TWO} [x, y]"
     cells = cells_of(Sequence((node,), node.span) if one else node, findings, row, gaps=False)
-    if cells is None:
+    if cells is UNKNOWN:
         return UNKNOWN
     wrong = np.flatnonzero(cells.widths != 2)
     for place in wrong[:PATIENCE].tolist() if row else ():
@@ -86,9 +86,9 @@ def _one_for_all(node: Sequence | Packed, n: int) -> bool:
 def depend_on_positions(node: FileReference | Sequence | Packed | None, constants: Constants) -> None:
     """Mark the parameters in these positions as structural: something that is fixed in a run depends on them."""
     quiet = replace(constants, findings=Findings())
-    cells = None if node is None or isinstance(node, FileReference) else cells_of(node, quiet.findings, "")
-    for cell in () if cells is None else np.flatnonzero(cells.kinds == TEXT).tolist():
-        assert cells is not None
+    cells = UNKNOWN if node is None or isinstance(node, FileReference) else cells_of(node, quiet.findings, "")
+    for cell in () if cells is UNKNOWN else np.flatnonzero(cells.kinds == TEXT).tolist():
+        assert cells is not UNKNOWN
         formula = formula_of(cells.node(cell), quiet.findings)
-        tree = UNKNOWN if formula is None else quiet.tree(formula, _POSITION)
+        tree = UNKNOWN if formula is UNKNOWN else quiet.tree(formula, _POSITION)
         constants.depend(() if tree is UNKNOWN else names(tree))

@@ -83,8 +83,8 @@ def check_settings(choice: Choice, constants: Constants, extra: Collection[str] 
         nodes = entry.value.items if isinstance(entry.value, (Sequence, Packed)) else (entry.value,)
         for node in nodes[:_MOST_CHECKED]:
             name = isinstance(node, Scalar) and isinstance(node.value, str) and IDENTIFIER.fullmatch(node.value.strip())
-            formula = None if name else formula_of(node, constants.findings)
-            if formula is not None:
+            formula = UNKNOWN if name else formula_of(node, constants.findings)
+            if formula is not UNKNOWN:
                 constants.value(formula, dict.fromkeys(extra, UNKNOWN))
 
 
@@ -143,12 +143,12 @@ def _listed(
 def _formulas(entry: Entry, constants: Constants) -> Formula | FormulaList | Unknown:
     node = entry.value
     if not isinstance(node, (Sequence, Packed)):
-        return formula_of(node, constants.findings) or UNKNOWN
+        return formula_of(node, constants.findings)
     items: list[Formula] = []
     before = constants.findings.errors
     for item in node.items:
         formula = formula_of(item, constants.findings)
-        if formula is not None:
+        if formula is not UNKNOWN:
             items.append(formula)
         elif constants.findings.errors - before >= PATIENCE:
             return UNKNOWN

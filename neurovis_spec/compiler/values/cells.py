@@ -53,17 +53,19 @@ class Cells:
 
 def cells_of(
     node: Sequence | Packed, findings: Findings, row: str, *, named: bool = False, gaps: bool = True
-) -> Cells | None:
-    """The cells of a list of rows; findings where one is no number, text or null, or a row is no list. None where there
-    are many such.
+) -> Cells | Unknown:
+    """The cells of a list of rows; findings where one is no number, text or null, or a row is no list. UNKNOWN where
+    there are many such.
 
     ``row`` is what a row is, for a finding; with "" a bare cell is a row of one. ``named``: some cells are names, so
     that the caller has to say what an empty text is. ``gaps``: a cell may be null.
     """
-    cells = _packed(node, row) if isinstance(node, Packed) else None
-    cells = cells or _written(node, findings, row, named)
-    if cells is None:
-        return None
+    if isinstance(node, Packed) and (node.rows is not None or not row):
+        cells: Cells | Unknown = _packed(node)
+    else:
+        cells = _written(node, findings, row, named)
+    if cells is UNKNOWN:
+        return UNKNOWN
     wild = np.flatnonzero(
         ((cells.kinds == NUMBER) & ~np.isfinite(cells.numbers)) | ((cells.kinds == NULL) & (not gaps))
     )
@@ -72,9 +74,7 @@ def cells_of(
     return replace(cells, failed=True) if len(wild) else cells
 
 
-def _packed(node: Packed, row: str) -> Cells | None:
-    if node.rows is None and row:
-        return None
+def _packed(node: Packed) -> Cells:
     starts = np.arange(len(node.kinds) + 1) if node.rows is None else np.array(node.rows, dtype=np.int64)
     kinds = np.array(node.kinds, dtype=np.int8)
     numbers = np.array(node.numbers, dtype=np.float64)
@@ -85,7 +85,7 @@ def _row_span(node: Packed, row: int) -> Span:
     return node.cell(row).span if node.rows is None else node.row(row).span
 
 
-def _written(node: Sequence | Packed, findings: Findings, row: str, named: bool) -> Cells | None:
+def _written(node: Sequence | Packed, findings: Findings, row: str, named: bool) -> Cells | Unknown:
     before = findings.errors
     nodes: list[Node] = []
     starts = [0]
@@ -99,7 +99,7 @@ def _written(node: Sequence | Packed, findings: Findings, row: str, named: bool)
             nodes.append(item)
         starts.append(len(nodes))
         if findings.errors - before >= PATIENCE:
-            return None
+            return UNKNOWN
     texts: dict[str, int] = {}
     kinds = np.zeros(len(nodes), dtype=np.int8)
     numbers = np.full(len(nodes), np.nan)
@@ -109,7 +109,7 @@ def _written(node: Sequence | Packed, findings: Findings, row: str, named: bool)
         if not isinstance(cell, Scalar) or isinstance(cell.value, bool) or (cell.value == "" and not named):
             formula_of(cell, findings)
             if findings.errors - before >= PATIENCE:
-                return None
+                return UNKNOWN
         elif isinstance(cell.value, str):
             kinds[place], numbers[place] = TEXT, texts.setdefault(cell.value, len(texts))
         elif cell.value is not None:
@@ -184,7 +184,7 @@ def _evaluated(
 ) -> Value | Unknown:
     """The values of one formula in all its cells; a finding stands at the first cell whose value is not finite."""
     formula = formula_of(cells.node(int(which[0])), constants.findings)
-    if formula is None:
+    if formula is UNKNOWN:
         return UNKNOWN
     values = constants.unchecked(formula, seen, randomness, places=places)
     if values is UNKNOWN or np.isfinite(values).all():

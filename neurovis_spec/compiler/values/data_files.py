@@ -28,19 +28,19 @@ _FEW = 1 << 16
 
 @dataclass
 class _Shelf(Generic[T]):
-    """What was read, each file once; None where it is invalid."""
+    """What was read, each file once; UNKNOWN where it is invalid."""
 
-    read: dict[Hashable, T | None] = field(default_factory=dict)
+    read: dict[Hashable, T | Unknown] = field(default_factory=dict)
     #: what was too large for a place, with what there is room for; another place may have more
     refused: set[Hashable] = field(default_factory=set)
 
-    def get(self, file: Hashable, place: Hashable, room: Room, read: Callable[[Room], T | None]) -> T | None:
+    def get(self, file: Hashable, place: Hashable, room: Room, read: Callable[[Room], T | Unknown]) -> T | Unknown:
         """What ``read`` returns for a file, cached. ``room`` raises CellError where the file is too large for this
-        place; that is remembered for the place alone, and the result is None."""
+        place; that is remembered for the place alone, and the result is UNKNOWN."""
         if file in self.read:
             return self.read[file]
         if (file, place) in self.refused:
-            return None
+            return UNKNOWN
 
         def noting(count: int) -> None:
             try:
@@ -77,13 +77,13 @@ class Files:
             if shape is not None and cells > max(_FEW, 2 * shape[0] * shape[1]):  # a header counts as well
                 raise CellError("wrong-size", f"it has {amount(cells)} cells; {shape[0]} × {shape[1]} are wanted")
 
-        def read(room: Room) -> Table | None:
+        def read(room: Room) -> Table | Unknown:
             where = (path.value, self.root, self.base, path.span)
             return read_table(*where, self.findings, key, keyed=keyed, gaps=not full, room=room)
 
         file = (path.value, None if key is None else key.value, keyed, full)
         table = self._tables.get(file, shape, room, read)
-        if table is None:
+        if table is UNKNOWN:
             return UNKNOWN
         gap = next(table.gaps(), None) if full and shape in (None, table.values.shape) else None
         if gap is not None:
@@ -106,8 +106,7 @@ class Files:
                 message = f"it has {amount(edges)} edges; {amount(most)} more connections may be made"
                 raise CellError("too-many", message, "raise the limit with --limit")
 
-        def read(room: Room) -> EdgeTable | None:
+        def read(room: Room) -> EdgeTable | Unknown:
             return read_edges(path.value, self.root, self.base, path.span, self.findings, key, room=room)
 
-        table = self._edges.get((path.value, None if key is None else key.value), most, room, read)
-        return UNKNOWN if table is None else table
+        return self._edges.get((path.value, None if key is None else key.value), most, room, read)

@@ -17,7 +17,7 @@ from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Findings, Span
-from neurovis_spec.language.unknown import UNKNOWN
+from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
 from neurovis_spec.language.values import FileReference, Matrix, MatrixRows
 from neurovis_spec.language.yaml.source import NULL
 
@@ -40,35 +40,41 @@ class Grid(NamedTuple):
 
 
 def grid_of(
-    matrix: Matrix, n: int | None, m: int | None, by_target: bool, constants: Constants, files: Files, stream: Stream
-) -> Grid | None:
-    """The numbers of a matrix from n sources to m targets; None where it is invalid. An end of which nothing is known
-    (None) is taken to be as large as the matrix has it, so that all else can be checked.
+    matrix: Matrix,
+    n: int | Unknown,
+    m: int | Unknown,
+    by_target: bool,
+    constants: Constants,
+    files: Files,
+    stream: Stream,
+) -> Grid | Unknown:
+    """The numbers of a matrix from n sources to m targets; UNKNOWN where it is invalid. An end of which nothing is
+    known is taken to be as large as the matrix has it, so that all else can be checked.
 
     In its cells ``i`` is the source and ``j`` the target, also where ``by_target`` its rows are targets.
     """
     if isinstance(matrix, FileReference):
-        table = files.table(matrix, None if n is None or m is None else (n, m))
+        table = files.table(matrix, None if n is UNKNOWN or m is UNKNOWN else (n, m))
         if table is UNKNOWN:
-            return None
+            return UNKNOWN
         return fit(Grid(table.values, table.present, matrix.path.span), n, m, by_target, constants.findings)
     return _written(matrix, n, m, by_target, constants, stream)
 
 
 def _written(
-    matrix: MatrixRows, n: int | None, m: int | None, by_target: bool, constants: Constants, stream: Stream
-) -> Grid | None:
+    matrix: MatrixRows, n: int | Unknown, m: int | Unknown, by_target: bool, constants: Constants, stream: Stream
+) -> Grid | Unknown:
     findings = constants.findings
     cells = cells_of(matrix.node, findings, "a row of a matrix is a list")
-    if cells is None:
-        return None
+    if cells is UNKNOWN:
+        return UNKNOWN
     widths = cells.widths
     if cells.failed:
         uneven = widths[:0]  # a row may be none
     elif not len(widths) or not widths[0]:
         span = cells.row_span(0) if len(widths) else matrix.span
         findings.error("wrong-size", span, "a matrix needs at least one row, and a row at least one cell")
-        return None
+        return UNKNOWN
     else:
         uneven = np.flatnonzero(widths != widths[0])
     for row in uneven[:PATIENCE].tolist():
@@ -78,21 +84,19 @@ def _written(
     i, j = (UNKNOWN, UNKNOWN) if cells.failed else (columns, rows) if by_target else (rows, columns)
     shape = (len(widths), int(widths.max(initial=0)))
     own = shape[::-1] if by_target else shape
-    sizes = (
-        (UNKNOWN, UNKNOWN) if cells.failed else (float(own[0] if n is None else n), float(own[1] if m is None else m))
-    )
+    sizes = (UNKNOWN, UNKNOWN) if cells.failed else (float(known(n, own[0])), float(known(m, own[1])))
     values = values_of(cells, np.arange(len(rows)), constants, *seen_by_pairs(i, j, sizes, stream))
     if values is UNKNOWN or len(uneven) or cells.failed:
-        return None
+        return UNKNOWN
     grid = Grid(values.reshape(shape), (cells.kinds != NULL).reshape(shape), matrix.span)
     return fit(grid, n, m, by_target, findings)
 
 
-def fit(grid: Grid, n: int | None, m: int | None, by_target: bool, findings: Findings) -> Grid | None:
+def fit(grid: Grid, n: int | Unknown, m: int | Unknown, by_target: bool, findings: Findings) -> Grid | Unknown:
     """The grid with sources as rows, of n × m; a shape that fits only when transposed is an error that says so. A size
-    that is not known (None) fits."""
+    that is UNKNOWN fits."""
     oriented = grid.transposed() if by_target else grid
-    n, m = (own if size is None else size for own, size in zip(oriented.shape, (n, m), strict=True))
+    n, m = (known(size, own) for own, size in zip(oriented.shape, (n, m), strict=True))
     if oriented.shape == (n, m):
         return oriented
     rows, columns = grid.shape
@@ -104,4 +108,4 @@ def fit(grid: Grid, n: int | None, m: int | None, by_target: bool, findings: Fin
         findings.error("transposed", grid.span, f"{message}: it fits transposed; {sides}", f"transpose it, or {other}")
     else:
         findings.error("wrong-size", grid.span, message)
-    return None
+    return UNKNOWN

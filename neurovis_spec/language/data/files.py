@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final
 from neurovis_spec.diagnostics import Findings, Span, suggest
 from neurovis_spec.language.data.table import EMPTY_CELL, MOST_FAULTS, CellError, Faults, Room, Table, full, in_cell
 from neurovis_spec.language.located import Located
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ _FROM: Final = "paths are relative to the file that names them"
 KINDS: Final = (".csv", ".npy", ".npz", ".mtx")
 
 
-def locate(path_text: str, root: Path, base: Path, span: Span, findings: Findings) -> Path | None:
+def locate(path_text: str, root: Path, base: Path, span: Span, findings: Findings) -> Path | Unknown:
     """The file that an author means by a path: relative to ``base``, inside ``root`` also behind symbolic links.
 
     Codes: ``path-outside``, ``file-missing``. Whether there is such a file is not asked here.
@@ -42,38 +43,38 @@ def locate(path_text: str, root: Path, base: Path, span: Span, findings: Finding
     shown = _short(path_text)
     if not path_text or "\0" in path_text:
         findings.error("file-missing", span, "this is no path of a file")
-        return None
+        return UNKNOWN
     if len(path_text) > LONGEST_PATH:
         message = f"a path of {len(path_text):,} characters is no path of a file; {LONGEST_PATH:,} are the most"
         findings.error("file-missing", span, message)
-        return None
+        return UNKNOWN
     if Path(path_text).is_absolute() or PureWindowsPath(path_text).drive or path_text.startswith(("/", "\\")):
         findings.error("path-outside", span, f"the path '{shown}' is absolute", _FROM)
-        return None
+        return UNKNOWN
     try:
         inside = root.resolve()
         path = (base / path_text).resolve()
     except (OSError, RuntimeError, ValueError):  # loops of links, names too long
         findings.error("file-missing", span, f"the file '{shown}' does not exist")
-        return None
+        return UNKNOWN
     if not path.is_relative_to(inside):
         hint = "data lies in the folder of the main spec or below it (--root names another folder)"
         findings.error("path-outside", span, f"the path '{shown}' leaves the folder of the spec", hint)
-        return None
+        return UNKNOWN
     findings.files.add(path)
     return path
 
 
-def read_data(path_text: str, root: Path, base: Path, span: Span, findings: Findings) -> bytes | None:
+def read_data(path_text: str, root: Path, base: Path, span: Span, findings: Findings) -> bytes | Unknown:
     """The bytes of a file that an author named; None, and a finding, where it must not or cannot be read."""
     path = locate(path_text, root, base, span, findings)
-    if path is None:
-        return None
+    if path is UNKNOWN:
+        return UNKNOWN
     data = read_bytes(path, LARGEST)
     if isinstance(data, FileFault):
         hint = (_neighbours(path) or _FROM) if data.code == "file-missing" else None
         findings.error(data.code, span, f"the file '{_short(path_text)}' {data.reason}", hint)
-        return None
+        return UNKNOWN
     return data
 
 
@@ -90,7 +91,7 @@ def read_table(
     inside: bool = False,
     kinds: Iterable[str] = KINDS,
     room: Room | None = None,
-) -> Table | None:
+) -> Table | Unknown:
     """A table of numbers from a file of one of these ``kinds``; an array of one dimension is a column.
 
     A ``.csv`` may begin with a row of texts, the header; its empty cells are absent, and so is what an ``.mtx`` and a
@@ -104,13 +105,13 @@ def read_table(
     if suffix not in kinds:
         message = f"'{_short(path_text)}' is no kind of file that holds numbers"
         findings.error("file-format", span, message, "known: " + ", ".join(kinds))
-        return None
+        return UNKNOWN
     if key is not None and suffix != ".npz":
         _refuse_key(key, findings)
-        return None
+        return UNKNOWN
     data = read_data(path_text, root, base, span, findings)
-    if data is None:
-        return None
+    if data is UNKNOWN:
+        return UNKNOWN
     try:
         table = _parsed(suffix, data, None if key is None else key.value, room)
         if inside:
@@ -122,7 +123,7 @@ def read_table(
         place = key.span if key is not None and error.code == "unknown-array" else span
         shown = data if inside and suffix == ".csv" else None
         _refuse(error, path_text, place, findings, gaps=gaps and not inside, shown=shown)
-        return None
+        return UNKNOWN
 
 
 def _check_full(table: Table) -> None:
@@ -161,7 +162,7 @@ def read_edges(
     key: Located[str] | None = None,
     *,
     room: Room | None = None,
-) -> EdgeTable | None:
+) -> EdgeTable | Unknown:
     """A list of edges from a ``.csv`` file whose header names the columns from, to, weight and perhaps delay.
 
     An empty weight is 1, an empty delay −1; a ``key`` is refused; ``room`` may refuse so many edges before they are
@@ -170,20 +171,20 @@ def read_edges(
     """
     if Path(path_text).suffix.lower() != ".csv":
         findings.error("file-format", span, f"edges are read from a .csv file, not from '{_short(path_text)}'")
-        return None
+        return UNKNOWN
     if key is not None:
         _refuse_key(key, findings)
-        return None
+        return UNKNOWN
     data = read_data(path_text, root, base, span, findings)
-    if data is None:
-        return None
+    if data is UNKNOWN:
+        return UNKNOWN
     from neurovis_spec.language.data.edge_list import parse_edges
 
     try:
         table = parse_edges(data, room)
     except CellError as error:
         _refuse(error, path_text, span, findings)
-        return None
+        return UNKNOWN
     if table.fault is not None:
         _refuse(table.fault, path_text, span, findings)
     return table
