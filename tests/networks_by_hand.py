@@ -17,7 +17,6 @@ from neurovis_spec.compiler.network import Connections, Group, Input, Network, N
 from neurovis_spec.compiler.program import (
     Activation,
     Block,
-    Combine,
     Gather,
     Learn,
     Model,
@@ -31,6 +30,7 @@ from neurovis_spec.compiler.program import (
 )
 from neurovis_spec.language.expressions.parser import parse
 from neurovis_spec.language.expressions.tree import Tree
+from neurovis_spec.language.words import Combine
 
 States = Mapping[str, tuple[str, str | None, str | None]]
 

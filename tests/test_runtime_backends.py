@@ -30,7 +30,8 @@ from networks_by_hand import (
 from neurovis_spec.api import compile_text
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Input, Network
-from neurovis_spec.compiler.program import Activation, Combine, Model
+from neurovis_spec.compiler.program import Activation, Model
+from neurovis_spec.language.words import Combine
 from neurovis_spec.runtime.backend import BackendError, Capabilities, choose_backend, listing, load, prepare
 from neurovis_spec.runtime.conditions import first_conditions
 from neurovis_spec.runtime.inputs import InputReader

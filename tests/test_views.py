@@ -19,7 +19,7 @@ from PIL import Image as Pillow
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiler.drawing.drawing_settings import Panel
-from neurovis_spec.language.views import VIEWS
+from neurovis_spec.language.words import VIEWS
 from neurovis_spec.runtime.recording import Recording, RecordingError
 from neurovis_spec.scene import THEMES, Disc, Film, Group, Image, Polyline, Rectangle, Scene, Text, colours, still
 from neurovis_spec.scene.figure import figure

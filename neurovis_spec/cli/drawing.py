@@ -96,7 +96,7 @@ def show_warnings(network: CompiledNetwork, look: Look, effort: str | None = Non
 
 
 def _views() -> Iterable[str]:
-    from neurovis_spec.language.views import VIEWS
+    from neurovis_spec.language.words import VIEWS
 
     return VIEWS
 

@@ -19,7 +19,6 @@ from neurovis_spec.compiler.neurons.groups import Kind
 from neurovis_spec.compiler.neurons.populate import Population
 from neurovis_spec.compiler.program import (
     Block,
-    Combine,
     Gather,
     Learn,
     Operation,
@@ -28,6 +27,7 @@ from neurovis_spec.compiler.program import (
     Send,
     Update,
 )
+from neurovis_spec.language.words import Combine
 
 #: What the neurons of a block have in common: level, activation, model, combination.
 _Key: TypeAlias = tuple[int, str, str, Combine]

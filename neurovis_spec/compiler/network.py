@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
@@ -22,11 +21,10 @@ from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, Rend
 from neurovis_spec.compiler.events.changes import Change
 from neurovis_spec.compiler.events.settable import Binding, ParameterFormula, Part, Settable
 from neurovis_spec.compiler.names.state_references import StateOf
-from neurovis_spec.compiler.program import Block, Combine, Operation, Plasticity
+from neurovis_spec.compiler.program import Block, Operation, Plasticity
 from neurovis_spec.compiler.ros_settings import RosSettings
 from neurovis_spec.language.expressions.tree import Tree
-
-Role = Literal["input", "hidden", "output"]
+from neurovis_spec.language.words import Combine, NeuronRole
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +41,7 @@ class Group:
     model_parameters: Mapping[str, tuple[float, ...]]
     input: str | None = None
     box: str | None = None
-    role: Role | None = None
+    role: NeuronRole | None = None
     description: str | None = None
     #: the module of whose instance it is a part, None where it is the spec's own
     module: str | None = None

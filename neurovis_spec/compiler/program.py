@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.language.expressions.tree import Call, Tree, walk
-
-Combine = Literal["sum", "product", "distance"]
+from neurovis_spec.language.words import Combine
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import partial
-from typing import Final, Literal, cast
+from typing import Final
 
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.names.references import key_of, known_inputs
@@ -24,9 +24,9 @@ from neurovis_spec.compiler.ros_settings import (
 )
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, shorten, suggest
-from neurovis_spec.language.located import Formula
+from neurovis_spec.language.located import Formula, said
 from neurovis_spec.language.model import names_of
-from neurovis_spec.language.ros import PublishModel, QosModel, RosModel, SubscribeModel
+from neurovis_spec.language.ros import PublishModel, RosModel, SubscribeModel
 from neurovis_spec.language.ros_types import Field, all_types, fields_of, misspelt, numbers_of, plain
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.language.unknown import known
@@ -36,19 +36,20 @@ _DATA: Final = "data"
 #: The types of what the network itself publishes.
 _ARRAY: Final = "std_msgs/Float64MultiArray"
 _SPEC: Final = "std_msgs/String"
-#: A queue of more messages is a mistake.
 
 
 def ros_settings(model: RosModel, around: Surroundings, constants: Constants) -> RosSettings:
     """The ``ros`` section of a spec. What is invalid in it is reported and left out."""
     rate = None if model.rate is None else _above_zero(model.rate, "'rate' is steps a second", constants)
     namespace = NAMESPACE if model.namespace is None else f"/{model.namespace.value.strip('/')}"
-    reliability, durability, depth = _quality(model.qos, constants)
+    qos, depth = model.qos, None
+    if qos is not None and qos.depth is not None:
+        depth = known(constants.integer(qos.depth, "'depth'", 1, MOST_WAITING, structural=False), None)
     settings = RosSettings(
         namespace=namespace,
         rate=1 / constants.dt if rate is None else rate,
-        reliability=reliability,
-        durability=durability,
+        reliability="reliable" if qos is None else said(qos.reliability, "reliable"),
+        durability="volatile" if qos is None else said(qos.durability, "volatile"),
         depth=depth,
         subscribe=tuple(_subscriptions(model, around, constants)),
         publish=tuple(_publications(model, around, constants)),
@@ -77,23 +78,6 @@ def _check_topics(model: RosModel, settings: RosSettings, name: str, findings: F
         if "type" not in source.unknown and types.setdefault(topic, heard.type) != heard.type:
             message = f"{topic} has messages of {types[topic]} elsewhere in this spec, here of {heard.type}"
             findings.error("topic-conflict", (source.type or source.topic).span, message, "a topic has one type")
-
-
-def _quality(
-    model: QosModel | None, constants: Constants
-) -> tuple[Literal["reliable", "best_effort"], Literal["volatile", "transient_local"], int | None]:
-    reliability, durability = "reliable", "volatile"
-    depth: int | None = None
-    if model is not None:
-        reliability = reliability if model.reliability is None else model.reliability.value
-        durability = durability if model.durability is None else model.durability.value
-        if model.depth is not None:
-            depth = known(constants.integer(model.depth, "'depth'", 1, MOST_WAITING, structural=False), depth)
-    return (
-        cast(Literal["reliable", "best_effort"], reliability),
-        cast(Literal["volatile", "transient_local"], durability),
-        depth,
-    )
 
 
 def _above_zero(formula: Formula, what: str, constants: Constants) -> float | None:
@@ -129,12 +113,10 @@ def _subscriptions(model: RosModel, around: Surroundings, constants: Constants) 
                 input=name,
                 topic=entry.topic.value,
                 type=_type(entry, found.size),
-                field=_DATA if entry.field is None else entry.field.value,
+                field=said(entry.field, _DATA),
                 names=tuple(joint.value for joint in entry.names or ()),
                 timeout=timeout,
-                on_timeout=cast(
-                    Literal["hold", "zero", "stop"], "zero" if entry.on_timeout is None else entry.on_timeout.value
-                ),
+                on_timeout=said(entry.on_timeout, "zero"),
             )
 
 
@@ -148,8 +130,7 @@ def _publications(model: RosModel, around: Surroundings, constants: Constants) -
         size = None if output is None else output.size
         _check_numbers(entry, size, f"the output '{name}' has", constants.findings)
         if output is not None:
-            field = _DATA if entry.field is None else entry.field.value
-            yield Publication(name, entry.topic.value, _type(entry, output.size), field, safe)
+            yield Publication(name, entry.topic.value, _type(entry, output.size), said(entry.field, _DATA), safe)
 
 
 def _type(entry: SubscribeModel | PublishModel, size: int) -> str:
@@ -183,7 +164,7 @@ def _check_numbers(entry: SubscribeModel | PublishModel, size: int | None, who: 
             hint = suggest(name, all_types(), "types")
             findings.error("unknown-message", entry.type.span, f"there is no message type '{shorten(name)}'", hint)
         return
-    path = _DATA if entry.field is None else entry.field.value
+    path = said(entry.field, _DATA)
     span = (entry.field or entry.type or entry.topic).span
     field = fields.get(path)
     if field is None:

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final
+
+from neurovis_spec.language.words import Durability, OnTimeout, Reliability
 
 NAMESPACE: Final = "/neurovis"
 
-#: The most messages that may wait to be sent.
+#: The most messages that may wait to be sent: a longer queue is a mistake.
 MOST_WAITING = 1_000_000
 
 
@@ -29,7 +31,7 @@ class Subscription:
     field: str = "data"
     names: tuple[str, ...] = ()
     timeout: float | None = None
-    on_timeout: Literal["hold", "zero", "stop"] = "zero"
+    on_timeout: OnTimeout = "zero"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +52,8 @@ class RosSettings:
 
     rate: float = 1.0
     namespace: str = NAMESPACE
-    reliability: Literal["reliable", "best_effort"] = "reliable"
-    durability: Literal["volatile", "transient_local"] = "volatile"
+    reliability: Reliability = "reliable"
+    durability: Durability = "volatile"
     depth: int | None = None
     subscribe: tuple[Subscription, ...] = ()
     publish: tuple[Publication, ...] = ()

@@ -58,7 +58,7 @@ from neurovis_spec.language.values import (
     pair,
     sole,
 )
-from neurovis_spec.language.views import VIEWS, WHOLE
+from neurovis_spec.language.words import VIEWS, WHOLE, Direction
 from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
 
 
@@ -161,7 +161,7 @@ class LayoutModel(Model):
         description="What lays it out: auto, layered, organic, large, circular, grid, spatial, manual, or a plug-in "
         "(default auto).",
     )
-    direction: Annotated[Located[str], words("down", "up", "right", "left")] | None = Field(
+    direction: Annotated[Located[Direction], words(Direction)] | None = Field(
         None, description="Where the signals go: down, up, right, left (default down)."
     )
     positions: Annotated[Keyed[PointField], REFERENCES] = Field(

@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Annotated, Generic, NamedTuple, NoReturn, TypeAlias, TypeVar
+from typing import Annotated, Generic, NamedTuple, NoReturn, TypeAlias, TypeVar, get_args
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic.json_schema import JsonSchemaValue
@@ -30,6 +30,7 @@ T = TypeVar("T")
 M = TypeVar("M")
 V = TypeVar("V")
 N = TypeVar("N", bound=Node)
+Default = TypeVar("Default")
 
 #: The error by which a validator says that the finding is already noted.
 REPORTED = "reported"
@@ -74,6 +75,11 @@ class Located(NamedTuple, Generic[T]):
     def span(self) -> Span:
         """Where the whole value stands."""
         return self.node.span
+
+
+def said(written: Located[T] | None, otherwise: Default) -> T | Default:
+    """The value that is written, or another one where none is."""
+    return otherwise if written is None else written.value
 
 
 def unknown_at(span: Span) -> Located[Unknown]:
@@ -241,9 +247,11 @@ def one_of(*words: str) -> Callable[[Node, ValidationInfo], Located[str]]:
     return check
 
 
-def words(*allowed: str, abouts: Mapping[str, str] | None = None) -> Leaf[Node]:
-    """The annotation of a field that takes one of these words; ``abouts`` says what they mean."""
-    return Leaf(one_of(*allowed), grammar.words(*allowed, abouts=abouts))
+def words(*allowed: object, abouts: Mapping[str, str] | None = None) -> Leaf[Node]:
+    """The annotation of a field that takes one of these words, or those of a Literal; ``abouts`` says what they
+    mean."""
+    known = [str(word) for one in allowed for word in (get_args(one) or (one,))]
+    return Leaf(one_of(*known), grammar.words(*known, abouts=abouts))
 
 
 TextField = Annotated[Located[str], Leaf(as_text, TEXT)]

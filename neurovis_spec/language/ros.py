@@ -26,6 +26,7 @@ from neurovis_spec.language.located import (
 )
 from neurovis_spec.language.model import Keyed, Model
 from neurovis_spec.language.ros_types import all_types
+from neurovis_spec.language.words import Durability, OnTimeout, Reliability
 from neurovis_spec.language.yaml.source import Node
 
 #: Names joined with slashes; ROS 2 has no two underscores in a row.
@@ -95,10 +96,10 @@ class QosModel(Model):
 
     PLACE: ClassVar[str] = "'ros: qos'"
 
-    reliability: Annotated[Located[str], words("reliable", "best_effort")] | None = Field(
+    reliability: Annotated[Located[Reliability], words(Reliability)] | None = Field(
         None, description="Whether what is lost is sent again: reliable or best_effort (default reliable)."
     )
-    durability: Annotated[Located[str], words("volatile", "transient_local")] | None = Field(
+    durability: Annotated[Located[Durability], words(Durability)] | None = Field(
         None, description="Whether who comes late gets the last messages (default volatile)."
     )
     depth: FormulaField | None = Field(
@@ -131,7 +132,7 @@ class SubscribeModel(TopicModel):
     timeout: FormulaField | None = Field(
         None, description="Seconds after the last message from which on it is as on_timeout says; without it, never."
     )
-    on_timeout: Annotated[Located[str], words("hold", "zero", "stop")] | None = Field(
+    on_timeout: Annotated[Located[OnTimeout], words(OnTimeout)] | None = Field(
         None, description="The input then keeps its last value, falls to 0, or the run stops (default zero)."
     )
 

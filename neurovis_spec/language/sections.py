@@ -65,6 +65,7 @@ from neurovis_spec.language.values import (
     as_file,
     pair,
 )
+from neurovis_spec.language.words import Combine, NeuronRole
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Packed, Scalar, Sequence
 
 
@@ -138,7 +139,7 @@ class GroupModel(Model):
         None,
         description="How the activity follows from the input, name or {name: {…}}; static is Eq. 1 (default static).",
     )
-    combine: Annotated[Located[str], words("sum", "product", "distance")] | None = Field(
+    combine: Annotated[Located[Combine], words(Combine)] | None = Field(
         None,
         description="What arrives is combined by sum or product of w·a, or by distance √Σ(w·a − c)² (default sum).",
     )
@@ -162,7 +163,7 @@ class GroupModel(Model):
         None, description="Display text; a counted group may give a list. May hold expressions: 'd{number}'."
     )
     box: TextField | None = Field(None, description="The named box of the picture that holds the group.")
-    role: Annotated[Located[str], words("input", "hidden", "output")] | None = Field(
+    role: Annotated[Located[NeuronRole], words(NeuronRole)] | None = Field(
         None, description="What the picture and the layout take it for: input, hidden or output."
     )
     description: TextField | None = Field(None, description="Shown as tooltip and on hover.")

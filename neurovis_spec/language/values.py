@@ -48,6 +48,7 @@ from neurovis_spec.language.located import (
     findings_of,
     give_up,
     refuse,
+    said,
 )
 from neurovis_spec.language.model import Model, NamedParameters, Short, opening
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Packed, Scalar, Sequence
@@ -255,7 +256,7 @@ class ParameterModel(Model):
     @property
     def about(self) -> str:
         """What it is, as the author says."""
-        return "" if self.description is None else self.description.value
+        return said(self.description, "")
 
 
 ParameterField = Annotated[ParameterModel, Short("value", "a number or an expression")]

@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from neurovis_spec.language.words import Direction
+
 
 @dataclass(frozen=True, slots=True)
 class Mirror:
@@ -41,7 +43,7 @@ class LayoutSettings:
     """The ``layout`` section, references resolved. Pins by neuron index, units of the layout."""
 
     engine: str = "auto"
-    direction: Literal["down", "up", "right", "left"] = "down"
+    direction: Direction = "down"
     positions: Mapping[int, tuple[float, float]] = field(default_factory=dict)
     #: neuron indices → row, column, grid, ring, arc
     arrange: tuple[tuple[tuple[int, ...], str], ...] = ()

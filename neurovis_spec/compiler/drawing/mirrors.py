@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import takewhile
-from typing import Literal
 
 from neurovis_spec.compiler.drawing.drawing_settings import Mirror
 from neurovis_spec.compiler.drawing.pins import Pins
@@ -20,6 +19,7 @@ from neurovis_spec.diagnostics import Findings, shorten
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.values import Reference
+from neurovis_spec.language.words import Direction
 
 #: Coordinates of pins that differ by less are the same.
 _SLACK = 1e-9
@@ -142,7 +142,7 @@ def check_pins(
     mirrors: tuple[Mirror, ...],
     lines: tuple[tuple[int, ...], ...],
     pins: Pins,
-    direction: Literal["down", "up", "right", "left"],
+    direction: Direction,
     names: tuple[str, ...],
     findings: Findings,
 ) -> None:

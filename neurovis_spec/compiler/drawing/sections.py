@@ -6,7 +6,6 @@ In: the sections as written, who finds what they name. Out: LayoutSettings, Rend
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Literal, cast
 
 from neurovis_spec import plugins
 from neurovis_spec.compiler.drawing.drawing_settings import Cell, LayoutSettings, Mirror, RenderSettings, StatedTrace
@@ -21,11 +20,12 @@ from neurovis_spec.compiler.neurons.populate import Population
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, Span, shorten, suggest
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, RenderModel
-from neurovis_spec.language.located import Formula, Located
+from neurovis_spec.language.located import Formula, Located, said
 from neurovis_spec.language.references import Sum, parse
 from neurovis_spec.language.theme import ThemeModel
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
 from neurovis_spec.language.values import Reference
+from neurovis_spec.language.words import Direction
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 from neurovis_spec.themes import COLOURS
 
@@ -48,14 +48,12 @@ def layout_settings(
             boxes += _boxed(scope, scope.section.layout, directory, findings)
     if model is None:
         model = _NOTHING
-    engine = "auto" if model.engine is None else model.engine.value
+    engine = said(model.engine, "auto")
+    direction: Direction = said(model.direction, "down")
     if model.engine is not None:
         _check_engine(model.engine, findings)
     mirrors = mirrors_of(scopes, population, findings)
     lines = lines_of(scopes, population, findings)
-    direction = cast(
-        Literal["down", "up", "right", "left"], "down" if model.direction is None else model.direction.value
-    )
     plan = _plans(scopes, population, boxes, mirrors, lines, direction, findings)
     check_pins(mirrors, lines, pins, direction, population.neurons.names, findings)
     spacing = model.spacing
@@ -74,7 +72,7 @@ def layout_settings(
         mirrors=mirrors,
         align=lines,
         plan=plan,
-        file=None if model.file is None else model.file.value,
+        file=said(model.file, None),
     )
 
 
@@ -84,7 +82,7 @@ def _plans(
     boxes: Iterable[tuple[str, tuple[int, ...]]],
     mirrors: tuple[Mirror, ...],
     lines: tuple[tuple[int, ...], ...],
-    direction: Literal["down", "up", "right", "left"],
+    direction: Direction,
     findings: Findings,
 ) -> tuple[Cell, ...]:
     """The plans of the page and of instances, whose boxes are known by the titles that they have there."""
@@ -180,11 +178,11 @@ def render_settings(model: RenderModel | None, finder: Finder, constants: Consta
         thickness=() if gain is None else stated_gains(gain.thickness, "thickness", finder, constants),
         change=() if gain is None else stated_gains(gain.change, "change", finder, constants),
         traces=_traces(model, finder, constants),
-        theme="default" if theme is None or theme.base is None else theme.base.value,
+        theme="default" if theme is None else said(theme.base, "default"),
         colours=() if theme is None else _changes(theme),
         size=size,
-        labels=model.labels is None or model.labels.value,
-        legend=model.legend is None or model.legend.value,
+        labels=said(model.labels, True),
+        legend=said(model.legend, True),
         title=True if model.title is None else model.title.value,
         window=None if model.window is None else known(constants.integer(model.window, "a window of steps", 1), None),
         collapse=tuple(_collapsed(model.collapse, finder.directory, constants.findings)),

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, NamedTuple, TypeAlias, TypeVar, cast
+from typing import Literal, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -18,18 +18,18 @@ from neurovis_spec.compiler.limits import PATIENCE, Limits, amount, plural
 from neurovis_spec.compiler.names.references import key_span, known_inputs
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.names.state_references import no_state
-from neurovis_spec.compiler.network import Group, Input, Role
+from neurovis_spec.compiler.network import Group, Input
 from neurovis_spec.compiler.neurons.labels import labels_of
 from neurovis_spec.compiler.neurons.noise import noise_of
 from neurovis_spec.compiler.neurons.positions import positions_of
-from neurovis_spec.compiler.program import Activation, Combine, Model
+from neurovis_spec.compiler.program import Activation, Model
 from neurovis_spec.compiler.values.arguments import check_initials, check_settings, choose, parameters, spread
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.definitions import Defaults, Definitions
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import meant, nearest, shorten
 from neurovis_spec.language.expressions.tree import Tree
-from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, too_long
+from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, said, too_long
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
@@ -144,13 +144,13 @@ class Builder:
             count=n,
             activation=kind.activation.name,
             model=kind.model.name,
-            combine=cast(Combine, model.combine.value if model.combine else "sum"),
+            combine=said(model.combine, "sum"),
             activation_parameters={k: tuple(v.tolist()) for k, v in kind.activation_parameters.items()},
             model_parameters={k: tuple(v.tolist()) for k, v in kind.model_parameters.items()},
             input=self._fed(model),
             box=None if model.box is None else self.scope.called(model.box.value),
-            role=None if model.role is None else cast(Role, model.role.value),
-            description=None if model.description is None else model.description.value,
+            role=None if model.role is None else model.role.value,
+            description=said(model.description, None),
             module=self.scope.module,
             spikes=_spikes(kind),
         )
