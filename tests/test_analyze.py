@@ -18,7 +18,7 @@ import neurovis_spec as nv
 from neurovis_spec.analysis import cross_correlation, report
 from neurovis_spec.analysis.catalogue import catalogue
 from neurovis_spec.analysis.page import environment
-from neurovis_spec.analysis.report import Wish, analyze, file_names
+from neurovis_spec.analysis.report import ReportOptions, analyze, file_names
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.scene import THEMES
 
@@ -246,7 +246,7 @@ def test_without_jinja2_it_says_what_to_install(folder: Path, monkeypatch: pytes
 
 def test_in_python_it_is_one_call(folder: Path) -> None:
     network = nv.compile("small.yaml")
-    files = analyze(network, folder / "out", network.run(300), Wish(of="K", trials=False))
+    files = analyze(network, folder / "out", network.run(300), ReportOptions(of="K", trials=False))
     assert files == sorted(files, key=files.index)
     assert (folder / "out" / "index.html") in files
     assert {path.name for path in files} == {path.name for path in (folder / "out").iterdir()}

@@ -9,7 +9,7 @@ import pytest
 from chromium import chromium
 
 import neurovis_spec as nv
-from neurovis_spec.analysis.report import Wish, analyze
+from neurovis_spec.analysis.report import ReportOptions, analyze
 
 pytestmark = pytest.mark.browser
 
@@ -17,7 +17,7 @@ SPECS = Path(__file__).parents[1] / "specs"
 
 
 def test_it_shows_all_pictures_and_asks_nobody(tmp_path: Path) -> None:
-    analyze(nv.compile(SPECS / "cpg_rbf.yaml"), tmp_path / "out", wish=Wish(start=9_428))
+    analyze(nv.compile(SPECS / "cpg_rbf.yaml"), tmp_path / "out", options=ReportOptions(start=9_428))
     (tmp_path / "alone").mkdir()
     alone = tmp_path / "alone" / "index.html"  # nothing is beside it
     alone.write_bytes((tmp_path / "out" / "index.html").read_bytes())

@@ -193,7 +193,7 @@ def test_trials_that_would_take_too_long_with_a_body_are_left_out(
     monkeypatch.setattr(report, "_LONGEST", 10_000 * 10 * 40)
     for body, left_out in ((True, 2), (False, 0)):
         network = api.compile_text(WITH_BODY, body=body)
-        report.analyze(network, tmp_path / str(body), network.run(20), report.Wish(start=0, stop=40))
+        report.analyze(network, tmp_path / str(body), network.run(20), report.ReportOptions(start=0, stop=40))
         text = (tmp_path / str(body) / "index.html").read_text(encoding="utf-8")
         assert text.count("take too long") == left_out
 

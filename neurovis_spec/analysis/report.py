@@ -51,7 +51,7 @@ _BODY = 50_000
 
 
 @dataclass(frozen=True)
-class Wish:
+class ReportOptions:
     """What is to be measured: which neurons (``of``, None for all), which steps, above which threshold a neuron is
     active, how many bins; whether further runs are made (``trials``); the theme of the pictures."""
 
@@ -85,12 +85,12 @@ def analyze(
     network: CompiledNetwork,
     folder: str | Path,
     recording: Recording | None = None,
-    wish: Wish | None = None,
+    options: ReportOptions | None = None,
     progress: Progress | None = None,
 ) -> list[Path]:
     """Write the report of a recording, or of a run as long as ``time.steps``, into a folder, which is made if it is not
     there; gives the files. Raises what the measures raise, ImportError without the extra ``analyze``, OSError."""
-    asked = Wish() if wish is None else wish
+    asked = ReportOptions() if options is None else options
     place = Path(folder)
     if recording is None:
         run = network.run(inputs=asked.inputs, progress=progress)
@@ -120,13 +120,18 @@ class _Report:
     """The readings of one recording, each made when it is asked for."""
 
     def __init__(
-        self, network: CompiledNetwork, recording: Recording, wish: Wish, given: bool, progress: Progress | None
+        self,
+        network: CompiledNetwork,
+        recording: Recording,
+        options: ReportOptions,
+        given: bool,
+        progress: Progress | None,
     ) -> None:
-        self.network, self.recording, self.wish, self._progress = network, recording, wish, progress
+        self.network, self.recording, self.options, self._progress = network, recording, options, progress
         #: said of what is run, where the rest is of a recording that was given
         self._apart = ("These are runs of the spec, not of the recording.",) if given else ()
-        self.theme: Theme = theme_of(network.settings_for(wish.theme))
-        self._part = excerpt(recording, wish.of)
+        self.theme: Theme = theme_of(network.settings_for(options.theme))
+        self._part = excerpt(recording, options.of)
         self._late = cut(recording, int(recording.step[-_SEEN])) if len(recording) > _SEEN else recording
         self._dt = network.network.dt if network.network.dt_given else None
 
@@ -135,9 +140,11 @@ class _Report:
         step, names = self.recording.step, self._part.names
         return {
             "steps": f"{step[0]} to {step[-1]} ({len(step):,} rows)",
-            "neurons": f"{len(names):,} of {len(self.recording.neurons):,}" if self.wish.of else f"all {len(names):,}",
-            "active": f"above an absolute activity of {self.wish.threshold:g}",
-            "bins": str(self.wish.bins),
+            "neurons": f"{len(names):,} of {len(self.recording.neurons):,}"
+            if self.options.of
+            else f"all {len(names):,}",
+            "active": f"above an absolute activity of {self.options.threshold:g}",
+            "bins": str(self.options.bins),
         }
 
     def readings(self) -> Iterator[Reading]:
@@ -164,26 +171,26 @@ class _Report:
         """A view that the pictures of a network have as well."""
         with TemporaryDirectory() as folder:
             target = Path(folder) / "picture.svg"
-            self.network.render(target, recording=self.recording, view=view, theme=self.wish.theme, window=_SEEN)
+            self.network.render(target, recording=self.recording, view=view, theme=self.options.theme, window=_SEEN)
             return target.read_bytes()
 
     def _pairs(self, table: NamedArray, caption: str) -> bytes:
         return self._draw(pictures.cells(table, catalogue_title(table.name), caption, self.theme))
 
     def _connections(self) -> Reading:
-        made = connection_matrix(self.recording, self.wish.of)
+        made = connection_matrix(self.recording, self.options.of)
         drawn = {"connections": self._pairs(made, "rows send, columns take in")} if len(made.rows.labels) else {}
         return Reading("connections", {"connections": made}, drawn)
 
     def _traces(self) -> Reading:
-        made, part = traces(self.recording, self.wish.of), excerpt(self._late, self.wish.of)
+        made, part = traces(self.recording, self.options.of), excerpt(self._late, self.options.of)
         drawn, notes = {}, self._late_only()
         if len(part.names) <= _CURVES:
             scene = pictures.curves(part.names, part.activity, part.step, self._dt, "Traces", "activity", self.theme)
             drawn["traces"] = self._draw(scene)
         else:
             notes.append(f"{len(part.names):,} curves are too many for a picture: choose up to {_CURVES} with --of.")
-        if self.recording.missing is None and self.wish.of is None:
+        if self.recording.missing is None and self.options.of is None:
             drawn["raster"] = self._view("raster")
         thin, said = _thinned(made)
         return Reading("traces", {"traces": thin}, drawn, (*notes, *said))
@@ -196,20 +203,20 @@ class _Report:
 
     def _topography(self) -> Reading:
         self.recording.check_whole("a map is not drawn of")
-        made = topography(self.recording, self.network.drawn().value.positions, self.wish.of)
+        made = topography(self.recording, self.network.drawn().value.positions, self.options.of)
         return Reading("topography", {"topography": made}, {"topography": self._view("network")})
 
     def _correlation(self) -> Reading:
-        made = cross_correlation(self.recording, self.wish.of)
+        made = cross_correlation(self.recording, self.options.of)
         return Reading("correlation", {"correlation": made}, {"correlation": self._pairs(made, "E[x·y] of each pair")})
 
     def _information(self) -> Reading:
-        made = mutual_information(self.recording, self.wish.of, bins=self.wish.bins)
-        caption = f"bits, {self.wish.bins} bins; the diagonal is the entropy"
+        made = mutual_information(self.recording, self.options.of, bins=self.options.bins)
+        caption = f"bits, {self.options.bins} bins; the diagonal is the entropy"
         return Reading("information", {"information": made}, {"information": self._pairs(made, caption)})
 
     def _coactivation(self) -> Reading:
-        threshold, of = self.wish.threshold, self.wish.of
+        threshold, of = self.options.threshold, self.options.of
         total = self._timed(coactivation(self.recording, of, threshold=threshold, per="total"))
         found = {"coactivation_total": total}
         unit = "steps" if self._dt is None else "seconds"
@@ -233,7 +240,7 @@ class _Report:
         if not changes.rows.labels:
             raise RecordingError("no weight can change")
         thin, said = _thinned(made)
-        names, values, more = self._strongest(made, changes)
+        names, values, more = self._most_changed(made, changes)
         scene = pictures.curves(names, values, self.recording.step, self._dt, "Weights", "weight", self.theme)
         return Reading("weights", {"weight_changes": changes, "weights": thin}, {"weights": self._draw(scene)},
                        (*more, *said))  # fmt: skip
@@ -245,12 +252,14 @@ class _Report:
         if len(self.recording) < 2:
             raise RecordingError("one step alone has no updates")
         thin, said = _thinned(made)
-        names, values, more = self._strongest(made, changes)
+        names, values, more = self._most_changed(made, changes)
         scene = pictures.curves(names, values, self.recording.step[:-1], self._dt, "Updates", "update", self.theme)
         return Reading("updates", {"updates": thin}, {"updates": self._draw(scene)}, (*more, *said))
 
-    def _strongest(self, made: NamedArray, changes: NamedArray) -> tuple[tuple[str, ...], FloatArray, tuple[str, ...]]:
-        """Of many connections those whose weights have gone the longest way."""
+    def _most_changed(
+        self, made: NamedArray, changes: NamedArray
+    ) -> tuple[tuple[str, ...], FloatArray, tuple[str, ...]]:
+        """Of many connections those whose weights have changed most, summed over all steps."""
         names = made.columns.labels
         if len(names) <= _CURVES:
             return names, made.values, ()
@@ -264,7 +273,7 @@ class _Report:
         )
 
     def _gait(self) -> Reading:
-        threshold, of = self.wish.threshold, self.wish.of
+        threshold, of = self.options.threshold, self.options.of
         made = gait(self.recording, of, threshold=threshold)
         if len(made.rows.labels) > _LEGS:
             note = f"{len(made.rows.labels):,} rows are too many for a picture: choose up to {_LEGS} with --of."
@@ -275,14 +284,14 @@ class _Report:
 
     def _trials(self) -> Iterator[Reading]:
         keys = ("importance", "sensitivity")
-        if not self.wish.trials:
+        if not self.options.trials:
             yield from (Reading(key, notes=("Left out: no further runs were asked for.",)) for key in keys)
             return
         network = self.network.network
-        first = self.wish.start
-        last = network.steps if self.wish.stop is None else self.wish.stop
+        first = self.options.start
+        last = network.steps if self.options.stop is None else self.options.stop
         count = min(STEPS, network.steps) if first is None else max(min(STEPS, last - first), 1)
-        if self.wish.stop is not None and first is None:
+        if self.options.stop is not None and first is None:
             first = max(last - count, 0)
         runs = {
             "importance": 2 * (len(network.neurons) + len(network.inputs)),
@@ -291,7 +300,7 @@ class _Report:
         size = len(network.neurons) + len(network.connections) + (0 if network.body is None else _BODY)
         long = {key for key, number in runs.items() if number * count * size > _LONGEST}
         try:
-            trials = Trials(self.network, first, count, self.wish.inputs or None) if len(long) < len(runs) else None
+            trials = Trials(self.network, first, count, self.options.inputs or None) if len(long) < len(runs) else None
         except ValueError as error:
             yield from (Reading(key, notes=(_why(error),)) for key in keys)
             return

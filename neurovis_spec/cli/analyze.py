@@ -93,7 +93,7 @@ def command(
         raise click.UsageError(f"--to {stop} is not behind --from {start}: there is no step to measure")
     if find_spec("jinja2") is None:
         raise fault("the page needs jinja2, which is not installed", "pip install 'neurovis-spec[analyze]'")
-    from neurovis_spec.analysis.report import Wish, analyze, file_names
+    from neurovis_spec.analysis.report import ReportOptions, analyze, file_names
 
     check_folder(output)
     read = [("the spec itself", spec), ("the recording that is measured", recording), *files_of(inputs)]
@@ -104,7 +104,7 @@ def command(
     for name in file_names():
         check_files(output / name, network)
     record, arrays = recording_of(recording, run), tables(inputs, network.network)
-    wish = Wish(of or None, start, stop, threshold, bins, trials, theme, arrays)
+    options = ReportOptions(of or None, start, stop, threshold, bins, trials, theme, arrays)
     with progress("measuring") as bar, writing(output):
-        files = analyze(network, output, record, wish, bar)
+        files = analyze(network, output, record, options, bar)
     click.echo(f"{output}: {count(len(files), 'file')}; open {output / 'index.html'}")

@@ -64,12 +64,12 @@ class Meeting:
     @contextmanager
     def node(self, name: str, namespace: str = "/", anonymous: bool = False) -> Iterator[Node]:
         """A node that is there for a block. Raises MiddlewareError."""
-        from neurovis_spec.ros.middleware import Wish, open_node
+        from neurovis_spec.ros.middleware import NodeOptions, open_node
 
         context = click.get_current_context(silent=True)
         given: tuple[str, ...] = () if context is None else context.meta.get(_ARGUMENTS, ())
-        wish = Wish(name, namespace, self.ros, self.remote, self.sim_time, anonymous, given, self.seconds)
-        opened = open_node(wish, tell)
+        options = NodeOptions(name, namespace, self.ros, self.remote, self.sim_time, anonymous, given, self.seconds)
+        opened = open_node(options, tell)
         try:
             yield opened
         finally:

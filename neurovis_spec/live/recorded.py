@@ -1,6 +1,7 @@
 """A recording as a source: its steps, forward and back, as they were recorded.
 
-In: a Network and a Recording of it. Out: a Source that takes no turns. What is lesioned is what the spec's events say.
+In: a Network and a Recording of it. Out: a Source in which nothing can be set, clamped or lesioned by hand. What is
+lesioned is what the spec's events say.
 """
 
 from __future__ import annotations
@@ -45,12 +46,12 @@ class RecordedSource:
 
     @property
     def reach(self) -> Reach:
-        """All of it."""
+        """The first and the last step."""
         return Reach(self._steps[0], self._steps[-1])
 
     @property
     def turned(self) -> tuple[Turned, ...]:
-        """Nothing."""
+        """Nothing was changed by hand."""
         return ()
 
     @property
@@ -60,7 +61,7 @@ class RecordedSource:
 
     @property
     def fed(self) -> dict[str, tuple[float, ...]]:
-        """Nothing is given by hand."""
+        """No input is given by hand."""
         return {}
 
     @property

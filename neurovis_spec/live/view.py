@@ -42,7 +42,7 @@ FINENESS, _WIDEST = 16, (1 << 16) - 1
 #: Bits of a kind: a line that ends in a bar, what is lesioned, a connection whose weight is negative, a clamped neuron,
 #: a neuron whose activity is no finite number.
 BAR, FAINT, NEGATIVE, CLAMPED, UNDEFINED = 1, 2, 4, 4, 8
-#: What the kind of a line has besides in its higher bits: the size of a weight, from 0 to the largest of its scale.
+#: The higher bits of the kind of a line hold the size of its weight, from 0 to SHARES, the largest of its scale.
 SHARES, _SHARE = 31, 8
 
 
@@ -109,7 +109,7 @@ class View:
         return result
 
     def values(self, seen: Seen, items: Iterable[str]) -> dict[str, float]:
-        """Exact activities (``n3``) and weights (``c5``) at a step, by the ids of groups, of those that there are."""
+        """Exact activities (``n3``) and weights (``c5``) at a step, by these ids; unknown ones are left out."""
         snapshot = self.drawn.snapshot(seen.snapshot)
         result = {}
         for item in items:
@@ -129,7 +129,7 @@ class View:
         return moved(self.plan, self.layout, layout)
 
     def lesioned(self, seen: Seen) -> tuple[Mask, Mask]:
-        """What is drawn as lesioned: a glyph, or a line between glyphs, where all that it stands for is."""
+        """Which glyphs and lines are drawn as lesioned: those of which all neurons, or all connections, are."""
         drawn = self.drawn
         if not drawn.any:
             return seen.lesioned_neurons, seen.lesioned_connections
@@ -138,7 +138,7 @@ class View:
         return self._all(seen.lesioned_neurons), gone == drawn.counts
 
     def _all(self, neurons: Mask) -> Mask:
-        """What is drawn and stands for such neurons alone."""
+        """Which glyphs stand for such neurons and no others."""
         drawn = self.drawn
         if not drawn.any:
             return neurons

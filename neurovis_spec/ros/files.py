@@ -92,8 +92,8 @@ def in_the_way(path: Path, force: bool) -> list[Path]:
 
 @dataclass(eq=False)
 class Files:
-    """The files of a recording. ``first`` is what each begins with, as messages at the time of the file's first;
-    ``frame`` is what makes recordings of the network (``Recording``) of MCAP files."""
+    """The files of a recording. ``first`` are the messages with which each file begins, at the time of its first one;
+    ``frame`` is the record in an MCAP file from which a ``Recording`` of the network can be made."""
 
     path: Path
     ros: Ros
@@ -155,7 +155,7 @@ class Files:
         self._describe()
 
     def sync(self) -> None:
-        """Have the disk hold all of it. Raises OSError."""
+        """Have all of it written to the disk. Raises OSError."""
         if self._log is not None:
             self._log.sync()
 

@@ -188,7 +188,7 @@ class Node(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class NodeOptions:
     """How a node is to be opened: its name and namespace, ``ros`` (None: what is there), whether it meets other
     machines, whether its time is that of ``/clock`` (also where ROS is told so: ``use_sim_time``), whether another of
     its name may be there (``anonymous``), ``arguments`` for ROS itself: ``--ros-args -r a:=b -p name:=1``, in ROS 1
@@ -229,14 +229,14 @@ def _missing(message: str) -> MiddlewareError:
     )
 
 
-def confine(wish: Wish, ros: Ros) -> dict[str, str]:
+def confine(options: NodeOptions, ros: Ros) -> dict[str, str]:
     """What is added to the environment so that this machine alone is met. Raises MiddlewareError for a master on
     another machine."""
-    if wish.remote or any(wish.environment.get(name) for name in _OPEN):
+    if options.remote or any(options.environment.get(name) for name in _OPEN):
         return {}
     if ros == 2:
         return {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-    master = wish.environment.get("ROS_MASTER_URI", "")
+    master = options.environment.get("ROS_MASTER_URI", "")
     host = urlsplit(master).hostname
     if host is not None and host not in _HERE:
         raise MiddlewareError(
@@ -246,9 +246,9 @@ def confine(wish: Wish, ros: Ros) -> dict[str, str]:
     return {"ROS_IP": "127.0.0.1"}
 
 
-def open_node(wish: Wish, tell: Tell) -> Node:
-    """A node as it is wished for. Raises MiddlewareError."""
-    ros = choose(wish.ros, wish.environment)
-    os.environ.update(confine(wish, ros))
-    opened: Node = import_module(f"neurovis_spec.ros.ros{ros}").open_node(wish, tell)
+def open_node(options: NodeOptions, tell: Tell) -> Node:
+    """A node with these options. Raises MiddlewareError."""
+    ros = choose(options.ros, options.environment)
+    os.environ.update(confine(options, ros))
+    opened: Node = import_module(f"neurovis_spec.ros.ros{ros}").open_node(options, tell)
     return opened

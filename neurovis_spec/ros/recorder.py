@@ -1,8 +1,8 @@
-"""The recorder: takes messages as they arrive, and never has those who bring them wait.
+"""The recorder: takes messages as they arrive; who brings them never has to wait.
 
-In: messages, by any thread, into a queue of limited size. A thread of its own takes them out, has each judged and
-counted, and writes those that count; whoever wants to see them is given them, too. What a full queue or disk does not
-take is counted as lost.
+In: messages, by any thread, into a queue of limited size. A thread of its own takes them out, has each checked and
+counted, and writes those that are accepted; whoever wants to see them is given them, too. What a full queue or disk
+does not take is counted as lost.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _EACH: Final = 300
 _CHUNK_TIME: Final = 0.1
 _SYNC_TIME: Final = 1.0
 
-#: Called with what counts, in the recorder's thread.
+#: Called with each message that is accepted, in the recorder's thread.
 Heard: TypeAlias = Callable[[Stream, Arrival, Accepted], None]
 
 
@@ -37,7 +37,7 @@ def _ignore(stream: Stream, arrival: Arrival, accepted: Accepted) -> None:
 
 
 class Recorder:
-    """Records what is put into it; without ``files`` messages are judged and counted alone. ``definitions`` are those
+    """Records what is put into it; without ``files`` messages are only checked and counted. ``definitions`` are those
     of the types of the streams."""
 
     def __init__(

@@ -1,7 +1,7 @@
 """ROS 1, over rospy: a node whose messages are bytes, and which outlives its master.
 
-In: a Wish. Out: a Node. A process has one node of ROS 1 at most. Once a second a watchdog asks the master whether the
-node stands there with all its topics, and registers it anew where it does not: connections that are there stay.
+In: NodeOptions. Out: a Node. A process has one node of ROS 1 at most. Once a second a watchdog asks the master whether
+the node stands there with all its topics, and registers it anew where it does not: connections that are there stay.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from neurovis_spec.ros.middleware import (
     Arrived,
     MiddlewareError,
     Node,
+    NodeOptions,
     Parameter,
     Publisher,
     Quality,
@@ -35,7 +36,6 @@ from neurovis_spec.ros.middleware import (
     SetParameters,
     Subscription,
     Tell,
-    Wish,
 )
 from neurovis_spec.runtime.wire import Encoding
 
@@ -46,9 +46,9 @@ _QUEUE: Final = 2000
 _BUFFER: Final = 1 << 20
 
 
-def open_node(wish: Wish, tell: Tell) -> Node:
+def open_node(options: NodeOptions, tell: Tell) -> Node:
     """A node of ROS 1; waits for its master."""
-    return Ros1Node(wish, tell)
+    return Ros1Node(options, tell)
 
 
 class _Timely(Transport):
@@ -160,30 +160,32 @@ class Ros1Node:
     ros: Ros = 1
     encoding: Encoding = "ros1"
 
-    def __init__(self, wish: Wish, tell: Tell) -> None:
+    def __init__(self, options: NodeOptions, tell: Tell) -> None:
         self.tell, self.reconnects, self.closed = tell, 0, False
         self._lock, self._there = Lock(), list[Ros1Publisher | Ros1Subscription]()
         self._prefix, self._set = "", cast("SetParameters | None", None)
         self._seen: dict[str, object] = {}
         self._end, self._gone, self._away, self._ending = Event(), Event(), False, False
-        if wish.arguments[:1] == ("--ros-args",):
+        if options.arguments[:1] == ("--ros-args",):
             raise MiddlewareError("ROS 1 does not take '--ros-args'", "write /from:=/to, _NAME:=VALUE")
         uri = os.environ.setdefault("ROS_MASTER_URI", "http://localhost:11311")
-        asked = [word.removeprefix("__ns:=") for word in wish.arguments if word.startswith("__ns:=")]
-        namespace = asked[-1] if asked else wish.environment.get("ROS_NAMESPACE") or wish.namespace
+        asked = [word.removeprefix("__ns:=") for word in options.arguments if word.startswith("__ns:=")]
+        namespace = asked[-1] if asked else options.environment.get("ROS_NAMESPACE") or options.namespace
         os.environ["ROS_NAMESPACE"] = namespace
-        rospy.names._set_caller_id(rosgraph.names.make_global_ns(namespace) + wish.name)
+        rospy.names._set_caller_id(rosgraph.names.make_global_ns(namespace) + options.name)
         if urlsplit(uri).scheme not in ("http", "https") or not urlsplit(uri).hostname:
             raise MiddlewareError(f"ROS_MASTER_URI is no address: '{uri}'", "such as http://localhost:11311")
         self._uri = uri
-        self._wait_for_master(wish.seconds)
-        self.simulated = wish.sim_time or self._is_told_to_simulate()
+        self._wait_for_master(options.seconds)
+        self.simulated = options.sim_time or self._is_told_to_simulate()
         self._clock = 0 if self.simulated else None
         # rospy prints who has asked the node to end where the summary is printed
         rospy.impl.masterslave.print = partial(print, file=sys.stderr)
         try:
-            remaps = ["neurovis", f"__ns:={namespace}", *wish.arguments]
-            rospy.init_node(wish.name, remaps, anonymous=wish.anonymous, disable_signals=True, disable_rostime=True)
+            remaps = ["neurovis", f"__ns:={namespace}", *options.arguments]
+            rospy.init_node(
+                options.name, remaps, anonymous=options.anonymous, disable_signals=True, disable_rostime=True
+            )
         except Exception as error:
             raise MiddlewareError(f"a node of ROS 1 cannot be made: {error}") from None
         rospy.on_shutdown(self._asked_to_end)

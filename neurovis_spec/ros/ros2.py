@@ -1,6 +1,6 @@
 """ROS 2, over rclpy: a node whose messages are bytes, spun by a thread of its own.
 
-In: a Wish. Out: a Node. What arrives at once is taken at once, so that a burst costs one turn of the executor.
+In: NodeOptions. Out: a Node. What arrives at once is taken at once, so that a burst costs one turn of the executor.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from neurovis_spec.ros.middleware import (
     Arrived,
     MiddlewareError,
     Node,
+    NodeOptions,
     Parameter,
     Publisher,
     Quality,
@@ -34,7 +35,6 @@ from neurovis_spec.ros.middleware import (
     SetParameters,
     Subscription,
     Tell,
-    Wish,
 )
 from neurovis_spec.runtime.wire import Encoding
 
@@ -46,9 +46,9 @@ _PRIMITIVE: Final[Mapping[str, str]] = {"boolean": "bool", "octet": "byte", "dou
 _ARRAY: Final = re.compile(r"(?:sequence<(.+?)(?:, (\d+))?>|(.+)\[(\d+)\])")
 
 
-def open_node(wish: Wish, tell: Tell) -> Node:
+def open_node(options: NodeOptions, tell: Tell) -> Node:
     """A node of ROS 2."""
-    return Ros2Node(wish, tell)
+    return Ros2Node(options, tell)
 
 
 def _message(type_: str) -> type:
@@ -201,24 +201,24 @@ class Ros2Node:
     encoding: Encoding = "cdr"
     reconnects = 0
 
-    def __init__(self, wish: Wish, tell: Tell) -> None:
+    def __init__(self, options: NodeOptions, tell: Tell) -> None:
         self.tell, self.closed = tell, False
         self._lock, self._subscriptions, self._following = Lock(), list[Ros2Subscription](), False
         self._later: list[Callable[[], None]] = []
         self._declared: set[str] = set()
         self._clients: dict[str, Client] = {}
         self._context = Context()
-        if wish.arguments and wish.arguments[0] != "--ros-args":
-            raise MiddlewareError(f"ROS 2 does not take '{wish.arguments[0]}'", "write --ros-args -r /from:=/to")
+        if options.arguments and options.arguments[0] != "--ros-args":
+            raise MiddlewareError(f"ROS 2 does not take '{options.arguments[0]}'", "write --ros-args -r /from:=/to")
         no_signals = rclpy.SignalHandlerOptions.NO
         try:
-            rclpy.init(args=list(wish.arguments), context=self._context, signal_handler_options=no_signals)
+            rclpy.init(args=list(options.arguments), context=self._context, signal_handler_options=no_signals)
             self.rcl = rclpy.create_node(
-                wish.name,
-                namespace=wish.namespace,
+                options.name,
+                namespace=options.namespace,
                 context=self._context,
-                use_global_arguments=bool(wish.arguments),
-                parameter_overrides=[Given("use_sim_time", Given.Type.BOOL, True)] if wish.sim_time else [],
+                use_global_arguments=bool(options.arguments),
+                parameter_overrides=[Given("use_sim_time", Given.Type.BOOL, True)] if options.sim_time else [],
             )
         except Exception as error:
             raise MiddlewareError(f"a node of ROS 2 cannot be made: {error}") from None

@@ -1,7 +1,7 @@
 """An exported network as a folder: header, source, an example, how to build it, and what it costs.
 
 In: a Network, the State that it begins in, the type of numbers, a folder. Out: files. What somebody else has written
-there is left alone: an example and a CMakeLists.txt that are there stay, and of the others a strange one is refused.
+there is left alone: an example and a CMakeLists.txt that are there stay; any other file that is not ours is refused.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from neurovis_spec.runtime.c_settable import ExportError
 from neurovis_spec.runtime.files import replacing
 from neurovis_spec.runtime.state import State
 
-#: what says that a file is ours
+#: the words in a file by which we know that we wrote it
 _MARK = "by neurovis export"
 
 
@@ -35,17 +35,17 @@ def files(network: Network, start: State | None = None, real: str = "double") ->
 
 
 def write(
-    folder: Path, texts: dict[str, str], yours: Collection[str] = ("main.c", "CMakeLists.txt"), mark: str = _MARK
+    folder: Path, texts: dict[str, str], users: Collection[str] = ("main.c", "CMakeLists.txt"), mark: str = _MARK
 ) -> tuple[list[Path], list[Path]]:
-    """Write the files, by their paths in the folder; those that begin with ``#!`` can be executed. Of what is there,
-    ``yours`` stays, and what has our ``mark`` is replaced. Gives what was written, and what was there and stays. Raises
-    ExportError for a file of somebody else's in the way, OSError."""
+    """Write the files, by their paths in the folder; those that begin with ``#!`` can be executed. Of the files that
+    are there the ``users`` stay, as a user may have changed them, and those with our ``mark`` are replaced. Gives what
+    was written, and what was there and stays. Raises ExportError for a file of somebody else's in the way, OSError."""
     written, kept = dict[Path, str](), []
     for name, text in texts.items():
         path = folder / name
         if not path.exists() or _holds(path, text):
             written[path] = text
-        elif name in yours:
+        elif name in users:
             kept.append(path)
         elif path.is_file() and mark in path.read_text(encoding="utf-8", errors="replace"):
             written[path] = text

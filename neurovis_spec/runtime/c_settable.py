@@ -1,4 +1,4 @@
-"""Setting parameters in C: the same formulas as ``compiler.patch`` evaluates, over the parameters of a state.
+"""Setting parameters in C: the same formulas as ``compiler/events/patch`` evaluates, over the parameters of a state.
 
 In: Settable. Out: the lines of a function that takes new values for some parameters, follows all that depends on them,
 and writes what this comes to, or nothing where something would not be finite or leave its bounds.
@@ -80,7 +80,7 @@ def _number(place: Place) -> int:
 
 
 def regular(dependent: Dependent) -> bool:
-    """Whether the numbers of a formula can be gone through by a loop."""
+    """Whether a loop can compute the numbers of a formula."""
     return isinstance(dependent, ParameterFormula) and all(
         isinstance(value, float | np.ndarray) or regular(value) for value in dependent.known.values()
     )
@@ -126,7 +126,7 @@ def _outside(code: Code, value: str, low: float | Dependent, high: float | Depen
 
 
 def _write_binding(code: Code, binding: Binding, settable: Settable) -> None:
-    """What one formula gives, checked at first, then written; what stands nowhere is checked alone."""
+    """What one formula gives, checked in the first round, written in the second; without indices it is only checked."""
     condition = " || ".join(f"changed[{slot}]" for slot in sorted(binding.slots))
     count = len(binding.indices) or int(np.size(binding.formula.values(settable.parameters)))
     array = "weights" if binding.weights else "x"

@@ -31,8 +31,8 @@ class ViewError(RendererError):
 
 
 def panels_of(network: Network, wanted: View | Sequence[View] | None) -> tuple[Panel, ...]:
-    """The views of a picture, none where it is the network alone. Without any wish they are those of the spec's
-    ``figure``; a view that names nothing shows what the figure has of its kind. Raises ViewError, KeyError and
+    """The views of a picture, none where it is the network alone. Where nothing is asked for they are those of the
+    spec's ``figure``; a view that names nothing shows what the figure has of its kind. Raises ViewError, KeyError and
     TypeError."""
     own = network.render.figure
     if wanted is None:

@@ -1,4 +1,4 @@
-"""What a spec wishes for its picture: the ``layout`` and ``render`` sections, references resolved.
+"""What a spec says of its picture: the ``layout`` and ``render`` sections, references resolved.
 
 In: nothing; these are values of a Network. Nothing of them changes what the network does.
 """

@@ -56,7 +56,7 @@ class Patch:
     def write(self, weights: FloatArray, variables: FloatArray) -> None:
         """Put the values where they belong."""
         for binding, value in zip(self.bindings, self.values, strict=True):
-            if not len(binding.indices):  # it is there to be checked alone
+            if not len(binding.indices):  # it writes nothing, and is only checked
                 continue
             (weights if binding.weights else variables)[binding.indices] = value
 
