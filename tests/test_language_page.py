@@ -13,9 +13,10 @@ import pytest
 import yaml
 
 import neurovis_spec as nv
-from neurovis_spec.language.data.files import KINDS, LARGEST
+from neurovis_spec.language.data.files import LARGEST
 from neurovis_spec.language.data.table import MOST_CELLS
 from neurovis_spec.language.expressions.given import RESERVED
+from neurovis_spec.language.values import DATA_FILES
 from neurovis_spec.manual.keys import keys
 
 ROOT = Path(__file__).parents[1]
@@ -192,7 +193,7 @@ def test_an_expression_that_is_set_reads_the_values_before() -> None:
 
 def test_the_data_files_are_those_that_are_read() -> None:
     section = PAGE.partition("### Data files")[2].partition("\n### ")[0]
-    assert tuple(re.findall(r"^\| `(\.\w+)`", section, re.MULTILINE)) == KINDS
+    assert tuple(re.findall(r"^\| `(\.\w+)`", section, re.MULTILINE)) == DATA_FILES
     assert f"{MOST_CELLS:,} cells" in section
     assert f"{LARGEST >> 20} MiB" in section
 

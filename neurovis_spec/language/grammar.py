@@ -243,7 +243,7 @@ class NotWith:
     """Keys that exclude that of a field. ``why`` and ``hint`` may name {own} and {other}, the two keys."""
 
     others: tuple[Written, ...]
-    why: str = "'{own}' beside '{other}': the {other} says it already"
+    why: str = "'{own}' beside '{other}', which says it already"
     hint: str | None = "remove '{own}'"
     code: str = "conflicting-keys"
 

@@ -30,7 +30,7 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue, SkipJsonSchema
 from pydantic_core import core_schema
 
-from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.diagnostics import Findings, Span, listed
 from neurovis_spec.language.exclusions import Rules, check_rules, contradictory, schema_of
 from neurovis_spec.language.expressions.given import RESERVED
 from neurovis_spec.language.grammar import Needs, NotWith, OneOf
@@ -81,7 +81,8 @@ class Model(BaseModel):
             return result
         if not isinstance(data, Mapping):
             assert not isinstance(data, (str, int, float, dict))
-            hint = "write {} where there is nothing to say" if isinstance(data, Scalar) and data.value is None else None
+            nothing = isinstance(data, Scalar) and data.value is None
+            hint = "write {} where there is nothing to say" if nothing else f"its keys are {listed(cls._fields())}"
             refuse(info, data, "a mapping", hint)  # type: ignore[arg-type]
         keys = read_keys(data, cls._fields(), findings_of(info), Words(cls._foreign, _home))
         data = keys.mapping
@@ -256,7 +257,7 @@ def unread(model: Model, key: str) -> dict[str, Unknown]:
 
 def _named(node: Node, handler: Callable[[object], dict[str, V]], info: ValidationInfo) -> dict[str, V]:
     if not isinstance(node, Mapping):
-        refuse(info, node, "a mapping")
+        refuse(info, node, "a mapping", "write NAME: … for each")
     for entry in node.entries:
         if not IDENTIFIER.fullmatch(entry.name):
             tight = entry.name.partition(":")[0]

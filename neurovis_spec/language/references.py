@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple, TypeAlias
 
 from neurovis_spec.diagnostics import shorten
@@ -188,11 +189,20 @@ def _parse(text: str, start: int, end: int) -> Sum | Arrow | NoReference:
         return _sum(text, start, end, pluses)
     first, last = _stripped(text, start, end)
     whole = text[first:last]
-    if len(arrows) > 1:
-        return NoReference(whole, first, "bad-connection", f"'{shorten(whole)}' is no connection", "write FROM -> TO")
+    both = text[: arrows[0]].endswith("<")
+    if len(arrows) > 1 or both:
+        return NoReference(whole, first, "bad-connection", f"'{shorten(whole)}' is no connection", _steps(whole, both))
     (arrow,) = arrows
     sources = _sum(text, start, arrow, [plus for plus in pluses if plus < arrow])
     return Arrow(whole, first, sources, _sum(text, arrow + 2, end, [plus for plus in pluses if plus > arrow]))
+
+
+def _steps(whole: str, both: bool) -> str:
+    """How to write what has several arrows, or (``both``) one that goes both ways."""
+    names = [part.strip() for part in whole.replace("<->", "->").split("->")]
+    steps = [*pairwise(names), *(pairwise(reversed(names)) if both else ())]
+    written = ", ".join(f"{one} -> {other}" for one, other in steps)
+    return f"write each by itself: {shorten(written, 200)}" if all(names) else "write FROM -> TO"
 
 
 def _sum(text: str, start: int, end: int, pluses: list[int]) -> Sum:

@@ -114,6 +114,10 @@ class FileReference(NamedTuple):
     span: Span
 
 
+#: How the names of files end that hold a table of numbers.
+DATA_FILES: Final = (".csv", ".npy", ".npz", ".mtx")
+
+
 class MatrixRows(NamedTuple):
     """Dense rows as written: every row a list of formulas or nulls (checked when they are evaluated)."""
 
@@ -141,12 +145,18 @@ def as_file(node: Mapping, info: ValidationInfo) -> FileReference:
     return FileReference(as_text(path, info), None if key is None else as_text(key, info), node.span)
 
 
+def _file_hint(node: Node) -> str | None:
+    """How a file is named whose path stands in its place."""
+    path = node.value if isinstance(node, Scalar) else None
+    return f"write {{file: {path}}}" if isinstance(path, str) and path.endswith(DATA_FILES) else None
+
+
 def as_matrix(node: Node, info: ValidationInfo) -> Matrix:
     """A list of rows, or a file."""
     if isinstance(node, Mapping):
         return as_file(node, info)
     if not isinstance(node, (Sequence, Packed)):
-        refuse(info, node, "a list of rows, or {file: …}")
+        refuse(info, node, "a list of rows, or {file: …}", _file_hint(node))
     rows = node.items if isinstance(node, Sequence) else (node.cell(0),) if node.rows is None else ()
     for row in rows:
         if not isinstance(row, (Sequence, Packed)):
@@ -180,9 +190,11 @@ def as_edges(node: Node, info: ValidationInfo) -> EdgeRows | FileReference:
     if isinstance(node, Mapping):
         return as_file(node, info)
     if not isinstance(node, (Sequence, Packed)):
-        refuse(info, node, "a list of edges [from, to, weight], or {file: …}")
-    if isinstance(node, Packed) and node.rows is None:
-        refuse(info, node.cell(0), "an edge, that is a list [from, to, weight]")
+        refuse(info, node, "a list of edges [from, to, weight], or {file: …}", _file_hint(node))
+    rows = node.items[:1] if isinstance(node, Sequence) else (node.cell(0),) if node.rows is None else ()
+    for row in rows:
+        if not isinstance(row, (Sequence, Packed)):
+            refuse(info, row, "an edge, that is a list", "edges are a list of lists: [[A, B, 0.5], [A, C, 1]]")
     return EdgeRows(node)
 
 

@@ -51,6 +51,7 @@ def check_events(
     if steps is not None:
         for model in models:
             _check_beyond(model, reader, steps, findings)
+    _check_mended(models, reader, findings)
     lesions = _lesions(models, reader, findings)
     clamps = [clamp for clamp in reader.clamps(models) if not _is_lesioned(clamp, lesions, findings)]
     _check_overlaps(clamps, reader.count, findings)
@@ -110,6 +111,19 @@ def _check_beyond(model: EventModel, reader: _Reader, steps: int, findings: Find
         message = f"step {begin:.0f} is never reached: a run has the steps 0 to {steps - 1} ('steps')"
         hint = f"let it be earlier, or lengthen the run: time: {{steps: {begin + 1:.0f}}}"
         findings.warning("beyond-steps", formula.span, message, hint)
+
+
+def _check_mended(models: tuple[EventModel, ...], reader: _Reader, findings: Findings) -> None:
+    """Warn of what is mended and was not lesioned until then, neither by itself nor with its neurons or connections."""
+    lesioned = np.full(reader.count, np.inf)  # since when a neuron, or any of its connections, is
+    timed = [(begin, model) for model in models if (begin := reader.step(model.at)) is not None]
+    for begin, text in ((begin, text) for begin, model in timed for text in model.lesion):
+        touched = np.concatenate(reader.ends(text))
+        lesioned[touched] = np.minimum(lesioned[touched], begin)
+    for begin, text in ((begin, text) for begin, model in timed for text in model.mend):
+        if (lesioned[np.concatenate(reader.ends(text))] > begin).all():
+            message = f"nothing of '{shorten(text.value)}' is lesioned until step {begin:.0f}: it mends nothing"
+            findings.warning("no-effect", text.span, message, "remove it, or lesion it before")
 
 
 def _lesions(models: tuple[EventModel, ...], reader: _Reader, findings: Findings) -> _Lesions:

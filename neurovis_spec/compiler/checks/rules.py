@@ -35,6 +35,7 @@ def check_rules(compiled: Compiled, findings: Findings) -> None:
             if all(_is_own(bundle, signal) for bundle in entry.bundles):
                 _check_signal(entry, signal, findings)
         _check_rate(entry, findings)
+        _check_bounds(entry, findings)
         if compiled.network.episode is None and learning.rule.each_step is None:
             name = learning.rule.name
             message = f"'{name}' changes weights at the end of an episode, and there are none: no weight will change"
@@ -87,6 +88,16 @@ def _check_signal(entry: WrittenEntry, signal: str, findings: Findings) -> None:
         f"'{rule.name}' changes no weight"
     )
     findings.warning("no-effect", span, message, "name a neuron or an input that says what 'post' should be")
+
+
+def _check_bounds(entry: WrittenEntry, findings: Findings) -> None:
+    """Bounds that are one number. One that names a parameter can be set later."""
+    bounds = entry.body.bounds
+    if bounds is None or isinstance(bounds.first.value, str) or isinstance(bounds.second.value, str):
+        return
+    if bounds.first.value == bounds.second.value:
+        message = f"both bounds are {bounds.first.value}: no weight will change"
+        findings.warning("no-effect", bounds.span, message, "leave the plasticity out, or give the weight room")
 
 
 def _check_rate(entry: WrittenEntry, findings: Findings) -> None:

@@ -39,6 +39,10 @@ def plan_of(
         for c, cell in enumerate(row.cells):
             if cell is not None:
                 places.setdefault(cell.value.strip(), {})[r, c] = cell
+    if rows and not places:
+        findings.warning(
+            "no-effect", rows[0].span, "this plan names nothing", "name an instance, a group or a box in it"
+        )
     taken: dict[int, str] = {}
     cells: list[Cell] = []
     for name, at in places.items():

@@ -11,6 +11,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Final
 
 from neurovis_spec.compiler.events.settable import ParameterFormula
 from neurovis_spec.compiler.limits import DEEPEST, MOST_INSTANCES, Limits
@@ -21,7 +22,7 @@ from neurovis_spec.compiler.names.scope import Expansion, Scope
 from neurovis_spec.compiler.names.size_estimate import SizeEstimate
 from neurovis_spec.compiler.network import Input
 from neurovis_spec.compiler.neurons.inputs import make_input
-from neurovis_spec.compiler.values.constants import Constants
+from neurovis_spec.compiler.values.constants import Constants, Outside
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.parameters import make_parameters
 from neurovis_spec.diagnostics import Findings, shorten, suggest
@@ -257,7 +258,9 @@ class Expander:
     ) -> tuple[Constants, dict[str, frozenset[str]]]:
         """The constants of one instance, and what its settings depend on."""
         outer = scope.constants
-        constants = replace(constants_of(module, self.dt, self.findings), slots=outer.slots, path=place.path)
+        constants = constants_of(module, self.dt, self.findings)
+        around = Outside(outer.names, _OUTSIDE)
+        constants = replace(constants, slots=outer.slots, path=place.path, outside=around)
         extra = dict(zip(COUNTED, (float(place.position), float(place.count)), strict=True))
         given: dict[str, float] = {}
         following: dict[str, ParameterFormula] = {}
@@ -279,6 +282,10 @@ class Expander:
         places = {name: formula.span for name, formula in model.set.items()}
         make_parameters(module.model, constants, given, places)
         return constants, settings
+
+
+#: What to do where a module reads a parameter from around it.
+_OUTSIDE: Final = "a module sees its own parameters alone: declare '{0}' there, and give it with set: {{{0}: {0}}}"
 
 
 def constants_of(module: Module, dt: float, findings: Findings) -> Constants:

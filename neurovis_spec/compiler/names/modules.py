@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from neurovis_spec.compiler.values.builtin import builtin_definitions
-from neurovis_spec.compiler.values.definitions import Definitions, define
+from neurovis_spec.compiler.values.definitions import Around, Definitions, define
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.includes import Includes
 from neurovis_spec.language.library import Library as LanguageLibrary
@@ -44,13 +44,14 @@ def library_of(spec: Spec, includes: Includes, folder: Path, dt: float, findings
     """The modules and definitions of a spec and of its included files, on top of the built-in definitions."""
     _duplicates(spec, includes, findings)
     builtin = builtin_definitions()
-    definitions = define(spec, findings, builtin, dt).over(builtin)
+    around = Around(dt, spec.parameters)
+    definitions = define(spec, findings, builtin, around).over(builtin)
     own = {name: Module(name, model, folder, own=True) for name, model in spec.modules.items()}
     modules = names_of(spec, "modules", own)
     is_open = not includes.complete
     for included in includes.files:
         file = included.model
-        definitions = definitions.over(define(file, findings, builtin, dt))
+        definitions = definitions.over(define(file, findings, builtin, around))
         others = {name: Module(name, model, included.folder, own=False) for name, model in file.modules.items()}
         modules = modules.over(names_of(file, "modules", others))
         is_open = is_open or "include" in file.unknown

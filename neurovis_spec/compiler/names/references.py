@@ -15,7 +15,7 @@ from typing import TypeAlias
 from neurovis_spec.compiler.limits import PATIENCE
 from neurovis_spec.compiler.network import Group
 from neurovis_spec.diagnostics import Findings, Span, did_you_mean, listed, meant, nearest, shorten, suggest
-from neurovis_spec.language.located import Located
+from neurovis_spec.language.located import IDENTIFIER, Located
 from neurovis_spec.language.modules import ModuleModel
 from neurovis_spec.language.references import Arrow, NeuronRange, NoReference, Part, Sum, parse, parse_sum
 from neurovis_spec.language.spec import Spec
@@ -169,6 +169,8 @@ def few(name: str, known: Collection[str]) -> Collection[str]:
 
 def known_inputs(name: str, known: Collection[str]) -> str:
     """A help line for an input that is not declared; ``known`` are those that are."""
+    if not IDENTIFIER.fullmatch(name):
+        return f"name it under 'inputs', as in wave: {{expression: {shorten(name)}}}"
     return suggest(name, few(name, known), "inputs") or "no inputs are declared; add it under 'inputs'"
 
 
@@ -213,7 +215,9 @@ def resolve_part(part: Part, text: Located[str], directory: Directory, findings:
     if isinstance(part, NeuronRange):
         found = directory.range(part.low.text, part.high.text)
         if isinstance(found, str):
-            findings.error("bad-range", span, f"'{shorten(part.text)}' is no range: {found}")
+            whole = f"{part.low.text}..{part.low.text.rstrip('0123456789')}{part.high.text}"
+            hint = f"write {shorten(whole, 200)}" if part.high.text.isdecimal() else None
+            findings.error("bad-range", span, f"'{shorten(part.text)}' is no range: {found}", hint)
         return UNKNOWN if isinstance(found, str) else found
     result = directory.find(part.text)
     if result is None:
@@ -235,8 +239,19 @@ def _unknown(name: str, span: Span, directory: Directory, findings: Findings) ->
         hint = f"connect a neuron that takes it in: {{input: {own}}}{f' in the module of {path!r}' if dot else ''}"
         findings.error("unknown-neuron", span, f"'{shorten(name)}' is an input, not a neuron", hint)
         return
+    if "->" in name:
+        message = f"'{shorten(name)}' is a connection, and neurons are wanted here"
+        findings.error("unknown-neuron", span, message, "name a group, a neuron or a range")
+        return
     message = f"there is no neuron or group '{shorten(name)}'"
-    findings.error("unknown-neuron", span, message, lambda: directory.hint(name))
+    findings.error("unknown-neuron", span, message, lambda: _several(name) or directory.hint(name))
+
+
+def _several(name: str) -> str | None:
+    """How several references are joined, where a text lists them in another way."""
+    parts = [part.strip() for part in name.strip("[]{}() ").split(",")]
+    whole = " + ".join(map(shorten, parts))
+    return f"references are joined with '+': {shorten(whole, 200)}" if len(parts) > 1 and all(parts) else None
 
 
 def resolve(
@@ -262,8 +277,8 @@ def arrow_of(text: Located[str], findings: Findings) -> Arrow | Unknown:
     found = parse(text.value)
     if isinstance(found, Arrow):
         return found
-    message = f"'{shorten(text.value)}' is no connection"
-    findings.error("bad-connection", text.span, message, "write FROM -> TO")
+    hint = found.hint if isinstance(found, NoReference) else "write FROM -> TO"
+    findings.error("bad-connection", text.span, f"'{shorten(text.value)}' is no connection", hint)
     return UNKNOWN
 
 

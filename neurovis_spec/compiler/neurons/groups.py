@@ -315,7 +315,7 @@ class Builder:
         if node is None or isinstance(node, Scalar) or len(model.label) == len(names):
             return labels_of(model.label, len(names), self.scope)
         message = f"'label' has {plural(len(model.label), 'text')} for {plural(len(names), 'neuron')}"
-        self.constants.findings.error("wrong-size", model.label[0].span if model.label else node.span, message)
+        self.constants.findings.error("wrong-size", node.span, message)
         return None
 
 

@@ -60,6 +60,16 @@ def _parsed(text: str, random: bool, functions: tuple[tuple[str, int], ...], sub
     return parse(text, random=random, extra_functions=dict(functions), subscripts=subscripts)
 
 
+class Outside(NamedTuple):
+    """Parameters around a module or a definition, which does not see them, and what to do about it; {0} is a name."""
+
+    names: Collection[str]
+    hint: str
+
+
+NOTHING_OUTSIDE = Outside((), "")
+
+
 def parse_formula(
     formula: Formula,
     known: Collection[str],
@@ -70,10 +80,12 @@ def parse_formula(
     what: str = "known here",
     later: Collection[str] = (),
     subscripts: bool = False,
+    outside: Outside = NOTHING_OUTSIDE,
 ) -> Tree | Unknown:
     """The tree of a formula whose names are all known; else findings at the invalid characters.
 
-    ``later`` are names that are declared behind the formula; ``subscripts`` allows names such as ``legs[3]``.
+    ``later`` are names that are declared behind the formula, ``outside`` those that it does not see; ``subscripts``
+    allows names such as ``legs[3]``.
     """
     if formula.value is UNKNOWN:
         return UNKNOWN
@@ -98,6 +110,8 @@ def parse_formula(
         message, hint = _unknown(name, few, functions or {}, what)
         if name in later:
             message, hint = f"'{name}' comes later", "a parameter sees those that are declared before it"
+        elif name in outside.names:
+            hint = outside.hint.format(name)
         findings.error("unknown-name", formula.node.at(start, end), message, hint)
     return UNKNOWN
 
@@ -158,6 +172,8 @@ class Constants:
     #: parameter → the parameters that its own formula uses
     uses: dict[str, frozenset[str]] = field(default_factory=dict)
     structural: set[str] = field(default_factory=set)
+    #: the parameters that an instance of a module does not see
+    outside: Outside = NOTHING_OUTSIDE
     #: names that formulas read, whatever became of these
     read: set[str] = field(default_factory=set)
     #: the slots of the whole network, and for each parameter that can be set in a run, or follows one, its slot
@@ -225,7 +241,9 @@ class Constants:
         """The tree of a formula over the parameters and what it sees, for a caller that evaluates it; else findings.
         ``later`` are parameters that it does not see."""
         known = Scope((role.sees, self.names, ALWAYS))
-        tree = parse_formula(formula, known, self.findings, random=role.draws, what=what, later=later)
+        tree = parse_formula(
+            formula, known, self.findings, random=role.draws, what=what, later=later, outside=self.outside
+        )
         if tree is UNKNOWN:
             return UNKNOWN
         used = names(tree)

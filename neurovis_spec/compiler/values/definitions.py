@@ -15,7 +15,15 @@ import numpy as np
 
 from neurovis_spec.compiler.limits import PATIENCE
 from neurovis_spec.compiler.program import Activation, Model, Quantity, Rule
-from neurovis_spec.compiler.values.constants import ALWAYS, Value, check_finite, is_constant, parse_formula, value_of
+from neurovis_spec.compiler.values.constants import (
+    ALWAYS,
+    Outside,
+    Value,
+    check_finite,
+    is_constant,
+    parse_formula,
+    value_of,
+)
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.errors import ExpressionError
@@ -74,13 +82,34 @@ _SET = frozenset({"parameters", "signals"})
 _DECLARING = frozenset({"parameters", "signals", "let", "state"})
 
 
+#: What to do where a definition reads a parameter of the spec.
+_OUTSIDE = "a definition sees its own parameters alone: declare '{0}' among them, and set it where it is used"
+
+
+class Around(NamedTuple):
+    """What is around definitions: the seconds of a step, and the parameters of the spec, which they do not see."""
+
+    dt: float = 1.0
+    parameters: Collection[str] = ()
+
+    @property
+    def outside(self) -> Outside:
+        """These, and what to do about them."""
+        return Outside(self.parameters, _OUTSIDE)
+
+
+#: Seconds of a step of 1, and no parameters.
+NOTHING_AROUND = Around()
+
+
 class _Checker:
     """Checks one definition: the names that are taken, and the trees of its formulas."""
 
-    def __init__(self, given: tuple[str, ...], model: LanguageModel, findings: Findings, dt: float) -> None:
+    def __init__(self, given: tuple[str, ...], model: LanguageModel, findings: Findings, around: Around) -> None:
         self.model = model
         self.findings = findings
-        self.constants = {**CONSTANTS, "dt": dt}
+        self.constants = {**CONSTANTS, "dt": around.dt}
+        self.outside = around.outside
         #: where each name is declared; nowhere those that are given
         self.known = Names[Span | None](dict.fromkeys((*ALWAYS, *given)), not model.unknown.isdisjoint(_DECLARING))
 
@@ -120,7 +149,7 @@ class _Checker:
         """The tree of a formula over what is declared so far, or what is ``known``; 0 in the place of one that is
         invalid, as nothing is computed with it any more."""
         known = self.known if known is None else known
-        tree = parse_formula(formula, known, self.findings, functions=functions, what=what)
+        tree = parse_formula(formula, known, self.findings, functions=functions, what=what, outside=self.outside)
         if tree is not UNKNOWN and not functions and is_constant(tree):
             check_finite(evaluate_array(tree, self.constants), formula, self.findings)
         return Number(0.0) if tree is UNKNOWN else tree
@@ -152,7 +181,7 @@ class _Checker:
         )
 
     def _finite(self, formula: Formula, values: Names[Value]) -> Tree | Unknown:
-        tree = parse_formula(formula, values, self.findings, what="known in this default")
+        tree = parse_formula(formula, values, self.findings, what="known in this default", outside=self.outside)
         value = value_of(tree, values)
         return UNKNOWN if value is not UNKNOWN and not check_finite(value, formula, self.findings) else tree
 
@@ -203,10 +232,10 @@ def _bound(default: Default, how: str, bound: Tree | None) -> str | None:
 
 
 def _activation(
-    name: str, model: ActivationModel, findings: Findings, dt: float
+    name: str, model: ActivationModel, findings: Findings, around: Around
 ) -> tuple[Activation, Defaults] | Unknown:
     """The activation; UNKNOWN where an intermediate value is invalid."""
-    checker = _Checker(_ACTIVATION.sees, model, findings, dt)
+    checker = _Checker(_ACTIVATION.sees, model, findings, around)
     defaults = checker.parameters(model.parameters)
     replaced: dict[str, Tree] = {}
     let = checker.let(model.let)
@@ -229,8 +258,8 @@ def _expanded(tree: Tree, let: Mapping[str, Tree], span: Span, findings: Finding
         return Number(0.0)
 
 
-def _model(name: str, model: ModelModel, findings: Findings, dt: float) -> tuple[Model, Defaults]:
-    checker = _Checker(_MODEL.sees, model, findings, dt)
+def _model(name: str, model: ModelModel, findings: Findings, around: Around) -> tuple[Model, Defaults]:
+    checker = _Checker(_MODEL.sees, model, findings, around)
     defaults = checker.parameters(model.parameters)
     for key in names_of(model, "state", model.state):
         checker.declare("state", key)
@@ -242,9 +271,9 @@ def _model(name: str, model: ModelModel, findings: Findings, dt: float) -> tuple
     return Model(name, names, let, state, activity, spikes), defaults
 
 
-def _rule(name: str, model: RuleModel, findings: Findings, dt: float) -> tuple[Rule, Defaults] | Unknown:
+def _rule(name: str, model: RuleModel, findings: Findings, around: Around) -> tuple[Rule, Defaults] | Unknown:
     """The rule; UNKNOWN where it is not known which signals it has."""
-    checker = _Checker(_RULE.sees, model, findings, dt)
+    checker = _Checker(_RULE.sees, model, findings, around)
     defaults = checker.parameters(model.parameters)
     before = findings.errors
     for signal in model.signals:
@@ -267,7 +296,7 @@ def _rule(name: str, model: RuleModel, findings: Findings, dt: float) -> tuple[R
     return Rule(name, tuple(default.name for default in defaults), signals, let, state, step, episode), defaults
 
 
-def define(library: Library, findings: Findings, builtin: Definitions, dt: float = 1.0) -> Definitions:
+def define(library: Library, findings: Findings, builtin: Definitions, around: Around = NOTHING_AROUND) -> Definitions:
     """The definitions of a file. Who replaces a built-in one is warned."""
     sections: tuple[tuple[str, Collection[str]], ...] = (
         ("activations", builtin.activations), ("models", builtin.models), ("rules", builtin.rules)
@@ -279,9 +308,9 @@ def define(library: Library, findings: Findings, builtin: Definitions, dt: float
                 message = f"'{entry.name}' replaces the built-in of that name"
                 findings.warning("replaces-builtin", entry.key.span, message)
     return Definitions(
-        _defined("activations", library, library.activations, _activation, findings, dt),
-        _defined("models", library, library.models, _model, findings, dt),
-        _defined("rules", library, library.rules, _rule, findings, dt),
+        _defined("activations", library, library.activations, _activation, findings, around),
+        _defined("models", library, library.models, _model, findings, around),
+        _defined("rules", library, library.rules, _rule, findings, around),
     )
 
 
@@ -289,11 +318,11 @@ def _defined(
     section: str,
     library: Library,
     models: Mapping[str, M],
-    make: Callable[[str, M, Findings, float], tuple[D, Defaults] | Unknown],
+    make: Callable[[str, M, Findings, Around], tuple[D, Defaults] | Unknown],
     findings: Findings,
-    dt: float,
+    around: Around,
 ) -> Names[tuple[D, Defaults]]:
     """The definitions of a section. One of which it is not known which parameters and signals it has is UNKNOWN."""
-    made = {name: make(name, model, findings, dt) for name, model in models.items()}
+    made = {name: make(name, model, findings, around) for name, model in models.items()}
     sure = {name: made[name] if model.unknown.isdisjoint(_SET) else UNKNOWN for name, model in models.items()}
     return names_of(library, section, sure)

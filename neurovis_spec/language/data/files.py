@@ -16,12 +16,13 @@ from neurovis_spec.diagnostics import Findings, Span, suggest
 from neurovis_spec.language.data.table import EMPTY_CELL, MOST_FAULTS, CellError, Faults, Room, Table, full, in_cell
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
+from neurovis_spec.language.values import DATA_FILES
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
 
 if TYPE_CHECKING:
     from neurovis_spec.language.data.edge_list import EdgeTable
 
-__all__ = ["KINDS", "CellError", "Room", "Table", "locate", "read_data", "read_edges", "read_table"]
+__all__ = ["DATA_FILES", "CellError", "Room", "Table", "locate", "read_data", "read_edges", "read_table"]
 
 LARGEST: Final = 256 << 20  # bytes; ten million connections in double precision are 80 MB
 #: characters of a path: what common systems take
@@ -31,8 +32,6 @@ NO_GAP: Final = "a finite number is needed in every cell"
 #: bytes of a file of text that is shown with what is wrong in it
 _SHOWN: Final = 1 << 20
 _FROM: Final = "paths are relative to the file that names them"
-#: files that hold a table of numbers
-KINDS: Final = (".csv", ".npy", ".npz", ".mtx")
 
 
 def locate(path_text: str, root: Path, base: Path, span: Span, findings: Findings) -> Path | Unknown:
@@ -89,7 +88,7 @@ def read_table(
     keyed: bool = True,
     gaps: bool = True,
     inside: bool = False,
-    kinds: Iterable[str] = KINDS,
+    kinds: Iterable[str] = DATA_FILES,
     room: Room | None = None,
 ) -> Table | Unknown:
     """A table of numbers from a file of one of these ``kinds``; an array of one dimension is a column.
@@ -135,7 +134,7 @@ def _check_full(table: Table) -> None:
 
 
 def _parsed(suffix: str, data: bytes, key: str | None, room: Room | None) -> Table:
-    """The table in a file of one of KINDS. Raises CellError."""
+    """The table in a file of one of DATA_FILES. Raises CellError."""
     if suffix == ".csv":
         from neurovis_spec.language.data.csv_table import parse_numbers
 
