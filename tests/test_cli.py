@@ -234,14 +234,6 @@ def test_validate_prints_one_json_array_of_all_findings_in_order() -> None:
     assert json.loads(good("validate", "--format", "json", SPECS / "ring.yaml")) == []
 
 
-def test_validate_shows_at_most_twenty_findings_as_text(folder: Path) -> None:
-    groups = "\n".join(f"  N{i}: {{activation: tahn}}" for i in range(33))
-    result = call("validate", "-", stdin=f"neurovis: 1\nname: x\nneurons:\n{groups}\n")
-    assert result.stderr.count("error[") == 20
-    assert "13 more" in result.stderr
-    assert result.stderr.rstrip().endswith("33 errors")
-
-
 def test_validate_strict_makes_a_warning_an_error(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from neurovis_spec.compiler import compile as compiler
 
@@ -279,28 +271,6 @@ def test_validate_limit_and_root(folder: Path) -> None:
 
 
 # inspect, schema
-
-
-def test_inspect_json_is_the_object_of_the_contract(folder: Path) -> None:
-    seen = json.loads(good("inspect", "small.yaml", "--format", "json", "--set", "gain=2"))
-    assert (seen["name"], seen["dt"], seen["steps"], seen["seed"], seen["parameters"]) == (
-        "small",
-        0.5,
-        10,
-        0,
-        {"gain": 2},
-    )
-    assert seen["neurons"][0] == {
-        "name": "A", "group": "A", "module": None,
-        "activation": "identity", "model": "static", "combine": "sum", "bias": 0.25,
-    }  # fmt: skip
-    assert seen["connections"][0] == {"from": "A", "to": "B1", "weight": 2, "delay": 2, "rule": None}
-    assert seen["connections"][2] == {"from": "B1", "to": "B2", "weight": 0.1, "delay": 1, "rule": "hebbian"}
-    assert [entry["name"] for entry in seen["inputs"]] == ["push", "pull"]
-    assert [entry["name"] for entry in seen["outputs"]] == ["last", "both"]
-    assert len(seen["hash"]) == 64
-    assert "layered" in json.dumps(seen["engine"])
-    assert seen == json.loads(good("inspect", "-", "--format", "json", "--set", "gain=2", stdin=SMALL))
 
 
 def test_inspect_text_shows_the_tables_and_the_matrix(folder: Path) -> None:
@@ -424,13 +394,6 @@ def test_run_without_a_file_prints_the_last_values(folder: Path) -> None:
     assert lines[3] == f"  both  {last[1]:.6g} {last[2]:.6g}"
     assert lines[4].startswith("2 changing weights: ")
     assert sorted(folder.iterdir()) == [folder / "small.yaml"]
-
-
-def test_run_lists_backends_without_a_spec() -> None:
-    lines = good("run", "--backend", "list").splitlines()
-    assert [line.split()[:2] for line in lines if line.split()[0] in ("numpy", "reference")] == [
-        ["numpy", "available"], ["reference", "available"],
-    ]  # fmt: skip
 
 
 def test_run_warns_in_a_line_where_numbers_overflow(folder: Path) -> None:

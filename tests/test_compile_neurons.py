@@ -185,11 +185,6 @@ def test_what_is_set_replaces_a_value_and_others_follow() -> None:
             nv.compile_text(text, parameters=wrong)
 
 
-@pytest.mark.parametrize("name", ["t", "k", "dt", "i", "j", "n", "pi", "e"])
-def test_reserved_names(name: str) -> None:
-    assert codes(f"parameters: {{{name}: 1}}\nneurons: {{A: {{}}}}") == ["reserved-name"]
-
-
 def test_functions_bar_no_names() -> None:
     text = "parameters: {sin: 2, normal: 3, f: 4, x: 5}\nneurons: {A: {bias: sin(0) + sin*normal + f + x}}"
     assert network_of(text).neurons.bias.tolist() == [15]
@@ -247,13 +242,6 @@ def test_inputs(tmp_path: Path) -> None:
     ]
     tables = [None if entry.table is None else entry.table.tolist() for entry in inputs]
     assert tables == [None, [[1, 2], [3, 4]], [[1], [2], [3]], [[0], [2], [1]], None, None]
-
-
-def test_an_input_goes_to_all_or_to_one_each() -> None:
-    text = "inputs: {s: {}, v: {size: 3}}\nneurons: {A: {count: 3, input: v}, B: {count: 2, input: s}, C: {}}"
-    assert network_of(text).neurons.input.tolist() == [1, 2, 3, 0, 0, -1]
-    assert codes("inputs: {v: {size: 2}}\nneurons: {A: {count: 3, input: v}}") == ["wrong-size"]
-    assert answer("inputs: {left: {}}\nneurons: {A: {input: lfet}}")[2] == "did you mean 'left'?"
 
 
 @pytest.mark.parametrize(

@@ -32,22 +32,6 @@ def test_a_mapping_and_a_list_of_mappings_say_the_same() -> None:
     assert wires(network_of(ABD + "[{A1 -> O: 2}, {A1 -> O: 3}]")) == [("A1", "O", 2, 1), ("A1", "O", 3, 1)]
 
 
-def test_rows_are_sources_and_columns_are_targets() -> None:
-    """c_ij goes from i to j; ``rows: to`` states the opposite, ``rows: from`` the same."""
-    for body in ("[[1, 2, 3], [4, 5, 6]]", "[[1, 2, 3], [4, 5, 6]], rows: from", "[[1, 4], [2, 5], [3, 6]], rows: to"):
-        assert wires(network_of(f"{ABD}{{A -> B: {{matrix: {body}}}}}")) == [
-            (f"A{i}", f"B{j}", 3 * i + j - 3, 1) for i in (1, 2) for j in (1, 2, 3)
-        ]
-
-
-def test_blanks_around_arrows_and_pluses_are_optional() -> None:
-    """Also within one reference of several."""
-    found = {
-        tuple(pairs(f"{ABD}{{'{key}': 1}}")) for key in ("A1+B1..B2->O", "A1 + B1 .. B2 -> O", " A1  +B1..B2  ->O ")
-    }
-    assert found == {("A1 O", "B1 O", "B2 O")}
-
-
 def test_a_scale_is_applied_when_weights_are_made() -> None:
     """What a rule makes of them afterwards is not scaled again."""
     text = (
@@ -72,23 +56,6 @@ def test_a_centre_may_use_all_that_a_weight_may() -> None:
     assert pairs(text + "{A -> D: {centre: [[7], [null]]}}") == ["A1 D"]
 
 
-def test_a_matrix_and_a_centre_matrix_agree_in_shape_and_null_in_either_is_no_connection() -> None:
-    """Others are refused with both shapes."""
-    body = "{matrix: [[1, null], [2, 3]], centre: [[5, 6], [null, 8]]}"
-    network = network_of(f"{ABD}{{A -> D: {body}}}")
-    assert wires(network) == [("A1", "D1", 1, 1), ("A2", "D2", 3, 1)]
-    assert network.connections.centres.tolist() == [5, 8]
-    assert codes(ABD + "{A -> D: {matrix: [[1, 2], [3, 4]], centre: [[1], [2]]}}") == ["wrong-size"]
-
-
-def test_a_text_with_a_comma_in_a_flow_mapping_needs_quotes_and_the_finding_says_so() -> None:
-    """With the text to write."""
-    code, _, hint = answer(ABD + "{A1 -> O: {weight: normal(0, 1)}}")
-    assert code == "flow-comma"
-    assert '"normal(0, 1)"' in hint
-    assert len(weights(ABD + "\n  A1 -> O: normal(0, 1)\n")) == 1, "in a block it needs none"
-
-
 def test_an_empty_cell_is_null_in_a_matrix_and_an_error_in_an_input(tmp_path: Path) -> None:
     """A header is a first row of texts."""
     (tmp_path / "w.csv").write_text("x,y,z\n1,,3\n,5,\n", encoding="utf-8")
@@ -99,15 +66,6 @@ def test_an_empty_cell_is_null_in_a_matrix_and_an_error_in_an_input(tmp_path: Pa
         "neurons: {A: {count: 2, position: {file: w.csv}}}",
     ):
         assert len(codes(place, tmp_path)) == 1
-
-
-def test_an_edge_without_a_weight_has_1_and_its_fourth_item_is_the_delay() -> None:
-    """Without one it is that of the entry, and 1 without that."""
-    edges = "{edges: [[A1, O], [A2, O, 0.5], [A1, O, 2, 7]]%s}"
-    assert wires(network_of(f"{ABD}{{A -> O: {edges % ''}}}")) == [
-        ("A1", "O", 1, 1), ("A2", "O", 0.5, 1), ("A1", "O", 2, 7),
-    ]  # fmt: skip
-    assert [wire[3] for wire in wires(network_of(f"{ABD}{{A -> O: {edges % ', delay: 3'}}}"))] == [3, 3, 7]
 
 
 @pytest.mark.parametrize(
@@ -125,26 +83,6 @@ def test_a_first_weight_outside_bounds_is_an_error(body: str, place: str) -> Non
     code, message, _ = answer(f"{ABD}{{A -> O: {body}}}")
     assert code == "weight-outside"
     assert place in message
-
-
-def test_band_is_the_distance_of_the_indices() -> None:
-    """|i − j| ≤ width, both within their references."""
-    found = pairs(
-        "neurons: {A: {count: 4, bias: 1}, B: {count: 4}}\nconnections: {A -> B: {pattern: {band: {width: 1}}}}"
-    )
-    assert found == [f"A{i + 1} B{j + 1}" for i in range(4) for j in range(4) if abs(i - j) <= 1]
-
-
-def test_chain_and_ring_take_two_groups_of_equal_size_alone() -> None:
-    """A ring is closed."""
-    text = "neurons: {A: {count: 3, bias: 1}, B: {count: 3}, E: {count: 2}}\nconnections: {%s: {pattern: %s}}"
-    assert pairs(text % ("A -> B", "chain")) == ["A1 B2", "A2 B3"]
-    assert pairs(text % ("A -> B", "ring")) == ["A1 B2", "A2 B3", "A3 B1"]
-    for pattern in ("chain", "ring"):
-        code, message, _ = answer(text % ("A -> E", pattern))
-        assert code == "wrong-size"
-        assert "3" in message
-        assert "2" in message
 
 
 PURPOSES = """\
@@ -176,13 +114,3 @@ def test_a_draw_goes_by_seed_purpose_name_and_the_counter() -> None:
     for k in (1, 2):
         expected = network.neurons.bias[:3] + noise.uniform(n, 0, k, 0)
         np.testing.assert_array_equal(compiled(PURPOSES).run(3)["A"][k], expected)
-
-
-def test_a_draw_depends_on_no_order_of_the_spec() -> None:
-    """Groups and entries in another order, others beside them: the same numbers."""
-    one = compiled(PURPOSES).network
-    lines = PURPOSES.splitlines()
-    turned = "\n".join([*lines[:2], lines[3], "  Z: {count: 9, bias: 'normal(0, 1)'}", lines[2], *lines[4:]])
-    other = compiled(turned).network
-    assert sorted(wires(one)) == sorted(wires(other))
-    assert one.neurons.bias[:3].tolist() == other.neurons.bias[11:].tolist()

@@ -174,20 +174,6 @@ connections: {A -> B: {pattern: all_to_all, weight: 0, delay: 0, plasticity: sum
     assert compiled(text).run(4).weights[-1].tolist() == [3, 3, 6, 6]
 
 
-def test_several_states_are_updated_together_and_let_is_computed_in_order() -> None:
-    """Right-hand sides read old values; a later ``let`` sees an earlier one."""
-    text = """
-models:
-  swap:
-    let: {p: v + 1, q: 10*p}
-    state: {v: {initial: 1, each_step: w}, w: {initial: 2, each_step: v}, seen: {each_step: q}}
-    activity: 100*v + 10*w + seen
-neurons: {A: {model: swap}}
-"""
-    # (v, w) = (2, 1) and q of v = 1 is 20; then (1, 2) and q of v = 2 is 30
-    assert compiled(text).run(2)["A"].tolist() == [200 + 10 + 20, 100 + 20 + 30]
-
-
 def test_bounds_apply_after_the_change_at_an_episodes_end_too() -> None:
     """Right after each: what follows begins within them."""
     text = """

@@ -8,9 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_specs import HEAD, answer, codes, compiled, network_of, wires
-
-import neurovis_spec as nv
+from small_specs import answer, codes, compiled, network_of, wires
 
 
 def titles(text: str, folder: Path) -> dict[str, str]:
@@ -182,12 +180,3 @@ def test_limits_are_checked_before_memory_is_taken(text: str) -> None:
         assert tracemalloc.get_traced_memory()[1] < 64 << 20  # ten million connections alone would take 400 MB
     finally:
         tracemalloc.stop()
-
-
-def test_a_limit_raises_both() -> None:
-    """``limit`` counts connections, and neurons beyond a million."""
-    text = "neurons: {A: {count: 1000, bias: 1}}\nconnections: {A -> A: {pattern: {fixed_indegree: {count: 20}}}}"
-    with pytest.raises(nv.SpecError) as caught:
-        nv.compile_text(HEAD + text, limit=19_999)
-    assert [item.code for item in caught.value.diagnostics] == ["too-many"]
-    assert len(nv.compile_text(HEAD + text, limit=20_000).network.connections) == 20_000

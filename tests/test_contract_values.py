@@ -43,73 +43,22 @@ def test_a_byte_order_mark_counts_as_no_column() -> None:
     assert (found.code, found.span.line, found.span.column) == ("unknown-key", 3, 28)
 
 
-REFUSED = [
-    ("neurons: {A: {}, A: {}}\n", "duplicate-key"),
-    ("neurons: {A: !!str {}}\n", "tag"),
-    ("neurons: {A: {<<: {bias: 1}}}\n", "merge-key"),
-    ("neurons: {A: {}}\n---\na: 1\n", "several-documents"),
-    ("neurons: {A: &a {}}\n", "anchor"),
-    ("neurons: {A: {bias: .nan}}\n", "not-finite"),
-    ("neurons: {A: {bias: -.inf}}\n", "not-finite"),
-    ("neurons: {A: {bias: 9223372036854775808}}\n", "integer-range"),
-    ("neurons: {A: {bias: -9223372036854775809}}\n", "integer-range"),
-    ("neurons: {A: {label: 'a\u202eb'}}\n", "control-character"),
-    ("neurons: {A: {label: 'a\u2066b'}}\n", "control-character"),
-    ('neurons: {A: {label: "a\\u202eb"}}\n', "control-character"),
-    ("neurons: {A: {label: 'a\x7fb'}}\n", "control-character"),
-    ("neurons: {A: {}}\x00\n", "control-character"),
-]
-
-
-@pytest.mark.parametrize(("text", "code"), REFUSED)
-def test_what_yaml_allows_and_a_spec_does_not(text: str, code: str) -> None:
-    """Each has its own code."""
-    assert codes(text) == [code]
-
-
-def test_directives() -> None:
-    """Only %YAML 1.2 is one."""
-    for line, wanted in (("%YAML 1.2", []), ("%YAML 1.1", ["directive"]), ("%TAG ! tag:x,2000:", ["directive"])):
-        try:
-            nv.compile_text(f"{line}\n---\n{HEAD}neurons: {{A: {{bias: 1}}}}\n")
-            found: list[str] = []
-        except nv.SpecError as error:
-            found = [item.code for item in error.diagnostics]
-        assert found == wanted, line
-
-
 def test_the_limits_of_integers_are_numbers() -> None:
     """Signed 64 bits, both ends included."""
     assert codes("neurons: {A: {bias: -9223372036854775808}, B: {bias: 9223372036854775807}}\n") == []
 
 
 NEURONS = [
-    ("{K: {count: 11}, K1: {count: 1}}", ["duplicate-neuron"]),
-    ("{K: {first: 0}}", ["first-without-count"]),
-    ("{K: {count: 2, names: [a, b, c]}}", ["wrong-size"]),
-    ("{K: {count: 0}}", ["out-of-range"]),
-    ("{K: {count: 2, label: [a]}}", ["wrong-size"]),
-    ("{K: {role: sensor}}", ["unknown-value"]),
     ("{" + "a" * 65 + ": {}}", ["bad-name"]),
     ("{" + "a" * 64 + ": {}}", []),
-    ("{null: {}}", ["key-not-text"]),
-    ("{true: {}}", ["key-not-text"]),
-    ("{1: {}}", ["key-not-text"]),
-    ("{~: {}}", ["key-not-text"]),
     ("{n: {}, y: {}, e: {}, pi: {}, t: {}, sin: {}}", []),
 ]
 
 
 @pytest.mark.parametrize(("neurons", "wanted"), NEURONS)
-def test_names_and_counts(neurons: str, wanted: list[str]) -> None:
-    """Names of neurons are unique and names; a count and what stands beside it agree."""
+def test_names(neurons: str, wanted: list[str]) -> None:
+    """A name has 64 characters at most, and may be one that YAML 1.1 or an expression reads as something else."""
     assert codes(f"neurons: {neurons}\n") == wanted
-
-
-def test_how_neurons_are_named() -> None:
-    """From 1, from ``first``, one by one, or as the group; ``count: 1`` is counted."""
-    text = "neurons: {K: {count: 2}, L: {count: 2, first: 0}, M: {names: [p, q]}, N: {}, O: {count: 1}}\n"
-    assert nv.compile_text(HEAD + text).network.neurons.names == ("K1", "K2", "L0", "L1", "p", "q", "N", "O1")
 
 
 VALUES = [
@@ -131,19 +80,10 @@ def test_values_of_expressions(expression: str, value: float) -> None:
 @pytest.mark.parametrize(
     ("expression", "code"),
     [
-        ("1 < 2 < 3", "chained-comparison"),
-        ("a.b", "no-attributes"),
-        ("[1]", "no-collections"),
-        ("1[0]", "no-subscripts"),
-        ("f(1)", "unknown-function"),
-        ("sin", "unknown-name"),
-        ("sin(1, 2)", "wrong-arguments"),
         ("0x1f", "malformed-number"),
         ("1_000", "malformed-number"),
         ("1 // 2", "foreign-operator"),
         ("sqrt(-1)", "not-finite"),
-        ("1/0", "not-finite"),
-        ("1e400", "number-overflow"),
         ("1" * 1001, "expression-too-long"),
     ],
 )

@@ -20,28 +20,6 @@ def findings(text: str) -> tuple[Diagnostic, ...]:
     return caught.value.diagnostics
 
 
-REFUSED = [
-    ("neurons:\n  A: {}\n  A: {}\n", "duplicate-key", (5, 3)),
-    ("neurons: {A: !!map {}}\n", "tag", (3, 14)),
-    ("neurons: {A: {<<: {bias: 1}}}\n", "merge-key", (3, 15)),
-    ("neurons: {A: {}}\n---\nb: 1\n", "several-documents", (4, 1)),
-    ("neurons: {A: &a {}}\n", "anchor", (3, 14)),
-    ("neurons: {A: *a}\n", "alias", (3, 14)),
-    ("neurons: {A: {label: 'a\u202eb'}}\n", "control-character", (3, 24)),
-    ("neurons: {A: " + "[" * 65 + "]" * 65 + "}\n", "too-deep", (3, 76)),
-    ("neurons: {A: {bias: .nan}}\n", "not-finite", (3, 21)),
-    ("neurons: {A: {bias: 9223372036854775808}}\n", "integer-range", (3, 21)),
-]
-
-
-@pytest.mark.parametrize(("text", "code", "place"), REFUSED)
-def test_each_refusal_has_its_own_code_and_position(text: str, code: str, place: tuple[int, int]) -> None:
-    """At the very thing that is refused."""
-    found = [(item.code, (item.span.line, item.span.column)) for item in findings(text)]
-    assert (code, place) in found
-    assert len({code for code, _ in found}) == 1
-
-
 def test_all_that_is_refused_is_found_at_once() -> None:
     """One document with a bit of everything."""
     text = "title: !!str a\ndescription: &d b\nlicense: *d\nneurons:\n  A: {bias: .inf, <<: {}}\n  A: {bias: 1e999}\n"

@@ -107,6 +107,9 @@ def offered(text: str) -> dict[str, Completion]:
         (BASE + "ros: {subscribe: {go: {on_timeout: ¦", ["hold", "zero", "stop"], ["go"]),
         (BASE + "outputs: {o: K}\nros: {publish: {o: {¦", ["topic", "field", "safe"], ["timeout"]),
         ("description: |\n  ¦", [], ["name"]),
+        ("neurons:\n  K: {count: 3,\n  O: {activation: ta¦", ["tanh"], ["count"]),
+        ('parameters:\n  alpha: 1\n  p: "al¦pha"', ["alpha"], ["p"]),
+        (BASE + "outputs: {o: ¦\nlayout:\n  engine: x", ["K"], ["alpha"]),
     ],
 )
 def test_what_fits_is_offered_and_nothing_else(text: str, there: list[str], missing: list[str]) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from lsp_marks import MARK, marked
+from lsp_marks import marked
 
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.yaml.reader import read_any, read_text
@@ -96,36 +96,3 @@ def test_no_text_is_too_broken_to_look_at(source: str, line: int, column: int) -
     for item in () if root is None else outline(root):
         assert text.part(item.span) or item.scalar.value is None
     where(text, Place(min(line, len(text.lines.starts)), column))
-
-
-@pytest.mark.parametrize(
-    ("source", "mapping", "value", "typed"),
-    [
-        ("¦", (), None, ""),
-        ("neu¦", (), None, "neu"),
-        ("neurons:\n  K: {count: 3, act¦", ("neurons", "K"), None, "act"),
-        ("neurons:\n  K:\n    ¦", ("neurons", "K"), ("neurons", "K"), ""),
-        ("neurons:\n  K:\n    count: 3\n    ¦", ("neurons", "K"), None, ""),
-        ("neurons:\n  K:\n    count: ¦", None, ("neurons", "K", "count"), ""),
-        ("neurons:\n  K:\n    count: 3\n  ¦", ("neurons",), None, ""),
-        ("neurons:\n  K: {count: 3,\n  O: {activation: ta¦", None, ("neurons", "O", "activation"), "ta"),
-        ("connections:\n  K -> ¦", ("connections",), ("connections",), "K -> "),
-        ("connections:\n  - K -> O: 1\n  - K¦\n", ("connections", 1), ("connections", 1), "K"),
-        ("outputs:\n  a: [K1, K¦]", None, ("outputs", "a", 1), "K"),
-        ("outputs: {a: ¦\nlayout:\n  engine: x", None, ("outputs", "a"), ""),
-        ('parameters:\n  p: "al¦pha"', None, ("parameters", "p"), "al"),
-        ("a: [x,\n   ¦]", None, ("a", 1), ""),
-    ],
-)
-def test_where_a_place_stands(source: str, mapping: object, value: object, typed: str) -> None:
-    document, place = marked(source)
-    found = where(document.text, place)
-    assert found is not None
-    assert (found.mapping, found.value, found.typed) == (mapping, value, typed)
-
-
-def test_nothing_is_looked_for_in_a_block_of_text() -> None:
-    document, place = marked("description: |\n  K ¦ text\nname: x")
-    assert where(document.text, place) is None
-    assert MARK not in document.source
-    assert [item.path for item in document.items if item.is_key] == [("description",), ("name",)]
