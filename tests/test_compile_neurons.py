@@ -85,7 +85,7 @@ def test_values_of_a_group() -> None:
     assert neurons.initial[:3].tolist() == [0, 2, 1]
     assert np.isnan(neurons.initial[3])
     assert codes("neurons: {K: {count: 3, bias: [1, 2]}}") == ["wrong-size"]
-    assert codes("neurons: {K: {bias: 1/0}}") == ["not-finite"]
+    assert codes("neurons: {K: {bias: 1/0}, L: {bias: sqrt(-1)}}") == ["not-finite"] * 2
 
 
 def test_parameters_of_an_activation_may_differ_from_neuron_to_neuron() -> None:

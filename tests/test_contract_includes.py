@@ -82,30 +82,6 @@ def test_a_file_that_is_included_twice_is_included_once(tmp_path: Path) -> None:
     assert network_of(text, tmp_path).neurons.names == ("left.K",)
 
 
-def test_include_cycles_are_errors_that_name_the_files(tmp_path: Path) -> None:
-    """Of two, and of one."""
-    (tmp_path / "a.yaml").write_text("include: b.yaml\n", encoding="utf-8")
-    (tmp_path / "b.yaml").write_text("include: a.yaml\n", encoding="utf-8")
-    (tmp_path / "c.yaml").write_text("include: c.yaml\n", encoding="utf-8")
-    for name, files in (("a", ("a.yaml", "b.yaml")), ("c", ("c.yaml",))):
-        with pytest.raises(nv.SpecError) as caught:
-            nv.compile_text(f"{HEAD}include: {name}.yaml\nneurons: {{A: {{}}}}\n", folder=tmp_path)
-        (found,) = caught.value.diagnostics
-        assert found.code == "include-cycle"
-        assert [file for file in files if file not in found.message] == []
-        assert Path(found.span.file).name in files
-
-
-def test_a_module_that_holds_itself_is_an_error() -> None:
-    """Directly, and through another."""
-    one = "modules: {m: {neurons: {K: {}}, instances: {x: {module: m}}}}\ninstances: {i: {module: m}}"
-    two = (
-        "modules: {m: {neurons: {K: {}}, instances: {x: {module: o}}}, o: {instances: {x: {module: m}}}}\n"
-        "instances: {i: {module: m}}"
-    )
-    assert codes(one) == codes(two) == ["module-cycle"]
-
-
 def test_a_module_sees_the_definitions_and_its_own_parameters_alone() -> None:
     """Neither the parameters, nor the groups, nor the inputs of the spec around it."""
     outside = (
