@@ -191,7 +191,7 @@ def test_a_character_device_is_written_as_it_is(tmp_path: Path) -> None:
         formats.load(tmp_path / "x.npz")
 
 
-# ---- reading with suspicion --------------------------------------------------------------------------------------
+# ---- files that are no recordings --------------------------------------------------------------------------------
 
 
 def contents() -> dict[str, np.ndarray[tuple[int, ...], np.dtype[np.generic]]]:

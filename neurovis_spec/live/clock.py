@@ -65,7 +65,7 @@ class Clock:
 
 
 class Pace:
-    """When frames are due: one that was begun late has the next no later."""
+    """When frames are due: each a sixtieth of a second after the one before was, or at once where that has passed."""
 
     def __init__(self) -> None:
         self.due = 0.0

@@ -1,8 +1,9 @@
-"""The simulator as a source: a run that can be stepped back, turned, and gone on from differently.
+"""The simulator as a source: a run that can go back to a step of its past and go on from there differently.
 
-In: a Simulation. Out: a Source. Every so many steps, and at every turn, the state is kept; a step of the past is made
-again from the state before it, bit for bit, and what was turned on the way is turned again. Where the network has a
-body that cannot be kept there is no going back.
+In: a Simulation. Out: a Source. A turn is a change that a user makes on the way: a parameter set, an input fed, a
+neuron clamped or lesioned (``turns``). Every so many steps, and at every turn, the state is kept; a step of the past is
+made again from the state before it, bit for bit, with the turns that were taken then. Where the network has a body
+whose state cannot be kept there is no going back.
 """
 
 from __future__ import annotations
@@ -82,7 +83,7 @@ class SimulatedSource:
         """The turns that were taken up to the current step, in order."""
         taken = self._turned[: bisect_right(self._turned, self.step, key=attrgetter("step"))]
         if len(self._listed[0]) != len(taken):
-            self._listed = taken, _without_ways(taken)
+            self._listed = taken, _without_drags(taken)
         return self._listed[1]
 
     @property
@@ -245,12 +246,12 @@ class SimulatedSource:
         return Seen(Snapshot(step, activity, weights, previous, seen, pose, run.sensed), *lesioned, held)
 
 
-def _without_ways(turned: Sequence[Turned]) -> tuple[Turned, ...]:
-    """Turns, of values that were dragged those in which a drag has ended so far."""
+def _without_drags(turned: Sequence[Turned]) -> tuple[Turned, ...]:
+    """The turns without the values that a slider only passed while it was dragged."""
     pairs = zip(turned, [*turned[1:], None], strict=True)
-    return tuple(one for one, after in pairs if after is None or not _on_its_way(one.turn, after.turn))
+    return tuple(one for one, after in pairs if after is None or not _dragged_on(one.turn, after.turn))
 
 
-def _on_its_way(turn: Turn, after: Turn) -> bool:
-    """Whether a value was being dragged when the next one was given."""
+def _dragged_on(turn: Turn, after: Turn) -> bool:
+    """Whether a slider was being dragged when ``turn`` was taken, and ``after`` is the next value of the same drag."""
     return isinstance(turn, Set | Feed | Hold) and turn.moving and same_value(turn, after)

@@ -1,4 +1,4 @@
-"""Bags of ROS 1 (format 2.0) are read record by record, with suspicion, also those that break off and have no index.
+"""Bags of ROS 1 (format 2.0), read record by record and checked, also those that break off and have no index.
 
 In: an open file. Out: what its header says, its connections, its messages, to the last whole chunk.
 """

@@ -11,6 +11,7 @@ from typing import Final, Protocol
 
 #: seconds of a sleep, so that an end is soon noticed; and between two looks at a simulated clock
 _NAP, _LOOK = 0.05, 0.0005
+#: a clock that falls back by more seconds than this has begun anew
 _BACK: Final = 1e-3
 
 

@@ -33,7 +33,7 @@ class BagFormat:
         from neurovis_spec.ros.play import spec_of
         from neurovis_spec.runtime.arrived import Arrived
         from neurovis_spec.runtime.kinds import KINDS
-        from neurovis_spec.runtime.npz_file import suspicion
+        from neurovis_spec.runtime.npz_file import recording_errors
         from neurovis_spec.runtime.recording import RecordingError, after_rows, ended
         from neurovis_spec.runtime.wire import WireError
 
@@ -55,7 +55,7 @@ class BagFormat:
                     left_out += 1
         if left_out:
             warnings.warn(f"{path}: {left_out} messages are left out: none of this network's arrays", stacklevel=4)
-        with suspicion(path):
+        with recording_errors(path):
             recording = replace(arrived.recording(path, run), spec=text)
         rows = after_rows(recording.step, recording.weights, len(recording.plastic))
         return ended(recording, replace(rows, set_parameters=recording.set_parameters))

@@ -24,7 +24,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.expressions.tree import Number
 from neurovis_spec.runtime.conditions import Controls
 from neurovis_spec.runtime.files import regular_size, replacing
-from neurovis_spec.runtime.npz_file import Array, put_arrays, read_array, suspicion
+from neurovis_spec.runtime.npz_file import Array, put_arrays, read_array, recording_errors
 from neurovis_spec.runtime.recording import RecordingError
 from neurovis_spec.runtime.state import BodyState, State, initial_state
 
@@ -75,7 +75,7 @@ def numbers_of(carried: object) -> Array:
 def load_state(network: Network, path: Path) -> State:
     """The state in a file. Raises RecordingError for a file that is none, or one of another network, or of one with a
     body where this has none, and the other way round."""
-    with suspicion(path, "a checkpoint"):
+    with recording_errors(path, "a checkpoint"):
         state = initial_state(network)
         wanted = _arrays(state)
         size, most = regular_size(path), sum(array.nbytes for array in wanted.values())

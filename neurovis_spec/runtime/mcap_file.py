@@ -26,7 +26,7 @@ from neurovis_spec.runtime.arrived import Arrived
 from neurovis_spec.runtime.files import regular_size
 from neurovis_spec.runtime.kinds import KINDS, Rows
 from neurovis_spec.runtime.mcap_records import Channel, DamagedError, Found, Message, Schema, Topic
-from neurovis_spec.runtime.npz_file import frame_bytes, frame_of, suspicion
+from neurovis_spec.runtime.npz_file import frame_bytes, frame_of, recording_errors
 from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows, ended
 from neurovis_spec.runtime.ros_messages import ARRAY, STRING, label_of
 from neurovis_spec.runtime.rotated import following
@@ -173,7 +173,7 @@ def finish_mcap(file: FileIO, part: Path, path: Path) -> None:
 def recover_mcap(part: Path) -> Recording:
     """Read a part up to its last whole chunk. Raises RecordingError."""
     reading = _Reading()
-    with suspicion(part):
+    with recording_errors(part):
         reading.read(part)
         return reading.recording(part, None)
 
@@ -183,10 +183,10 @@ def read_mcap(path: Path, run: int | None = None) -> Recording:
     several runs the one with this number, by default the last. Raises RecordingError."""
     reading, broken = _Reading(), list[Path]()
     for file in chain([path], following(path, reading.about, _about)):
-        with suspicion(file):
+        with recording_errors(file):
             if not reading.read(file):
                 broken.append(file)
-    with suspicion(path):
+    with recording_errors(path):
         recording = reading.recording(path, run)
     for file in broken:
         last = f"up to step {recording.step[-1]}" if len(recording) else "no step"
@@ -196,7 +196,7 @@ def read_mcap(path: Path, run: int | None = None) -> Recording:
 
 def _about(path: Path) -> dict[str, str]:
     """What a file says of itself. Raises RecordingError."""
-    with suspicion(path):
+    with recording_errors(path):
         regular_size(path)
         with path.open("rb", buffering=1 << 16) as file:
             for found in records.scan(file):

@@ -1,4 +1,4 @@
-"""Records of MCAP files: written so that a file can be read at any moment, read with suspicion.
+"""Records of MCAP files: written so that a file can be read at any moment, and checked while they are read.
 
 In: messages; or a file. Out: bytes of records; or the records of a file as far as it is whole. A chunk goes to the
 system by one write. The index at a file's end is made of the records that the file holds, so that nothing grows while

@@ -1,6 +1,6 @@
-"""Recordings as ``.npz``: written in one go or row by row, read with suspicion.
+"""Recordings as ``.npz``: written in one go or row by row, and checked while they are read.
 
-In: a Recording and a path, or a path. Out: a file, or a Recording. A file is believed in nothing: headers are read
+In: a Recording and a path, or a path. Out: a file, or a Recording. Nothing in a file is trusted: headers are read
 before memory is taken, sizes must agree with each other and with the archive, and pickles are never loaded. Beside the
 arrays of §12 ours hold ``about``, a JSON text with what arrays do not say (names of groups and outputs, the network's
 hash, ranks of parallel connections, parameters that were set); a file without it is read as well. While a network runs
@@ -142,7 +142,7 @@ def finish_npz(file: FileIO, part: Path, path: Path) -> None:
 
 def recover_npz(part: Path) -> Recording:
     """Read a part. Raises RecordingError."""
-    with suspicion(part), FileIO(part) as file:
+    with recording_errors(part), FileIO(part) as file:
         journal, frame = _journal(file)
         steps = np.concatenate([frame.step, *journal.steps.parts()])
         return frame.having(steps, journal.all_rows)
@@ -168,7 +168,7 @@ def _journal(file: FileIO) -> tuple[Journal, Recording]:
             frame = ended(frame, _after(arrays, journal.after, none, len(frame.neurons), len(frame.sources)))
     except (OSError, RecordingError):
         raise
-    except Exception as error:  # as in suspicion
+    except Exception as error:  # as in recording_errors
         raise RecordingError(f"not a recording in progress ({type(error).__name__}: {str(error)[:200]})") from None
     return journal, frame
 
@@ -258,15 +258,15 @@ def _small(recording: Recording) -> dict[str, Array]:
 
 def read_npz(path: Path) -> Recording:
     """Read a recording. Raises RecordingError."""
-    with suspicion(path):
+    with recording_errors(path):
         size = regular_size(path)
         with path.open("rb") as file:
             return _recording(_arrays(file, size))
 
 
 @contextmanager
-def suspicion(path: Path, what: str = "a recording") -> Iterator[None]:
-    """A block that reads a file; whatever is wrong with it is a RecordingError."""
+def recording_errors(path: Path, what: str = "a recording") -> Iterator[None]:
+    """A block that reads a file: whatever is raised there becomes a RecordingError that names the file."""
     try:
         yield
     except RecordingError as error:

@@ -1,6 +1,6 @@
 """Messages of ROS as recordings of a network hold them: ``std_msgs/msg/Float64MultiArray`` and ``String``.
 
-In: bytes, in the encoding of either ROS. Out: the step and the numbers of an array, with suspicion. An array has one
+In: bytes, in the encoding of either ROS. Out: the step and the numbers of an array, all of it checked. An array has one
 dimension, whose label says whose numbers they are, and begins with two numbers of its own: the step and its seconds.
 """
 

@@ -50,7 +50,7 @@ def signal_layout(network: Network) -> SignalLayout:
     offsets = np.full(len(connections), -1, dtype=np.int64)
     classes: list[DelayClass] = []
     size = 0
-    # no longer than the slots of the longest delay
+    # the counts take no more memory than the slots of one connection with the longest delay
     for delay in (np.flatnonzero(np.bincount(connections.delays)[1:]) + 1).tolist():
         members = np.flatnonzero(connections.delays == delay)
         members = members[np.argsort(blocks[members], kind="stable")]

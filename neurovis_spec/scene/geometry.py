@@ -1,7 +1,7 @@
 """Cubic Bézier splines as arrays: sampled, bounded, and trimmed to the discs at their ends.
 
 In: routes from centre to centre (1 + 3k points). Out: sample points, rectangles, and the part of a route between two
-discs, again a cubic spline (de Casteljau). Routes of as many points are worked on together.
+discs, again a cubic spline (de Casteljau). Routes with the same number of points are worked on together.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def samples(splines: Sequence[Sequence[Point] | FloatArray], per_segment: int = 
 
 
 def batches(splines: Sequence[Sequence[Point] | FloatArray]) -> Iterator[tuple[list[int], FloatArray]]:
-    """Splines of as many points together: their indices, and their points (m, 1 + 3k, 2)."""
+    """Splines with the same number of points together: their indices, and their points (m, 1 + 3k, 2)."""
     sizes: dict[int, list[int]] = {}
     for index, spline in enumerate(splines):
         sizes.setdefault(len(spline), []).append(index)
