@@ -99,6 +99,11 @@ def formula_at(model: type[Model], *path: str | int) -> Role:
     return role
 
 
+def fitting(field: FieldInfo) -> Iterator[object]:
+    """What fits a field, one by one: models, mappings and lists of these as annotations, all else as shapes."""
+    return (place.kind for place in _open(field.annotation, tuple(field.metadata)))
+
+
 class Written(NamedTuple):
     """A formula as it is written: its text, and the keys that lead to it from a model; indices are left out."""
 
@@ -190,7 +195,7 @@ def _step(place: _Place, part: str | int) -> Iterator[_Place]:
         under = below(kind, part)
         yield from () if under is None else _choices(under, role)
     elif isinstance(kind, type) and issubclass(kind, Model):
-        field = dict(_fields(kind)).get(str(part))
+        field = dict(fields_of(kind)).get(str(part))
         if field is not None:
             yield from _open(field.annotation, tuple(field.metadata), role)
     elif get_origin(kind) is dict and isinstance(part, str):
@@ -201,7 +206,8 @@ def _step(place: _Place, part: str | int) -> Iterator[_Place]:
         yield from _open(arguments[0], (), role)
 
 
-def _fields(model: type[Model]) -> Iterator[tuple[str, FieldInfo]]:
+def fields_of(model: type[Model]) -> Iterator[tuple[str, FieldInfo]]:
+    """The keys of a model and their fields."""
     for name, field in model.model_fields.items():
         if name != "source":
             yield field.alias or name, field
@@ -209,7 +215,7 @@ def _fields(model: type[Model]) -> Iterator[tuple[str, FieldInfo]]:
 
 def _keys(kind: object) -> Iterator[KeyHere]:
     if isinstance(kind, type) and issubclass(kind, Model):
-        for name, field in _fields(kind):
+        for name, field in fields_of(kind):
             yield KeyHere(name, field.description or "", field.is_required())
     elif isinstance(kind, Map):
         for name, key in kind.known.items():

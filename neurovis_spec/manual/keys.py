@@ -1,21 +1,24 @@
 """The keys of the language, from its models: path, kind of value, default, what it means.
 
-In: the pydantic models, their descriptions and JSON Schemas. Out: Keys in the order of the models, those that this
+In: the pydantic models, their descriptions and shapes. Out: Keys in the order of the models, those that this
 version does not read yet among them.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
-from typing import get_args
+from types import NoneType
+from typing import get_args, get_origin
 
-from neurovis_spec.language.grammar import Role
+from pydantic.fields import FieldInfo
+
+from neurovis_spec.language.grammar import ListOf, Map, Plain, Role, Row
 from neurovis_spec.language.model import Model
 from neurovis_spec.language.modules import InstanceModel
-from neurovis_spec.language.places import role_at
+from neurovis_spec.language.places import fields_of, fitting, role_at
 from neurovis_spec.language.sections import ConnectionModel, GroupModel, InputModel
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.language.values import ParameterModel
@@ -64,18 +67,14 @@ def keys_of(section: str) -> tuple[Key, ...]:
 
 
 def _walk(model: type[Model], prefix: str) -> Iterator[Key]:
-    shapes = model.model_json_schema(by_alias=True)["properties"]
-    for name, field in model.model_fields.items():
-        shown = field.alias or name
-        if name == "source":
-            continue
+    for shown, field in fields_of(model):
         about = field.description or ""
         default = _DEFAULT.search(about)
         below = _model_in(field.annotation)
         again = model is not Spec and below in _SHARED
         yield Key(
             path=prefix + shown,
-            kind=kind(shapes[shown]),
+            kind=kind(field),
             about=f"{about} Written as at the top level." if again else _DEFAULT.sub("", about),
             default="" if default is None else default[1],
             required=field.is_required(),
@@ -96,70 +95,43 @@ def _model_in(annotation: object) -> type[Model] | None:
     return next((model for model in found if model is not None), None)
 
 
-def kind(shape: Mapping[str, object]) -> str:
-    """What may be written, in words, from a JSON Schema.
+def kind(field: FieldInfo) -> str:
+    """What may be written at a field, in words.
 
-    >>> kind({"anyOf": [{"type": "number"}, {"type": "string", "maxLength": 1000}, {"type": "null"}]})
-    'number or expression'
-    >>> kind({"anyOf": [{"enum": ["from", "to"]}, {"type": "null"}]})
-    'from, to'
+    >>> kind(GroupModel.model_fields["bias"]), kind(ConnectionModel.model_fields["rows"])
+    ('number or expression or list', 'from, to')
     """
-    options = shape.get("anyOf")
-    if not isinstance(options, list):
-        return _one(shape)
-    words = [word for word in dict.fromkeys(map(_one, options)) if word]
-    return " or ".join(("name" if word == "text" and _SINGLE in words else word) for word in words)
+    found = dict.fromkeys(word for word in map(_word, fitting(field)) if word)
+    words = sorted(found, key="mapping".__eq__)  # which comes last
+    return " or ".join("name" if word == "text" and _SINGLE in words else word for word in words)
 
 
-def _one(shape: Mapping[str, object]) -> str:
-    if "anyOf" in shape:
-        return kind(shape)
-    if "$ref" in shape:
-        return "mapping"
-    if "const" in shape:
-        return str(shape["const"])
-    words = shape.get("enum")
-    if isinstance(words, list):
-        return ", ".join(str(word) for word in words)
-    match shape.get("type"):
-        case "null":
-            return ""
-        case "string":
-            return _text(shape)
-        case "boolean":
-            return "true, false"
-        case "array":
-            return _list(shape)
-        case "object":
-            return _mapping(shape)
-        case plain:
-            return str(plain or "mapping")
-
-
-def _text(shape: Mapping[str, object]) -> str:
-    """Expressions have a length, names have a form."""
-    if "maxLength" in shape:
-        return "expression"
-    return "name" if str(shape.get("pattern", "")).startswith("^[A-Za-z_]") else "text"
-
-
-def _list(shape: Mapping[str, object]) -> str:
-    items = shape.get("items")
-    if shape.get("minItems") == shape.get("maxItems") == 2:
-        return "pair [a, b]"
-    if isinstance(items, dict) and items.get("type") == "array":
-        if items.get("items") == {"type": "string"} and items.get("maxItems") is None:
+def _word(fits: object) -> str:
+    """What fits a place, without what it may be beside it."""
+    match fits:
+        case Plain(formula=True):
+            return "number or expression"
+        case Plain(words=(_, *_) as words):
+            return ", ".join(words)
+        case Plain(written={"type": "string"} as written):
+            return "name" if str(written.get("pattern", "")).startswith("^[A-Za-z_]") else "text"
+        case Plain(written=written):
+            return str(written["type"])
+        case ListOf(least=2, most=2):
+            return "pair [a, b]"
+        case ListOf(item=ListOf(most=2)):
+            return "list of pairs"
+        case ListOf(item=ListOf(item=Plain())):
             return "list of lists"
-        return "list of pairs" if items.get("maxItems") == 2 else "list of rows"
-    word = _one(items) if isinstance(items, dict) else ""
-    return f"list of {word}s" if word in ("text", "name") else "list"
-
-
-def _mapping(shape: Mapping[str, object]) -> str:
-    properties = shape.get("properties")
-    if shape.get("maxProperties") == 1:
-        plain = isinstance(properties, dict) and any("anyOf" in one for one in properties.values())
-        return "{name: …}" if plain else _SINGLE
-    if isinstance(properties, dict) and "file" in properties:
-        return "{file: …}"
-    return "mapping"
+        case ListOf(item=ListOf() | Row()):
+            return "list of rows"
+        case ListOf(item=item):
+            word = _word(item)
+            return f"list of {word}s" if word in ("text", "name") else "list"
+        case Map(one=True, known=known):
+            return _SINGLE if all(isinstance(key.shape, Map) for key in known.values()) else "{name: …}"
+        case Map(known={"file": _}):
+            return "{file: …}"
+    if get_origin(fits) is tuple:
+        return "mapping or list" if get_origin(get_args(fits)[0]) is tuple else "list"
+    return "" if fits is NoneType else "mapping"
