@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from neurovis_layouts.routing import route_cost
-from neurovis_layouts.routing.corners import corners, smooth
+from neurovis_layouts.routing.corners import corners, smooth, smoothed
 from neurovis_layouts.routing.polylines import Polylines, close_segments, polylines
 from neurovis_layouts.routing.route_cost import Judge, Pen
 from neurovis_layouts.routing.simplify_routes import eased
@@ -485,3 +485,14 @@ def test_segments_are_close_whose_rectangles_are(
             for axis in (0, 1)
         )
     ]
+
+
+@given(
+    st.lists(st.tuples(st.lists(point, min_size=2, max_size=6, unique=True), st.sampled_from((4.0, 1.0))), min_size=1)
+)
+@settings(deadline=None)
+def test_many_lines_are_smoothed_at_once_as_one_by_one(ways: list[tuple[list[Point], float]]) -> None:
+    pieces, owner = smoothed(ways)
+    for k, way in enumerate(ways):
+        own, route = pieces[owner == k].tolist(), smooth(*way)
+        assert [tuple(own[0][0]), *(tuple(place) for piece in own for place in piece[1:])] == list(route)

@@ -9,10 +9,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from neurovis_layouts.routing.rounded import arc
-from neurovis_spec.layout import FloatArray
-from neurovis_spec.layout.geometry import cubic, distance, pieces_of, snap, squared_distances, straight
-from neurovis_spec.layout.model import Point, Route
+from neurovis_spec.layout import BoolArray, FloatArray, IntArray
+from neurovis_spec.layout.geometry import cubic, pieces_of, squared_distances
+from neurovis_spec.layout.model import GRID, Point, Route
 
 #: Corners closer to the line than this are none; there are so many at most, else more is none.
 _FLAT, _MOST, _MORE = 0.12, 6, 1.6
@@ -26,6 +25,7 @@ _UNEVEN = 2.5
 _HOLD = 0.62
 #: Shorter pieces are left out.
 _SHORT = 1e-3
+_PER_UNIT = round(1 / GRID)
 
 
 def corners(route: Route) -> tuple[Point, ...]:
@@ -59,19 +59,62 @@ def _simple(points: FloatArray, flat: float) -> tuple[Point, ...]:
 def smooth(line: Sequence[Point], cut: float) -> Route:
     """The route along a line of at least two points, its control points on the grid; of a leg at each of its ends no
     more than ``cut`` and no more than half is cut off, but nearly all where it leads to an end of the line."""
-    points: list[Point] = [line[0]]
-    last = len(line) - 2
-    for number in range(1, len(line) - 1):
-        before, corner, after = line[number - 1 : number + 2]
-        lead, tail = distance(before, corner), distance(corner, after)
-        if lead < _SHORT or tail < _SHORT:
-            continue
-        lead = min(cut, max(lead - _HEAD, (1 - _SHARE) * lead) if number == 1 else lead / 2)
-        tail = min(cut, max(tail - _HEAD, (1 - _SHARE) * tail) if number == last else tail / 2)
-        start, *control, end = arc(corner, before, after, min(lead, _UNEVEN * tail), min(tail, _UNEVEN * lead), _HOLD)
-        if distance(points[-1], start) > _SHORT:
-            points += straight(points[-1], start)[1:]
-        points += [*control, end]
-    if distance(points[-1], line[-1]) > _SHORT:
-        points += straight(points[-1], line[-1])[1:]
-    return line[0], *((snap(x), snap(y)) for x, y in points[1:-1]), line[-1]
+    pieces, _ = smoothed([(line, cut)])
+    first, *rest = ((x, y) for x, y in np.concatenate([pieces[0, :1], *pieces[:, 1:]]).tolist())
+    return first, *rest
+
+
+def smoothed(ways: Sequence[tuple[Sequence[Point], float]]) -> tuple[FloatArray, IntArray]:
+    """The cubic pieces (p, 4, 2) of the routes along many lines, and which line each (p,) is of."""
+    counts = np.array([len(line) for line, _ in ways], dtype=np.int64)
+    points = np.array([point for line, _ in ways for point in line], dtype=np.float64).reshape(-1, 2)
+    last = np.cumsum(counts) - 1
+    first = last - counts + 1
+    inner = np.ones(len(points), dtype=np.bool_)
+    inner[first] = inner[last] = False
+    corner = np.flatnonzero(inner)
+    legs = _lengths(points[1:] - points[:-1])
+    corner = corner[(legs[corner - 1] >= _SHORT) & (legs[corner] >= _SHORT)]
+    owner = np.repeat(np.arange(len(ways), dtype=np.int64), counts)[corner]
+    # how much is cut off before each corner and behind it
+    cut = np.array([cut for _, cut in ways], dtype=np.float64)[owner]
+    lead = np.minimum(cut, _part(legs[corner - 1], corner == first[owner] + 1))
+    tail = np.minimum(cut, _part(legs[corner], corner == last[owner] - 1))
+    lead, tail = np.minimum(lead, _UNEVEN * tail), np.minimum(tail, _UNEVEN * lead)
+    at = points[corner]
+    start = at + (lead / legs[corner - 1])[:, None] * (points[corner - 1] - at)
+    end = at + (tail / legs[corner])[:, None] * (points[corner + 1] - at)
+    # for each corner and each end of a line what leads there straight, and the round corner, where there is one
+    slot = np.arange(len(corner), dtype=np.int64) + owner
+    ends = np.cumsum(np.bincount(owner, minlength=len(ways)) + 1) - 1
+    stops = np.empty((len(corner) + len(ways), 2, 2))
+    stops[slot, 0], stops[slot, 1], stops[ends] = start, end, points[last][:, None]
+    before = np.concatenate([points[first[:1]], stops[:-1, 1]])
+    before[ends[:-1] + 1] = points[first[1:]]
+    straight = _lengths(stops[:, 0] - before) > _SHORT
+    pieces = np.empty((len(stops), 2, 4, 2))
+    pieces[:, 0, 0], pieces[:, 0, 3] = before, stops[:, 0]
+    pieces[:, 0, 1], pieces[:, 0, 2] = (2 * before + stops[:, 0]) / 3, (before + 2 * stops[:, 0]) / 3
+    pieces[:, 1, 0], pieces[:, 1, 3] = np.where(straight[:, None], stops[:, 0], before), stops[:, 1]
+    pieces[slot, 1, 1], pieces[slot, 1, 2] = start + _HOLD * (at - start), end + _HOLD * (at - end)
+    there = np.stack([straight, np.ones(len(stops), dtype=np.bool_)], axis=1)
+    there[ends, 1] = False
+    whole = np.rint(pieces[there] * _PER_UNIT) / _PER_UNIT + 0.0
+    number = np.repeat(np.arange(len(stops), dtype=np.int64), there.sum(axis=1))
+    line = np.searchsorted(ends, number)
+    # from end to end exactly
+    border = np.flatnonzero(line[1:] != line[:-1])
+    whole[np.append(0, border + 1), 0], whole[np.append(border, -1), 3] = points[first], points[last]
+    return whole, line
+
+
+def _lengths(way: FloatArray) -> FloatArray:
+    x, y = way.T
+    far: FloatArray = np.sqrt(x * x + y * y)
+    return far
+
+
+def _part(leg: FloatArray, whole: BoolArray) -> FloatArray:
+    """How much of a leg may be cut off at most: half, and nearly all of one to an end of the line."""
+    most: FloatArray = np.where(whole, np.maximum(leg - _HEAD, (1 - _SHARE) * leg), leg / 2)
+    return most

@@ -153,12 +153,11 @@ class Polylines:
 
     def clearances(self, centres: FloatArray, most: float) -> FloatArray:
         """(n,) how close they come to the nearest of centres (c, 2), at most so far."""
-        near = ((centres > self.points.min(axis=0) - most) & (centres < self.points.max(axis=0) + most)).all(axis=1)
-        if not near.any():
-            return np.full(len(self), most)
-        (x, y), (ux, uy) = (centres[near][:, None, :] - self.a[None, :, :]).transpose(2, 0, 1), self._way.T
-        least = np.sqrt(squared_distances(x, y, ux, uy).min(axis=0))
-        clear: FloatArray = np.minimum(np.minimum.reduceat(least, self._segments), most)
+        i, j = close_segments(centres, centres, self.a, self.b, most)
+        (x, y), (ux, uy) = (centres[i] - self.a[j]).T, self._way[j].T
+        least = np.full(len(self), np.inf)
+        np.minimum.at(least, self.owner[j], squared_distances(x, y, ux, uy))
+        clear: FloatArray = np.minimum(np.sqrt(least), most)
         return clear
 
     def enter(self, rects: FloatArray) -> BoolArray:
@@ -185,8 +184,12 @@ class Polylines:
 
 def polylines(routes: Sequence[Route]) -> Polylines:
     """Routes as lines: a straight piece is one step."""
-    pieces, owner = pieces_of(routes)
-    many = np.bincount(owner, minlength=len(routes))
+    return along(*pieces_of(routes), len(routes))
+
+
+def along(pieces: FloatArray, owner: IntArray, count: int) -> Polylines:
+    """So many lines along cubic pieces (p, 4, 2), of which ``owner`` says whose each is."""
+    many = np.bincount(owner, minlength=count)
     a, b, c, d = (pieces[:, k] for k in range(4))
     way, one, other = d - a, b - a, c - a
     squared = way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1]

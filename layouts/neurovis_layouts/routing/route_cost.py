@@ -80,8 +80,6 @@ _RUN = 2.0
 _BESIDE_BORDER = 0.08
 #: How far from a centre ends are checked, how far apart they are to be.
 _AT, _APART = 0.45, 0.16
-#: How many routes are checked closely at a time.
-_CLOSELY = 12
 
 
 class Judge:
@@ -282,44 +280,32 @@ class Pen:
 
     def cost(self) -> float:
         """The cost of the edge's present route."""
-        found = self.cheapest([self.route], np.inf)
+        found = self.cheapest(polylines([self.route]), np.inf)
         return found[1] if found is not None else np.inf
 
     def costs(self, routes: Sequence[Route]) -> FloatArray:
         """(n,) the cost of each of these routes."""
         lines = polylines(routes)
-        found = self._by_itself(lines)
-        for start in range(0, len(routes), _CLOSELY):
-            chosen = np.arange(start, min(start + _CLOSELY, len(routes)), dtype=np.int64)
-            for add in (self._in_the_way, self._beside, self._across):
-                found[chosen] += add(lines.some(chosen))
-        return found
+        return self._by_itself(lines) + self._in_the_way(lines) + self._beside(lines) + self._across(lines)
 
-    def cheapest(self, routes: Sequence[Route], limit: float, most: int | None = None) -> tuple[int, float] | None:
-        """The cheapest of these routes and its cost, if that is below the limit; no more than so many are checked
+    def cheapest(self, lines: Polylines, limit: float, most: int | None = None) -> tuple[int, float] | None:
+        """The cheapest of these lines and its cost, if that is below the limit; no more than so many are checked
         closely, those first that are cheap by themselves."""
-        if not routes:
-            return None
-        lines = polylines(routes)
-        plain = self._by_itself(lines)
-        some = np.flatnonzero(plain < limit)
-        some = some[np.argsort(plain[some], kind="stable")][:most]
-        best: tuple[int, float] | None = None
-        for start in range(0, len(some), _CLOSELY):
-            chosen = some[start : start + _CLOSELY]
-            chosen = chosen[plain[chosen] < limit]
+        costs = self._by_itself(lines)
+        chosen = np.flatnonzero(costs < limit)
+        chosen = chosen[np.argsort(costs[chosen], kind="stable")][:most]
+        costs, lines = costs[chosen], lines.some(chosen)
+        for add in (self._in_the_way, self._beside, self._across):
             if not len(chosen):
-                break
-            costs = plain[chosen]
-            for add in (self._in_the_way, self._beside, self._across):
-                near = np.flatnonzero(costs < limit)
-                chosen, costs = chosen[near], costs[near]
-                if len(chosen):
-                    costs += add(lines.some(chosen))
-            if len(chosen) and float(costs.min()) < limit:
-                least = int(np.argmin(costs))
-                limit, best = float(costs[least]), (int(chosen[least]), float(costs[least]))
-        return best
+                return None
+            costs += add(lines)
+            near = np.flatnonzero(costs < limit)
+            if len(near) < len(chosen):
+                chosen, costs, lines = chosen[near], costs[near], lines.some(near)
+        if not len(chosen):
+            return None
+        least = int(np.argmin(costs))
+        return int(chosen[least]), float(costs[least])
 
     def _by_itself(self, lines: Polylines) -> FloatArray:
         """(n,) what they cost whatever there is around them."""

@@ -13,7 +13,8 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from itertools import pairwise, product
 
-from neurovis_layouts.routing.corners import corners, smooth
+from neurovis_layouts.routing.corners import corners, smooth, smoothed
+from neurovis_layouts.routing.polylines import along, polylines
 from neurovis_layouts.routing.route_cost import Judge, Pen
 from neurovis_spec.layout.geometry import distance, turn
 from neurovis_spec.layout.model import RADIUS, Point, Route
@@ -111,7 +112,7 @@ def told_apart(judge: Judge, free: AbstractSet[int]) -> dict[int, Route]:
 
 def _clearer(pen: Pen, tries: Sequence[Route]) -> Route | None:
     """The best of these routes, where it is better; no closer to a disc or a frame than what is there."""
-    found = pen.cheapest(tries, pen.cost())
+    found = pen.cheapest(polylines(tries), pen.cost())
     if found is None:
         return None
     now, before = pen.trespass(tries[found[0]]), pen.trespass(pen.route)
@@ -155,12 +156,11 @@ def _turned(route: Route, leaves: bool) -> Iterator[Route]:
 
 @dataclass(frozen=True, slots=True)
 class _Try:
-    """A route, the line that it follows, how much is cut off its corners, and what it costs."""
+    """What a route costs, the line that it follows, and how much is cut off its corners."""
 
     cost: float
     line: tuple[Point, ...]
     cut: float
-    route: Route
 
 
 def _better(pen: Pen) -> Route | None:
@@ -183,9 +183,10 @@ def _better(pen: Pen) -> Route | None:
     best = _best(pen, product([best.line], _CUTS), best.cost - _GAIN) or best
     if best.cost > now - _BETTER:
         return None
-    entered, close = pen.trespass(best.route)
+    route = smooth(best.line, best.cut)
+    entered, close = pen.trespass(route)
     before = pen.trespass(pen.route)
-    return best.route if entered <= before[0] and close <= before[1] else None
+    return route if entered <= before[0] and close <= before[1] else None
 
 
 def _best(
@@ -194,9 +195,10 @@ def _best(
     """The best of these lines, with so much cut off their corners, None where all cost more than the limit; at most so
     many are checked closely."""
     ways = list(tries)
-    routes = [smooth(line, cut) for line, cut in ways]
-    found = pen.cheapest(routes, limit, most)
-    return None if found is None else _Try(found[1], *ways[found[0]], routes[found[0]])
+    if not ways:
+        return None
+    found = pen.cheapest(along(*smoothed(ways), len(ways)), limit, most)
+    return None if found is None else _Try(found[1], *ways[found[0]])
 
 
 def _fewer(line: tuple[Point, ...], most: int = _MOST_CORNERS) -> Iterator[tuple[Point, ...]]:
