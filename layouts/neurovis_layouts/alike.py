@@ -20,10 +20,22 @@ class Move:
     flip: Point = (1.0, 1.0)
     shift: Point = (0.0, 0.0)
 
+    def point(self, point: Point) -> Point:
+        """A point moved."""
+        return self.shift[0] + self.flip[0] * point[0], self.shift[1] + self.flip[1] * point[1]
+
+    def inverse(self) -> Move:
+        """The move back."""
+        (fx, fy), (x, y) = self.flip, self.shift
+        return Move(self.flip, (-fx * x, -fy * y))
+
     def then(self, other: Move) -> Move:
         """This move, then the other."""
-        (fx, fy), (x, y) = other.flip, other.shift
-        return Move((self.flip[0] * fx, self.flip[1] * fy), (x + fx * self.shift[0], y + fy * self.shift[1]))
+        return Move((self.flip[0] * other.flip[0], self.flip[1] * other.flip[1]), other.point(self.shift))
+
+
+#: What does not move.
+STAY = Move()
 
 
 class Alike:
@@ -61,7 +73,7 @@ class Alike:
             if image is not None and image[0] not in found:
                 add(image[0], move.then(image[1]), "")
 
-        reach(neuron, Move(), "")
+        reach(neuron, STAY, "")
         for one, by in waiting:
             for module, place in self._around.get(one, ()):
                 if module.template == by:  # all that are drawn like it have been found from where it was
@@ -97,11 +109,9 @@ class Alike:
             first, image = pairs[0][0][axis], pairs[0][1][axis]
             apart = next(((a[axis] - first, b[axis] - image) for a, b in pairs if a[axis] != first), None)
             flips.append(-1.0 if apart is not None and apart[0] == -apart[1] else 1.0)
-        flip = (flips[0], flips[1])
         (ax, ay), (bx, by) = pairs[0]
-        shift = (bx - flip[0] * ax, by - flip[1] * ay)
-        kept = all((shift[0] + flip[0] * a[0], shift[1] + flip[1] * a[1]) == b for a, b in pairs)
-        return Move(flip, shift) if kept else None
+        move = Move((flips[0], flips[1]), (bx - flips[0] * ax, by - flips[1] * ay))
+        return move if all(move.point(a) == b for a, b in pairs) else None
 
     def _reflection(self, mirror: LayoutMirror, across: int) -> Move | None:
         """The reflection on the axis of a mirror, where a pair is placed."""

@@ -11,7 +11,6 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from neurovis_layouts.around import around_pins, gives_way
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.incremental import kept
 from neurovis_layouts.pins import fit, with_origins
@@ -60,9 +59,7 @@ def drawn(
             for edge, route in zip(problem.edges, routes, strict=True)
         },
     )
-    if frames and gives_way(problem, pins, _MOST_AROUND_PINS):
-        return around_pins(problem, pins, fresh)
-    return kept(problem, fresh)
+    return kept(problem, fresh, pins, frames and len(problem.neurons) <= _MOST_AROUND_PINS)
 
 
 def pinned_places(problem: LayoutProblem) -> tuple[IntArray, FloatArray]:

@@ -25,13 +25,26 @@ from neurovis_spec.layout.model import Layout, LayoutProblem, Point, Route
 _CAREFULLY = 1000
 
 
-def kept(problem: LayoutProblem, fresh: Layout) -> Layout:
-    """The fresh layout itself where there is no earlier one, else one that keeps the earlier one's places exactly."""
+def kept(
+    problem: LayoutProblem, fresh: Layout, pins: Mapping[int, Point] | None = None, around: bool = False
+) -> Layout:
+    """The fresh layout itself where there is no earlier one, else one that keeps the earlier one's places exactly.
+
+    ``pins`` are where what is pinned stands, instances included (as in the fresh layout, if they are not given). With
+    ``around``, pins of instances are an earlier layout to which all else is new: no frame lies on another then if that
+    can be, and nobody stands in a frame who does not belong there.
+    """
+    if pins is None:
+        placed = {m for module in problem.modules if module.origin is not None for m in module.members}
+        pins = {**{m: fresh.positions[problem.neurons[m]] for m in placed}, **problem.pins}
+    problem = replace(problem, pins=pins)
     memory = problem.memory
+    if memory is None and around and pins and problem.modules:
+        pinned = {problem.neurons[i]: point for i, point in sorted(pins.items())}
+        memory = Layout(problem.network, fresh.engine, pinned, {})
     if memory is None:
         return fresh
-    placed = {m for module in problem.modules if module.origin is not None for m in module.members}
-    problem = replace(problem, pins={**{m: fresh.positions[problem.neurons[m]] for m in placed}, **problem.pins})
+    problem = replace(problem, memory=memory)
     there = {i: fresh.routes[edge.name] for i, edge in enumerate(problem.edges)}
     centres = remembered(problem, [fresh.positions[name] for name in problem.neurons], there)
     ways = _Ways(problem, centres)
@@ -39,7 +52,7 @@ def kept(problem: LayoutProblem, fresh: Layout) -> Layout:
     new = [i for i in range(len(problem.edges)) if i not in routes]
     twins = _Twins(problem, centres) if problem.modules or problem.mirrors else None
     if twins is not None:
-        _copied(problem, ways, twins, new, routes)
+        _draw_alike(problem, ways, twins, new, routes)
     _moved_routes(problem, fresh, ways, routes)
     # what is within a frame first, since the frame is around it: others may then run into it that did not before
     within = [i for i in range(len(problem.edges)) if i not in routes and ways.within(i)]
@@ -87,7 +100,12 @@ class _Ways:
                     found.append((own, rect))
         return found
 
-    def clear(self, chosen: Sequence[int], routes: Sequence[Route], walls: Sequence[Frame]) -> list[bool]:
+    def add_clear(self, found: Mapping[int, Route], routes: dict[int, Route]) -> None:
+        """Add those of the found routes, by edge, that have a clear way."""
+        clear = self._clear(list(found), list(found.values()), self.walls({**routes, **found}))
+        routes.update({i: route for (i, route), free in zip(found.items(), clear, strict=True) if free})
+
+    def _clear(self, chosen: Sequence[int], routes: Sequence[Route], walls: Sequence[Frame]) -> list[bool]:
         """For each of these edges whether it has a clear way on this route."""
         ends = [(self.problem.edges[i].source, self.problem.edges[i].target) for i in chosen]
         over = self._obstacles.crowded(routes, ends, TOUCH)
@@ -160,9 +178,7 @@ def _moved_routes(problem: LayoutProblem, fresh: Layout, ways: _Ways, routes: di
         if len(moves) == 1:
             dx, dy = moves.pop()
             found[i] = tuple((x + dx, y + dy) for x, y in fresh.routes[edge.name])
-    chosen = list(found)
-    clear = ways.clear(chosen, [found[i] for i in chosen], ways.walls({**routes, **found}))
-    routes.update({i: found[i] for i, free in zip(chosen, clear, strict=True) if free})
+    ways.add_clear(found, routes)
 
 
 class _Twins:
@@ -195,42 +211,26 @@ class _Twins:
         yield from found.values()
 
 
-def _moved(route: Route, move: Move, start: Point, end: Point) -> Route:
-    """A route moved, from centre to centre exactly."""
-    (fx, fy), (dx, dy) = move.flip, move.shift
-    return (start, *((dx + fx * x, dy + fy * y) for x, y in route[1:-1]), end)
-
-
-def _copied(problem: LayoutProblem, ways: _Ways, twins: _Twins, new: Sequence[int], routes: dict[int, Route]) -> None:
-    """Routes of new edges as old ones are that are drawn alike, such as those within other instances of the make."""
-    found: dict[int, Route] = {}
-    for i in new:
-        for twin, move in twins.of(i):
-            if twin in routes:
-                ends = ways.centres[problem.edges[i].source], ways.centres[problem.edges[i].target]
-                (fx, fy), (x, y) = move.flip, move.shift
-                found[i] = _moved(routes[twin], Move(move.flip, (-fx * x, -fy * y)), *ends)
-                break
-    chosen = list(found)
-    clear = ways.clear(chosen, [found[i] for i in chosen], ways.walls({**routes, **found}))
-    routes.update({i: found[i] for i, free in zip(chosen, clear, strict=True) if free})
-
-
 def _draw_alike(
     problem: LayoutProblem, ways: _Ways, twins: _Twins, new: Sequence[int], routes: dict[int, Route]
 ) -> None:
-    """The routes found anew, those between neurons drawn alike copied from the first of them, where their way is
-    clear."""
-    open_ones = set(new)
+    """The routes of new edges copied, where their way is clear, from those drawn alike: from an earlier one, such as
+    within another instance of the make, else from the first that has been found."""
+    fresh = set(new)
+    waiting = set(new)
     found: dict[int, Route] = {}
     for i in new:
-        if i not in open_ones:
+        if i not in waiting:
             continue
-        for twin, move in twins.of(i):
-            if twin in open_ones and twin != i:
-                ends = ways.centres[problem.edges[twin].source], ways.centres[problem.edges[twin].target]
-                found[twin] = _moved(routes[i], move, *ends)
-            open_ones.discard(twin)
-    chosen = list(found)
-    clear = ways.clear(chosen, [found[i] for i in chosen], ways.walls({**routes, **found}))
-    routes.update({i: found[i] for i, free in zip(chosen, clear, strict=True) if free})
+        alike = dict(twins.of(i))
+        waiting -= alike.keys()
+        lead = next((k for k in alike if k in routes and k not in fresh), i)
+        if lead not in routes:
+            continue
+        back = alike[lead].inverse()
+        for twin, move in alike.items():
+            if twin in fresh and twin != lead:
+                along, edge = back.then(move), problem.edges[twin]
+                inner = map(along.point, routes[lead][1:-1])
+                found[twin] = (ways.centres[edge.source], *inner, ways.centres[edge.target])
+    ways.add_clear(found, routes)

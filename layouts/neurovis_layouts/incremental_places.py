@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from neurovis_layouts.alike import Alike, Move
 from neurovis_layouts.conflicts import resolved, whole
 from neurovis_layouts.manual_edits import by_hand, giving_way, moved_routes
-from neurovis_layouts.occupancy import Body, CentreCells, Occupancy, Side, Wish
+from neurovis_layouts.occupancy import AxisSide, Body, CentreCells, Occupancy, Wish, instance_of
 from neurovis_layouts.rows import GroupRows
 from neurovis_spec.layout.frames import Frames
 from neurovis_spec.layout.geometry import Rect, bounds, snap
@@ -142,13 +142,13 @@ def _median(values: list[float]) -> float:
     return ordered[len(ordered) // 2]
 
 
-def _sides(problem: LayoutProblem, fresh: Sequence[Point], before: Mapping[int, Point]) -> dict[int, Side]:
+def _sides(problem: LayoutProblem, fresh: Sequence[Point], before: Mapping[int, Point]) -> dict[int, AxisSide]:
     """For neurons with a mirror image the axis, and on which side of it they are, as in the fresh layout."""
     across = 0 if problem.direction in ("down", "up") else 1
     scopes: dict[int, list[LayoutMirror]] = {}
     for mirror in problem.mirrors:
         scopes.setdefault(mirror.scope, []).append(mirror)
-    sides: dict[int, Side] = {}
+    sides: dict[int, AxisSide] = {}
     for mirrors in scopes.values():
         pairs = [pair for mirror in mirrors for pair in mirror.pairs]
         there = [(a, b) for a, b in pairs if a in before and b in before]
@@ -160,7 +160,7 @@ def _sides(problem: LayoutProblem, fresh: Sequence[Point], before: Mapping[int, 
         for a, b in pairs:
             side = _sign(fresh[a][across] - other) * (-1 if agree < 0 else 1)
             if side:
-                sides[a], sides[b] = Side(across, axis, side), Side(across, axis, -side)
+                sides[a], sides[b] = AxisSide(across, axis, side), AxisSide(across, axis, -side)
     return sides
 
 
@@ -215,7 +215,7 @@ def _pieces(
 
     def single(neuron: int) -> tuple[Body, ...]:
         found = [(mate, move) for mate, move in alike.of(neuron) if mate not in done]
-        singles = [Body(((mate, (0.0, 0.0)),), flip=move.flip, origin=move.shift) for mate, move in found]
+        singles = [Body(((mate, (0.0, 0.0)),), move=move) for mate, move in found]
         done.update(i for copy in singles for i in copy.members)
         return tuple(singles)
 
@@ -234,7 +234,7 @@ def _pieces(
             for mates, move in _copies(alike, module):
                 if not any(i in done for i in mates) and not any(set(mates) & set(c.members) for c in copies):
                     mirrored = tuple((i, offset) for i, (_, offset) in zip(mates, offsets, strict=True))
-                    copies.append(Body(mirrored, _number(problem, number, mates), rect, move.flip, move.shift))
+                    copies.append(Body(mirrored, instance_of(problem, mates), rect, move))
             done.update(i for copy in copies for i in copy.members)
             yield tuple(copies)
         for neuron in range(len(problem.neurons)):
@@ -255,10 +255,3 @@ def _copies(alike: Alike, module: LayoutModule) -> Iterator[tuple[tuple[int, ...
         mates = tuple(one[k][0] for one in moves)
         if mates[0] != module.members[0] and all(one[k][1] == moves[0][k][1] for one in moves):
             yield mates, moves[0][k][1]
-
-
-def _number(problem: LayoutProblem, number: int, mates: Sequence[int]) -> int:
-    """The instance that these are the neurons of, of the make of another."""
-    own = set(mates)
-    template = problem.modules[number].template
-    return next((k for k, m in enumerate(problem.modules) if m.template == template and set(m.members) == own), -1)

@@ -15,9 +15,10 @@ from functools import cache
 from itertools import chain, takewhile
 from types import MappingProxyType
 
+from neurovis_layouts.alike import STAY, Move
 from neurovis_spec.layout.frames import Frames, titled, untitled
 from neurovis_spec.layout.geometry import Rect, bounds, distance, meet, padded, sampled, snap, united
-from neurovis_spec.layout.model import RADIUS, Point, Route
+from neurovis_spec.layout.model import RADIUS, LayoutProblem, Point, Route
 
 #: Steps of the search and how many of them it goes: near first, then far, then beyond everything.
 _REACHES = ((0.25, 4), (0.25, 16), (0.5, 32), (1.0, 64))
@@ -31,7 +32,7 @@ _TOUCHING = 2 * RADIUS - 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class Side:
+class AxisSide:
     """The side of a mirror's axis, ``sign`` times the coordinate ``across``, that a neuron is on."""
 
     across: int
@@ -42,14 +43,13 @@ class Side:
 @dataclass(frozen=True, slots=True)
 class Body:
     """Neurons that move together: offset by neuron from the anchor. ``frame`` (−1: none) is the number of the frame of
-    which they are the neurons, ``rect`` where it is in relation to the anchor. ``flip`` says which coordinates are
-    reflected where the first of its copies is not; ``origin`` is what anchors of the first are measured from."""
+    which they are the neurons, ``rect`` where it is in relation to the anchor. ``move`` takes the first of its
+    copies to this one."""
 
     offsets: tuple[tuple[int, Point], ...]
     frame: int = -1
     rect: Rect = (0.0, 0.0, 0.0, 0.0)
-    flip: Point = (1.0, 1.0)
-    origin: Point = (0.0, 0.0)
+    move: Move = STAY
 
     @property
     def members(self) -> tuple[int, ...]:
@@ -59,16 +59,13 @@ class Body:
     def spots(self, anchor: Point) -> Iterator[tuple[int, Point]]:
         """Where its neurons stand when the first copy's anchor is at ``anchor``."""
         for neuron, (dx, dy) in self.offsets:
-            yield neuron, self._moved((anchor[0] + dx, anchor[1] + dy))
+            yield neuron, self.move.point((anchor[0] + dx, anchor[1] + dy))
 
     def framed(self, anchor: Point) -> Rect:
         """Where its frame is then; the title is on top in any case."""
         x0, y0, x1, y1 = untitled(self.rect)
-        corners = [self._moved((anchor[0] + x, anchor[1] + y)) for x, y in ((x0, y0), (x1, y1))]
+        corners = [self.move.point((anchor[0] + x, anchor[1] + y)) for x, y in ((x0, y0), (x1, y1))]
         return titled(bounds(corners))
-
-    def _moved(self, point: Point) -> Point:
-        return self.origin[0] + self.flip[0] * point[0], self.origin[1] + self.flip[1] * point[1]
 
 
 def lone(neuron: int) -> Body:
@@ -114,7 +111,7 @@ class Occupancy:
         frames: Frames | None = None,
         placed: Mapping[int, Point] = MappingProxyType({}),
         rects: Sequence[Rect | None] = (),
-        sides: Mapping[int, Side] = MappingProxyType({}),
+        sides: Mapping[int, AxisSide] = MappingProxyType({}),
         routes: Iterable[Route] = (),
     ) -> None:
         self.placed: dict[int, Point] = {}
@@ -344,6 +341,12 @@ def _steps(along: tuple[bool, bool]) -> Sequence[Point]:
         found += [(-i * step, -j * step) for r, _, i, j in ring if done < r <= far]
         done = far
     return found
+
+
+def instance_of(problem: LayoutProblem, members: Iterable[int]) -> int:
+    """The instance that these are the neurons of, −1 where there is none."""
+    own = set(members)
+    return next((k for k, module in enumerate(problem.modules) if own == set(module.members)), -1)
 
 
 class CentreCells:

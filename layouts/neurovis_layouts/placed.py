@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from neurovis_layouts.around import around_pins, gives_way
 from neurovis_layouts.blocks import Blocks, Drawing, routed
 from neurovis_layouts.formations import offsets
 from neurovis_layouts.frame import to_picture
@@ -57,9 +56,9 @@ def place(problem: LayoutProblem, engine: str, how: Arrangement, spacing: float)
     else:
         free = Drawing(tuple(formation(range(len(problem.neurons)))), {}, ())
     pins = with_origins(problem, free.places)
-    if gives_way(problem, pins, _MOST_AROUND_PINS):
-        return around_pins(problem, pins, _layout(problem, engine, routed(free, problem.edges)))
-    return kept(problem, _layout(problem, engine, routed(_pinned(free, pins), problem.edges)))
+    around = bool(problem.modules) and len(problem.neurons) <= _MOST_AROUND_PINS
+    drawing = routed(free if around else _pinned(free, pins), problem.edges)
+    return kept(problem, _layout(problem, engine, drawing), pins, around)
 
 
 def _layout(problem: LayoutProblem, engine: str, drawing: Drawing) -> Layout:

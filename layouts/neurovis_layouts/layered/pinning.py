@@ -14,12 +14,13 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from itertools import combinations
 
+from neurovis_layouts.alike import Move
 from neurovis_layouts.axes import axes, imaged, shift_of
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.layered.component_layout import ComponentLayout
 from neurovis_layouts.layered.drawing import Drawing, FrameMove, Piece
 from neurovis_layouts.layered.parts import images_of
-from neurovis_layouts.occupancy import Body, Occupancy, Side, Wish, lone
+from neurovis_layouts.occupancy import AxisSide, Body, Occupancy, Wish, instance_of, lone
 from neurovis_layouts.pins import fit
 from neurovis_spec.layout.frames import Frames
 from neurovis_spec.layout.geometry import Rect, bounds, meet, padded, shifted, snap
@@ -373,11 +374,11 @@ def _occupancy(problem: LayoutProblem, trial: _Trial, pair: Mapping[int, int]) -
     """Nothing yet, with the frames of this trial and the sides of the axis that mirror images are on."""
     boxes = tuple(problem.boxes[box] for box in _boxes(trial.held))
     across = _across(problem)
-    sides: dict[int, Side] = {}
+    sides: dict[int, AxisSide] = {}
     for wish in trial.wishes:
         for m, point in wish.bodies[0].spots(wish.anchor):
             if m in pair and point[across] != trial.axis:
-                sides[m] = Side(across, trial.axis, 1 if point[across] > trial.axis else -1)
+                sides[m] = AxisSide(across, trial.axis, 1 if point[across] > trial.axis else -1)
     return Occupancy(Frames(replace(problem, boxes=boxes)), sides=sides)
 
 
@@ -385,7 +386,8 @@ def _reflected(problem: LayoutProblem, axis: float, body: Body, members: Sequenc
     """A body of these neurons that is the mirror image of another."""
     offsets = tuple((m, offset) for m, (_, offset) in zip(members, body.offsets, strict=True))
     across = _across(problem)
-    return Body(offsets, frame, body.rect, _put((1.0, 1.0), across, -1.0), _put((0.0, 0.0), across, 2 * axis))
+    move = Move(_put((1.0, 1.0), across, -1.0), _put((0.0, 0.0), across, 2 * axis))
+    return Body(offsets, frame, body.rect, move)
 
 
 def _arranged(problem: LayoutProblem, trial: _Trial, pair: Mapping[int, int]) -> Mapping[int, Point]:
@@ -446,7 +448,7 @@ def _bent(problem: LayoutProblem, trial: _Trial, pair: Mapping[int, int]) -> dic
             images = [pair[m] for m in body.members if m in pair]
             bodies = [body]
             if len(images) == len(body.members):
-                bodies.append(_reflected(problem, trial.axis, body, images, _frame_of(problem, images)))
+                bodies.append(_reflected(problem, trial.axis, body, images, instance_of(problem, images)))
             on_axis = bool(pair) and not images and point[across] == trial.axis
             free = not on_axis, lined.isdisjoint(body.members)
             occupancy.put(Wish(bodies, point, free if across == 0 else free[::-1]))
@@ -462,16 +464,10 @@ def _within(
     done = set(firm)
     for own, rect in piece.drawing.frames:
         inside = [members[place] for place in own]
-        frame = _frame_of(problem, inside)
+        frame = instance_of(problem, inside)
         if frame >= 0 and done.isdisjoint(inside):
             x, y = where[inside[0]]
             offsets = tuple((m, (where[m][0] - x, where[m][1] - y)) for m in inside)
             yield Body(offsets, frame, shifted(_in_picture(move.rect(rect), problem), (-x, -y)))
             done.update(inside)
     yield from (lone(m) for m in members if m not in done)
-
-
-def _frame_of(problem: LayoutProblem, members: Sequence[int]) -> int:
-    """The instance that these are the neurons of, −1 without one."""
-    own = set(members)
-    return next((k for k, module in enumerate(problem.modules) if own == set(module.members)), -1)
