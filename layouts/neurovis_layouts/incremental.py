@@ -19,7 +19,7 @@ from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
 from neurovis_layouts.routing.walls import Frame, Walls
 from neurovis_spec.layout.frames import Frames
 from neurovis_spec.layout.geometry import bounds
-from neurovis_spec.layout.model import Layout, LayoutProblem, Point, Route
+from neurovis_spec.layout.model import Layout, LayoutProblem, Point, Route, Side
 
 #: With more new connections than this nobody can follow one: they do not go round frames.
 _CAREFULLY = 1000
@@ -47,7 +47,8 @@ def kept(
     problem = replace(problem, memory=memory)
     there = {i: fresh.routes[edge.name] for i, edge in enumerate(problem.edges)}
     centres = remembered(problem, [fresh.positions[name] for name in problem.neurons], there)
-    ways = _Ways(problem, centres)
+    sides = {**fresh.labels, **memory.labels}
+    ways = _Ways(problem, centres, sides)
     routes = _old_routes(problem, memory, ways)
     new = [i for i in range(len(problem.edges)) if i not in routes]
     twins = _Twins(problem, centres) if problem.modules or problem.mirrors else None
@@ -71,15 +72,16 @@ def kept(
         fresh.engine,
         dict(zip(problem.neurons, centres, strict=True)),
         {edge.name: routes[i] for i, edge in enumerate(problem.edges)},
+        sides,
     )
 
 
 class _Ways:
     """Where the neurons are and what is in the way between them."""
 
-    def __init__(self, problem: LayoutProblem, centres: Sequence[Point]) -> None:
+    def __init__(self, problem: LayoutProblem, centres: Sequence[Point], sides: Mapping[str, Side]) -> None:
         self.problem, self.centres = problem, centres
-        self.frames = Frames(problem)
+        self.frames = Frames(problem, sides)
         self._obstacles = Obstacles(centres)
 
     def within(self, edge: int) -> bool:

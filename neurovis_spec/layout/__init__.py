@@ -17,6 +17,7 @@ from neurovis_spec.layout.model import (
     Point,
     ReportingEngine,
     Route,
+    Side,
 )
 from neurovis_spec.progress import Progress
 
@@ -40,4 +41,5 @@ __all__ = [
     "Progress",
     "ReportingEngine",
     "Route",
+    "Side",
 ]

@@ -89,4 +89,6 @@ def _tidy(problem: LayoutProblem, name: str, result: Layout) -> Layout:
     for edge in problem.edges:
         start, end = positions[problem.neurons[edge.source]], positions[problem.neurons[edge.target]]
         routes[edge.name] = (start, *(moved(point) for point in result.routes[edge.name][1:-1]), end)
-    return Layout(problem.network, name, positions, routes)
+    labelled = {neuron for neuron, room in zip(problem.neurons, problem.labels, strict=False) if room[0]}
+    labels = {neuron: result.labels[neuron] for neuron in problem.neurons if neuron in labelled & result.labels.keys()}
+    return Layout(problem.network, name, positions, routes, labels)

@@ -14,11 +14,11 @@ from neurovis_spec.compiler.drawing.pins import FARTHEST
 from neurovis_spec.diagnostics import Findings, suggest
 from neurovis_spec.language.yaml.reader import read_content, read_text
 from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence, SourceDocument, describe
-from neurovis_spec.layout.model import Layout, Point, Route
+from neurovis_spec.layout.model import SIDES, Layout, Point, Route, Side
 from neurovis_spec.layout.naming import edge_key, natural_key
 
 VERSION = 1
-_KEYS = ("neurovis_layout", "network", "engine", "positions", "routes")
+_KEYS = ("neurovis_layout", "network", "engine", "positions", "routes", "labels")
 _NAME = r"[A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z_][A-Za-z0-9_]*)*"
 _PLAIN = re.compile(rf"{_NAME}(?: -> {_NAME}(?: \([0-9]+\))?)?")
 #: What some YAML reader takes for something else than a text.
@@ -30,7 +30,8 @@ _LONG_KEY = 1000
 
 
 def dump(layout: Layout) -> str:
-    """The layout as the text of a layout file: positions in natural order of the names, then every route.
+    """The layout as the text of a layout file: positions in natural order of the names, then every route, then on which
+    sides those labels stand for which there is room beside their discs.
 
     >>> print(dump(Layout("x", "grid", {"A": (0.0, 0.5)}, {})), end="")
     neurovis_layout: 1
@@ -51,6 +52,8 @@ def dump(layout: Layout) -> str:
     lines += _section(
         "routes", [(name, "[" + ", ".join(_point(point) for point in layout.routes[name]) + "]") for name in routes]
     )
+    if layout.labels:
+        lines += _section("labels", [(name, layout.labels[name]) for name in sorted(layout.labels, key=natural_key)])
     return "\n".join(lines) + "\n"
 
 
@@ -120,7 +123,12 @@ def _parsed(document: SourceDocument | None, before: int, findings: Findings) ->
         route = _read_route(node, name, findings)
         if route is not None:
             routes[name] = route
-    return None if findings.errors > before else Layout(network, engine, positions, routes)
+    labels: dict[str, Side] = {}
+    for name, node in _entries(root, "labels", findings):
+        side = _read_side(node, name, findings)
+        if side is not None:
+            labels[name] = side
+    return None if findings.errors > before else Layout(network, engine, positions, routes, labels)
 
 
 def _check_version(root: Mapping, findings: Findings) -> None:
@@ -175,6 +183,17 @@ def _read_number(node: Node, what: str, findings: Findings) -> float | None:
         findings.error("out-of-range", node.span, f"{what} lies within {_FARTHEST:g} of the origin")
         return None
     return float(value)
+
+
+def _read_side(node: Node, name: str, findings: Findings) -> Side | None:
+    value = node.value if isinstance(node, Scalar) else None
+    for side in SIDES:
+        if side == value:
+            return side
+    where = f"{', '.join(SIDES[:-1])} or {SIDES[-1]}"
+    hint = suggest(value, SIDES, "sides") if isinstance(value, str) else None
+    findings.error("wrong-type", node.span, f"the label of '{name}' stands {where}, found {describe(node)}", hint)
+    return None
 
 
 def _read_route(node: Node, name: str, findings: Findings) -> Route | None:

@@ -10,12 +10,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from neurovis_spec.layout.geometry import Rect, bounds, padded, sampled, united
-from neurovis_spec.layout.model import LayoutProblem, Point, Route
+from neurovis_spec.layout.labels import BOX_WEIGHT, instance_titles, label_rect, title_room, widened
+from neurovis_spec.layout.model import LayoutProblem, Point, Route, Side
 
 #: From centres, routes and frames within to the line of an instance's frame, and room for its title on top.
 PAD, PAD_ROUTE, PAD_FRAME, TITLE = 0.65, 0.2, 0.35, 0.35
 #: The same for boxes: from centres, sideways and up and down; from loops, from frames.
 BOX_ACROSS, BOX_DOWN, BOX_LOOP, BOX_FRAME = 0.62, 0.6, 0.15, 0.3
+#: From labels to the line of any frame.
+PAD_LABEL = 0.12
 #: From centres and from frames where a box would touch another otherwise.
 BOX_TIGHT, BOX_TIGHT_FRAME = 0.42, 0.15
 #: Rounding to the grid of coordinates, and to points on routes: frames that share no more do not lie on each other.
@@ -25,8 +28,13 @@ SLACK = 1 / 32
 class Frames:
     """Who is in which frame: ``members`` by number; an instance has its number among the problem's."""
 
-    def __init__(self, problem: LayoutProblem) -> None:
+    def __init__(self, problem: LayoutProblem, sides: Mapping[str, Side] | None = None) -> None:
+        """``sides`` are those on which labels stand for which there is room."""
         self._problem = problem
+        beside = [(i, (sides or {}).get(problem.neurons[i])) for i in range(len(problem.labels))]
+        self._sides = {i: side for i, side in beside if side is not None and problem.labels[i][0]}
+        self._titles = instance_titles((module.path, module.module) for module in problem.modules)
+        self._titles += [title_room(name, BOX_WEIGHT) for name, _ in problem.boxes]
         self.instances = len(problem.modules)
         self.members: list[frozenset[int]] = [frozenset(module.members) for module in problem.modules]
         self.members += [frozenset(own) for _, own in problem.boxes]
@@ -61,7 +69,13 @@ class Frames:
             parts = [padded(bounds(at), PAD) if instance else _boxed(bounds(at))]
             parts += [padded(bounds(lines), PAD_ROUTE if instance else BOX_LOOP)] if lines else []
             parts += [padded(rect, PAD_FRAME if instance else BOX_FRAME) for rect in held]
-            found[number] = titled(united(parts)) if instance else united(parts)
+            parts += [
+                padded(label_rect(placed[i], self._problem.labels[i], side), PAD_LABEL)
+                for i, side in self._sides.items()
+                if i in placed and i in self.members[number]
+            ]
+            rect = widened(united(parts), self._titles[number])
+            found[number] = titled(rect) if instance else rect
         return found
 
     def grown(self, number: int, rect: Rect) -> Rect:

@@ -14,6 +14,7 @@ import numpy as np
 
 from neurovis_spec.arrays import BoolArray, FloatArray, IntArray
 from neurovis_spec.layout.geometry import crossing, cubic, near_pairs, pieces_of, squared_distances
+from neurovis_spec.layout.label_overlaps import label_overlaps
 from neurovis_spec.layout.model import RADIUS, Direction, Layout, LayoutProblem, Point, Route
 
 #: Crossings this close to a neuron that both routes have are how edges meet, not how they cross.
@@ -35,7 +36,8 @@ _ALONG: dict[Direction, Point] = {"down": (0, 1), "up": (0, -1), "right": (1, 0)
 def metrics(layout: Layout, problem: LayoutProblem) -> dict[str, float | int]:
     """The measures of a complete layout of this problem; ``seconds`` is for whoever measured it. Where there are too
     many pairs of routes to compare them all, ``crossings`` are those of ``sampled`` routes times the pairs that there
-    are by the pairs compared."""
+    are by the pairs compared. Of labels beside their discs, ``label_overlaps`` are those that lie on something.
+    """
     centres = np.array([layout.positions[name] for name in problem.neurons], dtype=np.float64).reshape(-1, 2)
     segments = _Segments([layout.routes[edge.name] for edge in problem.edges])
     ends = np.array([(edge.source, edge.target) for edge in problem.edges], dtype=np.int64).reshape(-1, 2)
@@ -51,6 +53,7 @@ def metrics(layout: Layout, problem: LayoutProblem) -> dict[str, float | int]:
         "flow": _flow(layout, problem),
         "symmetry": _symmetry(centres, problem),
         "area": _area(centres),
+        **({"label_overlaps": label_overlaps(layout, problem)} if any(wide for wide, _ in problem.labels) else {}),
         "pins_moved": sum(layout.positions[problem.neurons[i]] != point for i, point in problem.pins.items()),
     }
 

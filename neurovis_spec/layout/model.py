@@ -20,6 +20,9 @@ Point: TypeAlias = tuple[float, float]
 Route: TypeAlias = tuple[Point, ...]
 Direction = Literal["down", "up", "right", "left"]
 Arrangement = Literal["row", "column", "grid", "ring", "arc"]
+#: Where a label stands, in the picture, that its disc cannot hold.
+Side = Literal["right", "left", "below", "above"]
+SIDES: tuple[Side, ...] = get_args(Side)
 #: How long an engine may look for fewer crossings.
 Effort = Literal["quick", "normal", "best"]
 EFFORTS: tuple[Effort, ...] = get_args(Effort)
@@ -125,6 +128,10 @@ class LayoutProblem:
     plan: tuple[LayoutCell, ...] = ()
     #: where neurons are as data (a body, a connectome); NaN where that is not known
     places: tuple[Point, ...] = ()
+    #: how wide and high the label of each neuron is beside its disc, (0, 0) where this holds it; none where all do
+    labels: tuple[Point, ...] = ()
+    #: how wide the title is of the frame that is drawn around all of this; 0 for none
+    title: float = 0.0
     #: an earlier layout of the same network: memory, not pins
     memory: Layout | None = None
     effort: Effort = "normal"
@@ -132,12 +139,14 @@ class LayoutProblem:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Where everything is: positions by neuron name, routes by connection name, neurons in natural order."""
+    """Where everything is: positions by neuron name, routes by connection name, neurons in natural order; on which side
+    of its disc a label stands for which room was kept there, by neuron name."""
 
     network: str
     engine: str
     positions: Mapping[str, Point]
     routes: Mapping[str, Route]
+    labels: Mapping[str, Side] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         sizes = f"{len(self.positions):,} positions, {len(self.routes):,} routes"

@@ -13,6 +13,7 @@ from typing import cast
 import numpy as np
 
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.layout.labels import label_room
 from neurovis_spec.layout.makes import modules_of
 from neurovis_spec.layout.model import (
     Arrangement,
@@ -28,6 +29,7 @@ from neurovis_spec.layout.model import (
 from neurovis_spec.layout.naming import edge_key, natural_key
 
 _NOWHERE = (math.nan, math.nan)
+_ON_DISC = (0.0, 0.0)
 
 
 def canonical(
@@ -49,6 +51,7 @@ def canonical(
     align: Iterable[Iterable[str]] = (),
     plan: Iterable[tuple[str, Iterable[str], tuple[int, int, int, int]]] = (),
     places: Mapping[str, Point] | None = None,
+    labels: Mapping[str, Point] | None = None,
     memory: Layout | None = None,
 ) -> LayoutProblem:
     """The problem made of these parts, in canonical order.
@@ -59,7 +62,8 @@ def canonical(
     begin with the path), ``relative`` the pins within instances, ``origins`` the places of
     these, ``mirrors`` the scope's path, the
     pairs of neurons and the pairs of instances; ``plan`` the path of the instance that is divided, what
-    stands in which row and column of it, and how many of them that spans; ``places`` where neurons are as data.
+    stands in which row and column of it, and how many of them that spans; ``places`` where neurons are as data;
+    ``labels`` how wide and high are those that discs cannot hold.
     """
     names = tuple(sorted(neurons, key=natural_key))
     index = {name: i for i, name in enumerate(names)}
@@ -117,6 +121,7 @@ def canonical(
             )
         ),
         places=tuple((places or {}).get(name, _NOWHERE) for name in names) if places else (),
+        labels=tuple((labels or {}).get(name, _ON_DISC) for name in names) if labels else (),
         memory=memory,
     )
 
@@ -168,6 +173,7 @@ def problem_of(network: Network, memory: Layout | None = None) -> LayoutProblem:
         [named(line) for line in settings.align],
         [(cell.scope, named(cell.members), (cell.row, cell.column, cell.rows, cell.columns)) for cell in settings.plan],
         _places(network),
+        dict(zip(names, label_room(network), strict=False)),
         memory,
     )
 

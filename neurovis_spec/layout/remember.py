@@ -50,4 +50,5 @@ def known_part(layout: Layout, network: Network, span: Span, findings: Findings)
         findings.warning("forgotten-neuron", span, message, "neurovis layout --update takes them out")
     positions = {name: point for name, point in layout.positions.items() if name in network.neuron_index}
     routes = {name: route for name, route in layout.routes.items() if name in network.connection_index}
-    return Layout(layout.network, layout.engine, positions, routes)
+    labels = {name: side for name, side in layout.labels.items() if name in network.neuron_index}
+    return Layout(layout.network, layout.engine, positions, routes, labels)

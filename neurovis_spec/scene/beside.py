@@ -86,12 +86,14 @@ class Wanted:
     members: tuple[int, ...]
     widths: tuple[float, ...]
     until: float = np.inf
+    #: where the layout kept room for them
+    kept: tuple[Slot, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Field:
     """Discs, sample points of lines and the extent, in layout units; how far labels are to reach beyond it, to either
-    side, in page units; whether signals run across."""
+    side, in page units; whether signals run across; what is ``taken`` (k, 4), in layout units."""
 
     places: FloatArray
     radii: FloatArray
@@ -99,6 +101,7 @@ class Field:
     extent: Rect
     reach: float
     level: bool
+    taken: FloatArray
 
 
 def beyond(extent: Rect, scale: float, wanted: float) -> float:
@@ -121,6 +124,9 @@ def placed(wanted: Sequence[Wanted], field: Field, size_of: Callable[[float], fl
                 ground.choose(one, found)
         at *= _STEP
     ground.begin(scale, size_of, _without(found, wanted, scale))
+    for one in wanted:  # what stands in the room of others leaves it
+        if one.kept and one.until > scale:
+            ground.choose(one, found)
     for one in wanted:  # now that all are there, each may find a better side
         if one.members[0] in found:
             ground.choose(one, found)
@@ -168,11 +174,10 @@ class _Ground:
         members = list(one.members)
         before = self._claims[members].copy()
         self._claims[members] = np.inf
-        slot = self._best(one)
-        if slot is None:
+        sides = self._best(one)
+        if sides is None:
             self._claims[members] = before
             return
-        sides = (slot, slot.mirrored(self._field.level))
         for index, width, side in zip(one.members, one.widths, sides, strict=False):
             found[index] = side, width
             self._claims[index] = self.claim(index, width, side)
@@ -184,29 +189,39 @@ class _Ground:
         x0, y0, x1, y1 = (side / self._scale for side in slot.claim(radius, width * size, size))
         return x + x0, y + y0, x + x1, y + y1
 
-    def _best(self, one: Wanted) -> Slot | None:
-        """The free side that lies on the fewest lines, the best of these; None where none is free."""
-        best: tuple[int, Slot] | None = None
+    def _best(self, one: Wanted) -> tuple[Slot, ...] | None:
+        """The sides that the layout kept free; else those that lie on the fewest lines, the best of these; None where
+        none are free."""
+        if one.kept and self._may(one, one.kept):
+            return one.kept
+        best: tuple[int, tuple[Slot, ...]] | None = None
         for slot in _LEVEL if self._field.level else _SIDES:
             sides = (slot, slot.mirrored(self._field.level))
-            claims = [self.claim(*own) for own in zip(one.members, one.widths, sides, strict=False)]
-            if not all(self._free(claim, index) for claim, index in zip(claims, one.members, strict=True)):
+            if not self._may(one, sides):
                 continue
-            if len(claims) == 2 and meet(claims[0], claims[1]):
-                continue
-            lines = sum(self._lines(claim) for claim in claims)
+            lines = sum(self._lines(claim) for claim in self._all(one, sides))
             if best is None or lines < best[0]:
-                best = lines, slot
+                best = lines, sides
             if lines == 0:
                 break
         return None if best is None else best[1]
+
+    def _all(self, one: Wanted, sides: Sequence[Slot]) -> list[Rect]:
+        return [self.claim(*own) for own in zip(one.members, one.widths, sides, strict=False)]
+
+    def _may(self, one: Wanted, sides: Sequence[Slot]) -> bool:
+        """Whether labels may stand on these sides of their discs."""
+        claims = self._all(one, sides)
+        if not all(self._free(claim, index) for claim, index in zip(claims, one.members, strict=True)):
+            return False
+        return len(claims) < 2 or not meet(claims[0], claims[1])
 
     def _free(self, claim: Rect, index: int) -> bool:
         (x0, y0, x1, y1), (left, top, right, bottom) = claim, self._field.extent
         across, down = (reach / self._scale for reach in (self._across, BEYOND))
         if x0 < left - across or x1 > right + across or y0 < top - down or y1 > bottom + down:
             return False
-        if _meeting(self._claims, claim):
+        if _meeting(self._claims, claim) or _meeting(self._field.taken, claim):
             return False
         first, last = np.searchsorted(self._xs, (x0 - self._largest, x1 + self._largest))
         near = slice(int(first), int(last))

@@ -7,8 +7,8 @@ titles.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,11 +23,14 @@ from neurovis_spec.layout.frames import (
     BOX_TIGHT_FRAME,
     PAD,
     PAD_FRAME,
+    PAD_LABEL,
     PAD_ROUTE,
     SLACK,
     TITLE,
 )
 from neurovis_spec.layout.geometry import Rect, meet
+from neurovis_spec.layout.labels import BOX_WEIGHT, TITLE_HIGH, instance_titles, title_room, widened
+from neurovis_spec.layout.model import RADIUS
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.geometry import bounds, sample
 from neurovis_spec.scene.sectors import Sector, sector
@@ -55,26 +58,37 @@ class _Named:
     members: tuple[int, ...]
 
 
-def boxes_of(network: Network, positions: FloatArray, routes: Sequence[FloatArray]) -> list[Box]:
+def boxes_of(
+    network: Network, positions: FloatArray, routes: Sequence[FloatArray], labels: Mapping[int, Rect] | None = None
+) -> list[Box]:
     """All boxes, and the instances of modules, largest first. Boxes that would touch another's are drawn tighter, what
     holds another is drawn around it. What foreign neurons stand in has no frame: it would say that they belong to it;
     nor has a box that would lie on the frame of others, where nobody could see what belongs to which. Of boxes on a
-    ring all are sectors where one of them would have no frame. Layout units."""
+    ring all are sectors where one of them would have no frame. ``labels`` (what those cover for which there is room
+    beside their discs) and titles are within their frames. Layout units."""
     named = _named(network)
     within = {n: frozenset(n.members) for n in named}
     inner = _routes_within(network, routes, [n for n in named if n.kind == "instance"])
+    titles = _titles(network, named)
+
+    def beside(item: _Named) -> list[Rect]:
+        return [_padded(labels[i], PAD_LABEL) for i in item.members if i in labels] if labels else []
+
     rects: dict[_Named, Rect] = {}
     for tight in (False, True):
         for item in named:  # what is held by another comes before it
             held = [rects[o] for o in named if o is not item and o in rects and within[o] < within[item]]
             if item.kind == "instance":
-                rects[item] = _framed(positions, inner.get(item.path, []), item.members, held)
+                rect = _framed(positions, inner.get(item.path, []), item.members, held, beside(item))
+                wide = widened(rect, titles[item])
+                rects[item] = rect if _entered(positions, wide, item.members) else wide
             elif not tight or any(
                 meet(rects[item], rects[o])
                 for o in named
                 if not (within[o] <= within[item] or within[item] <= within[o])
             ):
-                rects[item] = _around(network, positions, routes, item.members, held, tight)
+                rect = _around(network, positions, routes, item.members, held, tight)
+                rects[item] = rect if tight else widened(_union([rect, *beside(item)]), titles[item])
     clean = [n for n in named if not _entered(positions, rects[n], n.members)]
     framed = [
         n
@@ -95,6 +109,39 @@ def boxes_of(network: Network, positions: FloatArray, routes: Sequence[FloatArra
         for n, one in sectors.items()
     ]
     return sorted(boxes, key=lambda b: (-(b.rect[2] - b.rect[0]) * (b.rect[3] - b.rect[1]), b.kind, b.path))
+
+
+def entitled(boxes: Sequence[Box], positions: FloatArray, scale: float) -> list[Box]:
+    """The boxes in a picture with so many page units for a layout unit, frames drawn higher where a title would have no
+    room above the discs in them, as far as nothing is there."""
+    more = TITLE_HIGH / scale - (BOX_DOWN - RADIUS)
+    if more <= 0:
+        return list(boxes)
+    result = list(boxes)
+    for index, box in enumerate(boxes):
+        x0, y0, x1, y1 = box.rect
+        top = (x0, y0 - more, x1, y0)
+        above = _padded(top, RADIUS)
+        met = np.flatnonzero(((positions > above[:2]) & (positions < above[2:])).all(axis=1))
+        others = (o for o in boxes if o is not box and not frozenset(box.members) <= frozenset(o.members))
+        if (
+            box.kind == "box"
+            and box.sector is None
+            and set(met.tolist()) <= set(box.members)
+            and not any(meet(top, o.rect) for o in others)
+        ):
+            result[index] = replace(box, rect=(x0, y0 - more, x1, y1))
+    return result
+
+
+def _titles(network: Network, named: Sequence[_Named]) -> dict[_Named, float]:
+    """How wide frames have to be for their titles."""
+    module = {instance.path: instance.module for instance in network.instances}
+    instances = [n for n in named if n.kind == "instance"]
+    widths = instance_titles((n.path, module[n.path]) for n in instances)
+    return dict(zip(instances, widths, strict=True)) | {
+        n: title_room(n.path, BOX_WEIGHT) for n in named if n.kind == "box"
+    }
 
 
 def _named(network: Network) -> list[_Named]:
@@ -142,10 +189,18 @@ def _routes_within(
     return found
 
 
-def _framed(positions: FloatArray, lines: Sequence[FloatArray], inside: tuple[int, ...], held: Sequence[Rect]) -> Rect:
+def _framed(
+    positions: FloatArray,
+    lines: Sequence[FloatArray],
+    inside: tuple[int, ...],
+    held: Sequence[Rect],
+    beside: Sequence[Rect],
+) -> Rect:
     """The frame of an instance, as the layered engine keeps it free."""
     parts = [_wider(bounds([positions[list(inside)]]), PAD), _wider(bounds(lines), PAD_ROUTE)]
-    x0, y0, x1, y1 = _union([part for part in parts if part is not None] + [_padded(r, PAD_FRAME) for r in held])
+    x0, y0, x1, y1 = _union(
+        [part for part in parts if part is not None] + [_padded(r, PAD_FRAME) for r in held] + [*beside]
+    )
     return x0, y0 - TITLE, x1, y1
 
 

@@ -18,9 +18,8 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.layout.geometry import Rect
+from neurovis_spec.layout.labels import UNIT
 
-#: Page units for one layout unit in a picture that is small enough.
-UNIT = 66.0
 MOST = (1280.0, 960.0)
 MARGIN = 26.0
 #: Pixels for a page unit: without a stated size the first with which the picture is small enough. Multiples of

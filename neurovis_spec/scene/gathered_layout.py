@@ -64,7 +64,8 @@ def laid_out(drawn: Gathered, layout: Layout) -> Layout:
     for name, (a, b) in zip(drawn.network.connection_names, ends, strict=True):
         if name in kept:  # from centre to centre, to the last digit
             kept[name] = (found.positions[names[a]], *kept[name][1:-1], found.positions[names[b]])
-    return Layout(found.network, layout.engine, found.positions, {**found.routes, **kept})
+    labels = {name: side for name, side in layout.labels.items() if name in found.positions}
+    return Layout(found.network, layout.engine, found.positions, {**found.routes, **kept}, labels)
 
 
 def _sparse(places: FloatArray) -> bool:

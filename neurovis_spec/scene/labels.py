@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -17,34 +18,43 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.geometry import Rect
-from neurovis_spec.layout.model import Point
+from neurovis_spec.layout.labels import (
+    BESIDE,
+    MOST,
+    NUMBERED,
+    SMALLEST,
+    TINY,
+    UNIT,
+    WEIGHT,
+    WIDEST,
+    chord,
+    fits,
+    least_on_disc,
+    parts_of,
+)
+from neurovis_spec.layout.model import RADIUS, Point, Side
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.beside import Field, Slot, Wanted, placed
 from neurovis_spec.scene.cut import Cut
 from neurovis_spec.scene.model import Text
 from neurovis_spec.scene.obstacles import Obstacles
 
-_WEIGHT = 600
-#: on the disc: never smaller, not for the sake of others, never larger
-_SMALLEST, _READABLE, _LARGEST = 9.0, 10.5, 14.0
-#: beside it: these, and so much for each unit of the radius between them
-_BESIDE_SMALLEST, _BESIDE_LARGEST, _BESIDE_SHARE = 8.5, 11.0, 0.8
-#: a numbered name may be smaller: it says where one is among many; on small discs so may all
-_NUMBERED, _TINY = 7.5, 6.0
+#: on the disc: not smaller than the first for the sake of others, never larger than the second
+_READABLE, _LARGEST = 10.5, 14.0
+#: beside it: never smaller, and as large as the picture makes what the layout kept room for
+_BESIDE_SMALLEST, _BESIDE_SHARE = 8.5, BESIDE / (RADIUS * UNIT)
 #: how much larger than the smallest the others are at most
 _UNLIKE = 1.25
 #: one that is shortened may be
 _LEGIBLE = 8.0
-#: how long a name beside a disc may be, in sizes of its letters: it must not look like a title of those around
-_WIDEST_BESIDE = 18.0
-#: so many labels are placed beside discs at most: those of the neurons with the most connections
-_MOST_BESIDE = 400
 #: a disc smaller than this has no label on it
 _SMALLEST_DISC = 7.0
 #: and one smaller than this no label beside a number
 _SMALLEST_NUMBERED = 16.0
-#: what a text leaves free of its disc's width, as a share of the radius and at most
-_FREE, _MOST_FREE = 0.252, 5.0
+
+
+#: the sides that a layout speaks of
+_SLOTS: dict[Side, Slot] = {"right": Slot(1, 0), "left": Slot(-1, 0), "below": Slot(0, 1), "above": Slot(0, -1)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,14 +73,14 @@ class Label:
     def shape(self, fill: str, halo: str) -> Text:
         """The text in a colour; where it lies across a line, with a halo in another."""
         around = halo if self.crosses else ""
-        return Text(self.point, self.text, self.size, fill, self.anchor, _WEIGHT, self.subscript, self.on_disc, around)
+        return Text(self.point, self.text, self.size, fill, self.anchor, WEIGHT, self.subscript, self.on_disc, around)
 
 
 @dataclass(frozen=True, slots=True)
 class Ground:
     """What labels stand on: discs, in layout units (``places``, ``radii``) and where ``scale`` and ``shift`` put them
     in the picture; sample points of the lines, in layout units; the extent of it all; and how far labels are to reach
-    beyond it, to either side, in page units."""
+    beyond it, to either side, in page units; what other texts have ``taken`` of the picture (k, 4)."""
 
     places: FloatArray
     radii: FloatArray
@@ -79,6 +89,7 @@ class Ground:
     dots: FloatArray
     extent: Rect
     reach: float
+    taken: FloatArray
 
     def centre(self, index: int) -> Point:
         """The centre of a disc in the picture."""
@@ -96,15 +107,16 @@ def labels_of(
     obstacles: Obstacles,
     hidden: Sequence[bool] = (),
     numbered: Collection[int] = (),
+    sides: Mapping[int, Side] = MappingProxyType({}),
 ) -> list[Label | None]:
     """A label for every neuron, or None where there is no room for any of it, or it is ``hidden``. The discs of those
-    that are ``numbered`` bear a number as well."""
+    that are ``numbered`` bear a number as well. On the ``sides`` given there is room kept for labels."""
     neurons = network.neurons
-    parts = [_parts(label, name) for label, name in zip(neurons.labels, neurons.names, strict=True)]
+    parts = [parts_of(label, name) for label, name in zip(neurons.labels, neurons.names, strict=True)]
     chosen = [index for index in range(len(neurons)) if not (hidden and hidden[index])]
     partners = {a: b for a, b in partners_of(network).items() if not (hidden and (hidden[a] or hidden[b]))}
     smallest = float(ground.radii[chosen].min(initial=np.inf)) * ground.scale
-    common = _common_size([parts[index] for index in chosen], smallest) if smallest >= _SMALLEST_DISC else _TINY
+    common = _common_size([parts[index] for index in chosen], smallest) if smallest >= _SMALLEST_DISC else TINY
     result: list[Label | None] = [None] * len(neurons)
     for index in chosen:
         if ground.radius(index) >= (_SMALLEST_NUMBERED if index in numbered else _SMALLEST_DISC):
@@ -112,18 +124,18 @@ def labels_of(
     for one, other in partners.items():
         if result[other] is None:
             result[one] = None
-    across = [texts.width(base, _NUMBERED, _WEIGHT, subscript) for base, subscript in parts]
+    across = [texts.width(base, NUMBERED, WEIGHT, subscript) for base, subscript in parts]
     needed = {width: _radius_for(width) for width in set(across)}
-    fits = [
+    until = [
         max(needed[width], _SMALLEST_NUMBERED if index in numbered else _SMALLEST_DISC) / float(radius)
         for index, (width, radius) in enumerate(zip(across, ground.radii.tolist(), strict=True))
     ]
     for group in neurons.groups:  # what is numbered together stands alike
         counted = [index for index in group.indices if parts[index][1]]
-        latest = max((fits[index] for index in counted), default=0.0)
+        latest = max((until[index] for index in counted), default=0.0)
         for index in counted:
-            fits[index] = latest
-    beside = _beside(network, ground, obstacles, chosen, partners, fits)
+            until[index] = latest
+    beside = _beside(network, ground, obstacles, chosen, partners, until, sides)
     for index in chosen:  # it is easier to read beside a disc than where it has to be very small
         result[index] = beside.get(index) or result[index]
     for index, label in beside.items():
@@ -161,7 +173,7 @@ def rank_of(network: Network) -> list[int]:
 
 
 def _size_beside(radius: float) -> float:
-    return min(_BESIDE_LARGEST, max(_BESIDE_SMALLEST, _BESIDE_SHARE * radius))
+    return min(BESIDE, max(_BESIDE_SMALLEST, _BESIDE_SHARE * radius))
 
 
 def _beside(
@@ -170,29 +182,35 @@ def _beside(
     obstacles: Obstacles,
     chosen: Sequence[int],
     partners: Mapping[int, int],
-    fits: Sequence[float],
+    until: Sequence[float],
+    sides: Mapping[int, Side],
 ) -> dict[int, Label]:
-    """Labels beside discs, by neuron, as far as there is room for them at this scale or a smaller one; from the scale
-    ``fits`` on a label stands on its disc."""
+    """Labels beside discs, by neuron, as far as there is room for them at this scale or a smaller one, on the ``sides``
+    with room for them if that is enough; from the scale ``until`` on a label stands on its disc."""
     labels, cut, among = network.neurons.labels, Cut(network.neurons.labels), set(chosen)
     said: dict[int, str] = {}
     wanted: list[Wanted] = []
-    for index in [index for index in rank_of(network) if index in among][:_MOST_BESIDE]:
-        said[index] = cut.shorten(labels[index], 1.0, _WIDEST_BESIDE)
+
+    def kept(*members: int) -> tuple[Slot, ...]:
+        return tuple(_SLOTS[sides[one]] for one in members) if all(one in sides for one in members) else ()
+
+    for index in [index for index in rank_of(network) if index in among][:MOST]:
+        said[index] = cut.shorten(labels[index], 1.0, WIDEST)
         partner = partners.get(index)
         if partner is None or partner not in among:
-            wanted.append(Wanted((index,), (texts.width(said[index], 1.0, _WEIGHT),), fits[index]))
+            wanted.append(Wanted((index,), (texts.width(said[index], 1.0, WEIGHT),), until[index], kept(index)))
         elif partner not in said:
-            said[partner] = cut.shorten(labels[partner], 1.0, _WIDEST_BESIDE)
+            said[partner] = cut.shorten(labels[partner], 1.0, WIDEST)
             both = (index, partner)
-            widths = tuple(texts.width(said[one], 1.0, _WEIGHT) for one in both)
-            wanted.append(Wanted(both, widths, max(fits[index], fits[partner])))
-    field = Field(ground.places, ground.radii, ground.dots, ground.extent, ground.reach, _level(network))
+            widths = tuple(texts.width(said[one], 1.0, WEIGHT) for one in both)
+            wanted.append(Wanted(both, widths, max(until[index], until[partner]), kept(*both)))
+    taken = (ground.taken - np.tile(ground.shift, 2)) / ground.scale
+    field = Field(ground.places, ground.radii, ground.dots, ground.extent, ground.reach, _level(network), taken)
     found = placed(wanted, field, _size_beside, ground.scale)
     result: dict[int, Label] = {}
     for index, slot in found.items():
         size = _size_beside(ground.radius(index))
-        width = texts.width(said[index], size, _WEIGHT)
+        width = texts.width(said[index], size, WEIGHT)
         x0, y0, _, _ = slot.text(ground.radius(index), width, size)
         x, y = ground.centre(index)
         anchor: Literal["start", "middle", "end"] = ("end", "middle", "start")[slot.across + 1]
@@ -204,21 +222,27 @@ def _beside(
 
 def _rect(label: Label) -> Rect:
     """What a label beside a disc covers."""
-    width, (x, y) = texts.width(label.text, label.size, _WEIGHT, label.subscript), label.point
+    width, (x, y) = texts.width(label.text, label.size, WEIGHT, label.subscript), label.point
     left = x - {"start": 0.0, "middle": width / 2, "end": width}[label.anchor]
     return left - 2, y - 0.8 * label.size, left + width + 2, y + 0.25 * label.size
 
 
-def margin_beside(network: Network, radius: float) -> float:
-    """How far labels may reach beyond the discs at the rim: 0 where all fit on discs of this radius."""
+def margin_beside(network: Network, radius: float, rooms: Collection[int] = ()) -> float:
+    """How far labels may reach beyond the discs at the rim: 0 where all fit on discs of this radius, or have ``rooms``
+    kept for them in a picture that is not reduced."""
     neurons, cut = network.neurons, Cut(network.neurons.labels)
+    kept = rooms if radius >= _BESIDE_SMALLEST / _BESIDE_SHARE else ()
+    named = [
+        (label, name)
+        for index, (label, name) in enumerate(zip(neurons.labels, neurons.names, strict=True))
+        if index not in kept
+    ]
     if radius >= _SMALLEST_DISC and all(
-        _on_disc(*_parts(label, name), (0.0, 0.0), radius, _READABLE) is not None
-        for label, name in zip(neurons.labels, neurons.names, strict=True)
+        _on_disc(*parts_of(label, name), (0.0, 0.0), radius, _READABLE) is not None for label, name in named
     ):
         return 0.0
-    said = [cut.shorten(label, 1.0, _WIDEST_BESIDE) for label in neurons.labels]
-    return max((texts.width(text, _BESIDE_SMALLEST, _WEIGHT) for text in said), default=0.0) + Slot.ASIDE + 3
+    said = [cut.shorten(label, 1.0, WIDEST) for label, _ in named]
+    return max((texts.width(text, _BESIDE_SMALLEST, WEIGHT) for text in said), default=0.0) + Slot.ASIDE + 3
 
 
 def room_beside(network: Network, radius: float) -> list[tuple[int, Point]]:
@@ -227,8 +251,8 @@ def room_beside(network: Network, radius: float) -> list[tuple[int, Point]]:
     neurons, level = network.neurons, _level(network)
     result: list[tuple[int, Point]] = []
     for index, (label, name) in enumerate(zip(neurons.labels, neurons.names, strict=True)):
-        if _on_disc(*_parts(label, name), (0.0, 0.0), radius, _READABLE) is None:
-            width = min(texts.width(label, _BESIDE_LARGEST, _WEIGHT), 5 * radius)
+        if _on_disc(*parts_of(label, name), (0.0, 0.0), radius, _READABLE) is None:
+            width = min(texts.width(label, BESIDE, WEIGHT), 5 * radius)
             result.append((index, (radius + 8 + width, 0.0) if level else (0.0, radius + 17)))
     return result
 
@@ -238,75 +262,55 @@ def _level(network: Network) -> bool:
     return network.layout.direction in ("right", "left")
 
 
-def _parts(label: str, name: str) -> tuple[str, str]:
-    """The label and its subscript: a numbered neuron has one, and a label of its own that is such a name."""
-    return texts.with_subscript(label) if label == name.rsplit(".", 1)[-1] or label.isidentifier() else (label, "")
-
-
-def _fits(parts: tuple[str, str], size: float, radius: float) -> bool:
-    return texts.width(parts[0], size, _WEIGHT, parts[1]) <= _chord(radius, size)
-
-
 def _radius_for(width: float) -> float:
     """The radius of the disc on which a label so wide is easy to read."""
     low, high = 0.0, 100.0
-    if _chord(high, _NUMBERED) < width:
+    if chord(high, NUMBERED) < width:
         return np.inf
     for _ in range(24):
         middle = (low + high) / 2
-        low, high = (low, middle) if width <= _chord(middle, _NUMBERED) else (middle, high)
+        low, high = (low, middle) if width <= chord(middle, NUMBERED) else (middle, high)
     return high
 
 
 def _common_size(parts: list[tuple[str, str]], radius: float) -> float:
     """The size of most labels: the largest at which all that fit at a readable size do fit."""
     size = largest = min(_LARGEST, 0.76 * radius)
-    readable = [p for p in dict.fromkeys(parts) if _fits(p, min(_READABLE, largest), radius)]
-    while size > _READABLE and not all(_fits(p, size, radius) for p in readable):
+    readable = [p for p in dict.fromkeys(parts) if fits(p, min(_READABLE, largest), radius)]
+    while size > _READABLE and not all(fits(p, size, radius) for p in readable):
         size -= 0.5
     smallest = size
     for both in dict.fromkeys(parts):
-        least = _least(both[1], radius)
-        if _fits(both, least, radius):
-            while smallest > least and not _fits(both, smallest, radius):
+        least = least_on_disc(both[1], radius)
+        if fits(both, least, radius):
+            while smallest > least and not fits(both, smallest, radius):
                 smallest = max(smallest - 0.5, least)
-    return min(size, max(_UNLIKE * smallest, min(_SMALLEST, largest)))
-
-
-def _least(subscript: str, radius: float) -> float:
-    """The smallest size on a disc: it grows no faster than the disc, so that what fits on one fits on a larger one."""
-    return max(_TINY, min(_NUMBERED if subscript else _SMALLEST, 0.5 * radius))
+    return min(size, max(_UNLIKE * smallest, min(SMALLEST, largest)))
 
 
 def _on_disc(
     base: str, subscript: str, centre: Point, radius: float, common: float, least: float | None = None
 ) -> Label | None:
-    least = least or _least(subscript, radius)
+    least = least or least_on_disc(subscript, radius)
     size = max(common, least)
-    while size > least and not _fits((base, subscript), size, radius):
+    while size > least and not fits((base, subscript), size, radius):
         size = max(size - 0.5, least)
-    if not _fits((base, subscript), size, radius):
+    if not fits((base, subscript), size, radius):
         return None
     drop = 0.36 if not subscript else 0.32
     return Label(base, subscript, size, (centre[0], centre[1] + drop * size), "middle", True)
-
-
-def _chord(radius: float, size: float) -> float:
-    """How wide a text of this size may be on a disc."""
-    free = min(_FREE * radius, _MOST_FREE)
-    return float(2 * (max(radius * radius - (0.4 * size) ** 2, 0.0)) ** 0.5 - free)
 
 
 def _shortened(base: str, subscript: str, centre: Point, radius: float, cut: Cut) -> Label | None:
     """What fits on the disc: part of a name; of a numbered one its number, if need be alone."""
     if subscript:
         for end in range(min(len(base) - 1, 3), 0, -1):
-            found = _on_disc(base[:end] + "…", subscript, centre, radius, _SMALLEST, _LEGIBLE)
+            found = _on_disc(base[:end] + "…", subscript, centre, radius, SMALLEST, _LEGIBLE)
             if found is not None:
                 return found
-        return _on_disc(subscript, "", centre, radius, min(_SMALLEST, 0.76 * radius), _TINY)
-    size = min(max(_SMALLEST, min(10.0, 0.5 * radius)), 0.76 * radius)
-    text = cut.shorten(base, size, _chord(radius, size))
+        return _on_disc(subscript, "", centre, radius, min(SMALLEST, 0.76 * radius), TINY)
+    size = min(max(SMALLEST, min(10.0, 0.5 * radius)), 0.76 * radius)
+    text = cut.shorten(base, size, chord(radius, size))
     if len(text) < 3:  # a single letter says nothing
         return None
     return Label(text, "", size, (centre[0], centre[1] + 0.36 * size), "middle", True)

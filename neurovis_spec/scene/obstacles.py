@@ -34,6 +34,10 @@ class Obstacles:
         """Room that a text has taken."""
         self._texts.append(rect)
 
+    def texts(self) -> FloatArray:
+        """(k, 4) the room that texts have taken."""
+        return np.array(self._texts, float).reshape(-1, 4)
+
     def add_line(self, dots: FloatArray, reach: float = 2.5) -> None:
         """One more line, as sample points."""
         self._dots = np.concatenate([self._dots, dots])

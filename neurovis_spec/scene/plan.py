@@ -7,7 +7,7 @@ arranged in page units; the Plan is in user units (``frame``).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,14 +17,15 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.geometry import Rect
+from neurovis_spec.layout.labels import UNIT, label_rects, label_room
 from neurovis_spec.layout.model import RADIUS, Layout, Point
 from neurovis_spec.layout.naming import natural_key
 from neurovis_spec.scene import delays, encoding, legend, texts
 from neurovis_spec.scene.beside import beyond
-from neurovis_spec.scene.boxes import Box, boxes_of
+from neurovis_spec.scene.boxes import Box, boxes_of, entitled
 from neurovis_spec.scene.collapse import Gathered
 from neurovis_spec.scene.fading import seconds_of
-from neurovis_spec.scene.frame import MARGIN, MOST, UNIT, Frame, Margins, fit, unit_for
+from neurovis_spec.scene.frame import MARGIN, MOST, Frame, Margins, fit, unit_for
 from neurovis_spec.scene.gains import Gains, in_pages
 from neurovis_spec.scene.gathered_layout import radius_of
 from neurovis_spec.scene.geometry import batches, bounds, samples
@@ -42,7 +43,7 @@ from neurovis_spec.scene.shown import shown
 from neurovis_spec.scene.teachers import Teacher, dash, dotted, label_of, room_of, teachers_of
 from neurovis_spec.scene.themes import theme_of
 from neurovis_spec.scene.tints import tints_of
-from neurovis_spec.scene.titles import Titled, outline, titles_of
+from neurovis_spec.scene.titles import Titled, elsewhere, in_one_corner, outline
 
 #: how high a line is that says what is left out; what texts keep of the picture's edge
 _NOTE_LINE, _EDGE = 16.0, 6.0
@@ -114,14 +115,17 @@ def plan(
     widths = encoding.thickness(weights, gains.thickness)
     seen = shown(network, drawn.asked(settings), weights, widths, _lengths(routes))
     factors = np.array([radius_of(size) for size in drawn.sizes.tolist()]) * np.where(seen.focus, 1.0, _UNFOCUSED)
-    boxes = boxes_of(network, positions, routes)
+    rooms = _rooms(network, layout) if settings.labels else {}
+    boxes = boxes_of(network, positions, routes, rooms)
     teachers = [one for one in teachers_of(network) if seen.focus[one.source] and seen.focus[one.target]]
     teachers = teachers[:_MOST_TEACHERS]
     beside = room_beside(network, RADIUS * UNIT) if settings.labels else []
-    extent = _extent(positions, factors, routes, boxes, beside)
+    beside = [(index, reach) for index, reach in beside if index not in rooms]
+    extent = _extent(positions, factors, routes, boxes, beside, rooms.values())
     smallest = float(factors[seen.focus].min(initial=RADIUS))
-    wanted = _Wanted(network, gains, settings, theme, teachers, seen.notes, extent, narrowest)
+    wanted = _Wanted(network, gains, settings, theme, teachers, seen.notes, extent, narrowest, frozenset(rooms))
     title, items, frame, unit, margin = _framed(wanted, smallest, encoding.clamped(widths[seen.lines]))
+    boxes = entitled(boxes, positions, frame.scale)
     gains = in_pages(gains, unit)
     centres = frame.map(positions)
     radii = factors * frame.scale
@@ -149,18 +153,25 @@ def plan(
     notes = _noted(seen.notes, title is not None, frame, theme)
     spots: list[Point] = [(x, y) for x, y in centres.tolist()]
     sizes = {unit: size for unit, size in enumerate(drawn.sizes.tolist()) if drawn.glyph[unit]}
+    titled = _titled(boxes, frame, picture)
+    titles = in_one_corner(titled, obstacles, theme, [_mapped(rect, frame) for rect in rooms.values()])
     labels: list[Label | None] = [None] * len(spots)
     if settings.labels:
         around = [outline(box.rect, 4 / UNIT) if box.sector is None else box.sector.border(4 / UNIT) for box in boxes]
         inner = np.concatenate([np.zeros((0, 2)), *samples([routes[i] for i in kept], 24), *around])
-        reach = margin_beside(network, RADIUS * frame.scale) if margin > MARGIN else 0.0
-        ground = Ground(positions, factors, frame.scale, (frame.left, frame.top), inner, extent, reach)
-        labels = labels_of(network, ground, obstacles, (~seen.focus).tolist(), sizes)
+        reach = margin_beside(network, RADIUS * frame.scale, wanted.rooms) if margin > MARGIN else 0.0
+        ground = Ground(
+            positions, factors, frame.scale, (frame.left, frame.top), inner, extent, reach, obstacles.texts()
+        )
+        sides = {index: layout.labels[network.neurons.names[index]] for index in rooms}
+        labels = labels_of(network, ground, obstacles, (~seen.focus).tolist(), sizes, sides)
     named = line_labels(network, lines, obstacles, theme) if settings.labels else {}
-    titles = _box_titles(boxes, frame, obstacles, theme, picture)
+    left = [index for index in range(len(boxes)) if index not in titles]
+    others = elsewhere([titled[index] for index in left], obstacles, theme)
+    titles |= {index: text for index, text in zip(left, others, strict=True) if text is not None}
     front = [
         *(Group((text,), id=f"label:{entry}") for entry, text in named.items()),
-        *titles,
+        *(Group((titles[index],), id=f"title:{box.path}") for index, box in enumerate(boxes) if index in titles),
         *([header] if header else []),
         *([notes] if notes else []),
     ]
@@ -241,15 +252,27 @@ def _in_units(network: Network, layout: Layout) -> tuple[FloatArray, list[FloatA
     return positions, routes_of(network.connection_names, ends, layout)
 
 
+def _rooms(network: Network, layout: Layout) -> dict[int, Rect]:
+    """What labels cover for which the layout kept room, by neuron, in its units."""
+    if not layout.labels:
+        return {}
+    names = network.neurons.names
+    sides = [layout.labels.get(name) for name in names]
+    rects = label_rects([layout.positions[name] for name in names], label_room(network), sides)
+    return {index: rect for index, rect in enumerate(rects) if rect is not None}
+
+
 def _extent(
     positions: FloatArray,
     radii: FloatArray,
     routes: Sequence[FloatArray],
     boxes: Sequence[Box],
     beside: Sequence[tuple[int, Point]],
+    rooms: Iterable[Rect],
 ) -> Rect:
-    """What the layout takes up, in its units; the neurons in ``beside`` have labels that reach so far."""
-    corners = [np.array([box.rect[:2], box.rect[2:]]) for box in boxes]
+    """What the layout takes up, in its units; the neurons in ``beside`` have labels that reach so far, others have room
+    for them."""
+    corners = [np.array([rect[:2], rect[2:]]) for rect in (*(box.rect for box in boxes), *rooms)]
     for index, (across, down) in beside:
         x, y = positions[index].tolist()
         corners.append(np.array([(x - across / UNIT, y), (x + across / UNIT, y + down / UNIT)]))
@@ -271,12 +294,15 @@ class _Wanted:
     notes: tuple[str, ...]
     extent: Rect
     narrowest: float
+    #: the neurons for whose labels the layout kept room
+    rooms: frozenset[int]
 
     def margin(self, frame: Frame | None) -> float:
         """What is left free on either side, so that there is room for the labels of discs at the rim."""
         if not self.settings.labels or frame is None:
             return MARGIN
-        return _EDGE + beyond(self.extent, frame.scale, margin_beside(self.network, RADIUS * frame.scale))
+        reach = margin_beside(self.network, RADIUS * frame.scale, self.rooms)
+        return _EDGE + beyond(self.extent, frame.scale, reach)
 
 
 def _framed(
@@ -420,14 +446,12 @@ def _box_frames(boxes: Sequence[Box], frame: Frame, theme: Theme) -> list[Group]
     return groups
 
 
-def _box_titles(boxes: Sequence[Box], frame: Frame, obstacles: Obstacles, theme: Theme, picture: Rect) -> list[Group]:
-    items = [
+def _titled(boxes: Sequence[Box], frame: Frame, picture: Rect) -> list[Titled]:
+    return [
         Titled(box, _mapped(rect, frame), _room(box, boxes, frame, picture), _foreign(box, boxes, frame))
         for box in boxes
         for rect in (box.rect if box.sector is None else box.sector.outmost(),)
     ]
-    found = titles_of(items, obstacles, theme)
-    return [Group((text,), id=f"title:{box.path}") for box, text in zip(boxes, found, strict=True) if text is not None]
 
 
 def _room(box: Box, boxes: Sequence[Box], frame: Frame, picture: Rect) -> Rect:

@@ -1,19 +1,21 @@
-"""Titles of boxes: where no line crosses them, and for boxes that are alike in the same place.
+"""Titles of boxes: in the same corner of all boxes of a picture, that in which the fewest lines cross them.
 
-In: boxes in user units, what is in the way. Out: a Text for each box, or None where there is no room for any. Boxes of
-one name and size, as instances of a module have them, are alike, and so are the instances themselves; their titles are
-worded alike, and stand in the same place or in its mirror image.
+In: boxes in user units, what is in the way. Out: a Text for each box, or None where there is no room for any. A title
+that has no room in the corner of the others stands elsewhere, in or beside its box. Boxes of one name and size, as
+instances of a module have them, are alike, and so are the instances themselves; their titles are worded alike, and
+elsewhere stand in the same place or in its mirror image.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.layout.geometry import Rect, meet
+from neurovis_spec.layout.labels import BOX_WEIGHT, INSTANCE_WEIGHT, TITLE_INSET, TITLE_SIZE
 from neurovis_spec.layout.model import Point
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.boxes import Box
@@ -21,9 +23,9 @@ from neurovis_spec.scene.model import Text, Theme
 from neurovis_spec.scene.obstacles import Obstacles
 
 #: where nothing else helps a name gets as small as the last
-_SIZE, _SMALLER = 11.5, (10.0, 9.0)
+_SIZE, _SMALLER = TITLE_SIZE, (10.0, 9.0)
 #: instances are more than boxes
-_WEIGHTS = {"box": 400, "instance": 600}
+_WEIGHTS = {"box": BOX_WEIGHT, "instance": INSTANCE_WEIGHT}
 #: more in the way than this, and there is no title
 _TOO_MUCH = 10_000
 #: how bad it is to stand in a frame that does not hold the box: worse than lines
@@ -43,20 +45,54 @@ class Titled:
     foreign: tuple[Rect, ...] = ()
 
 
-def titles_of(boxes: Sequence[Titled], obstacles: Obstacles, theme: Theme) -> list[Text | None]:
-    """The titles, in the order of the boxes: first inside the corners, then just outside; the name alone where the
-    whole finds no room, or as much of the name as finds it."""
+def in_one_corner(
+    boxes: Sequence[Titled], obstacles: Obstacles, theme: Theme, kept: Sequence[Rect] = ()
+) -> dict[int, Text]:
+    """The titles, by the place of their boxes, of one size and in the corner that has room for the most of them; the
+    largest of such sizes, and of its corners that in which they cover least. None is on what is ``kept`` for others."""
+    around = [obstacles.near(_grown(item, _WEIGHTS[item.box.kind])) for item in boxes]
+    best: tuple[int, int, int, dict[int, _Title]] | None = None
+    for place, inside in enumerate(_INSIDE):
+        for corner in _CORNERS:
+            found: dict[int, _Title] = {}
+            for members in _alike(boxes):
+                taken = [*kept, *(title.place.taken for title in found.values())]
+                wordings: list[dict[int, _Title]] = []
+                for whole in (True, False):
+                    worded = {i: _in_corner(boxes[i], whole, inside, corner, around[i], taken) for i in members}
+                    wordings.append({i: title for i, title in worded.items() if title is not None})
+                chosen: dict[int, _Title] = min(wordings, key=_worth)
+                found.update(chosen)
+            missing, hits = _worth(found)
+            if best is None or (missing, place, hits) < best[:3]:
+                best = missing, place, hits, found
+    result: dict[int, Text] = {}
+    for index, title in best[3].items() if best else ():
+        text = _drawn(title, title.place.hits, _WEIGHTS[boxes[index].box.kind], obstacles, theme)
+        if text is not None:
+            result[index] = text
+    return result
+
+
+def elsewhere(boxes: Sequence[Titled], obstacles: Obstacles, theme: Theme) -> list[Text | None]:
+    """Titles that have no room in one corner, in the order of the boxes: inside, then just outside; the name alone
+    where the whole finds no room, or as much of the name as finds it."""
+    result: list[Text | None] = [None] * len(boxes)
+    for members in _alike(boxes):
+        for index, text in zip(members, _together([boxes[i] for i in members], obstacles, theme), strict=True):
+            result[index] = text
+    return result
+
+
+def _alike(boxes: Sequence[Titled]) -> list[list[int]]:
+    """Boxes that are alike, by their places."""
     alike: dict[object, list[int]] = {}
     for index, item in enumerate(boxes):
         x0, y0, x1, y1 = item.rect
         name = item.box.name if item.box.kind == "box" else ""
         key = (item.box.kind, name, len(item.box.members), round(x1 - x0), round(y1 - y0))
         alike.setdefault(key, []).append(index)
-    result: list[Text | None] = [None] * len(boxes)
-    for members in alike.values():
-        for index, text in zip(members, _together([boxes[i] for i in members], obstacles, theme), strict=True):
-            result[index] = text
-    return result
+    return list(alike.values())
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +135,32 @@ class _Title:
     text: str
     size: float
     place: _Place
+
+
+def _worth(titles: Mapping[int, _Title]) -> tuple[int, int]:
+    return -len(titles), sum(title.place.hits for title in titles.values())
+
+
+def _in_corner(
+    item: Titled,
+    whole: bool,
+    inside: tuple[float, Point],
+    corner: Point,
+    obstacles: Obstacles,
+    taken: Sequence[Rect],
+) -> _Title | None:
+    """A title in a corner of its frame; None where a disc or a text is in the way, or the frame is not as wide."""
+    (size, inset), weight, (x0, y0, x1, y1) = inside, _WEIGHTS[item.box.kind], item.rect
+    text = item.box.title if whole else item.box.name
+    width = texts.width(text, size, weight)
+    if width > x1 - x0 - 2 * inset[0] + 1e-6:
+        return None
+    x = x1 - inset[0] - width if corner[0] else x0 + inset[0]
+    y = y1 - inset[1] - _DEPTH * size if corner[1] else y0 + inset[1] + _HEIGHT * size
+    rect = (x - 1, y - _HEIGHT * size, x + width + 1, y + _DEPTH * size)
+    hits = obstacles.hits(rect, _CROSSED)
+    hits += _TOO_MUCH * sum(meet(rect, other) for other in (*taken, *item.foreign))
+    return _Title(text, size, _Place((x, y), rect, hits)) if hits < _TOO_MUCH else None
 
 
 def _together(boxes: list[Titled], obstacles: Obstacles, theme: Theme) -> list[Text | None]:
@@ -159,6 +221,15 @@ def _drawn(title: _Title, hits: int, weight: int, obstacles: Obstacles, theme: T
     return Text(title.place.start, title.text, title.size, theme.muted, weight=weight, halo=halo)
 
 
+_CLOSE = 5.0
+#: how large all titles are in their corners, and how far from the sides of their frames
+_INSIDE: tuple[tuple[float, Point], ...] = (
+    (_SIZE, (TITLE_INSET, 5.0)),
+    (_SIZE, (_CLOSE, 2.0)),
+    *((size, (_CLOSE, 2.0)) for size in _SMALLER),
+)
+#: the corners of a frame, across and down: upper left first
+_CORNERS: tuple[Point, ...] = ((0, 0), (1, 0), (0, 1), (1, 1))
 #: how far letters reach above and below their baseline, by their size
 _HEIGHT, _DEPTH = 0.78, 0.22
 #: rows: inside at the top and at the bottom, above, below
@@ -166,8 +237,8 @@ _ROWS = 4
 #: how far a title slides along a row, as shares of the way from one corner to the other
 _SLIDES = (1, 2, 3, 4, 5, 6)
 _FARTHER = _ROWS + 2 + _ROWS * len(_SLIDES) + 2
-#: then close to the frame, in steps from the edge, for what is narrow or crossed by many lines
-_CLOSE, _CLOSER_STEPS = 5.0, 12
+#: then ``_CLOSE`` to the frame, in steps from the edge, for what is narrow or crossed by many lines
+_CLOSER_STEPS = 12
 _SLOTS = _FARTHER + _ROWS * _CLOSER_STEPS
 
 

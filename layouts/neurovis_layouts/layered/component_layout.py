@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from neurovis_layouts.formations import columns, grid
+from neurovis_layouts.label_room import at_ends, covered, excess, sides_of
 from neurovis_layouts.layered.box_columns import straightened, tied, with_spines
 from neurovis_layouts.layered.components import components_of, packed
 from neurovis_layouts.layered.flips import turned
@@ -26,7 +27,7 @@ from neurovis_layouts.layered.ranks import INSTANT, ranks_of
 from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.routing import Waypoint
 from neurovis_spec.layout.geometry import snap
-from neurovis_spec.layout.model import LayoutProblem, Point
+from neurovis_spec.layout.model import LayoutProblem, Point, Side
 
 
 @dataclass(slots=True)
@@ -39,6 +40,8 @@ class ComponentLayout:
     #: edges whose waypoints are all that they need
     firm: set[int] = field(default_factory=set)
     turned: set[int] = field(default_factory=set)
+    #: on which sides labels stand that do not stand on the usual one
+    sides: dict[int, Side] = field(default_factory=dict)
     #: how far the frames and the passages reach
     corners: list[Point] = field(default_factory=list)
 
@@ -55,6 +58,7 @@ class ComponentLayout:
         self.places.update({i: (x + dx, y + dy) for i, (x, y) in other.places.items()})
         self.corners += [(x + dx, y + dy) for x, y in other.corners]
         self.turned |= other.turned
+        self.sides.update(other.sides)
         self.firm |= other.firm
         for i, ways in other.ways.items():
             self.ways[i] = [Waypoint(way.x + dx, way.y + dy, way.half) for way in ways]
@@ -144,16 +148,23 @@ def _component(
         else:
             levels, order = tied(levels, straight, columns)
     levels, flipped = turned(levels, order, {min(unit.members) for unit in units if unit.turns})
+    plan = ComponentLayout(turned=flipped)
+    plan.sides = at_ends(problem, _singles(levels, 0), _singles(levels, -1))
+    for n, node in enumerate(levels.nodes):
+        if node.members and node.members[0][0] in plan.sides:
+            levels.nodes[n] = replace(node, reach=(node.reach[0], 0.0))
     places = placed(
         stacked(levels, folds), order, problem.neuron_spacing, problem.rank_spacing, partner, columns, folds.ranks
     )
     _draw_in(levels, order, places, {m for unit in guests for m in unit.members}, problem.neuron_spacing)
-    plan = ComponentLayout(turned=flipped)
     for node, (x, y) in zip(levels.nodes, places, strict=True):
         for member, dx, dy in node.members:
             plan.places[member] = (x + dx, y + dy)
         if node.framed:
             plan.corners += [(x - node.reach[0], y - node.reach[1]), (x + node.reach[0], y + node.reach[1])]
+    sides = {**dict(enumerate(sides_of(problem))), **plan.sides}
+    for rect in covered(problem, plan.places, sides, sorted(plan.places)).values():
+        plan.corners += [(rect[0], rect[1]), (rect[2], rect[3])]
     spans = list(zip(*reaches(levels, order), strict=True))
     for i, passages in levels.passages.items():
         plan.ways[i] = [_passage(places[n], *spans[levels.nodes[n].rank]) for n in passages]
@@ -161,6 +172,12 @@ def _component(
     if whole and not crossings(levels, order):
         plan.firm |= whole
     return plan
+
+
+def _singles(levels: Levels, rank: int) -> list[int]:
+    """The neurons in a rank that are in no block and in no frame."""
+    nodes = [levels.nodes[n] for n in levels.ranks[rank]]
+    return [node.members[0][0] for node in nodes if len(node.members) == 1 and not node.framed]
 
 
 def _passage(place: Point, before: float, behind: float) -> Waypoint:
@@ -235,5 +252,7 @@ def _unconnected(problem: LayoutProblem, units: Sequence[Unit]) -> ComponentLayo
     """Neurons that nothing connects: in a row, or a grid where they are many."""
     members = sorted(m for unit in units for m in unit.members)
     width = len(members) if len(members) <= 12 else columns(len(members))
+    wide, high = (max(more) for more in zip(*(excess(problem, m) for m in members), strict=True))
     points = grid(len(members), width, max(problem.neuron_spacing, 0.65))
+    points = [(x * (1 + wide), y * (1 + 2 * high)) for x, y in points]
     return ComponentLayout({m: (snap(x), snap(y)) for m, (x, y) in zip(members, points, strict=True)})

@@ -12,7 +12,8 @@ from neurovis_layouts.layered.parts import Part
 from neurovis_layouts.routing.ends import Key
 from neurovis_spec.layout.frames import PAD, PAD_FRAME, PAD_ROUTE, TITLE
 from neurovis_spec.layout.geometry import Rect, sampled
-from neurovis_spec.layout.model import GRID, Direction, Point, Route
+from neurovis_spec.layout.labels import widened
+from neurovis_spec.layout.model import GRID, Direction, Point, Route, Side
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,12 +30,16 @@ class Drawing:
     #: its coordinates are given by pins, so that its origin means something
     fixed: bool = False
     direction: Direction = "down"
+    #: on which side the label of each neuron stands, None where its disc holds it, and what labels cover
+    sides: tuple[Side | None, ...] = ()
+    labels: tuple[Rect, ...] = ()
+    #: how wide the title of its frame is
+    title: float = 0.0
 
     def rect(self) -> Rect:
         """The frame around all of it."""
-        return around(
-            self.places, self.routes.values(), [rect for _, rect in (*self.frames, *self.boxes)], self.direction
-        )
+        frames = [rect for _, rect in (*self.frames, *self.boxes)]
+        return around(self.places, self.routes.values(), frames, self.direction, self.labels, self.title)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,16 +64,26 @@ class FrameMove:
 
 
 def around(
-    places: Iterable[Point], routes: Iterable[Route], frames: Sequence[Rect], direction: Direction = "down"
+    places: Iterable[Point],
+    routes: Iterable[Route],
+    frames: Sequence[Rect],
+    direction: Direction = "down",
+    labels: Sequence[Rect] = (),
+    title: float = 0.0,
 ) -> Rect:
-    """The frame around neurons, routes and frames: on the grid, so that it moves exactly. There is room for the title
-    where the picture has its top: across the direction on both sides, since the frame may be turned round."""
+    """The frame around neurons, routes, frames and labels: on the grid, so that it moves exactly. There is room for the
+    ``title``, so wide, where the picture has its top: across the direction on both sides, since the frame may be turned
+    round."""
     points = list(places)
     line = [point for route in routes for point in sampled(route, 0.3)]
     x0 = min([x - PAD for x, _ in points] + [x - PAD_ROUTE for x, _ in line] + [r[0] - PAD_FRAME for r in frames])
     x1 = max([x + PAD for x, _ in points] + [x + PAD_ROUTE for x, _ in line] + [r[2] + PAD_FRAME for r in frames])
     y0 = min([y - PAD for _, y in points] + [y - PAD_ROUTE for _, y in line] + [r[1] - PAD_FRAME for r in frames])
     y1 = max([y + PAD for _, y in points] + [y + PAD_ROUTE for _, y in line] + [r[3] + PAD_FRAME for r in frames])
+    if labels:
+        x0, y0 = min(x0, *(r[0] for r in labels)), min(y0, *(r[1] for r in labels))
+        x1, y1 = max(x1, *(r[2] for r in labels)), max(y1, *(r[3] for r in labels))
+    x0, y0, x1, y1 = entitled((x0, y0, x1, y1), title, direction)
     match direction:
         case "down":
             y0 -= TITLE
@@ -77,6 +92,14 @@ def around(
         case "right" | "left":
             x0, x1 = x0 - TITLE, x1 + TITLE
     return _down(x0), _down(y0), _up(x1), _up(y1)
+
+
+def entitled(rect: Rect, title: float, direction: Direction) -> Rect:
+    """A frame wide enough for its title in the picture."""
+    if direction in ("down", "up"):
+        return widened(rect, title)
+    y0, x0, y1, x1 = widened((rect[1], rect[0], rect[3], rect[2]), title)
+    return x0, y0, x1, y1
 
 
 def _down(value: float) -> float:

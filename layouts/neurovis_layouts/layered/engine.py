@@ -33,6 +33,7 @@ def drawn(problem: LayoutProblem, engine: str) -> Layout:
             edge.name: tuple(to_picture(point, problem.direction) for point in drawing.routes[key])
             for edge, key in zip(problem.edges, keys_of(problem.edges), strict=True)
         },
+        {name: side for name, side in zip(problem.neurons, drawing.sides, strict=True) if side is not None},
     )
 
 

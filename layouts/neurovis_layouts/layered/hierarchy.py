@@ -12,8 +12,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 
+from neurovis_layouts.label_room import covered, flipped, roomy, sides_of
 from neurovis_layouts.layered.component_layout import ComponentLayout, planned
-from neurovis_layouts.layered.drawing import Drawing, FrameMove, Piece
+from neurovis_layouts.layered.drawing import Drawing, FrameMove, Piece, entitled
 from neurovis_layouts.layered.frame_routing import linked
 from neurovis_layouts.layered.mirror_units import arranged_on_axis, symmetric_units
 from neurovis_layouts.layered.page_plan import facing, in_direction, parts_by_cell
@@ -23,9 +24,10 @@ from neurovis_layouts.layered.same_rank import bonded
 from neurovis_layouts.layered.templates import Book, restricted
 from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.routing.ends import Key, keys_of
-from neurovis_spec.layout.frames import BOX_DOWN
-from neurovis_spec.layout.geometry import Rect, distance, snap
-from neurovis_spec.layout.model import Direction, LayoutMirror, LayoutProblem, Point, Route
+from neurovis_spec.layout.frames import BOX_DOWN, SLACK
+from neurovis_spec.layout.geometry import Rect, bounds, distance, meet, padded, snap, united
+from neurovis_spec.layout.labels import BOX_WEIGHT, title_room
+from neurovis_spec.layout.model import RADIUS, Direction, LayoutMirror, LayoutProblem, Point, Route, Side
 
 #: What a module pins gives way to pins closer than this.
 _OFF = 0.75
@@ -103,13 +105,13 @@ class Composer:
         while True:
             parts = parts_of(problem, frames, pair)
             standing = self._attempt(problem, parts, pair, known)
-            entered = {i for i in loose - frames if standing.entered(problem.boxes[i][1])}
+            entered = {i for i in loose - frames if standing.entered(i, problem.boxes[i][1])}
             if not entered:
                 return standing.joined(problem, pair, routed)
             columns = columns_of(problem, parts, loose - frames) if not pair else frozenset()
             if entered <= columns:
                 standing = self._attempt(problem, parts, pair, known, columns)
-                if not any(standing.entered(problem.boxes[i][1]) for i in loose - frames):
+                if not any(standing.entered(i, problem.boxes[i][1]) for i in loose - frames):
                     return standing.joined(problem, pair, routed)
             frames |= entered
 
@@ -134,7 +136,7 @@ class Composer:
         for piece in pieces:
             if piece.part.family:
                 families.setdefault((piece.part.family, piece.part.kind), []).append(min(piece.part.members))
-        units, bonds = bonded(problem, units, pair, list(families.values()))
+        units, bonds = bonded(problem, _spread(problem, units), pair, list(families.values()))
         # a ring or a line of which a box holds some alone can be in no strip of its own
         columns = {box for box in columns if _whole(units, problem.boxes[box][1])}
         plan = planned(problem, units, bonds, pair, columns)
@@ -255,6 +257,7 @@ def _boxed(problem: LayoutProblem, part: Part, pair: Mapping[int, int]) -> Layou
     return replace(
         restricted(problem, part.members),
         edges=tuple(replace(e, source=a, target=b) for a, b, e in edges),
+        title=title_room(problem.boxes[part.box][0], BOX_WEIGHT) if part.box >= 0 else 0.0,
         entries=tuple(sorted(place[m] for m in driven - drives if m in place)),
         exits=tuple(sorted(place[m] for m in drives - driven if m in place)),
         mirrors=(LayoutMirror(-1, pairs),) if pairs else (),
@@ -274,6 +277,11 @@ class _Standing:
     frames: tuple[tuple[tuple[int, ...], Rect], ...]
     #: boxes that are no frames
     boxes: tuple[tuple[tuple[int, ...], Rect], ...]
+    #: the line round the neurons of each of the problem's boxes; where labels stand
+    lined: Sequence[Rect]
+    #: where labels stand, and what they cover with the air that a frame leaves them
+    sides: Sequence[Side | None]
+    labels: Mapping[int, Rect]
 
     @classmethod
     def of(
@@ -286,27 +294,41 @@ class _Standing:
     ) -> _Standing:
         """What has settled, with its frames."""
         places = rests.places
+        sides = [plan.sides.get(i, side) for i, side in enumerate(sides_of(problem))]
+        for piece, move in rests.pieces:
+            for member, side in zip(piece.part.members, piece.drawing.sides, strict=True):
+                sides[member] = flipped(side, problem.direction) if side and move.flip else side
+        lined = [_box(problem, places, sides, name, own) for name, own in problem.boxes]
         frames: list[tuple[tuple[int, ...], Rect]] = []
         for piece, move in rests.pieces:
             part = piece.part
             frames += [(tuple(part.members[m] for m in own), move.rect(rect)) for own, rect in piece.drawing.frames]
             if part.module >= 0 or part.box >= 0:
                 frames.append((part.members, move.rect(piece.rect)))
-        frames += [(problem.boxes[i][1], _box(places, problem.boxes[i][1])) for i in sorted(columns)]
+        frames += [(problem.boxes[i][1], lined[i]) for i in sorted(columns)]
         boxes = [(own, move.rect(rect)) for own, move, rect in _boxes_within(rests)]
         done = {frozenset(own) for own, _ in (*frames, *boxes)}
-        boxes += [(own, _box(places, own)) for _, own in problem.boxes if frozenset(own) not in done]
-        return cls(plan, rests, units, tuple(frames), tuple(boxes))
+        boxes += [(own, lined[i]) for i, (_, own) in enumerate(problem.boxes) if frozenset(own) not in done]
+        return cls(
+            plan,
+            rests,
+            units,
+            tuple(frames),
+            tuple(boxes),
+            lined,
+            sides,
+            covered(problem, places, sides, range(len(places))),
+        )
 
-    def entered(self, members: Sequence[int]) -> bool:
-        """Whether a neuron stands, or a frame reaches, where the line round these neurons is drawn."""
-        own, places = set(members), self.rests.places
-        x0, y0, x1, y1 = _box(places, members)
+    def entered(self, box: int, members: Sequence[int]) -> bool:
+        """Whether a disc or a label stands, or a frame reaches, where the line round the neurons of a box is drawn."""
+        own, places, line = set(members), self.rests.places, self.lined[box]
+        x0, y0, x1, y1 = padded(line, RADIUS - SLACK)
         if any(x0 < x < x1 and y0 < y < y1 for i, (x, y) in enumerate(places) if i not in own):
             return True
-        return any(
-            not own & set(inside) and r[0] < x1 and x0 < r[2] and r[1] < y1 and y0 < r[3] for inside, r in self.frames
-        )
+        if any(meet(line, rect) for i, rect in self.labels.items() if i not in own):
+            return True
+        return any(not own & set(inside) and meet(line, rect) for inside, rect in self.frames)
 
     def joined(self, problem: LayoutProblem, pair: Mapping[int, int], routed: bool) -> Drawing:
         """Neurons, what is within frames, and, where they are to be ``routed``, the connections between them."""
@@ -329,7 +351,11 @@ class _Standing:
             )
         axis = self.rests.axis if pair else None
         fixed = bool(problem.pins)
-        return Drawing(tuple(places), routes, self.frames, self.boxes, axis, fixed, direction=problem.direction)
+        labels = tuple(self.labels.values())
+        return Drawing(
+            tuple(places), routes, self.frames, self.boxes, axis, fixed, problem.direction, tuple(self.sides), labels,
+            problem.title,
+        )  # fmt: skip
 
 
 def _boxes_within(rests: Settled) -> Iterator[tuple[tuple[int, ...], FrameMove, Rect]]:
@@ -338,9 +364,25 @@ def _boxes_within(rests: Settled) -> Iterator[tuple[tuple[int, ...], FrameMove, 
             yield tuple(piece.part.members[m] for m in own), move, rect
 
 
-def _box(places: Sequence[Point], members: Sequence[int]) -> Rect:
-    xs, ys = [places[m][0] for m in members], [places[m][1] for m in members]
-    return snap(min(xs) - BOX_DOWN), snap(min(ys) - BOX_DOWN), snap(max(xs) + BOX_DOWN), snap(max(ys) + BOX_DOWN)
+def _box(
+    problem: LayoutProblem, places: Sequence[Point], sides: Sequence[Side | None], name: str, members: Sequence[int]
+) -> Rect:
+    rect = padded(bounds([places[m] for m in members]), BOX_DOWN)
+    rect = united([rect, *covered(problem, places, sides, members).values()])
+    x0, y0, x1, y1 = entitled(rect, title_room(name, BOX_WEIGHT), problem.direction)
+    return snap(x0), snap(y0), snap(x1), snap(y1)
+
+
+def _spread(problem: LayoutProblem, units: Sequence[Unit]) -> list[Unit]:
+    """The units, blocks with room for the labels of their neurons."""
+    sides = sides_of(problem)
+    result: list[Unit] = []
+    for unit in units:
+        if unit.places is not None and unit.reach is None and any(sides[m] is not None for m in unit.members):
+            grown = roomy(problem, dict(zip(unit.members, unit.places, strict=True)), sides)
+            unit = replace(unit, places=tuple((snap(grown[m][0]), snap(grown[m][1])) for m in unit.members))
+        result.append(unit)
+    return result
 
 
 def _whole(units: Sequence[Unit], members: Sequence[int]) -> bool:

@@ -12,8 +12,9 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
+from neurovis_layouts.label_room import excess, sides_of
 from neurovis_layouts.layered.units import Unit
-from neurovis_spec.layout.model import LayoutProblem
+from neurovis_spec.layout.model import LayoutProblem, Point, Side
 
 #: Passages in all; beyond it the longest connections get none.
 _MOST_PASSAGES = 60_000
@@ -25,8 +26,9 @@ Ends = tuple[int, float, int, float]
 @dataclass(frozen=True, slots=True)
 class Node:
     """Something in a rank. ``members`` with their offsets; none for a passage. ``reach`` is how far centres lie from
-    its middle, across and along; ``kin`` is shared by neurons of a group that keep their order; ``lift`` is how far the
-    middle stands behind the line of the rank; ``framed`` says that nothing may come within its reach."""
+    its middle, across and along, and how much farther a label beside its disc; ``kin`` is shared by neurons of a group
+    that keep their order; ``lift`` is how far the middle stands behind the line of the rank; ``framed`` says that
+    nothing may come within its reach."""
 
     rank: int
     members: tuple[tuple[int, float, float], ...] = ()
@@ -80,8 +82,13 @@ def levels_of(
     boxes = {m: number for number, (_, members) in enumerate(problem.boxes) for m in reversed(members)}
     boxes.update({m: number for number in sorted(columns) for m in problem.boxes[number][1]})
     groups = {m: number for number, group in enumerate(problem.groups) for m in group.members}
+    sides = sides_of(problem)
+    paired = {m for mirror in problem.mirrors for pair in mirror.pairs for m in pair}
+    on_axis = {m for m in range(len(problem.neurons)) if problem.labels and problem.mirrors and m not in paired}
     for unit, level in sorted(zip(units, rank, strict=True), key=lambda pair: min(pair[0].members)):
-        for node in _nodes(unit, level, boxes, groups):
+        for node in _nodes(problem, unit, level, boxes, groups):
+            if len(node.members) == 1 and node.reach[0] and not node.framed and node.members[0][0] not in on_axis:
+                node = _aside(node, sides[node.members[0][0]])
             index = _add(levels, node)
             where.update({member: (index, dx) for member, dx, _ in node.members})
     spans: list[tuple[int, int]] = []
@@ -106,20 +113,36 @@ def levels_of(
     return levels
 
 
-def _nodes(unit: Unit, rank: int, boxes: dict[int, int], groups: dict[int, int]) -> list[Node]:
+def _nodes(problem: LayoutProblem, unit: Unit, rank: int, boxes: dict[int, int], groups: dict[int, int]) -> list[Node]:
     if unit.places is None:
         # a group keeps its order where it shares a rank; of others only the names have something in common
         size = Counter(groups.get(m, -1) for m in unit.members)
         kin = {m: groups[m] if size[groups.get(m, -1)] > 1 and m in groups else -1 for m in unit.members}
-        return [Node(rank, ((m, 0.0, 0.0),), (0.0, 0.0), kin[m], boxes.get(m, -1), unit.lift) for m in unit.members]
+        return [
+            Node(rank, ((m, 0.0, 0.0),), excess(problem, m), kin[m], boxes.get(m, -1), unit.lift) for m in unit.members
+        ]
     members = tuple((m, dx, dy) for m, (dx, dy) in zip(unit.members, unit.places, strict=True))
-    reach = unit.reach or (max(abs(dx) for _, dx, _ in members), max(abs(dy) for _, _, dy in members))
+    reach = unit.reach or _reach(problem, members)
     shared = {boxes.get(m, -1) for m in unit.members}
     return [
         Node(
             rank, members, reach, unit.kin, shared.pop() if len(shared) == 1 else -1, unit.lift, unit.reach is not None
         )
     ]
+
+
+def _aside(node: Node, side: Side | None) -> Node:
+    """A node of one neuron with room for its label on one side alone: the neuron is off the middle."""
+    (neuron, _, dy), half = node.members[0], node.reach[0] / 2
+    return replace(node, members=((neuron, half if side == "left" else -half, dy),), reach=(half, node.reach[1]))
+
+
+def _reach(problem: LayoutProblem, members: Sequence[tuple[int, float, float]]) -> Point:
+    """How far a block reaches from its middle."""
+    more = [excess(problem, m) for m, _, _ in members]
+    across = (abs(dx) + wide for (_, dx, _), (wide, _) in zip(members, more, strict=True))
+    along = (abs(dy) + high for (_, _, dy), (_, high) in zip(members, more, strict=True))
+    return max(across), max(along)
 
 
 def _add(levels: Levels, node: Node) -> int:

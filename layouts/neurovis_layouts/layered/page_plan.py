@@ -247,6 +247,7 @@ def in_direction(drawing: Drawing, of: Direction, frame: Direction) -> Drawing:
         routes={key: tuple(map(point, route)) for key, route in drawing.routes.items()},
         frames=tuple((own, rect(r)) for own, r in drawing.frames),
         boxes=tuple((own, rect(r)) for own, r in drawing.boxes),
+        labels=tuple(map(rect, drawing.labels)),
         axis=drawing.axis if of == _OPPOSITE[frame] else None,
         direction=frame,
     )

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from neurovis_layouts.isotonic import spread
 from neurovis_layouts.layered.box_columns import Strips
-from neurovis_layouts.layered.levels import Levels, Segment
+from neurovis_layouts.layered.levels import Levels, Node, Segment
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import Point
 
@@ -92,9 +92,14 @@ def _gap(levels: Levels, a: int, b: int, spacing: float) -> float:
         return _BESIDE_PASSAGE
     if not first.members or not second.members:
         return between + _BESIDE_DISC
-    if (first.reach[0] or second.reach[0]) and not (first.framed and second.framed):
+    if (_rigid(first) or _rigid(second)) and not (first.framed and second.framed):
         between += 0.5 * spacing
     return between + spacing + (_BETWEEN_BOXES if first.box != second.box else 0.0)
+
+
+def _rigid(node: Node) -> bool:
+    """Whether a node is a block or a frame, as wide as it is."""
+    return node.reach[0] > 0 and (node.framed or len(node.members) > 1)
 
 
 def _across(levels: Levels, order: Sequence[Sequence[int]], gaps: Sequence[Sequence[float]]) -> list[float]:

@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import TypeAlias
 
 from neurovis_layouts.routing.ends import Key, keys_of
+from neurovis_spec.layout.labels import instance_titles
 from neurovis_spec.layout.model import (
     LayoutCell,
     LayoutEdge,
@@ -160,6 +161,7 @@ class Book:
             for neuron, point in modules[number].pins.items():
                 pins.setdefault(place[neuron], point)
         part = restricted(self._problem, modules[copies[0]].members, copies[0])
+        titles = instance_titles((module.path, module.module) for module in modules)
         return replace(
             part,
             edges=tuple(LayoutEdge(f"{k}", k[0], k[1], delay) for k, delay in sorted(edges.items())),
@@ -170,6 +172,7 @@ class Book:
             align=tuple(sorted(lines)),
             plan=tuple(sorted(cells, key=lambda cell: cell.members)),
             pins=dict(sorted(pins.items())),
+            title=max(titles[number] for number in copies),
         )
 
 
@@ -217,6 +220,7 @@ def restricted(problem: LayoutProblem, members: Sequence[int], within: int = -1)
         rank_spacing=problem.rank_spacing,
         modules=modules,
         effort=problem.effort,
+        labels=tuple(problem.labels[n] for n in members) if problem.labels else (),
     )
 
 

@@ -1,0 +1,112 @@
+"""Label room: what labels that discs cannot hold take up, in the frame of an engine (x across, y along).
+
+In: a problem whose ``labels`` say how large these are. Out: on which side of its disc each stands, what it covers
+there, how much farther apart neurons have to be for it. Where signals run down or up, labels stand at the sides; where
+they run across, below and above. Those of mirror images stand on the outer sides, all others on one side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from neurovis_layouts.frame import from_picture, to_picture
+from neurovis_spec.layout.frames import PAD_LABEL
+from neurovis_spec.layout.geometry import Rect, bounds, meet, padded
+from neurovis_spec.layout.labels import label_rect
+from neurovis_spec.layout.model import RADIUS, Direction, LayoutProblem, Point, Side
+
+#: From a label to the disc or the label beside it.
+AIR = 0.2
+#: What is free around a disc without a label, to either side and along.
+_HALF, _ALONG = 0.5, 0.65
+#: In how many steps a formation grows until its labels have room, and how much with each.
+_STEPS, _STEP = 40, 1.125
+
+
+def sides_of(problem: LayoutProblem) -> tuple[Side | None, ...]:
+    """On which side of its disc each label stands; None where the disc holds it."""
+    if not problem.labels:
+        return (None,) * len(problem.neurons)
+    outer = flipped(_usual(problem.direction), problem.direction)
+    first = {a for mirror in problem.mirrors for a, b in mirror.pairs if a != b}
+    return tuple(
+        None if not wide else outer if i in first else _usual(problem.direction)
+        for i, (wide, _) in enumerate(problem.labels)
+    )
+
+
+def _usual(direction: Direction) -> Side:
+    return "right" if direction in ("down", "up") else "below"
+
+
+def flipped(side: Side, direction: Direction) -> Side:
+    """A side after a reflection across the direction."""
+    if direction in ("down", "up"):
+        return "left" if side == "right" else "right" if side == "left" else side
+    return "above" if side == "below" else "below" if side == "above" else side
+
+
+def rect_of(room: Point, side: Side, direction: Direction, place: Point = (0.0, 0.0)) -> Rect:
+    """What a label of this width and height covers, of a neuron at a place."""
+    rect = label_rect(to_picture(place, direction), room, side)
+    return bounds([from_picture((rect[0], rect[1]), direction), from_picture((rect[2], rect[3]), direction)])
+
+
+def at_ends(problem: LayoutProblem, first: Iterable[int], last: Iterable[int]) -> dict[int, Side]:
+    """The sides of labels of neurons in the first rank that nothing drives, and in the last that drive nothing: where
+    signals run across, nothing is in the way there."""
+    if problem.direction in ("down", "up") or not problem.labels:
+        return {}
+    driven = {edge.target for edge in problem.edges if edge.source != edge.target}
+    driving = {edge.source for edge in problem.edges if edge.source != edge.target}
+    before: Side = "left" if problem.direction == "right" else "right"
+    behind: Side = "right" if problem.direction == "right" else "left"
+    ends: dict[int, Side] = {m: before for m in first if problem.labels[m][0] and m not in driven}
+    return ends | {m: behind for m in last if problem.labels[m][0] and m not in driving and m not in ends}
+
+
+def excess(problem: LayoutProblem, neuron: int) -> Point:
+    """How much more room than its disc has a neuron needs for its label: across, on the side where this stands, and
+    along, before it and behind it."""
+    if not problem.labels or not problem.labels[neuron][0]:
+        return 0.0, 0.0
+    _, _, across, along = rect_of(problem.labels[neuron], _usual(problem.direction), problem.direction)
+    if problem.direction in ("down", "up"):
+        return max(0.0, across + AIR - _HALF), 0.0
+    return 0.0, max(0.0, along + AIR / 2 - _ALONG)
+
+
+def covered(
+    problem: LayoutProblem,
+    places: Sequence[Point] | Mapping[int, Point],
+    sides: Sequence[Side | None] | Mapping[int, Side | None],
+    among: Iterable[int],
+) -> dict[int, Rect]:
+    """What the labels of these neurons cover, with the air that a frame leaves around them."""
+    beside = [(i, side) for i in among if (side := sides[i]) is not None]
+    return {i: padded(rect_of(problem.labels[i], side, problem.direction, places[i]), PAD_LABEL) for i, side in beside}
+
+
+def roomy(problem: LayoutProblem, places: Mapping[int, Point], sides: Sequence[Side | None]) -> dict[int, Point]:
+    """Places of a formation, those of its neurons farther apart in the direction of reading where labels would lie on
+    discs or on each other otherwise."""
+    labelled = {i: side for i in places if (side := sides[i]) is not None}
+    if not labelled:
+        return dict(places)
+    level = problem.direction in ("right", "left")
+    factor = 1.0
+    for _ in range(_STEPS):
+        grown = {i: (x, y * factor) if level else (x * factor, y) for i, (x, y) in places.items()}
+        rects = {i: rect_of(problem.labels[i], s, problem.direction, grown[i]) for i, s in labelled.items()}
+        if not any(_met(rect, i, grown, rects) for i, rect in rects.items()):
+            return grown
+        factor *= _STEP
+    return grown
+
+
+def _met(rect: Rect, own: int, places: Mapping[int, Point], rects: Mapping[int, Rect]) -> bool:
+    """Whether a label comes near another neuron's disc or label."""
+    discs = ((x - RADIUS, y - RADIUS, x + RADIUS, y + RADIUS) for i, (x, y) in places.items() if i != own)
+    return any(meet(rect, disc, AIR / 2) for disc in discs) or any(
+        meet(rect, other, AIR / 2) for i, other in rects.items() if i != own
+    )

@@ -1,0 +1,208 @@
+"""Labels and titles that do not fit find room in the layout, and scenes put them there."""
+
+from __future__ import annotations
+
+import math
+import random
+from itertools import combinations
+
+import pytest
+
+import neurovis_spec as nv
+from neurovis_spec import pipeline
+from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.layout import Layout
+from neurovis_spec.layout.file import dump, parse
+from neurovis_spec.layout.geometry import Rect, meet
+from neurovis_spec.layout.labels import WIDEST, label_rect
+from neurovis_spec.layout.metrics import metrics
+from neurovis_spec.layout.problem import problem_of
+from neurovis_spec.scene import Disc, Rectangle, Text
+from neurovis_spec.scene.texts import width
+
+WORDS = [
+    "left",
+    "front",
+    "coxa-trochanter",
+    "femur-tibia",
+    "thorax-coxa",
+    "load",
+    "sensor",
+    "of the ground",
+    "joint",
+    "x",
+]
+
+
+def label(chooser: random.Random) -> str:
+    return " ".join(chooser.sample(WORDS, chooser.choice([1, 2, 2, 3])))
+
+
+def generated(seed: int) -> str:
+    """A network with long names: in boxes, in instances, in mirrored halves, in any direction."""
+    chooser = random.Random(seed)
+    names = [f"N{i}" for i in range(chooser.choice([5, 8, 12]))]
+    box = {name: f', box: "{label(chooser)} {i % 3}"' for i, name in enumerate(names) if chooser.random() < 0.4}
+    lines = ["neurovis: 1", "name: generated", "modules:", "  limb:", "    neurons:"]
+    lines += [f'      {name}: {{label: "{label(chooser)}"}}' for name in "abc"]
+    lines += ["    connections: {a -> b: 1, a -> c: 1}", "neurons:"]
+    lines += [f'  {name}: {{label: "{label(chooser)}"{box.get(name, "")}}}' for name in names]
+    limbs = [f"{label(chooser).replace(' ', '_').replace('-', '_')}_{side}" for side in ("l", "r")]
+    lines += ["instances:", *(f"  {limb}: {{module: limb}}" for limb in limbs), "connections:"]
+    lines += [f"  N0 -> {limb}.a: 1" for limb in limbs]
+    lines += [f"  {names[chooser.randrange(i)]} -> {name}: 1" for i, name in enumerate(names) if i]
+    lines += [f"layout: {{direction: {chooser.choice(['down', 'right', 'up', 'left'])}"]
+    lines[-1] += f", mirror: [[{limbs[0]}, {limbs[1]}]]}}" if chooser.random() < 0.5 else "}"
+    return "\n".join(lines) + "\n"
+
+
+def overlaps(network: CompiledNetwork, layout: Layout) -> float:
+    return metrics(layout, problem_of(network.network)).get("label_overlaps", 0)
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_no_label_lies_on_anything_in_a_layered_layout(seed: int) -> None:
+    network = nv.compile_text(generated(seed))
+    assert any(wide for wide, _ in problem_of(network.network).labels)
+    assert overlaps(network, network.layout("layered").value) == 0
+
+
+def shown(network: CompiledNetwork) -> tuple[dict[str, Text], dict[str, Disc], dict[str, Text], dict[str, Rectangle]]:
+    """The labels and the discs by neuron, the titles and the frames by path, of a picture."""
+    layout, snapshot = network.layout().value, network.run(2).snapshot(1)
+    scene = pipeline.picture(network.network, layout, snapshot, network.gains, network.network.render)
+    labels: dict[str, Text] = {}
+    discs: dict[str, Disc] = {}
+    titles: dict[str, Text] = {}
+    frames: dict[str, Rectangle] = {}
+    for group in scene.groups:
+        for shape in group.shapes:
+            if isinstance(shape, Text) and "neuron" in group.data:
+                labels[group.data["neuron"]] = shape
+            elif isinstance(shape, Disc) and "neuron" in group.data:
+                discs[group.data["neuron"]] = shape
+            elif isinstance(shape, Text) and group.id.startswith("title:"):
+                titles[group.id.removeprefix("title:")] = shape
+            elif isinstance(shape, Rectangle) and group.id.startswith(("box:", "instance:")):
+                frames[group.id.partition(":")[2]] = shape
+    return labels, discs, titles, frames
+
+
+def covers(text: Text) -> Rect:
+    wide, (x, y) = width(text.text, text.size, text.weight, text.subscript), text.point
+    left = x - {"start": 0.0, "middle": wide / 2, "end": wide}[text.anchor]
+    return left, y - 0.78 * text.size, left + wide, y + 0.22 * text.size
+
+
+def around(frame: Rectangle) -> Rect:
+    (x, y), wide, high = frame.corner, frame.width, frame.height
+    return x, y, x + wide, y + high
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_labels_and_titles_are_drawn_where_they_have_room(seed: int) -> None:
+    text = generated(seed) + "render: {size: [4000, 4000], title: false, legend: false}\n"
+    network = nv.compile_text(text)
+    labels, discs, titles, frames = shown(network)
+    for name, words in zip(network.network.neurons.names, network.network.neurons.labels, strict=True):
+        assert labels[name].text == words if width(words, 1.0, 600) <= WIDEST else "…" in labels[name].text
+    texts = [*labels.values(), *titles.values()]
+    assert not [(a.text, b.text) for a, b in combinations(texts, 2) if meet(covers(a), covers(b))]
+    for label in [label for label in labels.values() if not label.on_disc] + [*titles.values()]:
+        x0, y0, x1, y1 = covers(label)
+        for disc in discs.values():
+            (x, y), reach = disc.centre, disc.radius
+            assert math.hypot(max(x0 - x, x - x1, 0), max(y0 - y, y - y1, 0)) > reach
+    for path, title in titles.items():
+        x0, y0, x1, y1 = covers(title)
+        left, top, right, bottom = around(frames[path])
+        assert min(x0 - left, right - x1, y0 - top, bottom - y1) > 0
+
+
+def corner(title: Text, frame: Rectangle) -> tuple[bool, bool]:
+    x0, y0, x1, y1 = covers(title)
+    left, top, right, bottom = around(frame)
+    return x0 - left < right - x1 + 1e-6, y0 - top < bottom - y1
+
+
+@pytest.mark.parametrize("direction", ["down", "right"])
+def test_titles_of_all_boxes_stand_in_one_corner_in_mirrored_pictures_too(direction: str) -> None:
+    network = nv.compile_text(f"""
+neurovis: 1
+name: mirrored
+modules:
+  leg:
+    neurons: {{A: {{count: 3, box: upper}}, B: {{count: 2, box: lower}}, C: {{}}}}
+    connections: {{A -> B: {{pattern: all_to_all}}, B -> C: 1}}
+neurons: {{P: {{count: 2, box: brain}}}}
+instances: {{left: {{module: leg}}, right: {{module: leg}}}}
+connections: {{P1 -> left.A: 1, P2 -> right.A: 1}}
+layout: {{direction: {direction}, mirror: [[left, right], [P1, P2]]}}
+""")
+    _, _, titles, frames = shown(network)
+    assert set(titles) == set(frames) == {
+        "left", "right", "left.upper", "left.lower", "right.upper", "right.lower", "brain"
+    }  # fmt: skip
+    wide = {path for path in titles if around(frames[path])[2] - around(frames[path])[0] > 100}
+    assert len({corner(titles[path], frames[path]) for path in wide}) == 1
+    assert len({title.size for title in titles.values()}) == 1
+
+
+LEGS = """
+neurovis: 1
+name: legs
+modules: {leg: {neurons: {A: {label: "coxa-trochanter {number}"}, B: {}}, connections: {A -> B: 1}}}
+neurons: {P: {}}
+instances: {left: {module: leg, count: 2}, right: {module: leg, count: 2}}
+connections: {P -> left.A: 1, P -> right.A: 1}
+layout: {mirror: [[left, right]]}
+"""
+
+
+def test_instances_of_one_make_and_mirror_images_keep_room_alike() -> None:
+    network = nv.compile_text(LEGS)
+    layout, problem = network.layout().value, problem_of(network.network)
+    rooms = {name: room for name, room in zip(problem.neurons, problem.labels, strict=True) if room[0]}
+    assert set(rooms) == {"left1.A", "left2.A", "right1.A", "right2.A"}
+    assert len(set(rooms.values())) == 1
+    assert {layout.labels[f"left{n}.A"] for n in (1, 2)} == {"right"}
+    assert {layout.labels[f"right{n}.A"] for n in (1, 2)} == {"left"}
+    assert metrics(layout, problem)["symmetry"] == 1
+
+
+def test_short_names_and_numbers_take_no_room() -> None:
+    network = nv.compile_text(
+        "neurovis: 1\nname: x\nneurons: {A: {}, LongNameHere: {count: 9}}\nconnections: {A -> LongNameHere: 1}\n"
+    )
+    assert problem_of(network.network).labels == ()
+    assert network.layout().value.labels == {}
+
+
+def test_no_room_is_kept_where_labels_are_left_out() -> None:
+    assert problem_of(nv.compile_text(LEGS + "render: {labels: false}\n").network).labels == ()
+
+
+def test_a_layout_file_says_on_which_side_labels_stand() -> None:
+    layout = nv.compile_text(LEGS).layout().value
+    findings = Findings({})
+    assert parse(dump(layout), "legs.layout.yaml", findings) == layout
+    text = dump(layout).replace("left1.A: right\n", "left1.A: aside\n")
+    assert parse(text, "legs.layout.yaml", findings) is None
+    (found,) = findings.sorted()
+    assert (found.code, found.span.line) == ("wrong-type", text.count("\n", 0, text.index("aside")) + 1)
+
+
+def test_a_remembered_layout_keeps_its_sides() -> None:
+    before = nv.compile_text(LEGS).layout()
+    more = nv.compile_text(LEGS.replace("neurons: {P: {}}", 'neurons: {P: {}, Q: {label: "another long label"}}'))
+    after = more.layout(earlier=before.value)
+    assert after.value.positions["left1.A"] == before.value.positions["left1.A"]
+    assert after.value.labels == {**before.value.labels, "Q": after.value.labels["Q"]}
+
+
+def test_a_label_needs_no_more_room_than_it_has_beside_its_disc() -> None:
+    assert label_rect((0.0, 0.0), (1.0, 0.2), "right")[0] > 0.3
+    assert label_rect((0.0, 0.0), (1.0, 0.2), "left")[2] < -0.3
+    assert label_rect((0.0, 0.0), (1.0, 0.2), "below")[1] > 0.3
+    assert label_rect((0.0, 0.0), (1.0, 0.2), "above")[3] < -0.3
