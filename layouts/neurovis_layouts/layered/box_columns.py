@@ -126,7 +126,7 @@ def tied(levels: Levels, order: Sequence[Sequence[int]], columns: AbstractSet[in
         for r, (above, below) in enumerate(pairwise(own)):
             for a in above:
                 segments[r] += [Segment(a, 0.0, b, 0.0, _TIED / max(len(above), len(below))) for b in below]
-    return Levels(nodes, left, segments, levels.passages, levels.spines), left
+    return Levels(nodes, left, segments, levels.passages, levels.spines, levels.ends), left
 
 
 class Strips:

@@ -14,6 +14,7 @@ from itertools import pairwise
 
 from neurovis_layouts.formations import columns, grid
 from neurovis_layouts.label_room import at_ends, covered, excess, sides_of
+from neurovis_layouts.layered.bands import UNCUT, Bands, Wanted, banded
 from neurovis_layouts.layered.box_columns import straightened, tied, with_spines
 from neurovis_layouts.layered.components import components_of, packed
 from neurovis_layouts.layered.flips import turned
@@ -42,6 +43,10 @@ class ComponentLayout:
     turned: set[int] = field(default_factory=set)
     #: on which sides labels stand that do not stand on the usual one
     sides: dict[int, Side] = field(default_factory=dict)
+    #: at how many places the ranks of the largest component may be cut
+    cuts: int = 0
+    #: the corners of edges from band to band, which have no waypoints
+    cut: dict[int, Sequence[Point]] = field(default_factory=dict)
     #: how far the frames and the passages reach
     corners: list[Point] = field(default_factory=list)
 
@@ -60,6 +65,8 @@ class ComponentLayout:
         self.turned |= other.turned
         self.sides.update(other.sides)
         self.firm |= other.firm
+        self.cuts = max(self.cuts, other.cuts)
+        self.cut.update({i: [(x + dx, y + dy) for x, y in line] for i, line in other.cut.items()})
         for i, ways in other.ways.items():
             self.ways[i] = [Waypoint(way.x + dx, way.y + dy, way.half) for way in ways]
 
@@ -70,14 +77,16 @@ def planned(
     bonds: Sequence[int],
     pair: Mapping[int, int],
     columns: AbstractSet[int] = frozenset(),
+    wanted: Wanted = UNCUT,
 ) -> ComponentLayout:
     """All components laid out and packed; units without connections beside the last rank of the largest component.
 
     ``bonds`` are numbers that units of one rank share. With ``pair`` (mirror images, both ways) all is one component,
-    its axis at 0. ``columns`` are boxes to be drawn as such where that can be.
+    its axis at 0. ``columns`` are boxes to be drawn as such where that can be. The largest component stands in bands as
+    ``wanted`` where it can be cut, which no axis can.
     """
     if pair:
-        return _component(problem, units, bonds, (), range(len(problem.edges)), pair, frozenset())
+        return _component(problem, units, bonds, (), range(len(problem.edges)), pair, frozenset(), wanted)
     connected, alone = components_of(problem, units, bonds)
     largest = max(connected, key=lambda part: sum(len(units[u].members) for u in part), default=None)
     parts: list[ComponentLayout] = []
@@ -92,7 +101,9 @@ def planned(
     for k, part in enumerate(connected):
         guests = [units[u] for u in alone if few and hosts.get(u, largest) == part]
         own, tied = [units[u] for u in part], [bonds[u] for u in part]
-        parts.append(_component(problem, own, tied, guests, edges.get(k, []), {}, columns))
+        parts.append(
+            _component(problem, own, tied, guests, edges.get(k, []), {}, columns, wanted if part == largest else UNCUT)
+        )
     if alone and not (few and connected):
         parts.append(_unconnected(problem, [units[u] for u in alone]))
     plan = ComponentLayout()
@@ -123,6 +134,7 @@ def _component(
     edges: Sequence[int],
     pair: Mapping[int, int],
     columns: AbstractSet[int],
+    wanted: Wanted,
 ) -> ComponentLayout:
     everyone = [*units, *guests]
     here = {m for unit in units for m in unit.members}
@@ -171,6 +183,10 @@ def _component(
     plan.ways, whole = with_exits(problem, edges, levels, places, spans, folds, plan.ways)
     if whole and not crossings(levels, order):
         plan.firm |= whole
+    if not pair:
+        plan.cuts, found = banded(problem, levels, places, folds.ranks, wanted)
+        if wanted.bands > 1:
+            _in_bands(problem, plan, levels, found)
     return plan
 
 
@@ -178,6 +194,26 @@ def _singles(levels: Levels, rank: int) -> list[int]:
     """The neurons in a rank that are in no block and in no frame."""
     nodes = [levels.nodes[n] for n in levels.ranks[rank]]
     return [node.members[0][0] for node in nodes if len(node.members) == 1 and not node.framed]
+
+
+def _in_bands(problem: LayoutProblem, plan: ComponentLayout, levels: Levels, bands: Bands) -> None:
+    """Move what stands in each band there."""
+    shift = [bands.shifts[bands.band[node.rank]] for node in levels.nodes]
+    own = {m: shift[n] for n, node in enumerate(levels.nodes) for m, _, _ in node.members}
+    framed = [n for n, node in enumerate(levels.nodes) if node.framed for _ in range(2)]
+    plan.places.update({m: (x + own[m][0], y + own[m][1]) for m, (x, y) in plan.places.items()})
+    plan.corners = [(x + shift[n][0], y + shift[n][1]) for n, (x, y) in zip(framed, plan.corners, strict=True)]
+    plan.corners += [point for line in bands.ways.values() for point in line]
+    rank = {m: node.rank for node in levels.nodes for m, _, _ in node.members}
+    for i, line in bands.ways.items():
+        plan.cut[i] = line if rank[problem.edges[i].source] < rank[problem.edges[i].target] else line[::-1]
+    plan.firm -= plan.cut.keys()
+    plan.ways = {
+        i: [Waypoint(way.x + dx, way.y + dy, way.half) for way in ways]
+        for i, ways in plan.ways.items()
+        for dx, dy in (own[problem.edges[i].source],)
+        if i not in plan.cut
+    }
 
 
 def _passage(place: Point, before: float, behind: float) -> Waypoint:

@@ -73,4 +73,8 @@ def _turn(levels: Levels, flipped: AbstractSet[int]) -> Levels:
         ]
         for gap in levels.segments
     ]
-    return Levels(nodes, levels.ranks, segments, levels.passages, levels.spines)
+    ends = {
+        i: (upper, _offset(upper, a, flipped), lower, _offset(lower, b, flipped))
+        for i, (upper, a, lower, b) in levels.ends.items()
+    }
+    return Levels(nodes, levels.ranks, segments, levels.passages, levels.spines, ends)

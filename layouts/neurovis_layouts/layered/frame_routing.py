@@ -16,6 +16,8 @@ from neurovis_layouts.routing.arcs import Arcs, even
 from neurovis_layouts.routing.channel_routing import channels
 from neurovis_layouts.routing.corners import reflected
 from neurovis_layouts.routing.ends import Key
+from neurovis_layouts.routing.obstacles import REACH
+from neurovis_layouts.routing.rounded import rounded
 from neurovis_layouts.routing.route_cost import Judge
 from neurovis_layouts.routing.simplify_routes import MOST_EASED, eased, told_apart
 from neurovis_spec.layout.geometry import Rect, snap
@@ -45,18 +47,28 @@ def linked(
     firm: dict[int, list[Waypoint]] = {}
     lateral: dict[int, list[Waypoint]] = {}
     planned = _passing(problem, plan, rests)
+    begun = _cut(problem, links, plan, rests)
     if frames:
         gates = {k: planned[i] for k, i in enumerate(links) if i in planned}
         firm = {k: gates[k] for k, i in enumerate(links) if k in gates and i in plan.firm and not rests.moved}
-        lines = [*drawn, *(_through(rests.places, edges[k], line) for k, line in firm.items())]
-        free = {k: edge for k, edge in enumerate(edges) if k not in firm}
+        lines = [*drawn, *(_through(rests.places, edges[k], line) for k, line in firm.items()), *begun.values()]
+        free = {k: edge for k, edge in enumerate(edges) if k not in firm and k not in begun}
         ways, lateral = channels(free, rests.places, framed, gates, lines)
         ways.update(firm)
     else:
         ways = planned
     bowed = _bowed(edges, units)
     routes = route_all(
-        edges, rests.places, ways, bowed, lateral, frames=framed, drawn=drawn, ease=not firm, improve=not pair
+        edges,
+        rests.places,
+        ways,
+        bowed,
+        lateral,
+        frames=framed,
+        drawn=drawn,
+        begun=begun,
+        ease=not firm,
+        improve=not pair,
     )
     found = {keys[i]: tuple(_snapped(route)) for i, route in zip(links, routes, strict=True)}
     if not pair:
@@ -103,6 +115,37 @@ def _improved(
     better = eased(judge, free) if ease and len(routes) <= MOST_EASED else {}
     better.update(told_apart(judge, free))
     return {keys[i]: tuple(_snapped(judge.routes[i])) for i in mended | better.keys()}
+
+
+def _cut(problem: LayoutProblem, links: Sequence[int], plan: ComponentLayout, rests: Settled) -> dict[int, Route]:
+    """The routes from band to band, of edges whose ends stand where the plan has them; an end that has nothing between
+    it and the street is left straight for that."""
+    found: dict[int, Route] = {}
+    dx, dy = rests.shift
+    for k, i in enumerate(links):
+        own = problem.edges[i].source, problem.edges[i].target
+        if i not in plan.cut or not rests.moved.isdisjoint(own):
+            continue
+        line = [rests.places[own[0]], *((x + dx, y + dy) for x, y in plan.cut[i]), rests.places[own[1]]]
+        for _ in range(2):  # from either end
+            if not any(_beside(place, line[0], line[2][0]) for place in rests.places):
+                line = [line[0], _aslant(line), *line[3:]]
+            line.reverse()
+        found[k] = rounded(line, lambda _: True)
+    return found
+
+
+def _beside(place: Point, start: Point, street: float) -> bool:
+    """Whether something stands between a neuron and the street."""
+    low, high = sorted((start[0], street))
+    return low < place[0] < high and abs(place[1] - start[1]) < 2 * REACH
+
+
+def _aslant(line: Sequence[Point]) -> Point:
+    """Where a line meets that through its third and fourth points by half a right angle, no farther on than halfway."""
+    (x, y), turn, end = line[0], line[2], line[3]
+    far = min(abs(turn[0] - x), abs(end[1] - y) / 2)
+    return turn[0], y + (far if end[1] > y else -far)
 
 
 def _through(places: Sequence[Point], edge: LayoutEdge, line: Sequence[Waypoint]) -> Route:

@@ -13,6 +13,8 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 
 from neurovis_layouts.label_room import covered, flipped, roomy, sides_of
+from neurovis_layouts.layered.bands import FEW, Wanted
+from neurovis_layouts.layered.compact import NONE, WHOLE, Shape, ShapeKey, compact, may_be_folded
 from neurovis_layouts.layered.component_layout import ComponentLayout, planned
 from neurovis_layouts.layered.drawing import Drawing, FrameMove, Piece, entitled
 from neurovis_layouts.layered.frame_routing import linked
@@ -39,13 +41,25 @@ class Composer:
     def __init__(self, problem: LayoutProblem) -> None:
         """Raises LayoutRefusalError where a mirror pairs what cannot be mirror images."""
         self._book = Book(problem)
-        self._kinds: dict[tuple[int, Direction], Drawing] = {}
+        self._kinds: dict[tuple[int, Direction, ShapeKey], Drawing] = {}
+        self._shape = Shape()
+        self._wholes: dict[ShapeKey, _Standing] = {}
+        #: at how many places a kind of instance can be cut into bands
+        self._cuts: dict[int, int] = {}
 
     def whole(self, routed: bool = True) -> Drawing:
         """The drawing of the problem; without ``routed`` that of its neurons and frames alone, which stand where they
         do with it. Raises LayoutRefusalError for what cannot be met."""
         problem = self._book.whole()
-        return self.compose(replace(problem, pins=self._with_origins(problem)), routed)
+        problem = replace(problem, pins=self._with_origins(problem))
+        if may_be_folded(problem):
+            self._shape = compact(problem, self._in_shape, self._cuts)
+        return self.compose(problem, routed)
+
+    def _in_shape(self, problem: LayoutProblem, shape: Shape) -> Drawing:
+        """The drawing of the whole in a shape, without routes between its outermost frames."""
+        self._shape = shape
+        return self.compose(problem, False)
 
     def check_mirrors(self) -> None:
         """Raises LayoutRefusalError where an arrangement cannot be symmetric, in the problem or in a kind of instance,
@@ -88,31 +102,42 @@ class Composer:
 
     def kind(self, number: int, direction: Direction) -> Drawing:
         """The drawing of a kind of instance in a direction, in the frame of an engine that draws in it."""
-        key = number, direction
+        problem = self._book.problem_of(number)
+        key = number, direction, self._shape.of(number, problem)
         if key not in self._kinds:
-            self._kinds[key] = self.compose(replace(self._book.problem_of(number), direction=direction))
+            self._kinds[key] = self.compose(replace(problem, direction=direction), kind=number)
         return self._kinds[key]
 
-    def compose(self, problem: LayoutProblem, routed: bool = True) -> Drawing:
-        """The drawing of one problem, its modules named by their kinds; without ``routed`` no connection between its
-        frames has a route."""
+    def compose(self, problem: LayoutProblem, routed: bool = True, kind: int = WHOLE) -> Drawing:
+        """The drawing of one problem, that of a ``kind`` of instance or of the whole, its modules named by their kinds;
+        without ``routed`` no connection between its frames has a route."""
         pair = {a: b for mirror in problem.mirrors for one in mirror.pairs for a, b in (one, one[::-1])}
         if problem.plan:
             return self._on_page(problem, pair, routed)
+        key = self._shape.of(WHOLE, problem)
+        if kind == WHOLE and key in self._wholes:
+            return self._wholes[key].joined(problem, pair, routed)
+        standing = self._standing(problem, pair, kind)
+        if kind == WHOLE:
+            self._wholes[key] = standing
+        return standing.joined(problem, pair, routed)
+
+    def _standing(self, problem: LayoutProblem, pair: Mapping[int, int], kind: int) -> _Standing:
+        """Where everything stands, with those boxes as frames or columns that foreign neurons would stand in."""
         frames = firm(problem, pair)
         loose = {i for i in range(len(problem.boxes)) if i not in frames and may_be_frame(problem, i, pair)}
         known: dict[Part, Drawing] = {}
         while True:
             parts = parts_of(problem, frames, pair)
-            standing = self._attempt(problem, parts, pair, known)
+            standing = self._attempt(problem, parts, pair, known, kind)
             entered = {i for i in loose - frames if standing.entered(i, problem.boxes[i][1])}
             if not entered:
-                return standing.joined(problem, pair, routed)
+                return standing
             columns = columns_of(problem, parts, loose - frames) if not pair else frozenset()
             if entered <= columns:
-                standing = self._attempt(problem, parts, pair, known, columns)
+                standing = self._attempt(problem, parts, pair, known, kind, columns)
                 if not any(standing.entered(i, problem.boxes[i][1]) for i in loose - frames):
-                    return standing.joined(problem, pair, routed)
+                    return standing
             frames |= entered
 
     def _attempt(
@@ -121,6 +146,7 @@ class Composer:
         parts: Sequence[Part],
         pair: Mapping[int, int],
         known: dict[Part, Drawing],
+        kind: int,
         columns: AbstractSet[int] = frozenset(),
     ) -> _Standing:
         """Where everything stands with these parts; ``known`` are boxes that are drawn already."""
@@ -139,13 +165,18 @@ class Composer:
         units, bonds = bonded(problem, _spread(problem, units), pair, list(families.values()))
         # a ring or a line of which a box holds some alone can be in no strip of its own
         columns = {box for box in columns if _whole(units, problem.boxes[box][1])}
-        plan = planned(problem, units, bonds, pair, columns)
+        few = FEW if kind >= 0 or problem.modules else 1
+        wanted = Wanted(self._shape.bands.get(kind, 1), few)
+        plan = planned(problem, units, bonds, pair, columns, wanted)
+        self._cuts[kind] = plan.cuts
 
         def redraw(piece: Piece, pins: Mapping[int, Point]) -> Piece:
             inner = (
                 self._book.problem_of(piece.part.kind) if piece.part.kind >= 0 else _boxed(problem, piece.part, pair)
             )
-            return _as_piece(piece.part, self.compose(replace(inner, pins=_around_pins(piece.drawing, pins, inner))))
+            return _as_piece(
+                piece.part, self.compose(replace(inner, pins=_around_pins(piece.drawing, pins, inner)), kind=NONE)
+            )
 
         rests = settled(problem, plan, [_resting(plan, piece) for piece in pieces], pair, redraw)
         return _Standing.of(problem, plan, rests, units, columns)
@@ -161,7 +192,7 @@ class Composer:
                     drawing = drawn(parts[part.image_of], direction).drawing
                 else:
                     inner = self._inside(problem, part, direction, pair)
-                    drawing = inner if isinstance(inner, Drawing) else self.compose(inner)
+                    drawing = inner if isinstance(inner, Drawing) else self.compose(inner, kind=NONE)
                     drawing = in_direction(drawing, direction, problem.direction)
                 known[key] = _as_piece(part, drawing)
             return known[key]
@@ -169,7 +200,9 @@ class Composer:
         def redraw(piece: Piece, pins: Mapping[int, Point]) -> Piece:
             inner = self._inside(problem, piece.part, problem.direction, pair)
             inner = self._book.problem_of(piece.part.kind) if isinstance(inner, Drawing) else inner
-            return _as_piece(piece.part, self.compose(replace(inner, pins=_around_pins(piece.drawing, pins, inner))))
+            return _as_piece(
+                piece.part, self.compose(replace(inner, pins=_around_pins(piece.drawing, pins, inner)), kind=NONE)
+            )
 
         parts, where = parts_by_cell(problem, pair)
         pieces = facing(problem, parts, where, pair, drawn)
@@ -201,7 +234,7 @@ class Composer:
             drawing = self.kind(part.kind, problem.direction)
         else:
             if part not in known:
-                known[part] = self.compose(_boxed(problem, part, pair))
+                known[part] = self.compose(_boxed(problem, part, pair), kind=NONE)
             drawing = known[part]
         return _as_piece(part, drawing)
 

@@ -52,6 +52,7 @@ def route_all(
     ease: bool = True,
     improve: bool = True,
     highest: float = math.inf,
+    begun: Mapping[int, Route] | None = None,
 ) -> list[Route]:
     """Routes by edge index.
 
@@ -60,18 +61,18 @@ def route_all(
     and y exchanged. With more than ``careful`` edges, discs in the way are not gone round. No route enters one of the
     ``frames`` that holds neither of its ends, if there is a way round. ``drawn`` are other routes, which are
     there, as are those of these edges that are ``there``. A bow is at most ``highest`` times as high as its way is
-    long; what it cannot get over it goes round from disc to disc.
+    long; what it cannot get over it goes round from disc to disc. ``begun`` are routes to begin with, not curves.
     """
     near = Obstacles(centres)
     obstacles = near if len(edges) <= careful else Obstacles(())
-    routes: dict[int, Route] = {}
+    routes: dict[int, Route] = dict(begun or {})
     if lateral:
         exchanged = [(y, x) for x, y in centres]
         beside = Obstacles(exchanged if len(edges) <= careful else ())
         across = _curves(edges, exchanged, sorted(lateral), lateral, beside)
         routes.update({i: tuple((x, y) for y, x in route) for i, route in across.items()})
     if waypoints is not None:
-        chosen = bowed if lateral is None else bowed | lateral.keys()
+        chosen = bowed | routes.keys()
         along = [i for i, edge in enumerate(edges) if i not in chosen and _runs_along(edge, centres)]
         routes.update(_curves(edges, centres, along, waypoints, obstacles))
     rest = [i for i, edge in enumerate(edges) if i not in routes and edge.source != edge.target]

@@ -1,0 +1,123 @@
+"""Compact: how long frames are folded, so that the whole comes near to the proportions of a page.
+
+In: a problem, and how it is drawn in a shape. Out: the shape in which it takes least of a page: how many bands (see
+``bands``) the ranks of each kind of instance, and those of the whole, stand in. What is near to these proportions is
+left as it is, so that signals run one way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias
+
+from neurovis_layouts.layered.drawing import Drawing
+from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.model import Direction, LayoutProblem
+
+#: The number of the whole, beside those of kinds of instances; and of what is never folded.
+WHOLE, NONE = -1, -2
+#: Width by height of a page: that of a screen or a slide.
+ASPECT = 4 / 3
+#: What is longer than a page by this is folded, if that is worth so much of what it costs as it is.
+_STRETCHED, _WORTH = 2.0, 0.5
+#: Each single fold has to be worth this.
+_EACH = 0.9
+#: What is no longer than this, in units of the layout, can be read as it is.
+_SHORT = 24.0
+#: What it costs if all connections run back: one in ten is worth twice the page.
+_BACK = 10.0
+#: So many numbers of bands in a row are tried in vain.
+_IN_VAIN = 2
+#: In no more bands than this, nor more neurons and connections; nor are all kinds tried more often.
+_MOST_BANDS, _MOST, _ROUNDS = 8, 3000, 2
+
+
+#: What of a shape concerns a drawing.
+ShapeKey: TypeAlias = tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """How many bands there are of the whole, and of kinds of instances by their numbers, where there are several."""
+
+    bands: Mapping[int, int] = field(default_factory=dict)
+
+    def of(self, kind: int, problem: LayoutProblem) -> ShapeKey:
+        """What of it concerns one kind of instance, whose problem this is."""
+        inside = {kind, *(int(module.template) for module in problem.modules)}
+        return tuple((number, bands) for number, bands in sorted(self.bands.items()) if number in inside)
+
+    def changed(self, kind: int, bands: int) -> Shape:
+        """Another number of bands for a kind."""
+        return replace(self, bands={**self.bands, kind: bands})
+
+
+#: How a problem is drawn in a shape.
+Drawn: TypeAlias = Callable[[LayoutProblem, Shape], Drawing]
+
+
+def may_be_folded(problem: LayoutProblem) -> bool:
+    """Whether nothing says where on the page something stands, and it is not too large to try."""
+    fixed = problem.plan or problem.pins or any(module.pins for module in problem.modules)
+    return not fixed and len(problem.neurons) + len(problem.edges) <= _MOST
+
+
+def compact(problem: LayoutProblem, drawn: Drawn, cuts: Mapping[int, int]) -> Shape:
+    """The shape that costs least. ``cuts`` are by the number of a kind where, at most, it can be cut, once it has been
+    drawn."""
+    shape = Shape()
+    drawing = drawn(problem, shape)
+    if _stretched(drawing, problem.direction) < _STRETCHED or max(_size(drawing, problem.direction)) < _SHORT:
+        return shape
+    first = least = _cost(problem, drawing)
+    kinds = (WHOLE, *sorted({int(module.template) for module in problem.modules}))
+    for _ in range(_ROUNDS):
+        before = least
+        for kind in kinds:
+            least, shape = _folded(problem, drawn, kind, cuts.get(kind, 0), least, shape)
+        if least == before:
+            break
+    return shape if least < _WORTH * first else Shape()
+
+
+def _folded(
+    problem: LayoutProblem, drawn: Drawn, kind: int, cuts: int, least: float, shape: Shape
+) -> tuple[float, Shape]:
+    """The least cost, and the shape that has it, with whatever number of bands of one kind; once more bands have been
+    no better for some times, more are not tried."""
+    best, found, vain = least, shape, 0
+    for bands in range(1, min(_MOST_BANDS, cuts + 1) + 1):
+        if bands == shape.bands.get(kind, 1):
+            continue
+        other = shape.changed(kind, bands)
+        now = _cost(problem, drawn(problem, other))
+        vain += 1
+        if now < _EACH * best:
+            best, found, vain = now, other, 0
+        if vain == _IN_VAIN:
+            break
+    return best, found
+
+
+def _size(drawing: Drawing, direction: Direction) -> tuple[float, float]:
+    """Width and height in the picture."""
+    x0, y0, x1, y1 = drawing.rect()
+    return (x1 - x0, y1 - y0) if direction in ("down", "up") else (y1 - y0, x1 - x0)
+
+
+def _stretched(drawing: Drawing, direction: Direction) -> float:
+    """How much wider or higher than a page a drawing is."""
+    wide, high = _size(drawing, direction)
+    return max(wide / (ASPECT * high), ASPECT * high / wide)
+
+
+def _cost(problem: LayoutProblem, drawing: Drawing) -> float:
+    """How large a page is that holds a drawing, times how long straight lines between the ends of its connections
+    are, times what those cost that run back."""
+    wide, high = _size(drawing, problem.direction)
+    page = max(wide, ASPECT * high) ** 2
+    lengths = [distance(drawing.places[edge.source], drawing.places[edge.target]) for edge in problem.edges]
+    back = sum(drawing.places[edge.source][1] > drawing.places[edge.target][1] for edge in problem.edges)
+    return page * math.fsum(lengths) * (1 + _BACK * back / max(1, len(problem.edges)))

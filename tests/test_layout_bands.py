@@ -1,0 +1,91 @@
+"""Bands of the layered engine: what is much longer than a page is cut between ranks, its parts side by side."""
+
+from __future__ import annotations
+
+import pytest
+
+import neurovis_spec as nv
+from neurovis_spec.layout import Layout
+from neurovis_spec.layout.arrange import lay_out_problem
+from neurovis_spec.layout.metrics import metrics
+from neurovis_spec.layout.model import LayoutProblem
+from neurovis_spec.layout.problem import problem_of
+
+LINE = "neurovis: 1\nname: line\nneurons: {a: {count: 30}}\nconnections:\n  a -> a: {pattern: chain}\n"
+#: Six legs, each of which drives the next on its side.
+LEGS = (
+    "neurovis: 1\nname: legs\nmodules:\n  leg: {neurons: {a: {count: 15}}, connections: {a -> a: {pattern: chain}}}\n"
+    "neurons: {C: {}}\ninstances: {left: {module: leg, count: 3}, right: {module: leg, count: 3}}\n"
+    "connections: {C -> left.a1: 1, C -> right.a1: 1"
+    + "".join(f", {side}{i}.a15 -> {side}{i + 1}.a1: 1" for side in ("left", "right") for i in (1, 2))
+    + "}\nlayout: {mirror: [[left, right]]}\n"
+)
+MODULES = (
+    "neurovis: 1\nname: chain\nmodules: {m: {neurons: {x: {count: 3}, y: {}}, connections: {x -> y: 1}}}\n"
+    "instances: {"
+    + ", ".join(f"{name}: {{module: m}}" for name in "abcdefghij")
+    + "}\nconnections: {"
+    + ", ".join(f"{a}.y -> {b}.x1: 1" for a, b in zip("abcdefghi", "bcdefghij", strict=True))
+    + "}\n"
+)
+
+
+def drawn(text: str) -> tuple[LayoutProblem, Layout]:
+    problem = problem_of(nv.compile_text(text).network)
+    return problem, lay_out_problem(problem, "layered")
+
+
+def stretched(layout: Layout) -> float:
+    """How much wider or higher than a page neurons stand."""
+    xs, ys = [x for x, _ in layout.positions.values()], [y for _, y in layout.positions.values()]
+    wide, high = max(xs) - min(xs) + 1, max(ys) - min(ys) + 1
+    return max(wide / high * 3 / 4, high / wide * 4 / 3)
+
+
+@pytest.mark.parametrize("direction", ["down", "up", "right", "left"])
+@pytest.mark.parametrize("text", [LINE, MODULES], ids=["line", "modules"])
+def test_a_long_chain_stands_in_bands_without_a_crossing(text: str, direction: str) -> None:
+    problem, layout = drawn(f"{text}layout: {{direction: {direction}}}\n")
+    found = metrics(layout, problem)
+    assert (found["crossings"], found["edges_over_neurons"], found["overlaps"]) == (0, 0, 0)
+    assert found["flow"] >= 0.8  # in each band signals run the same way
+    assert stretched(layout) < 2
+
+
+def test_bands_are_read_like_columns_of_a_text() -> None:
+    _, layout = drawn(LINE)
+    columns: dict[float, list[str]] = {}
+    for name, (x, y) in sorted(layout.positions.items(), key=lambda item: item[1]):
+        columns.setdefault(x, []).append(name)
+        assert y == layout.positions[columns[x][0]][1] + 2 * (len(columns[x]) - 1)
+    assert [name for column in columns.values() for name in column] == [f"a{i}" for i in range(1, 31)]
+
+
+def test_legs_of_fifteen_ranks_fold_alike_and_mirror_images_are_exact() -> None:
+    _, layout = drawn(LEGS)
+    assert stretched(layout) < 2.5
+    axis = 2 * layout.positions["C"][0]
+    first = [layout.positions[f"left1.a{i}"] for i in range(1, 16)]
+    assert max(y for _, y in first) - min(y for _, y in first) < 20
+    for leg in (1, 2, 3):
+        (ax, ay), (bx, by) = layout.positions[f"left{leg}.a1"], first[0]
+        for i in range(1, 16):
+            x, y = layout.positions[f"left{leg}.a{i}"]
+            assert layout.positions[f"right{leg}.a{i}"] == (axis - x, y)
+            assert (x - ax, y - ay) == (first[i - 1][0] - bx, first[i - 1][1] - by)
+
+
+def test_what_is_near_to_a_page_runs_one_way() -> None:
+    problem, layout = drawn(LINE.replace("30", "11"))
+    assert metrics(layout, problem)["flow"] == 1
+
+
+def test_pins_keep_ranks_uncut() -> None:
+    problem, layout = drawn(f"{LINE}layout: {{positions: {{a1: [0, 0]}}}}\n")
+    assert metrics(layout, problem)["flow"] == 1
+
+
+def test_a_box_is_not_cut() -> None:
+    _, layout = drawn(f"{LINE}layout: {{boxes: {{middle: [a10..a14]}}}}\n")
+    assert len({layout.positions[f"a{i}"][0] for i in range(10, 15)}) == 1
+    assert stretched(layout) < 2
