@@ -25,15 +25,14 @@ from neurovis_spec.language.expressions.arrays import Value, evaluate_array
 from neurovis_spec.language.expressions.errors import ExpressionError
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import (
-    MAX_COST,
     Call,
     Conditional,
     Name,
     Number,
     Tree,
+    check_extent,
     names,
     substitute,
-    walk,
 )
 from neurovis_spec.language.expressions.undefined import Hazard, Hazards, Hidden, Read, either, hazards, together
 
@@ -172,8 +171,13 @@ def _with_new(made: Hazards, model: Model) -> Hazards:
 
 
 def _sized(found: Iterable[Hazard]) -> list[Hazard]:
-    """Those that are not too long to be computed beside the rest."""
-    return [hazard for hazard in found if sum(1 for _ in walk(hazard.formula)) <= MAX_COST]
+    """The first of them, as many as are together no longer than a formula may be."""
+    kept: list[Hazard] = []
+    for hazard in found:
+        with suppress(ExpressionError):
+            check_extent(either(one.formula for one in (*kept, hazard)))
+            kept.append(hazard)
+    return kept
 
 
 def _open(found: Iterable[Hazard], known: Mapping[str, Value]) -> Iterator[Hazard]:

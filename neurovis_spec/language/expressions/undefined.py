@@ -127,7 +127,13 @@ def hazards(
 
 def both(where: Tree | None, condition: Tree) -> Tree:
     """Where both are true; the first may be None, which is always."""
-    return condition if where is None else Chain(("and",), (where, condition))
+    match where:
+        case None:
+            return condition
+        case Chain(operators=("and", *_), operands=operands):
+            return Chain(tuple("and" for _ in operands), (*operands, condition))
+        case _:
+            return Chain(("and",), (where, condition))
 
 
 def either(conditions: Iterable[Tree]) -> Tree:
