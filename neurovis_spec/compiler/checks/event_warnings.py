@@ -52,6 +52,7 @@ def check_events(
         for model in models:
             _check_beyond(model, reader, steps, findings)
     _check_mended(models, reader, findings)
+    _check_learning(models, reader, findings)
     lesions = _lesions(models, reader, findings)
     clamps = [clamp for clamp in reader.clamps(models) if not _is_lesioned(clamp, lesions, findings)]
     _check_overlaps(clamps, reader.count, findings)
@@ -111,6 +112,37 @@ def _check_beyond(model: EventModel, reader: _Reader, steps: int, findings: Find
         message = f"step {begin:.0f} is never reached: a run has the steps 0 to {steps - 1} ('steps')"
         hint = f"let it be earlier, or lengthen the run: time: {{steps: {begin + 1:.0f}}}"
         findings.warning("beyond-steps", formula.span, message, hint)
+
+
+def _check_learning(models: tuple[EventModel, ...], reader: _Reader, findings: Findings) -> None:
+    """Warn of rules that are stopped or started where they are so already, as far as no event names some of their
+    connections in another way."""
+    timed = [(begin, model) for model in models if (begin := reader.step(model.at)) is not None]
+    keys = [
+        (begin, key_of(model.source, "learning", name), on.value)
+        for begin, model in sorted(timed, key=lambda one: one[0])
+        for name, on in model.learning.items()
+    ]
+    ends = {_normal(key): reader.ends(key) for _, key, _ in keys}
+    alone = {name for name in ends if not any(_meet(ends[name], ends[other]) for other in ends if other != name)}
+    learns: dict[str, bool] = {}
+    for begin, key, on in keys:
+        name = _normal(key)
+        if name in alone and learns.get(name, True) == on:
+            message = f"'{shorten(key.value)}' {'learns' if on else 'does not learn'} already at step {begin:.0f}"
+            findings.warning("no-effect", key.span, message, "remove it")
+        learns[name] = on
+
+
+def _normal(key: Located[str]) -> str:
+    """Connections as they are named, without what blanks make of it."""
+    found = parse(key.value)
+    return found.normal if isinstance(found, Arrow) else key.value
+
+
+def _meet(some: tuple[IntArray, ...], others: tuple[IntArray, ...]) -> bool:
+    """Whether two pairs of ends may have a connection in common."""
+    return all(bool(np.isin(one, other).any()) for one, other in zip(some, others, strict=True))
 
 
 def _check_mended(models: tuple[EventModel, ...], reader: _Reader, findings: Findings) -> None:

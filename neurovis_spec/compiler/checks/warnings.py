@@ -37,6 +37,7 @@ def warn(compiled: Compiled, findings: Findings) -> None:
     check_undefined(compiled, findings)
     _events(compiled, findings)
     _theme(compiled, findings)
+    _figure(compiled, findings)
     _outputs(compiled, findings)
     _reset(compiled, findings)
 
@@ -48,6 +49,18 @@ def _theme(compiled: Compiled, findings: Findings) -> None:
         from neurovis_spec.compiler.checks.like_colours import check_like_colours
 
         check_like_colours(render.theme, findings)
+
+
+def _figure(compiled: Compiled, findings: Findings) -> None:
+    """Views that show nothing, or the same once more."""
+    models = () if compiled.spec.render is None else compiled.spec.render.figure
+    for number, (model, panel) in enumerate(zip(models, compiled.network.render.figure, strict=False)):
+        if panel.view == "body" and compiled.spec.body is None and compiled.network.body is None:
+            message = "this network has no body: the view stays empty"
+            findings.warning("no-effect", model.view.span, message, "remove it, or give the network a 'body'")
+        elif panel in compiled.network.render.figure[:number]:
+            message = f"the view '{panel.view}' is there twice, and shows the same"
+            findings.warning("no-effect", model.view.span, message, "remove one of them")
 
 
 def _events(compiled: Compiled, findings: Findings) -> None:
