@@ -2,14 +2,33 @@
 
 from __future__ import annotations
 
+import math
+import random
 import warnings
 
 import numpy as np
 import pytest
+from fuzz_expressions import NAMES, make
 
 import neurovis_spec as nv
 from neurovis_spec.compiler.program import Check
 from neurovis_spec.compiler.run_checks import without_checks
+from neurovis_spec.language.expressions.errors import ExpressionError
+from neurovis_spec.language.expressions.evaluate import evaluate
+from neurovis_spec.language.expressions.functions import CONSTANTS
+from neurovis_spec.language.expressions.parser import parse
+from neurovis_spec.language.expressions.tree import (
+    Binary,
+    Call,
+    Chain,
+    Conditional,
+    Name,
+    Tree,
+    children,
+    names,
+    rebuild,
+)
+from neurovis_spec.language.expressions.undefined import either, hazards
 from neurovis_spec.runtime.c_export import Exported
 from neurovis_spec.runtime.record import record
 
@@ -160,3 +179,74 @@ def test_only_what_is_hidden_is_checked() -> None:
         states = [state for block in network.blocks for state in block.model.state]
         states += [state for one in network.plasticity for state in one.rule.state]
         assert not any(isinstance(state, Check) for state in states)
+
+
+def lazily(tree: Tree, known: dict[str, float]) -> tuple[float, bool, bool]:
+    """The value of an expression of which only what counts is computed; whether something undefined was, and whether
+    something overflowed."""
+    match tree:
+        case Conditional(condition=condition, then=then, otherwise=otherwise):
+            parts = [lazily(condition, known)]
+            parts.append(lazily(then if parts[0][0] != 0 else otherwise, known))
+            value = parts[1][0]
+        case Chain(operators=("and" | "or" as sign, *_), operands=operands):
+            parts, value = [], float(sign == "and")
+            for operand in operands:
+                parts.append(lazily(operand, known))
+                if (parts[-1][0] != 0) != (sign == "and"):
+                    value = 1.0 - value
+                    break
+        case Chain(operands=(first, *_)):
+            value, undefined, overflown = lazily(first, known)
+            for joined, operand in tree.steps:
+                right = lazily(operand, known)
+                value, wrong, beyond = one(Chain((joined,), (Name("0"), Name("1"))), (value, right[0]))
+                undefined, overflown = undefined or right[1] or wrong, overflown or right[2] or beyond
+            return value, undefined, overflown
+        case _:
+            parts = [lazily(part, known) for part in children(tree)]
+            own = rebuild(tree, tuple(Name(str(place)) for place in range(len(parts))))
+            made = one(own, tuple(part[0] for part in parts), known)
+            parts.append(made)
+            value = made[0]
+    return value, any(part[1] for part in parts), any(part[2] for part in parts)
+
+
+def one(tree: Tree, given: tuple[float, ...], known: dict[str, float] | None = None) -> tuple[float, bool, bool]:
+    """The value of one operation; whether it is undefined, or overflows."""
+    value = evaluate(tree, {**(known or {}), **{str(place): number for place, number in enumerate(given)}})
+    if not all(map(math.isfinite, given)) or math.isfinite(value):
+        return value, False, False
+    divides = isinstance(tree, Chain) and tree.operators[0] in ("/", "%") and given[1] == 0
+    pole = isinstance(tree, Call) and tree.function in ("log", "log1p")
+    powers = isinstance(tree, Binary) or (isinstance(tree, Call) and tree.function == "pow")
+    undefined = divides or pole or math.isnan(value) or (powers and given[0] == 0)
+    return value, undefined, not undefined
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_what_is_told_of_is_computed_and_hidden(seed: int) -> None:
+    """Laws: where a hazard is told of, something undefined is computed; where something undefined is computed and none
+    is, the value shows it."""
+    told = missed = shown = 0
+    for number in range(4000):
+        try:
+            tree = parse(make(seed, number))
+        except ExpressionError:
+            continue
+        if not names(tree) <= {*NAMES, *CONSTANTS}:
+            continue
+        found = hazards(tree).found
+        chooser = random.Random(number)
+        for _ in range(6):
+            values = {name: chooser.choice((-2.0, -1.0, 0.0, 0.5, 1.0)) for name in NAMES} | dict(CONSTANTS)
+            value, undefined, overflown = lazily(tree, values)
+            tells = bool(found) and evaluate(either(hazard.formula for hazard in found), values) != 0
+            if overflown:
+                continue
+            assert undefined or not tells, make(seed, number)
+            told, shown = told + tells, shown + (undefined and not tells)
+            missed += undefined and not tells and math.isfinite(value)
+    assert missed == 0
+    assert told > 20
+    assert shown > 100

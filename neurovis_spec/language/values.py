@@ -139,7 +139,7 @@ def as_file(node: Mapping, info: ValidationInfo) -> FileReference:
     path = node.get("file")
     if path is None:
         if keys.lack("file"):
-            findings_of(info).error("missing-key", opening(node), "the key 'file' is missing")
+            findings_of(info).error("missing-key", opening(node), "the key 'file' is missing", "write {file: PATH}")
         give_up()
     key = node.get("key")
     return FileReference(as_text(path, info), None if key is None else as_text(key, info), node.span)
