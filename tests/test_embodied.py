@@ -121,6 +121,17 @@ def test_a_source_that_a_sensor_replaces_is_not_warned_of() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         carted(spec=SPEC.replace("place: {expression: 0.5}", "place: {expression: 1/k}")).run(3)
+        carted(spec=SPEC.replace("place: {expression: 0.5}", "place: {expression: tanh(1/k)}")).run(3)
+
+
+def test_what_the_formula_of_another_input_hides_is_warned_of() -> None:
+    hiding = SPEC.replace("{expression: sin(t)}", "{expression: tanh(1/(k - 2))}")
+    with pytest.warns(RuntimeWarning, match="the input 'wave' of W has an undefined operation at step 2"):
+        carted(spec=hiding).run(5)
+    simulation = carted(spec=hiding).simulator()
+    with pytest.warns(RuntimeWarning, match="the input 'wave' of W has an undefined operation at step 2"):
+        for _ in range(5):
+            simulation.step(place=0.1)
 
 
 def test_a_sensor_that_is_no_number_is_warned_of_by_its_input(monkeypatch: pytest.MonkeyPatch) -> None:

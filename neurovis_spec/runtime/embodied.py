@@ -85,6 +85,11 @@ class Embodied:
         """Refuse a body that cannot be put into a file. Raises BodyError."""
         numbers_of(self.body.state())
 
+    @property
+    def inputs(self) -> frozenset[str]:
+        """The inputs that it senses."""
+        return frozenset(self._wired)
+
     def sense(self, vector: FloatArray, given: Collection[str] = ()) -> FloatArray:
         """The vector of all inputs with what is sensed in it, but for the inputs that are ``given`` otherwise."""
         self.sensed = sensed = self.body.sense().copy()

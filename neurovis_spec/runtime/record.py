@@ -250,7 +250,7 @@ def go(network: Network, state: State, course: Course, rows: RowSink, progress: 
     rows = rows if watched is None else watched
     watch = Watch(network)
     columns = columns_of(network, course.keep, body)
-    reader = InputReader(network, course.inputs, None if body is not None else watch.given)
+    reader = InputReader(network, course.inputs, watch.given)
     stepper = prepare(network, course.backend, steps)
     make: _Make = _OneByOne(columns, stepper, body, frozenset(course.inputs or ()))
     plain = columns.neurons is None and not columns.probe.names and len(columns.weights) == len(network.changing)
@@ -311,7 +311,7 @@ class _OneByOne:
                 weights[row] = state.weights[changing]
             if body is not None:
                 vector = body.sense(vector, self.given)
-                watch.given_at(k, vector)
+                watch.given_at(k, vector, body.inputs)
                 if keep:
                     body.show(sensors[row], poses[row])
             step(state, vector)

@@ -71,7 +71,7 @@ class Simulation:
         self._stepper, self._watch = prepare(network, backend), Watch(network)
         self._body = embodied(network) if body is None else body
         self._given = frozenset(inputs or ())
-        self._reader = InputReader(network, inputs, None if self._body is not None else self._watch.given)
+        self._reader = InputReader(network, inputs, self._watch.given)
         self._controls = Controls(network)
         self._begin = initial_state(network) if start is None else resumed_state(network, start)
         self._apply(self._begin)
@@ -243,7 +243,7 @@ class Simulation:
         if body is not None:
             vector = body.sense(vector, self._given.union(given))
         if body is not None or given:
-            self._watch.given_at(state.k, vector)
+            self._watch.given_at(state.k, vector, given if body is None else body.inputs.union(given))
         recorder = self._recorder if self._recorder is not None and self._recorder.going else None
         if recorder is not None:
             recorder.begin(state)

@@ -7,7 +7,7 @@ the step and the neuron or the connection whose activity, weight, state or input
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import chain
 from math import isfinite
 
@@ -43,11 +43,16 @@ class Watch:
         rows = np.flatnonzero(wrong).tolist()
         self._odd = {first + row: (vectors[row], None if hidden is None else hidden[row]) for row in rows}
 
-    def given_at(self, k: int, vector: FloatArray) -> None:
-        """Take the inputs of step k alone, where they are known only then."""
-        self._odd.pop(k, None)
-        if not all_finite([vector]):
-            self._odd[k] = vector, None
+    def given_at(self, k: int, vector: FloatArray, replaced: Iterable[str]) -> None:
+        """Take the inputs of step k alone, where they are known only then: these (``replaced``) do not come from their
+        formulas."""
+        _, hidden = self._odd.pop(k, (vector, None))
+        if hidden is not None:
+            hidden = hidden.copy()
+            for entry in map(self._network.input_index.__getitem__, replaced):
+                hidden[entry.start : entry.start + entry.size] = False
+        if not all_finite([vector]) or (hidden is not None and hidden.any()):
+            self._odd[k] = vector, hidden
 
     def until(self, k: int, stop: int) -> int:
         """How far steps from k on may be made, ``stop`` at most, before one must be checked: one behind the first
