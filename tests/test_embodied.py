@@ -129,9 +129,10 @@ def test_what_the_formula_of_another_input_hides_is_warned_of() -> None:
     with pytest.warns(RuntimeWarning, match="the input 'wave' of W has an undefined operation at step 2"):
         carted(spec=hiding).run(5)
     simulation = carted(spec=hiding).simulator()
+    simulation.step()
+    simulation.step(place=0.1)
     with pytest.warns(RuntimeWarning, match="the input 'wave' of W has an undefined operation at step 2"):
-        for _ in range(5):
-            simulation.step(place=0.1)
+        simulation.step(place=0.1)
 
 
 def test_a_sensor_that_is_no_number_is_warned_of_by_its_input(monkeypatch: pytest.MonkeyPatch) -> None:
