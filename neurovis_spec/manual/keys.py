@@ -107,7 +107,7 @@ def kind(field: FieldInfo) -> str:
 
 
 def _word(fits: object) -> str:
-    """What fits a place, without what it may be beside it."""
+    """One of the things that fit a place, in words."""
     match fits:
         case Plain(formula=True):
             return "number or expression"
