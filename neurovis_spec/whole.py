@@ -19,8 +19,8 @@ from neurovis_spec.language.data.files import read_edges, read_table
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.language.unknown import UNKNOWN
+from neurovis_spec.language.yaml.source import AnyList, Node, Scalar
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
-from neurovis_spec.language.yaml.source import Node, Packed, Scalar, Sequence
 
 Plain: TypeAlias = "bool | int | float | str | list[Plain] | dict[str, Plain] | None"
 #: sections that an included file brings in
@@ -88,7 +88,7 @@ class _Reader:
             if path and path[-1] == "edges" and node.get("file") is not None:
                 return self._edges(node, folder)
             return self.mapping(node, folder, path)
-        if isinstance(node, (Sequence, Packed)):
+        if isinstance(node, AnyList):
             return [self.value(item, folder, path) for item in node.items]
         return node.value
 

@@ -37,10 +37,10 @@ from neurovis_spec.language.located import (
     TextField,
     as_formula,
     as_text,
-    as_texts,
     each,
     findings_of,
     give_up,
+    items_of,
     one_of,
     refuse,
     valid,
@@ -59,20 +59,18 @@ from neurovis_spec.language.values import (
     sole,
 )
 from neurovis_spec.language.words import VIEWS, WHOLE, Direction
-from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
+from neurovis_spec.language.yaml.source import AnyList, Mapping, Node, Scalar, Sequence
 
 
 def _references(node: Node, info: ValidationInfo) -> tuple[Reference, ...]:
     """A list of lists of references."""
-    if not isinstance(node, (Sequence, Packed)):
-        refuse(info, node, "a list of lists", "write [[K1, K2], [O1, O2]]")
-    return tuple(_several(item, info) for item in node.items)
+    items = items_of(node, info, "a list of lists", "write [[K1, K2], [O1, O2]]")
+    return tuple(_several(item, info) for item in items)
 
 
 def _several(node: Node, info: ValidationInfo) -> Reference:
-    if not isinstance(node, (Sequence, Packed)):
-        refuse(info, node, "a list of references", "write [[K1, K2]], a list of lists")
-    return Reference(as_texts(node, info), node.span)
+    items = items_of(node, info, "a list of references", "write [[K1, K2]], a list of lists")
+    return Reference(each(items, as_text, info), node.span)
 
 
 def _pairs(node: Node, info: ValidationInfo) -> tuple[Reference, ...]:
@@ -96,15 +94,11 @@ class PlanRow(NamedTuple):
 def _plan(node: Node, info: ValidationInfo) -> tuple[PlanRow, ...]:
     """A list of rows of names; ``~`` is an empty cell."""
     hint = "write [[left1, ~, right1], [left2, middle, right2]]"
-    if not isinstance(node, (Sequence, Packed)):
-        refuse(info, node, "a list of rows", hint)
 
     def row(node: Node, info: ValidationInfo) -> PlanRow:
-        if not isinstance(node, (Sequence, Packed)):
-            refuse(info, node, "a row, that is a list of names", hint)
-        return PlanRow(each(node.items, _cell, info), node.span)
+        return PlanRow(each(items_of(node, info, "a row, that is a list of names", hint), _cell, info), node.span)
 
-    return tuple(row(item, info) for item in node.items)
+    return tuple(row(item, info) for item in items_of(node, info, "a list of rows", hint))
 
 
 def _cell(node: Node, info: ValidationInfo) -> Located[str] | None:
@@ -207,13 +201,13 @@ class GainValue(NamedTuple):
 
 
 def _factor(node: Node, info: ValidationInfo) -> Formula:
-    if isinstance(node, (Sequence, Packed)):
+    if isinstance(node, AnyList):
         refuse(info, node, "a number or an expression", "a range [low, high] is for 'activity' alone")
     return as_formula(node, info)
 
 
 def _factor_or_range(node: Node, info: ValidationInfo) -> Formula | Range:
-    if not isinstance(node, (Sequence, Packed)):
+    if not isinstance(node, AnyList):
         return as_formula(node, info)
     if len(node.items) != 2:
         refuse(info, node, "a gain, or a range [low, high]")

@@ -24,7 +24,7 @@ from neurovis_spec.language.expressions.lexer import decimal_hint
 from neurovis_spec.language.grammar import FORMULA, REFERENCE, TEXT, TEXTS, Either, ListOf, Plain, Shape
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.yaml.scalars import INTEGER_HIGH, INTEGER_LOW
-from neurovis_spec.language.yaml.source import Node, Packed, Scalar, Sequence, describe
+from neurovis_spec.language.yaml.source import AnyList, Node, Scalar, describe, one_or_more
 
 T = TypeVar("T")
 M = TypeVar("M")
@@ -110,6 +110,11 @@ def refuse(
     give_up()
 
 
+def items_of(node: Node, info: ValidationInfo, wanted: str, hint: str | None = None) -> tuple[Node, ...]:
+    """The items of a list; anything else is refused."""
+    return node.items if isinstance(node, AnyList) else refuse(info, node, wanted, hint)
+
+
 def as_text(node: Node, info: ValidationInfo) -> Located[str]:
     """A text; numbers and truth values are answered with a hint to quote them."""
     if isinstance(node, Scalar) and isinstance(node.value, str):
@@ -173,7 +178,7 @@ def formula_of(node: Node, findings: Findings, hint: str | None = None) -> Formu
 
 def as_formula(node: Node, info: ValidationInfo) -> Formula:
     """A finite number, or the text of an expression."""
-    rows = info.field_name == "weight" and isinstance(node, (Sequence, Packed))
+    rows = info.field_name == "weight" and isinstance(node, AnyList)
     formula = formula_of(node, findings_of(info), "rows of weights stand under 'matrix'" if rows else None)
     if formula is UNKNOWN:
         give_up()
@@ -221,12 +226,12 @@ def each(items: Collection[M], read: Callable[[M, ValidationInfo], V], info: Val
 
 def as_texts(node: Node, info: ValidationInfo) -> tuple[Located[str], ...]:
     """A text or a list of texts; each that is none is reported."""
-    return each(node.items, as_text, info) if isinstance(node, (Sequence, Packed)) else (as_text(node, info),)
+    return each(one_or_more(node), as_text, info)
 
 
 def as_parts(node: Node, info: ValidationInfo) -> tuple[Located[str], ...]:
     """The same, without the items that are no texts: an invalid one does not make the others invalid."""
-    return tuple(valid(node.items, as_text, info)) if isinstance(node, (Sequence, Packed)) else (as_text(node, info),)
+    return tuple(valid(node.items, as_text, info)) if isinstance(node, AnyList) else (as_text(node, info),)
 
 
 def one_of(*words: str) -> Callable[[Node, ValidationInfo], Located[str]]:

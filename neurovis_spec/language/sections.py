@@ -5,7 +5,7 @@ In: nodes. Out: frozen models whose leaves know their places. A spec has these s
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from contextlib import suppress
 from typing import Annotated, ClassVar
 
@@ -45,7 +45,9 @@ from neurovis_spec.language.located import (
     TextField,
     TextsField,
     findings_of,
+    items_of,
     refuse,
+    valid,
     words,
 )
 from neurovis_spec.language.model import Filled, Keyed, KeysAreNames, Model, Named, Short
@@ -66,7 +68,7 @@ from neurovis_spec.language.values import (
     pair,
 )
 from neurovis_spec.language.words import Combine, NeuronRole
-from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Packed, Scalar, Sequence
+from neurovis_spec.language.yaml.source import AnyList, Entry, Mapping, Node, Scalar, one_or_more
 
 
 class Time(Model):
@@ -79,10 +81,8 @@ class Time(Model):
     episode: FormulaField | None = Field(None, description="Steps of an episode; it ends after every m steps.")
 
 
-def _table(node: Node, info: ValidationInfo) -> FileReference | Sequence | Packed:
-    if isinstance(node, (Sequence, Packed)):
-        return node
-    refuse(info, node, "a list of rows, one a step")
+def _table(node: Node, info: ValidationInfo) -> FileReference | AnyList:
+    return node if isinstance(node, AnyList) else refuse(info, node, "a list of rows, one a step")
 
 
 def _one_source(*others: str) -> NotWith:
@@ -100,8 +100,8 @@ class InputModel(Model):
     file: Annotated[TextField | None, _one_source("expression")] = Field(
         None, description="A .csv, .npy or .npz file, one row a step; the last row stays."
     )
-    values: Annotated[Sequence | Packed | None, Leaf(_table, ListOf(FORMULAS)), _one_source("expression", "file")] = (
-        Field(None, description="The same, inline: one row a step.")
+    values: Annotated[AnyList | None, Leaf(_table, ListOf(FORMULAS)), _one_source("expression", "file")] = Field(
+        None, description="The same, inline: one row a step."
     )
     size: Annotated[FormulaField | None, _one_source("expression", "file", "values")] = Field(
         None, description="How many numbers a step, for an input without a source."
@@ -112,12 +112,11 @@ class InputModel(Model):
 InputsField = Annotated[Named[InputModel], declaring("input")]
 
 
-def _position(node: Node, info: ValidationInfo) -> FileReference | Sequence | Packed:
+def _position(node: Node, info: ValidationInfo) -> FileReference | AnyList:
     if isinstance(node, Mapping):
         return as_file(node, info)
-    if isinstance(node, (Sequence, Packed)):
-        return node
-    refuse(info, node, "a position [x, y], a list of them, or {file: …}")
+    wanted = "a position [x, y], a list of them, or {file: …}"
+    return node if isinstance(node, AnyList) else refuse(info, node, wanted)
 
 
 class GroupModel(Model):
@@ -156,9 +155,9 @@ class GroupModel(Model):
     noise: Annotated[FormulaField, NOISE] | None = Field(
         None, description="An expression with normal(m, s) or uniform(a, b), drawn anew and added each step."
     )
-    position: Annotated[
-        FileReference | Sequence | Packed | None, Leaf(_position, Either((TWO, ListOf(TWO), FILE))), GROUP
-    ] = Field(None, description="Where the neuron is, as data: [x, y], a list of them, a file. It is no pin.")
+    position: Annotated[FileReference | AnyList | None, Leaf(_position, Either((TWO, ListOf(TWO), FILE))), GROUP] = (
+        Field(None, description="Where the neuron is, as data: [x, y], a list of them, a file. It is no pin.")
+    )
     label: Annotated[TextsField, LABEL] | None = Field(
         None, description="Display text; a counted group may give a list. May hold expressions: 'd{number}'."
     )
@@ -305,26 +304,18 @@ class EventModel(Model):
     )
 
 
-#: Findings of one list, after which the rest of it is not checked.
-_PATIENCE = 20
+def _mappings(items: Iterable[Node], info: ValidationInfo, wanted: str) -> tuple[Mapping, ...]:
+    """Those of some items that are mappings; the others are reported."""
 
+    def read(node: Node, info: ValidationInfo) -> Mapping:
+        return node if isinstance(node, Mapping) else refuse(info, node, wanted)
 
-def _mappings(node: Node, info: ValidationInfo, wanted: str) -> Iterator[Mapping]:
-    """The mappings of a list; what is none is reported."""
-    findings = findings_of(info)
-    before = findings.errors
-    for item in node.items if isinstance(node, (Sequence, Packed)) else (node,):
-        if isinstance(item, Mapping):
-            yield item
-        elif findings.errors - before < _PATIENCE:
-            with suppress(PydanticCustomError):
-                refuse(info, item, wanted)
+    return tuple(valid(items, read, info))
 
 
 def _events(node: Node, info: ValidationInfo) -> tuple[Mapping, ...]:
-    if not isinstance(node, (Sequence, Packed)):
-        refuse(info, node, "a list of events", "write each event behind a dash")
-    return tuple(_mappings(node, info, "an event, that is a mapping"))
+    items = items_of(node, info, "a list of events", "write each event behind a dash")
+    return _mappings(items, info, "an event, that is a mapping")
 
 
 def _as_it_is(value: Located[str], info: ValidationInfo) -> Located[str]:
@@ -335,7 +326,7 @@ def _connections(node: Node, info: ValidationInfo) -> list[tuple[Located[str], o
     """One mapping, or a list of mappings: in both cases the entries in the order written. What is invalid is reported
     and left out."""
     result: list[tuple[Located[str], object]] = []
-    for mapping in _mappings(node, info, "a mapping FROM -> TO: weight, or a list of such"):
+    for mapping in _mappings(one_or_more(node), info, "a mapping FROM -> TO: weight, or a list of such"):
         if _in_parts(mapping, info):
             continue
         first: dict[str, Entry] = {}
@@ -368,10 +359,7 @@ _ENDS = ("from", "to", "source", "target", "pre", "post")
 
 def written(section: Mapping) -> int:
     """How many entries the connections of a spec or a module have as they are written; what is none counts as one."""
-    node = section.get("connections")
-    if node is None:
-        return 0
-    parts = node.items if isinstance(node, (Sequence, Packed)) else (node,)
+    parts = one_or_more(section.get("connections"))
     return sum(len(part.entries) + part.is_open if isinstance(part, Mapping) else 1 for part in parts)
 
 
@@ -381,7 +369,7 @@ def _body(entry: Entry, info: ValidationInfo) -> Mapping:
     if isinstance(node, Mapping):
         return node
     if not isinstance(node, Scalar):
-        hint = "write {matrix: …}" if isinstance(node, (Sequence, Packed)) else None
+        hint = "write {matrix: …}" if isinstance(node, AnyList) else None
         refuse(info, node, "a weight or a mapping", hint)
     if node.value is None:
         return Mapping((), entry.key.span)

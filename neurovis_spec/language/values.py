@@ -51,7 +51,7 @@ from neurovis_spec.language.located import (
     said,
 )
 from neurovis_spec.language.model import Model, NamedParameters, Short, opening
-from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Packed, Scalar, Sequence
+from neurovis_spec.language.yaml.source import AnyList, Entry, Mapping, Node, Scalar, Sequence
 
 T = TypeVar("T")
 
@@ -121,7 +121,7 @@ DATA_FILES: Final = (".csv", ".npy", ".npz", ".mtx")
 class MatrixRows(NamedTuple):
     """Dense rows as written: every row a list of formulas or nulls (checked when they are evaluated)."""
 
-    node: Sequence | Packed
+    node: AnyList
 
     @property
     def span(self) -> Span:
@@ -155,11 +155,11 @@ def as_matrix(node: Node, info: ValidationInfo) -> Matrix:
     """A list of rows, or a file."""
     if isinstance(node, Mapping):
         return as_file(node, info)
-    if not isinstance(node, (Sequence, Packed)):
+    if not isinstance(node, AnyList):
         refuse(info, node, "a list of rows, or {file: …}", _file_hint(node))
     rows = node.items if isinstance(node, Sequence) else (node.cell(0),) if node.rows is None else ()
     for row in rows:
-        if not isinstance(row, (Sequence, Packed)):
+        if not isinstance(row, AnyList):
             refuse(info, row, "a row, that is a list", "a matrix is a list of lists: [[1, 2], [3, 4]]")
     return MatrixRows(node)
 
@@ -182,18 +182,18 @@ MatrixField = Annotated[Matrix, Leaf(as_matrix, Either((_ROWS, FILE)))]
 class EdgeRows(NamedTuple):
     """Edges as written: ``[from, to, weight, delay]``, the last two optional (checked when they are connected)."""
 
-    node: Sequence | Packed
+    node: AnyList
 
 
 def as_edges(node: Node, info: ValidationInfo) -> EdgeRows | FileReference:
     """A list of edges, or a file."""
     if isinstance(node, Mapping):
         return as_file(node, info)
-    if not isinstance(node, (Sequence, Packed)):
+    if not isinstance(node, AnyList):
         refuse(info, node, "a list of edges [from, to, weight], or {file: …}", _file_hint(node))
     rows = node.items[:1] if isinstance(node, Sequence) else (node.cell(0),) if node.rows is None else ()
     for row in rows:
-        if not isinstance(row, (Sequence, Packed)):
+        if not isinstance(row, AnyList):
             refuse(info, row, "an edge, that is a list", "edges are a list of lists: [[A, B, 0.5], [A, C, 1]]")
     return EdgeRows(node)
 
@@ -218,7 +218,7 @@ class FormulaList(NamedTuple):
 
 def as_formulas(node: Node, info: ValidationInfo) -> Formula | FormulaList:
     """A formula, or a list with one for each neuron."""
-    if isinstance(node, (Sequence, Packed)):
+    if isinstance(node, AnyList):
         return FormulaList(each(node.items, as_formula, info), node.span)
     return as_formula(node, info)
 

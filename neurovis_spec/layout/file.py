@@ -13,7 +13,7 @@ import re
 from neurovis_spec.compiler.drawing.pins import FARTHEST
 from neurovis_spec.diagnostics import Findings, suggest
 from neurovis_spec.language.yaml.reader import read_content, read_text
-from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence, SourceDocument, describe
+from neurovis_spec.language.yaml.source import AnyList, Mapping, Node, Scalar, SourceDocument, describe
 from neurovis_spec.layout.model import SIDES, Layout, Point, Route, Side
 from neurovis_spec.layout.naming import edge_key, natural_key
 
@@ -162,9 +162,9 @@ def _entries(root: Mapping, key: str, findings: Findings) -> list[tuple[str, Nod
 
 
 def _read_point(node: Node, what: str, findings: Findings) -> Point | None:
-    items = node.items if isinstance(node, Sequence | Packed) else ()
+    items = node.items if isinstance(node, AnyList) else ()
     if len(items) != 2:
-        found = f"a list of {len(items)}" if isinstance(node, Sequence | Packed) else describe(node)
+        found = f"a list of {len(items)}" if isinstance(node, AnyList) else describe(node)
         findings.error("wrong-type", node.span, f"{what} is a pair [x, y], found {found}")
         return None
     x, y = (_read_number(item, what, findings) for item in items)
@@ -198,7 +198,7 @@ def _read_side(node: Node, name: str, findings: Findings) -> Side | None:
 
 def _read_route(node: Node, name: str, findings: Findings) -> Route | None:
     what = f"the route of '{name}'"
-    if not isinstance(node, Sequence | Packed):
+    if not isinstance(node, AnyList):
         findings.error("wrong-type", node.span, f"{what} is a list of points, found {describe(node)}")
         return None
     items = node.items

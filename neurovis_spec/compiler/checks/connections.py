@@ -14,7 +14,7 @@ from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.names.references import Section
 from neurovis_spec.diagnostics import Findings, shorten
-from neurovis_spec.language.yaml.source import Mapping, Packed, Sequence
+from neurovis_spec.language.yaml.source import Mapping, one_or_more
 
 
 def check_connections(compiled: Compiled, findings: Findings) -> None:
@@ -30,8 +30,7 @@ def check_connections(compiled: Compiled, findings: Findings) -> None:
 def _mappings(section: Section) -> Iterator[Mapping]:
     """The mappings of a section's connections that have several entries. Parallel connections are written as a list of
     mappings; so entries of two mappings, and equal edges of one entry, are let be."""
-    node = section.source.get("connections")
-    for part in node.items if isinstance(node, (Sequence, Packed)) else (node,):
+    for part in one_or_more(section.source.get("connections")):
         if isinstance(part, Mapping) and len(part.entries) > 1:
             yield part
 

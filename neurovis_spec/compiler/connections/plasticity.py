@@ -24,7 +24,7 @@ from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import ConnectionModel
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.values import Choice
-from neurovis_spec.language.yaml.source import Entry, Node, Packed, Scalar, Sequence
+from neurovis_spec.language.yaml.source import AnyList, Entry, Node, Scalar, one_or_more
 
 
 class Learning(NamedTuple):
@@ -108,7 +108,7 @@ def _signal(
 ) -> IntArray | Unknown:
     """Where a signal comes from, for each connection; one name, or a list of names that are taken together."""
     node, before = entry.value, scope.constants.findings.errors
-    items = node.items if isinstance(node, (Sequence, Packed)) else (node,)
+    items = one_or_more(node)
     parts: list[IntArray | Unknown] = []
     for item in items:
         parts.append(_place(entry.name, item, scope, directory, neurons))
@@ -160,7 +160,7 @@ def _place(signal: str, node: Node, scope: Scope, directory: Directory, neurons:
 
 def _text(node: Node) -> str:
     """What an author calls a signal."""
-    if isinstance(node, (Sequence, Packed)):
+    if isinstance(node, AnyList):
         few = [_text(item) for item in node.items[:_SHOWN]]
         return f"[{', '.join(few if len(node.items) <= _SHOWN else [*few, '…'])}]"
     return str(node.value).strip() if isinstance(node, Scalar) else "…"

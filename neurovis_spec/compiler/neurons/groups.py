@@ -34,8 +34,8 @@ from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.values import Choice, FormulaList, Initial
+from neurovis_spec.language.yaml.source import AnyList, Scalar
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
-from neurovis_spec.language.yaml.source import Packed, Scalar, Sequence
 
 T = TypeVar("T")
 _SETTING = formula_at(GroupModel, "model", "NAME", "SETTING")
@@ -356,6 +356,6 @@ def _unsure(model: GroupModel) -> bool:
 def unread_neurons(model: GroupModel) -> Names[Group]:
     """What the neurons of a group may be called of which it is not known which it has."""
     node = model.source.get("names")
-    items = node.items if isinstance(node, (Sequence, Packed)) else ()
+    items = node.items if isinstance(node, AnyList) else ()
     texts = {str(item.value): UNKNOWN for item in items if isinstance(item, Scalar)}
-    return Names(texts, "names" in model.unknown and not isinstance(node, (Sequence, Packed)))
+    return Names(texts, "names" in model.unknown and not isinstance(node, AnyList))

@@ -22,7 +22,7 @@ from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import InputModel
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
-from neurovis_spec.language.yaml.source import Packed, Sequence
+from neurovis_spec.language.yaml.source import AnyList
 
 _SOURCES = ("expression", "file", "values", "size")
 
@@ -58,7 +58,7 @@ def _by_file(name: str, path: Located[str], start: int, files: Files) -> Input |
     return UNKNOWN if table is UNKNOWN else _tabled(name, start, np.array(table.values, dtype=np.float64))
 
 
-def _by_values(name: str, node: Sequence | Packed, start: int, constants: Constants) -> Input | Unknown:
+def _by_values(name: str, node: AnyList, start: int, constants: Constants) -> Input | Unknown:
     with constants.following() as parts:
         values = _inline(node, constants)
     if values is UNKNOWN:
@@ -89,7 +89,7 @@ def _tabled(name: str, start: int, table: FloatArray) -> Input:
     return Input(name, start, table.shape[1], table=table)
 
 
-def _inline(node: Sequence | Packed, constants: Constants) -> FloatArray | Unknown:
+def _inline(node: AnyList, constants: Constants) -> FloatArray | Unknown:
     """Rows of numbers; a bare number is a row of one."""
     findings = constants.findings
     cells = cells_of(node, findings, "", gaps=False)

@@ -23,14 +23,14 @@ from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.values import FileReference
-from neurovis_spec.language.yaml.source import TEXT, Packed, Scalar, Sequence
+from neurovis_spec.language.yaml.source import TEXT, AnyList, Scalar, Sequence
 
 _POSITION = formula_at(GroupModel, "position", 0)
 _TWO = "a position is two numbers"
 
 
 def positions_of(
-    node: FileReference | Sequence | Packed | None, n: int | Unknown, constants: Constants, files: Files
+    node: FileReference | AnyList | None, n: int | Unknown, constants: Constants, files: Files
 ) -> FloatArray | Unknown:
     """One position for each of n neurons."""
     if isinstance(node, FileReference):
@@ -52,7 +52,7 @@ def _from_file(reference: FileReference, n: int | Unknown, findings: Findings, f
     return UNKNOWN
 
 
-def _written(node: Sequence | Packed, n: int | Unknown, constants: Constants) -> FloatArray | Unknown:
+def _written(node: AnyList, n: int | Unknown, constants: Constants) -> FloatArray | Unknown:
     findings = constants.findings
     one = n is not UNKNOWN and _one_for_all(node, n)
     if n is not UNKNOWN and not one and len(node) != n:
@@ -74,7 +74,7 @@ def _written(node: Sequence | Packed, n: int | Unknown, constants: Constants) ->
     return UNKNOWN if values is UNKNOWN or cells.failed else values.reshape(n, 2)
 
 
-def _one_for_all(node: Sequence | Packed, n: int) -> bool:
+def _one_for_all(node: AnyList, n: int) -> bool:
     """Whether this is one ``[x, y]``: that of the only neuron, or one that differs from neuron to neuron, or can."""
     items = node.items if len(node) <= 2 else ()
     scalars = [item for item in items if isinstance(item, Scalar)]
@@ -83,7 +83,7 @@ def _one_for_all(node: Sequence | Packed, n: int) -> bool:
     return len(scalars) == 2 and any(isinstance(scalar.value, str) for scalar in scalars)
 
 
-def depend_on_positions(node: FileReference | Sequence | Packed | None, constants: Constants) -> None:
+def depend_on_positions(node: FileReference | AnyList | None, constants: Constants) -> None:
     """Mark the parameters in these positions as structural: something that is fixed in a run depends on them."""
     quiet = replace(constants, findings=Findings())
     cells = UNKNOWN if node is None or isinstance(node, FileReference) else cells_of(node, quiet.findings, "")

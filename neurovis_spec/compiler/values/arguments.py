@@ -26,7 +26,7 @@ from neurovis_spec.language.keys import settings_of
 from neurovis_spec.language.located import IDENTIFIER, Formula, formula_of
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.values import Choice, FormulaList
-from neurovis_spec.language.yaml.source import Entry, Packed, Scalar, Sequence
+from neurovis_spec.language.yaml.source import AnyList, Entry, Scalar, one_or_more
 
 T = TypeVar("T")
 
@@ -80,7 +80,7 @@ def settle(choice: Choice, known: Collection[str], findings: Findings) -> Names[
 def check_settings(choice: Choice, constants: Constants, extra: Collection[str] = ()) -> None:
     """Evaluate the settings of a definition that is UNKNOWN, as far as they are no names: these may be signals."""
     for entry in choice.settings.entries:
-        nodes = entry.value.items if isinstance(entry.value, (Sequence, Packed)) else (entry.value,)
+        nodes = one_or_more(entry.value)
         for node in nodes[:_MOST_CHECKED]:
             name = isinstance(node, Scalar) and isinstance(node.value, str) and IDENTIFIER.fullmatch(node.value.strip())
             formula = UNKNOWN if name else formula_of(node, constants.findings)
@@ -142,7 +142,7 @@ def _listed(
 
 def _formulas(entry: Entry, constants: Constants) -> Formula | FormulaList | Unknown:
     node = entry.value
-    if not isinstance(node, (Sequence, Packed)):
+    if not isinstance(node, AnyList):
         return formula_of(node, constants.findings)
     items: list[Formula] = []
     before = constants.findings.errors

@@ -20,7 +20,7 @@ from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.located import Located, formula_of
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
-from neurovis_spec.language.yaml.source import NULL, NUMBER, TEXT, Node, Packed, Scalar, Sequence
+from neurovis_spec.language.yaml.source import NULL, NUMBER, TEXT, AnyList, Node, Packed, Scalar
 
 
 @dataclass(frozen=True)
@@ -51,9 +51,7 @@ class Cells:
         return np.arange(len(self.kinds)) - np.repeat(self.starts[:-1], self.widths)
 
 
-def cells_of(
-    node: Sequence | Packed, findings: Findings, row: str, *, named: bool = False, gaps: bool = True
-) -> Cells | Unknown:
+def cells_of(node: AnyList, findings: Findings, row: str, *, named: bool = False, gaps: bool = True) -> Cells | Unknown:
     """The cells of a list of rows; findings where one is no number, text or null, or a row is no list. UNKNOWN where
     there are many such.
 
@@ -85,13 +83,13 @@ def _row_span(node: Packed, row: int) -> Span:
     return node.cell(row).span if node.rows is None else node.row(row).span
 
 
-def _written(node: Sequence | Packed, findings: Findings, row: str, named: bool) -> Cells | Unknown:
+def _written(node: AnyList, findings: Findings, row: str, named: bool) -> Cells | Unknown:
     before = findings.errors
     nodes: list[Node] = []
     starts = [0]
     items = node.items
     for item in items:
-        if isinstance(item, (Sequence, Packed)):
+        if isinstance(item, AnyList):
             nodes += item.items
         elif row:
             findings.error("wrong-type", item.span, row)

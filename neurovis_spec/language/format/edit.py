@@ -15,7 +15,7 @@ from neurovis_spec.language.format.canonical import format_read, with_line_feeds
 from neurovis_spec.language.format.gaps import read_gap
 from neurovis_spec.language.format.printer import Source, is_empty
 from neurovis_spec.language.yaml.reader import read_text
-from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
+from neurovis_spec.language.yaml.source import AnyList, Mapping, Node, Scalar
 
 #: The keys that lead to a value.
 Path: TypeAlias = tuple[str, ...]
@@ -116,7 +116,7 @@ class _Editor:
     def _written(self, node: Node, value: Value) -> Iterator[_Edit]:
         """A value that is written out; comments between the items of a list stay."""
         begin, end = self._source.begin(node), self._source.end(node)
-        items = node.items if isinstance(node, Sequence | Packed) else ()
+        items = node.items if isinstance(node, AnyList) else ()
         if isinstance(value, tuple) and len(items) == len(value):
             for item, cell in zip(items, value, strict=True):
                 yield _Edit(self._source.begin(item), self._source.end(item), cell)

@@ -20,7 +20,7 @@ from neurovis_spec.language.format.gaps import NONE, Comment, Gap, joined, read_
 from neurovis_spec.language.format.lines import LineWriter
 from neurovis_spec.language.places import Path
 from neurovis_spec.language.yaml.characters import Lines as Places
-from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
+from neurovis_spec.language.yaml.source import AnyList, Mapping, Node, Packed, Scalar
 
 _STEP: Final = 2
 _WIDEST: Final = 120  # a value that the author has put below its key comes up beside it if the line is no longer
@@ -96,7 +96,7 @@ class Source:
         match = _COLON.match(self.text, self.end(key))
         return None if match is None else match.end()
 
-    def flow(self, node: Mapping | Sequence | Packed) -> Flow:
+    def flow(self, node: Mapping | AnyList) -> Flow:
         """What stands between two brackets."""
         begin, stop = self.begin(node), self.end(node) - 1
         broken = self.text.find("\n", begin, stop) >= 0
@@ -125,7 +125,7 @@ class Source:
 
     def row(self, node: Node) -> list[str] | None:
         """The cells of a list of scalars in brackets that takes one line; None for anything else."""
-        if not isinstance(node, Sequence | Packed) or self.is_block(node) or (isinstance(node, Packed) and node.rows):
+        if not isinstance(node, AnyList) or self.is_block(node) or (isinstance(node, Packed) and node.rows):
             return None
         flow = self.flow(node)
         cells = [self.written(item.value) for item in flow.items if isinstance(item.value, Scalar)]
@@ -207,7 +207,7 @@ class _Printer:
         level = _Level(node.span.column - 1, indent)
         if isinstance(node, Mapping):
             self._mapping(node, level, path, beside=beside)
-        elif isinstance(node, Sequence | Packed):
+        elif isinstance(node, AnyList):
             self._listing(node, level, path, beside=beside)
         self._ended.append(level)
 
@@ -235,7 +235,7 @@ class _Printer:
                 self._out.write(":")
             self._value(entry.value, None, level, (*path, _bare(name)), beside=False)
 
-    def _listing(self, node: Sequence | Packed, level: _Level, path: Path, *, beside: bool) -> None:
+    def _listing(self, node: AnyList, level: _Level, path: Path, *, beside: bool) -> None:
         items = node.items
         matrix = self._source.matrix(items)
         for index, item in enumerate(items):

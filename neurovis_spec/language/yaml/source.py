@@ -162,7 +162,14 @@ class Packed:
         return tuple(self)
 
 
-Node: TypeAlias = Scalar | Mapping | Sequence | Packed
+#: A list, however it is kept.
+AnyList: TypeAlias = Sequence | Packed
+Node: TypeAlias = Scalar | Mapping | AnyList
+
+
+def one_or_more(node: Node | None) -> tuple[Node, ...]:
+    """The items of a list, or what stands there alone, if there is anything."""
+    return node.items if isinstance(node, AnyList) else () if node is None else (node,)
 
 
 class SourceDocument(NamedTuple):
