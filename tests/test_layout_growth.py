@@ -14,7 +14,7 @@ import pytest
 from neurovis_layouts.layered import flips
 from neurovis_layouts.layered.frame_routing import linked
 from neurovis_layouts.layered.levels import Levels, Node, Segment
-from neurovis_layouts.routing import nearby, walls
+from neurovis_layouts.routing import walls
 from neurovis_layouts.routing.detours import Detours
 from neurovis_layouts.routing.obstacles import Obstacles
 from neurovis_layouts.routing.walls import Walls
@@ -80,11 +80,10 @@ def test_a_way_round_many_frames_meets_few_of_them(monkeypatch: pytest.MonkeyPat
         return meetings(a, b, rects)
 
     meetings = walls.meetings
-    for module in (walls, nearby):
-        monkeypatch.setattr(module, "meetings", counted)
+    monkeypatch.setattr(walls, "meetings", counted)
     centres = [(4.0 * i, 4.0 * j) for i in range(20) for j in range(20)]
     frames = [(frozenset({k}), (x - 1.5, y - 1.5, x + 1.5, y + 1.5)) for k, (x, y) in enumerate(centres)]
-    detours = Detours(Walls(frames, len(centres)), centres, ways=200)
+    detours = Detours(Walls(frames, len(centres)), centres)
     draw = random.Random(1)
     ways = [tuple(draw.sample(range(400), 2)) for _ in range(200)]
     assert all(detours.route(a, b, True) for a, b in ways)

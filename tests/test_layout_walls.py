@@ -20,7 +20,6 @@ from neurovis_spec.layout import Direction, Layout, LayoutEdge, LayoutProblem, L
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.geometry import Rect, distance, sampled
 from neurovis_spec.layout.metrics import metrics
-from neurovis_spec.layout.model import Route
 from neurovis_spec.layout.problem import canonical, problem_of
 
 ROOT = Path(__file__).parent.parent
@@ -213,16 +212,13 @@ layout: {{engine: layered, mirror: [[left, right], [C1, C2]], direction: left}}
     check(lay_out_problem(problem, "layered"), problem)
 
 
-def test_what_is_remembered_of_corners_changes_no_detour(monkeypatch: pytest.MonkeyPatch) -> None:
-    centres = [(2.6 * i, 2.2 * j) for i in range(5) for j in range(4)]
-    frames = [(frozenset({k}), (x - 0.7, y - 0.7, x + 0.7, y + 0.7)) for k, (x, y) in enumerate(centres)]
-    pairs = [(a, b) for a in range(0, 20, 3) for b in range(1, 20, 4) if a != b]
-
-    def routes() -> list[Route | None]:
-        found = Detours(Walls(frames, len(centres)), centres)
-        return [found.route(a, b, True) for a, b in pairs]
-
-    remembered = routes()
-    monkeypatch.setattr("neurovis_layouts.routing.detours.MOST", 0)
-    assert routes() == remembered
-    assert sum(route is not None and len(route) > 4 for route in remembered) > 10
+def test_a_disc_is_gone_round_as_a_frame_of_its_size_is() -> None:
+    ends = [(0.0, 0.0), (10.0, 0.5)]
+    disc = Detours(Walls((), 3), [*ends, (5.0, 0.2)])
+    frame = Detours(Walls([(frozenset({2}), (4.7, -0.1, 5.3, 0.5))], 3), [*ends, (90.0, 90.0)])
+    for _ in range(3):  # each in a lane of its own
+        found = disc.route(0, 1, False)
+        assert found is not None
+        assert len(found) > 4
+        assert found == frame.route(0, 1, False)
+        assert min(distance(point, (5.0, 0.2)) for point in sampled(found, 0.05)) > 0.35

@@ -118,7 +118,7 @@ class Arcs:
         x, level = self._twice / 2, a[1]
         for y0, y1 in ((level - _OFF, level + _LONG), (level - _LONG, level + _OFF)):
             wall: Frame = (frozenset(), (x - _THIN, y0, x + _THIN, y1))
-            detours = Detours(Walls([*self._frames, wall], len(self._both)), self._both, ways=_WAYS)
+            detours = Detours(Walls([*self._frames, wall], len(self._both)), self._both)
             for _ in range(_WAYS):
                 found = detours.folded(source, target, self._twice)
                 if found is None:

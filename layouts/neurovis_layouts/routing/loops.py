@@ -71,7 +71,7 @@ class Loops:
         near: Sequence[Point],
         tangents: Sequence[Point],
         obstacles: Obstacles,
-        walls: Walls | None = None,
+        walls: Walls,
     ) -> None:
         """``near`` are neighbours' centres, ``tangents`` unit vectors in which other edges leave or arrive."""
         self._centre, self._own, self._obstacles, self._walls = centre, (index, index), obstacles, walls
@@ -94,7 +94,7 @@ class Loops:
         """The loop with most room; one that enters no foreign frame, unless there is no room for such a one."""
         self._look()
         found = self._least([False] * len(self._choice))
-        if self._walls is not None and self._walls.entered([found], [self._own])[0]:
+        if self._walls.entered([found], [self._own])[0]:
             routes = [tried.route for tried in self._choice]
             found = self._least(self._walls.entered(routes, [self._own] * len(routes)))
         return found

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 
 from neurovis_layouts.routing.bows import FEW_TRIES, MANY_TRIES, Wish, clear_bow, clear_bows
-from neurovis_layouts.routing.bypasses import round_discs, round_frames
 from neurovis_layouts.routing.curves import Waypoint, curve
+from neurovis_layouts.routing.detours import detoured
 from neurovis_layouts.routing.ends import shared_ends
 from neurovis_layouts.routing.loops import Loops
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
@@ -78,12 +78,10 @@ def route_all(
     rest = [i for i, edge in enumerate(edges) if i not in routes and edge.source != edge.target]
     bowed_over = _bows(edges, centres, rest, obstacles, highest)
     routes.update(bowed_over)
-    walls = Walls(frames, len(centres)) if frames else None
-    detoured = {} if walls is None else round_frames(edges, centres, routes, walls)
-    if len(edges) <= min(careful, _MOST_AT_LENGTH):
-        detoured.update(round_discs(edges, centres, {**routes, **detoured}, obstacles, walls))
-    routes.update(detoured)
-    if len(edges) <= min(careful, _MOST_AT_LENGTH):
+    walls = Walls(frames, len(centres))
+    few = len(edges) <= min(careful, _MOST_AT_LENGTH)
+    routes.update(detoured(edges, centres, routes, obstacles if few else Obstacles(()), walls))
+    if few:
         if there:
             routes.update((i, route) for i, route in there.items() if i in routes)
         free = routes.keys() - there.keys() if there else routes.keys()
@@ -236,7 +234,7 @@ def _loops(
     centres: Sequence[Point],
     routes: Mapping[int, Route],
     obstacles: Obstacles,
-    walls: Walls | None,
+    walls: Walls,
     there: Mapping[int, Route],
 ) -> dict[int, Route]:
     looping = [i for i, edge in enumerate(edges) if edge.source == edge.target]
