@@ -23,6 +23,8 @@ _PER_UNIT = round(1 / GRID)
 _PI = 3.141592653589793
 #: How many points there are on a piece, and how many are made at once: so many stay in the processor's cache.
 _FEWEST, _MOST, _AT_ONCE = 4, 400, 1 << 14
+#: How far the numbers of cells beside each other are apart: no column has so many.
+_COLUMN = 1 << 31
 
 
 def snap(value: float) -> float:
@@ -119,29 +121,61 @@ def straight(a: Point, b: Point) -> Route:
     return (a, third, ((a[0] + 2 * b[0]) / 3, (a[1] + 2 * b[1]) / 3), b)
 
 
+class Cells:
+    """Places (n, 2) in square cells that are ``reach`` wide, to find which of them are closer than that to what."""
+
+    def __init__(self, places: FloatArray, reach: float) -> None:
+        self._reach = reach
+        keys = self._keys(places)
+        self._order = np.argsort(keys, kind="stable")
+        self._sorted, self._places = keys[self._order], places[self._order]
+
+    def _keys(self, points: FloatArray) -> IntArray:
+        """(k,) the cell that each point is in: those of a column follow each other."""
+        cells = np.floor(points / self._reach).astype(np.int64)
+        keys: IntArray = cells[:, 0] * _COLUMN + cells[:, 1]
+        return keys
+
+    def near(self, points: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
+        """All pairs of points (k, 2) and places closer than the reach: both numbers, how far, squared."""
+        keys = self._keys(points)
+        found: list[tuple[IntArray, IntArray, FloatArray]] = []
+        for column in (-_COLUMN, 0, _COLUMN):
+            begin = np.searchsorted(self._sorted, keys + (column - 1))
+            point, place = _ranges(begin, np.searchsorted(self._sorted, keys + (column + 1), side="right"))
+            x, y = (self._places[place] - points[point]).T
+            squared = x * x + y * y
+            near = squared < self._reach * self._reach
+            found.append((point[near], self._order[place[near]], squared[near]))
+        point, place, squared = (np.concatenate(part) for part in zip(*found, strict=True))
+        return point, place, squared
+
+    def pairs(self) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+        """All pairs of places closer than the reach: both numbers, from the first to the second (k, 2), how far."""
+        keys, ones, others = self._sorted, list[IntArray](), list[IntArray]()
+        # each cell with half of those around it, and what is in it with what follows
+        for step in (0, 1, _COLUMN - 1, _COLUMN, _COLUMN + 1):
+            begin = np.searchsorted(keys, keys + step) if step else np.arange(len(keys), dtype=np.int64) + 1
+            one, other = _ranges(begin, np.searchsorted(keys, keys + step, side="right"))
+            ones.append(one)
+            others.append(other)
+        one, other = np.concatenate(ones), np.concatenate(others)
+        way = self._places[other] - self._places[one]
+        squared = (way**2).sum(axis=1)
+        near = squared < self._reach * self._reach
+        return self._order[one[near]], self._order[other[near]], way[near], np.sqrt(squared[near])
+
+
+def _ranges(begin: IntArray, end: IntArray) -> tuple[IntArray, IntArray]:
+    """For ranges of numbers, all those within them, each behind the number of its range."""
+    counts = np.maximum(end - begin, 0)
+    which = np.repeat(np.arange(len(counts), dtype=np.int64), counts)
+    return which, begin[which] + np.arange(len(which), dtype=np.int64) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
 def near_pairs(places: FloatArray, reach: float) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
     """All pairs of places (n, 2) closer than ``reach``: both numbers, from the first to the second (k, 2), how far."""
-    cells = np.floor(places / reach).astype(np.int64)
-    cells -= cells.min(axis=0, initial=0)
-    width = np.int64(cells[:, 1].max(initial=0)) + 3
-    keys = cells[:, 0] * width + cells[:, 1]
-    order = np.argsort(keys, kind="stable")
-    keys = keys[order]
-    ones: list[IntArray] = []
-    others: list[IntArray] = []
-    at = np.arange(len(keys), dtype=np.int64)
-    for step in (0, 1, width - 1, width, width + 1):
-        begin = np.searchsorted(keys, keys + step) if step else at + 1
-        counts = np.maximum(np.searchsorted(keys, keys + step, side="right") - begin, 0)
-        first = np.repeat(at, counts)
-        place = np.arange(len(first), dtype=np.int64) - np.repeat(np.cumsum(counts) - counts, counts)
-        ones.append(order[first])
-        others.append(order[begin[first] + place])
-    one, other = np.concatenate(ones), np.concatenate(others)
-    way = places[other] - places[one]
-    squared = (way**2).sum(axis=1)
-    near = squared < reach * reach
-    return one[near], other[near], way[near], np.sqrt(squared[near])
+    return Cells(places, reach).pairs()
 
 
 def squared_distances(x: FloatArray, y: FloatArray, ux: FloatArray, uy: FloatArray) -> FloatArray:

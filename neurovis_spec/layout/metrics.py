@@ -13,7 +13,7 @@ import networkx as nx
 import numpy as np
 
 from neurovis_spec.arrays import BoolArray, FloatArray, IntArray
-from neurovis_spec.layout.geometry import crossing, cubic, near_pairs, pieces_of, squared_distances
+from neurovis_spec.layout.geometry import Cells, crossing, cubic, near_pairs, pieces_of, squared_distances
 from neurovis_spec.layout.label_overlaps import label_overlaps
 from neurovis_spec.layout.model import RADIUS, Direction, Layout, LayoutProblem, Point, Route
 
@@ -28,6 +28,8 @@ _FINEST_CELL, _MOST_CELLS = 0.02, 32
 _FINEST = 4096
 #: Beyond this many in all they grow longer: memory has an end.
 _MOST_SEGMENTS = 2_000_000
+#: Segments that are compared with discs at a time.
+_AT_ONCE = 1 << 14
 #: Pairs of segments that are compared, about; of more than that a sample of the routes is.
 _MOST_PAIRS = 20_000_000
 _ALONG: dict[Direction, Point] = {"down": (0, 1), "up": (0, -1), "right": (1, 0), "left": (-1, 0)}
@@ -161,28 +163,18 @@ def _outside(where: FloatArray, one: IntArray, two: IntArray, centres: FloatArra
 
 
 def _edges_over_neurons(segments: _Segments, ends: IntArray, centres: FloatArray) -> int:
-    """Routes closer than 0.3 to a centre that is not theirs: segments against the centres in the cells around them."""
+    """Routes closer than 0.3 to a centre that is not theirs."""
     if not len(segments.a) or not len(centres):
         return 0
-    cell = segments.longest + 2 * _OVER
-    column, row = np.floor(centres / cell).astype(np.int64).T
-    order = np.argsort(_key(column, row), kind="stable")
-    sorted_keys = _key(column, row)[order]
-    middle = (segments.a + segments.b) / 2
-    at = np.floor(middle / cell).astype(np.int64)
+    cells = Cells(centres, segments.longest / 2 + _OVER)
     over: set[int] = set()
-    for i in (-1, 0, 1):
-        for j in (-1, 0, 1):
-            wanted = _key(at[:, 0] + i, at[:, 1] + j)
-            begin, end = np.searchsorted(sorted_keys, wanted), np.searchsorted(sorted_keys, wanted, side="right")
-            for offset in range(int((end - begin).max())):
-                chosen = np.flatnonzero(begin + offset < end)
-                neuron = order[begin[chosen] + offset]
-                edge = segments.edge[chosen]
-                foreign = (ends[edge, 0] != neuron) & (ends[edge, 1] != neuron)
-                way = (segments.b - segments.a)[chosen]
-                near = squared_distances(*(centres[neuron] - segments.a[chosen]).T, *way.T) < (_OVER - _SLACK) ** 2
-                over.update(edge[foreign & near].tolist())
+    for start in range(0, len(segments.a), _AT_ONCE):
+        a, b = segments.a[start : start + _AT_ONCE], segments.b[start : start + _AT_ONCE]
+        chosen, neuron, _ = cells.near((a + b) / 2)
+        edge = segments.edge[start + chosen]
+        foreign = (ends[edge, 0] != neuron) & (ends[edge, 1] != neuron)
+        near = squared_distances(*(centres[neuron] - a[chosen]).T, *(b - a)[chosen].T) < (_OVER - _SLACK) ** 2
+        over.update(edge[foreign & near].tolist())
     return len(over)
 
 

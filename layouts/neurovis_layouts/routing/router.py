@@ -9,6 +9,8 @@ import math
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 
+import numpy as np
+
 from neurovis_layouts.routing.bows import FEW_TRIES, MANY_TRIES, Wish, clear_bow, clear_bows
 from neurovis_layouts.routing.curves import Waypoint, curve
 from neurovis_layouts.routing.detours import detoured
@@ -19,7 +21,7 @@ from neurovis_layouts.routing.ports import Port, leanings
 from neurovis_layouts.routing.route_cost import Judge
 from neurovis_layouts.routing.simplify_routes import MOST_EASED, eased, told_apart
 from neurovis_layouts.routing.walls import Frame, Walls
-from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.geometry import Cells, distance
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
 __all__ = ["Waypoint", "route_all"]
@@ -244,7 +246,12 @@ def _loops(
             tangents[edges[i].source].append(_unit(route[0], route[1]))
         if edges[i].target in tangents:
             tangents[edges[i].target].append(_unit(route[-1], route[-2]))
-    near = _neighbours(centres, tangents)
+    near: dict[int, list[Point]] = {own: [] for own in tangents}
+    places, owns = np.array(centres, dtype=np.float64).reshape(-1, 2), np.array(list(tangents), dtype=np.int64)
+    number, other, _ = Cells(places, _NEAR).near(places[owns])
+    for own, neighbour in zip(owns[number].tolist(), other.tolist(), strict=True):
+        if neighbour != own:
+            near[own].append(centres[neighbour])
     loops = {own: Loops(centres[own], own, near[own], tangents[own], obstacles, walls) for own in tangents}
     result = {i: there[i] for i in looping if i in there}
     for i, route in result.items():
@@ -252,19 +259,6 @@ def _loops(
     for i in (i for i in looping if i not in result):
         result[i] = loops[edges[i].source].best()
         loops[edges[i].source].add(result[i])
-    return result
-
-
-def _neighbours(centres: Sequence[Point], of: Mapping[int, object]) -> dict[int, list[Point]]:
-    """Centres within ``_NEAR`` of each of these neurons, by cells of that width."""
-    cells: dict[tuple[int, int], list[int]] = {}
-    for index, (x, y) in enumerate(centres):
-        cells.setdefault((int(x // _NEAR), int(y // _NEAR)), []).append(index)
-    result: dict[int, list[Point]] = {}
-    for neuron in of:
-        column, row = int(centres[neuron][0] // _NEAR), int(centres[neuron][1] // _NEAR)
-        around = [k for i in (-1, 0, 1) for j in (-1, 0, 1) for k in cells.get((column + i, row + j), ())]
-        result[neuron] = [centres[k] for k in around if k != neuron and distance(centres[k], centres[neuron]) <= _NEAR]
     return result
 
 
