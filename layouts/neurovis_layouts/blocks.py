@@ -8,15 +8,14 @@ included, and copied by steps of the grid.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TypeAlias
 
+from neurovis_layouts.layered.drawing import Drawing
 from neurovis_layouts.packing import packed
 from neurovis_layouts.pins import fit
 from neurovis_layouts.routing import route_all
 from neurovis_layouts.routing.ends import Key, keys_of
-from neurovis_spec.layout.frames import PAD, PAD_FRAME, PAD_ROUTE, TITLE
-from neurovis_spec.layout.geometry import Rect, sampled, snap
+from neurovis_spec.layout.geometry import Rect, shifted, snap
 from neurovis_spec.layout.model import LayoutEdge, LayoutProblem, Point, Route
 
 #: Places for these neurons, around (0, 0).
@@ -24,30 +23,6 @@ Formation: TypeAlias = Callable[[Sequence[int]], list[Point]]
 
 #: Between frames.
 _BETWEEN = 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class Drawing:
-    """Neurons by place in a list of members; routes within, by key; frames within, each with its members."""
-
-    places: tuple[Point, ...]
-    routes: Mapping[Key, Route]
-    frames: tuple[tuple[tuple[int, ...], Rect], ...]
-
-    def rect(self) -> Rect:
-        """The frame around all of it."""
-        lines = [point for route in self.routes.values() for point in sampled(route, 0.1)]
-        rects = [rect for _, rect in self.frames]
-        around = (
-            (self.places, PAD),
-            (lines, PAD_ROUTE),
-            ([r[:2] for r in rects] + [r[2:] for r in rects], PAD_FRAME),
-        )
-        x0 = min(x - pad for points, pad in around for x, _ in points)
-        y0 = min(y - pad for points, pad in around for _, y in points)
-        x1 = max(x + pad for points, pad in around for x, _ in points)
-        y1 = max(y + pad for points, pad in around for _, y in points)
-        return snap(x0), snap(y0 - TITLE), snap(x1), snap(y1)
 
 
 class Blocks:
@@ -115,8 +90,7 @@ class Blocks:
                 routes[here[a], here[b], k] = tuple((x + sx, y + sy) for x, y in route)
             around = [] if inner < 0 else [(tuple(range(len(own))), rect)]
             frames += [
-                (tuple(here[m] for m in inside), (r[0] + sx, r[1] + sy, r[2] + sx, r[3] + sy))
-                for inside, r in (*around, *drawing.frames)
+                (tuple(here[m] for m in inside), shifted(r, (sx, sy))) for inside, r in (*around, *drawing.frames)
             ]
         local = [LayoutEdge(e.name, place[e.source], place[e.target], e.delay) for e in edges]
         return routed(Drawing(tuple(places), routes, tuple(frames)), local)

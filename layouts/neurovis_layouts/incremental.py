@@ -14,6 +14,7 @@ import numpy as np
 from neurovis_layouts.alike import Alike, Move
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.incremental_places import remembered
+from neurovis_layouts.manual_edits import carried
 from neurovis_layouts.routing import route_all
 from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
 from neurovis_layouts.routing.walls import Frame, Walls
@@ -54,7 +55,9 @@ def kept(
     twins = _Twins(problem, centres) if problem.modules or problem.mirrors else None
     if twins is not None:
         _draw_alike(problem, ways, twins, new, routes)
-    _moved_routes(problem, fresh, ways, routes)
+    # such as those within a new instance
+    along = carried(problem, fresh, dict(enumerate(centres)))
+    ways.add_clear({i: route for i, route in along.items() if i not in routes}, routes)
     # what is within a frame first, since the frame is around it: others may then run into it that did not before
     within = [i for i in range(len(problem.edges)) if i not in routes and ways.within(i)]
     routes.update(_found(problem, ways, within, routes))
@@ -166,21 +169,6 @@ def _entering(
     changed = [wall for wall in ways.walls(routes) if wall[1] not in before]
     ends = [(problem.edges[i].source, problem.edges[i].target) for i in chosen]
     return Walls(changed, len(ways.centres)).entered([routes[i] for i in chosen], ends)
-
-
-def _moved_routes(problem: LayoutProblem, fresh: Layout, ways: _Ways, routes: dict[int, Route]) -> None:
-    """Add the fresh routes whose two ends were moved by the same amount, such as those within a new instance; moved
-    along, and only if they are clear then."""
-    found: dict[int, Route] = {}
-    for i, edge in enumerate(problem.edges):
-        if i in routes:
-            continue
-        ends = [(fresh.positions[problem.neurons[n]], ways.centres[n]) for n in (edge.source, edge.target)]
-        moves = {(b[0] - a[0], b[1] - a[1]) for a, b in ends}
-        if len(moves) == 1:
-            dx, dy = moves.pop()
-            found[i] = tuple((x + dx, y + dy) for x, y in fresh.routes[edge.name])
-    ways.add_clear(found, routes)
 
 
 class _Twins:

@@ -10,11 +10,12 @@ both of a mirrored pair.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from neurovis_layouts.alike import Alike, Move
 from neurovis_layouts.conflicts import resolved, whole
-from neurovis_layouts.manual_edits import by_hand, giving_way, moved_routes
-from neurovis_layouts.occupancy import AxisSide, Body, CentreCells, Occupancy, Wish, instance_of
+from neurovis_layouts.manual_edits import by_hand, carried, giving_way
+from neurovis_layouts.occupancy import AxisSide, Body, CentreCells, Occupancy, Wish, instance_of, lone
 from neurovis_layouts.rows import GroupRows
 from neurovis_spec.layout.frames import Frames
 from neurovis_spec.layout.geometry import Rect, bounds, snap
@@ -36,9 +37,9 @@ def remembered(problem: LayoutProblem, fresh: Sequence[Point], routes: Mapping[i
     wanted, put = resolved(problem, fresh, placed, by_hand(problem))
     frames = Frames(problem)
     before = {**placed, **put, **wanted}
-    old = moved_routes(problem, before)
+    old = carried(problem, problem.memory, before)
     newly = put.keys() | {i for i, point in problem.pins.items() if known.get(i) != point}
-    for i in whole(problem, giving_way(problem, frames, before, newly, old)) & before.keys():
+    for i in whole(problem, giving_way(problem, before, newly, old)) & before.keys():
         if i not in problem.pins and i not in put:
             wanted.setdefault(i, before[i])
     placed = _apart(problem, {i: point for i, point in before.items() if i not in wanted})
@@ -215,7 +216,7 @@ def _pieces(
 
     def single(neuron: int) -> tuple[Body, ...]:
         found = [(mate, move) for mate, move in alike.of(neuron) if mate not in done]
-        singles = [Body(((mate, (0.0, 0.0)),), move=move) for mate, move in found]
+        singles = [replace(lone(mate), move=move) for mate, move in found]
         done.update(i for copy in singles for i in copy.members)
         return tuple(singles)
 

@@ -9,13 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from collections.abc import Set as AbstractSet
+from dataclasses import replace
 
+from neurovis_layouts.occupancy import Body, Occupancy, lone
 from neurovis_spec.layout.frames import Frames
-from neurovis_spec.layout.geometry import Rect, distance, meet
-from neurovis_spec.layout.model import RADIUS, LayoutProblem, Point, Route
+from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.model import Layout, LayoutProblem, Point, Route
 
 #: Differences up to this are rounding.
 _SLACK = 1e-6
+#: What bodies are anchored at that stand where they are.
+_HERE = (0.0, 0.0)
 
 
 def by_hand(problem: LayoutProblem) -> dict[int, Point]:
@@ -47,12 +51,12 @@ def by_hand(problem: LayoutProblem) -> dict[int, Point]:
     return {i: moved[i] for i in sorted(moved.keys() - problem.pins.keys())}
 
 
-def moved_routes(problem: LayoutProblem, placed: Mapping[int, Point]) -> dict[int, Route]:
-    """The earlier routes, by edge, whose two ends are where they were or were moved by the same amount; moved along."""
+def carried(problem: LayoutProblem, layout: Layout, placed: Mapping[int, Point]) -> dict[int, Route]:
+    """The routes of a layout, by edge, whose two ends are where they were or were moved by the same amount; moved
+    along."""
     found: dict[int, Route] = {}
-    routes = {} if problem.memory is None else problem.memory.routes
     for number, edge in enumerate(problem.edges):
-        route = routes.get(edge.name)
+        route = layout.routes.get(edge.name)
         if route is None or edge.source not in placed or edge.target not in placed:
             continue
         (x, y), (a, b) = placed[edge.source], placed[edge.target]
@@ -63,37 +67,26 @@ def moved_routes(problem: LayoutProblem, placed: Mapping[int, Point]) -> dict[in
 
 
 def giving_way(
-    problem: LayoutProblem,
-    frames: Frames,
-    placed: Mapping[int, Point],
-    put: AbstractSet[int],
-    routes: Mapping[int, Route],
+    problem: LayoutProblem, placed: Mapping[int, Point], put: AbstractSet[int], routes: Mapping[int, Route]
 ) -> set[int]:
     """The neurons (with all others of their instances) that overlap a disc or a frame that was ``put`` by hand."""
     if not put:
         return set()
-    rects = frames.rects(placed, routes)
-    outer = _outermost(problem)
+    frames = Frames(replace(problem, boxes=()))
+    rects, outer = frames.rects(placed, routes), _outermost(problem)
     framed = {i for own in outer.values() for i in own}
-    firm: list[Rect] = [
-        rect for number, own in outer.items() if not own.isdisjoint(put) and (rect := rects[number]) is not None
-    ]
-    discs = [placed[i] for i in sorted(put) if i in placed and i not in framed]
-    found: set[int] = set()
+    bodies = [lone(i, point) for i, point in sorted(placed.items()) if i not in framed]
     for number, own in outer.items():
-        rect = rects[number]
-        if rect is None or not own.isdisjoint(put) or not problem.pins.keys().isdisjoint(own):
-            continue
-        if any(meet(rect, other) for other in firm) or any(meet(rect, (*point, *point)) for point in discs):
-            found |= own & placed.keys()
-    for i, point in placed.items():
-        if i in framed or i in put or i in problem.pins:
-            continue
-        if any(meet((*point, *point), other) for other in firm) or any(
-            distance(point, other) < 2 * RADIUS for other in discs
-        ):
-            found.add(i)
-    return found
+        if (rect := rects[number]) is not None:
+            bodies.append(Body(tuple((i, placed[i]) for i in sorted(own & placed.keys())), number, rect))
+    firm = Occupancy(frames)
+    for body in bodies:
+        if not put.isdisjoint(body.members):
+            firm.enter((body,), _HERE)
+    held = put | problem.pins.keys()
+    return {
+        i for body in bodies if held.isdisjoint(body.members) and not firm.fits((body,), _HERE) for i in body.members
+    }
 
 
 def _outermost(problem: LayoutProblem) -> dict[int, frozenset[int]]:

@@ -68,9 +68,9 @@ class Body:
         return titled(bounds(corners))
 
 
-def lone(neuron: int) -> Body:
+def lone(neuron: int, offset: Point = (0.0, 0.0)) -> Body:
     """A neuron that moves by itself."""
-    return Body(((neuron, (0.0, 0.0)),))
+    return Body(((neuron, offset),))
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,10 +149,14 @@ class Occupancy:
     def put(self, wish: Wish, stay: bool = False, in_row: bool = False) -> bool:
         """Place bodies as near to their wish as possible, with ``stay`` exactly there, if that is free, and say whether
         there is a place. They keep off the lines that are drawn, unless they continue a row (``in_row``)."""
-        anchor = wish.anchor if stay and self._free(wish.bodies, wish.anchor, _TIGHT) else self._found(wish, in_row)
+        anchor = wish.anchor if stay and self.fits(wish.bodies, wish.anchor) else self._found(wish, in_row)
         if anchor is not None:
             self.enter(wish.bodies, anchor)
         return anchor is not None
+
+    def fits(self, bodies: Sequence[Body], anchor: Point) -> bool:
+        """Whether bodies can stand here, however near to others."""
+        return self._free(bodies, anchor, _TIGHT)
 
     def enter(self, bodies: Sequence[Body], anchor: Point) -> None:
         """Bodies have their place, whatever else is there."""

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from neurovis_layouts.blocks import Blocks, Drawing, routed
+from neurovis_layouts.blocks import Blocks, routed
 from neurovis_layouts.formations import offsets
 from neurovis_layouts.frame import to_picture
 from neurovis_layouts.incremental import kept
+from neurovis_layouts.layered.drawing import Drawing
 from neurovis_layouts.pins import fit, with_origins
 from neurovis_layouts.routing.ends import keys_of
+from neurovis_spec.layout.geometry import shifted
 from neurovis_spec.layout.model import Arrangement, Layout, LayoutProblem, Point
 
 #: So many neurons are arranged around pins frame by frame.
@@ -83,9 +85,5 @@ def _pinned(drawing: Drawing, pins: Mapping[int, Point]) -> Drawing:
             for key, route in drawing.routes.items()
             if not (key[0] in broken or key[1] in broken)
         },
-        tuple(
-            (own, (r[0] + dx, r[1] + dy, r[2] + dx, r[3] + dy))
-            for own, r in drawing.frames
-            if not bent.intersection(own)
-        ),
+        tuple((own, shifted(r, (dx, dy))) for own, r in drawing.frames if not bent.intersection(own)),
     )

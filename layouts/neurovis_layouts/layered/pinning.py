@@ -21,7 +21,6 @@ from neurovis_layouts.layered.component_layout import ComponentLayout
 from neurovis_layouts.layered.drawing import Drawing, FrameMove, Piece
 from neurovis_layouts.layered.parts import images_of
 from neurovis_layouts.occupancy import AxisSide, Body, Occupancy, Wish, instance_of, lone
-from neurovis_layouts.pins import fit
 from neurovis_spec.layout.frames import Frames
 from neurovis_spec.layout.geometry import Rect, bounds, meet, padded, shifted, snap
 from neurovis_spec.layout.model import GRID, RADIUS, LayoutProblem, LayoutRefusalError, Point
@@ -92,9 +91,6 @@ def settled(
     free = [plan.places[i] for i in range(len(problem.neurons))]
     if not problem.pins:
         return Settled(free, list(pieces))
-    if not (pieces or pair or problem.align):
-        places, shift, moved = fit(free, problem.pins)
-        return Settled(places, [], shift, moved)
     trial = _best(problem, free, pieces, pair, _remembering(redraw))
     found = {i: from_picture(point, problem.direction) for i, point in _arranged(problem, trial, pair).items()}
     done: list[tuple[Piece, FrameMove]] = []
