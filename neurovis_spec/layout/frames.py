@@ -2,7 +2,8 @@
 their lines are from what they hold.
 
 In: a problem, where its neurons stand, routes. Out: by number, those of the instances first, then those of the boxes,
-who is in a frame, which frames hold which, and the rectangles of what is placed.
+who is in a frame, which frames hold which, and the rectangles of what is placed. A neuron is foreign to a frame that it
+is not in.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from neurovis_layouts.label_room import at_ends, covered, excess, sides_of
 from neurovis_layouts.layered.bands import UNCUT, Bands, Wanted, banded
 from neurovis_layouts.layered.box_columns import straightened, tied, with_spines
 from neurovis_layouts.layered.components import components_of, packed
-from neurovis_layouts.layered.flips import turned
+from neurovis_layouts.layered.flips import reflected
 from neurovis_layouts.layered.fold_ports import with_exits
 from neurovis_layouts.layered.folds import folded, interleaved, stacked
 from neurovis_layouts.layered.levels import Levels, levels_of
@@ -40,7 +40,7 @@ class ComponentLayout:
     ways: dict[int, list[Waypoint]] = field(default_factory=dict)
     #: edges whose waypoints are all that they need
     firm: set[int] = field(default_factory=set)
-    turned: set[int] = field(default_factory=set)
+    reflected: set[int] = field(default_factory=set)
     #: on which sides labels stand that do not stand on the usual one
     sides: dict[int, Side] = field(default_factory=dict)
     #: at how many places the ranks of the largest component may be cut
@@ -62,7 +62,7 @@ class ComponentLayout:
         dx, dy = shift
         self.places.update({i: (x + dx, y + dy) for i, (x, y) in other.places.items()})
         self.corners += [(x + dx, y + dy) for x, y in other.corners]
-        self.turned |= other.turned
+        self.reflected |= other.reflected
         self.sides.update(other.sides)
         self.firm |= other.firm
         self.cuts = max(self.cuts, other.cuts)
@@ -159,8 +159,8 @@ def _component(
             columns = frozenset()
         else:
             levels, order = tied(levels, straight, columns)
-    levels, flipped = turned(levels, order, {min(unit.members) for unit in units if unit.turns})
-    plan = ComponentLayout(turned=flipped)
+    levels, flipped = reflected(levels, order, {min(unit.members) for unit in units if unit.turns})
+    plan = ComponentLayout(reflected=flipped)
     plan.sides = at_ends(problem, _singles(levels, 0), _singles(levels, -1))
     for n, node in enumerate(levels.nodes):
         if node.members and node.members[0][0] in plan.sides:

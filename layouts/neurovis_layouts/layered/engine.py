@@ -51,16 +51,16 @@ def checked(problem: LayoutProblem) -> None:
 def _framed(problem: LayoutProblem) -> LayoutProblem:
     """Pins in the engine's frame: x across, y along."""
 
-    def turned(pins: Mapping[int, Point]) -> dict[int, Point]:
+    def in_frame(pins: Mapping[int, Point]) -> dict[int, Point]:
         return {i: from_picture(point, problem.direction) for i, point in pins.items()}
 
     return replace(
         problem,
-        pins=turned(problem.pins),
+        pins=in_frame(problem.pins),
         modules=tuple(
             replace(
                 m,
-                pins=turned(m.pins),
+                pins=in_frame(m.pins),
                 origin=None if m.origin is None else from_picture(m.origin, problem.direction),
             )
             for m in problem.modules

@@ -18,8 +18,8 @@ from neurovis_layouts.layered.place import placed
 _MOST = 1500
 
 
-def turned(levels: Levels, order: Sequence[Sequence[int]], may: AbstractSet[int]) -> tuple[Levels, set[int]]:
-    """The levels with frames turned, and the first neurons of these; ``may`` are first neurons of frames."""
+def reflected(levels: Levels, order: Sequence[Sequence[int]], may: AbstractSet[int]) -> tuple[Levels, set[int]]:
+    """The levels with some frames reflected, and the first neurons of these; ``may`` are first neurons of frames."""
     frames = [n for rank in order for n in rank if levels.nodes[n].members and _first(levels, n) in may]
     frames = [n for n in frames if any(dx for _, dx, _ in levels.nodes[n].members)]
     if not frames:
@@ -34,7 +34,7 @@ def turned(levels: Levels, order: Sequence[Sequence[int]], may: AbstractSet[int]
                 flipped ^= {node}
         if flipped == before:
             break
-    return _turn(levels, flipped), {_first(levels, node) for node in flipped}
+    return _reflect(levels, flipped), {_first(levels, node) for node in flipped}
 
 
 def _first(levels: Levels, node: int) -> int:
@@ -62,7 +62,7 @@ def _offset(node: int, offset: float, flipped: AbstractSet[int]) -> float:
     return -offset if node in flipped else offset
 
 
-def _turn(levels: Levels, flipped: AbstractSet[int]) -> Levels:
+def _reflect(levels: Levels, flipped: AbstractSet[int]) -> Levels:
     nodes = list(levels.nodes)
     for node in flipped:
         nodes[node] = replace(nodes[node], members=tuple((m, -dx + 0.0, dy) for m, dx, dy in nodes[node].members))

@@ -271,7 +271,7 @@ def _unit(piece: Piece, kin: int, pair: Mapping[int, int]) -> Unit:
 def _resting(plan: ComponentLayout, piece: Piece) -> tuple[Piece, FrameMove]:
     """A piece, and the move from its own drawing to its place in the plan."""
     first = piece.part.members[0]
-    flip = (piece.part.image_of >= 0) != (min(piece.part.members) in plan.turned)
+    flip = (piece.part.image_of >= 0) != (min(piece.part.members) in plan.reflected)
     x, y = plan.places[first]
     dx, dy = FrameMove((0.0, 0.0), flip).point(piece.drawing.places[0])
     return piece, FrameMove((x - dx, y - dy), flip)

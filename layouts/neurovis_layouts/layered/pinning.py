@@ -233,10 +233,10 @@ def _held(
 
 def _fitted(drawing: Drawing, pins: Mapping[int, Point], flip: bool) -> FrameMove | None:
     """The move that takes a drawing to its pins, if one does."""
-    turned = FrameMove((0.0, 0.0), flip)
+    reflection = FrameMove((0.0, 0.0), flip)
     apart = []
     for place, (x, y) in sorted(pins.items()):
-        px, py = turned.point(drawing.places[place])
+        px, py = reflection.point(drawing.places[place])
         apart.append((x - px, y - py))
     x, y = apart[0]
     if any(abs(x - dx) > _SLACK or abs(y - dy) > _SLACK for dx, dy in apart):
@@ -247,11 +247,11 @@ def _fitted(drawing: Drawing, pins: Mapping[int, Point], flip: bool) -> FrameMov
 def _frames(problem: LayoutProblem, pieces: Sequence[Piece], moves: Sequence[FrameMove]) -> Iterator[Wish]:
     number = {box: len(problem.modules) + k for k, box in enumerate(_boxes(pieces))}
     for piece, move in zip(pieces, moves, strict=True):
-        part, turned = piece.part, FrameMove((0.0, 0.0), move.flip)
-        places = (to_picture(turned.point(place), problem.direction) for place in piece.drawing.places)
+        part, reflection = piece.part, FrameMove((0.0, 0.0), move.flip)
+        places = (to_picture(reflection.point(place), problem.direction) for place in piece.drawing.places)
         offsets = tuple(zip(part.members, places, strict=True))
         frame = part.module if part.module >= 0 else number.get(part.box, -1)
-        rect = _in_picture(turned.rect(piece.rect), problem)
+        rect = _in_picture(reflection.rect(piece.rect), problem)
         yield Wish((Body(offsets, frame, rect),), to_picture(move.shift, problem.direction))
 
 

@@ -1,7 +1,7 @@
 """Walls: frames that a route may enter only to reach one of its ends.
 
-In: frames, each with the neurons in it and its rectangle. Out: which of them are foreign to a route, and which routes
-run through such a one.
+In: frames, each with the neurons in it and its rectangle. Out: which of them are foreign to a route (neither of its
+ends is in them), and which routes run through such a one.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from neurovis_spec.layout import BoolArray, FloatArray, IntArray
 from neurovis_spec.layout.geometry import Rect, pieces_of, points_in_turn, squared_distances
 from neurovis_spec.layout.model import Route
 
+#: The neurons in a frame, and its rectangle.
 Frame: TypeAlias = tuple[frozenset[int], Rect]
 
 #: How far apart the points of a route are that must not lie in a foreign frame.
