@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import neurovis_layouts.blocks
-import neurovis_layouts.layered.drawing
 import numpy as np
 import pytest
 from neurovis_layouts.frame import to_picture
@@ -59,11 +57,3 @@ def test_frames_are_drawn_where_engines_and_memory_keep_room_for_them(direction:
         assert room[1] <= rect[1] + 0.03, path
         assert room[2] >= rect[2] - 0.03, path
         assert room[3] >= rect[3] - 0.03, path
-
-
-@pytest.mark.parametrize(
-    "module", [neurovis_layouts.blocks, neurovis_layouts.layered.drawing, neurovis_spec.scene.boxes]
-)
-def test_nobody_has_distances_of_their_own(module: object) -> None:
-    for name in ("PAD", "PAD_ROUTE", "PAD_FRAME", "TITLE"):
-        assert getattr(module, name) is getattr(frames, name)

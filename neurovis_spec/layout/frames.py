@@ -8,7 +8,7 @@ is not in.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from neurovis_spec.layout.geometry import Rect, bounds, padded, sampled, united
 from neurovis_spec.layout.labels import BOX_WEIGHT, instance_titles, label_rect, title_room, widened
@@ -67,15 +67,17 @@ class Frames:
                 continue
             lines = [p for i in self._inner.get(number, ()) if i in routes for p in sampled(routes[i], 0.1)]
             held = [rect for n in self._held.get(number, ()) if (rect := found[n]) is not None]
-            parts = [padded(bounds(at), PAD) if instance else _boxed(bounds(at))]
-            parts += [padded(bounds(lines), PAD_ROUTE if instance else BOX_LOOP)] if lines else []
-            parts += [padded(rect, PAD_FRAME if instance else BOX_FRAME) for rect in held]
-            parts += [
+            labels = [
                 padded(label_rect(placed[i], self._problem.labels[i], side), PAD_LABEL)
                 for i, side in self._sides.items()
                 if i in placed and i in self.members[number]
             ]
-            rect = widened(united(parts), self._titles[number])
+            if instance:
+                rect = enclosing(bounds(at), bounds(lines) if lines else None, held, labels)
+            else:
+                parts = [_boxed(bounds(at)), *(padded(rect, BOX_FRAME) for rect in held), *labels]
+                rect = united([*parts, padded(bounds(lines), BOX_LOOP)] if lines else parts)
+            rect = widened(rect, self._titles[number])
             found[number] = titled(rect) if instance else rect
         return found
 
@@ -93,6 +95,13 @@ class Frames:
     def related(self, one: int, other: int) -> bool:
         """Whether frames have neurons in common, so that they cannot keep off each other."""
         return not self.members[one].isdisjoint(self.members[other])
+
+
+def enclosing(centres: Rect, lines: Rect | None, held: Iterable[Rect], labels: Iterable[Rect] = ()) -> Rect:
+    """The frame of an instance, but for its title: around centres, what lies on routes, frames in it, and labels with
+    the room around these."""
+    parts = [padded(centres, PAD), *(padded(rect, PAD_FRAME) for rect in held), *labels]
+    return united(parts if lines is None else [*parts, padded(lines, PAD_ROUTE)])
 
 
 def _boxed(rect: Rect) -> Rect:

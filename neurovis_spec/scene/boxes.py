@@ -21,12 +21,10 @@ from neurovis_spec.layout.frames import (
     BOX_LOOP,
     BOX_TIGHT,
     BOX_TIGHT_FRAME,
-    PAD,
-    PAD_FRAME,
     PAD_LABEL,
-    PAD_ROUTE,
     SLACK,
-    TITLE,
+    enclosing,
+    titled,
 )
 from neurovis_spec.layout.geometry import Rect, meet
 from neurovis_spec.layout.labels import BOX_WEIGHT, TITLE_HIGH, instance_titles, title_room, widened
@@ -197,15 +195,9 @@ def _framed(
     beside: Sequence[Rect],
 ) -> Rect:
     """The frame of an instance, as the layered engine keeps it free."""
-    parts = [_wider(bounds([positions[list(inside)]]), PAD), _wider(bounds(lines), PAD_ROUTE)]
-    x0, y0, x1, y1 = _union(
-        [part for part in parts if part is not None] + [_padded(r, PAD_FRAME) for r in held] + [*beside]
-    )
-    return x0, y0 - TITLE, x1, y1
-
-
-def _wider(rect: Rect | None, by: float) -> Rect | None:
-    return None if rect is None else _padded(rect, by)
+    centres = bounds([positions[list(inside)]])
+    assert centres is not None
+    return titled(enclosing(centres, bounds(lines), held, beside))
 
 
 def _padded(rect: Rect, by: float) -> Rect:

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 from neurovis_layouts.layered.parts import Part
 from neurovis_layouts.routing.ends import Key
-from neurovis_spec.layout.frames import PAD, PAD_FRAME, PAD_ROUTE, TITLE
-from neurovis_spec.layout.geometry import Rect, sampled
+from neurovis_spec.layout.frames import TITLE, enclosing
+from neurovis_spec.layout.geometry import Rect, bounds, sampled
 from neurovis_spec.layout.labels import widened
 from neurovis_spec.layout.model import GRID, Direction, Point, Route, Side
 
@@ -74,16 +74,9 @@ def around(
     """The frame around neurons, routes, frames and labels: on the grid, so that it moves exactly. There is room for the
     ``title``, so wide, where the picture has its top: across the direction on both sides, since the frame may be turned
     round."""
-    points = list(places)
     line = [point for route in routes for point in sampled(route, 0.3)]
-    x0 = min([x - PAD for x, _ in points] + [x - PAD_ROUTE for x, _ in line] + [r[0] - PAD_FRAME for r in frames])
-    x1 = max([x + PAD for x, _ in points] + [x + PAD_ROUTE for x, _ in line] + [r[2] + PAD_FRAME for r in frames])
-    y0 = min([y - PAD for _, y in points] + [y - PAD_ROUTE for _, y in line] + [r[1] - PAD_FRAME for r in frames])
-    y1 = max([y + PAD for _, y in points] + [y + PAD_ROUTE for _, y in line] + [r[3] + PAD_FRAME for r in frames])
-    if labels:
-        x0, y0 = min(x0, *(r[0] for r in labels)), min(y0, *(r[1] for r in labels))
-        x1, y1 = max(x1, *(r[2] for r in labels)), max(y1, *(r[3] for r in labels))
-    x0, y0, x1, y1 = entitled((x0, y0, x1, y1), title, direction)
+    rect = enclosing(bounds(places), bounds(line) if line else None, frames, labels)
+    x0, y0, x1, y1 = entitled(rect, title, direction)
     match direction:
         case "down":
             y0 -= TITLE
