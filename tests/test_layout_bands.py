@@ -89,3 +89,42 @@ def test_a_box_is_not_cut() -> None:
     _, layout = drawn(f"{LINE}layout: {{boxes: {{middle: [a10..a14]}}}}\n")
     assert len({layout.positions[f"a{i}"][0] for i in range(10, 15)}) == 1
     assert stretched(layout) < 2
+
+
+WIDE = (
+    "neurovis: 1\nname: wide\nmodules:\n"
+    "  leg: {neurons: {s: {}, a: {count: 9}, m: {}}, connections: {s -> a: 1, a -> m: 1}}\n"
+    "neurons: {C: {}}\ninstances: {left: {module: leg, count: 3}, right: {module: leg, count: 3}}\n"
+    "connections: {C -> left.s: 1, C -> right.s: 1}\nlayout: {mirror: [[left, right]]}\n"
+)
+RING = (
+    "neurovis: 1\nname: ring\nmodules: {m: {neurons: {E: {}, F: {}}, connections: {E -> F: -1, F -> E: -1}}}\n"
+    "instances: {c: {module: m, count: 16}}\nneurons: {O: {count: 16}}\nconnections: {"
+    + ", ".join(f"c{i}.F -> c{i % 16 + 1}.E: 1, c{i}.E -> O{i}: 1" for i in range(1, 17))
+    + "}\n"
+)
+
+
+def test_instances_of_one_row_that_is_too_wide_stand_in_rows() -> None:
+    problem, layout = drawn(WIDE)
+    assert stretched(layout) < 2
+    assert metrics(layout, problem)["flow"] == 1
+    axis = 2 * layout.positions["C"][0]
+    rows = [layout.positions[f"left{leg}.s"][1] for leg in (1, 2, 3)]
+    assert rows == sorted(rows)
+    assert len(set(rows)) > 1
+    for name, (x, y) in layout.positions.items():
+        if name.startswith("left"):
+            assert layout.positions[name.replace("left", "right")] == (axis - x, y)
+
+
+def test_a_line_holds_instances_in_one_row() -> None:
+    _, layout = drawn(WIDE.replace("right]]", "right]], align: [[left1.s, left2.s, left3.s]]"))
+    assert len({layout.positions[f"{side}{leg}.s"][1] for side in ("left", "right") for leg in (1, 2, 3)}) == 1
+
+
+def test_rows_are_numbered_from_the_first_on() -> None:
+    _, layout = drawn(RING)
+    assert stretched(layout) < 2
+    heights = [layout.positions[f"c{i}.E"][1] for i in range(1, 17)]
+    assert heights == sorted(heights)

@@ -1,15 +1,15 @@
-"""Compact: how long frames are folded, so that the whole comes near to the proportions of a page.
+"""Compact: how often frames are folded, so that the whole comes near to the proportions of a page.
 
-In: a problem, and how it is drawn in a shape. Out: the shape in which it takes least of a page: how many bands (see
-``bands``) the ranks of each kind of instance, and those of the whole, stand in. What is near to these proportions is
-left as it is, so that signals run one way.
+In: a problem, and how it is drawn in a shape. Out: the shape in which it takes least of a page: in how many bands (see
+``bands``) the ranks of each kind of instance, and those of the whole, stand, and in how many rows the instances of a
+kind that are declared together. What is near to these proportions is left as it is, so that signals run one way.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from neurovis_layouts.layered.drawing import Drawing
@@ -18,6 +18,8 @@ from neurovis_spec.layout.model import Direction, LayoutProblem
 
 #: The number of the whole, beside those of kinds of instances; and of what is never folded.
 WHOLE, NONE = -1, -2
+#: What is folded where ranks are.
+RANKS = -1
 #: Width by height of a page: that of a screen or a slide.
 ASPECT = 4 / 3
 #: What is longer than a page by this is folded, if that is worth so much of what it costs as it is.
@@ -28,30 +30,37 @@ _EACH = 0.9
 _SHORT = 24.0
 #: What it costs if all connections run back: one in ten is worth twice the page.
 _BACK = 10.0
-#: So many numbers of bands in a row are tried in vain.
+#: So many numbers of bands one after the other are tried in vain.
 _IN_VAIN = 2
-#: In no more bands than this, nor more neurons and connections; nor are all kinds tried more often.
-_MOST_BANDS, _MOST, _ROUNDS = 8, 3000, 2
+#: In no more bands or rows than this, nor more neurons and connections; nor are all kinds tried more often.
+_MOST_FOLDS, _MOST, _ROUNDS = 8, 3000, 2
 
 
+#: What can be folded: the ranks of a kind of instance, or of the whole (its number, RANKS), or the rows of instances of
+#: one kind (the second number) in another.
+Fold: TypeAlias = tuple[int, int]
 #: What of a shape concerns a drawing.
-ShapeKey: TypeAlias = tuple[tuple[int, int], ...]
+ShapeKey: TypeAlias = tuple[tuple[Fold, int], ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """How many bands there are of the whole, and of kinds of instances by their numbers, where there are several."""
+    """How many bands or rows there are of what is folded."""
 
-    bands: Mapping[int, int] = field(default_factory=dict)
+    counts: Mapping[Fold, int] = field(default_factory=dict)
+
+    def count(self, where: int, what: int = RANKS) -> int:
+        """How many bands the ranks of a kind of instance stand in, or how many rows instances of one kind in it."""
+        return self.counts.get((where, what), 1)
 
     def of(self, kind: int, problem: LayoutProblem) -> ShapeKey:
         """What of it concerns one kind of instance, whose problem this is."""
         inside = {kind, *(int(module.template) for module in problem.modules)}
-        return tuple((number, bands) for number, bands in sorted(self.bands.items()) if number in inside)
+        return tuple((fold, count) for fold, count in sorted(self.counts.items()) if fold[0] in inside)
 
-    def changed(self, kind: int, bands: int) -> Shape:
-        """Another number of bands for a kind."""
-        return replace(self, bands={**self.bands, kind: bands})
+    def changed(self, fold: Fold, count: int) -> Shape:
+        """Another number of bands or rows."""
+        return Shape({**self.counts, fold: count})
 
 
 #: How a problem is drawn in a shape.
@@ -64,34 +73,32 @@ def may_be_folded(problem: LayoutProblem) -> bool:
     return not fixed and len(problem.neurons) + len(problem.edges) <= _MOST
 
 
-def compact(problem: LayoutProblem, drawn: Drawn, cuts: Mapping[int, int]) -> Shape:
-    """The shape that costs least. ``cuts`` are by the number of a kind where, at most, it can be cut, once it has been
-    drawn."""
+def compact(problem: LayoutProblem, drawn: Drawn, most: Mapping[Fold, int]) -> Shape:
+    """The shape that costs least. ``most`` says, once it has been drawn, what can be folded, and how often at most."""
     shape = Shape()
     drawing = drawn(problem, shape)
     if _stretched(drawing, problem.direction) < _STRETCHED or max(_size(drawing, problem.direction)) < _SHORT:
         return shape
     first = least = _cost(problem, drawing)
-    kinds = (WHOLE, *sorted({int(module.template) for module in problem.modules}))
     for _ in range(_ROUNDS):
         before = least
-        for kind in kinds:
-            least, shape = _folded(problem, drawn, kind, cuts.get(kind, 0), least, shape)
+        for fold in sorted(most):
+            least, shape = _folded(problem, drawn, fold, most[fold], least, shape)
         if least == before:
             break
     return shape if least < _WORTH * first else Shape()
 
 
 def _folded(
-    problem: LayoutProblem, drawn: Drawn, kind: int, cuts: int, least: float, shape: Shape
+    problem: LayoutProblem, drawn: Drawn, fold: Fold, most: int, least: float, shape: Shape
 ) -> tuple[float, Shape]:
-    """The least cost, and the shape that has it, with whatever number of bands of one kind; once more bands have been
-    no better for some times, more are not tried."""
+    """The least cost, and the shape that has it, with whatever number of bands or rows of one kind; once more have been
+    no better for some times, even more are not tried."""
     best, found, vain = least, shape, 0
-    for bands in range(1, min(_MOST_BANDS, cuts + 1) + 1):
-        if bands == shape.bands.get(kind, 1):
+    for count in range(1, min(_MOST_FOLDS, most) + 1):
+        if count == shape.count(*fold):
             continue
-        other = shape.changed(kind, bands)
+        other = shape.changed(fold, count)
         now = _cost(problem, drawn(problem, other))
         vain += 1
         if now < _EACH * best:

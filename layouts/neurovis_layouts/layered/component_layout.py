@@ -30,6 +30,9 @@ from neurovis_layouts.routing import Waypoint
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import LayoutProblem, Point, Side
 
+#: That a row stands behind another outweighs any connection.
+_ROW = 1000 * INSTANT
+
 
 @dataclass(slots=True)
 class ComponentLayout:
@@ -78,15 +81,17 @@ def planned(
     pair: Mapping[int, int],
     columns: AbstractSet[int] = frozenset(),
     wanted: Wanted = UNCUT,
+    behind: Sequence[tuple[int, int]] = (),
 ) -> ComponentLayout:
     """All components laid out and packed; units without connections beside the last rank of the largest component.
 
     ``bonds`` are numbers that units of one rank share. With ``pair`` (mirror images, both ways) all is one component,
     its axis at 0. ``columns`` are boxes to be drawn as such where that can be. The largest component stands in bands as
-    ``wanted`` where it can be cut, which no axis can.
+    ``wanted`` where it can be cut, which no axis can. ``behind`` are pairs of
+    neurons of which the second stands in a later rank.
     """
     if pair:
-        return _component(problem, units, bonds, (), range(len(problem.edges)), pair, frozenset(), wanted)
+        return _component(problem, units, bonds, (), range(len(problem.edges)), pair, frozenset(), wanted, behind)
     connected, alone = components_of(problem, units, bonds)
     largest = max(connected, key=lambda part: sum(len(units[u].members) for u in part), default=None)
     parts: list[ComponentLayout] = []
@@ -102,7 +107,9 @@ def planned(
         guests = [units[u] for u in alone if few and hosts.get(u, largest) == part]
         own, tied = [units[u] for u in part], [bonds[u] for u in part]
         parts.append(
-            _component(problem, own, tied, guests, edges.get(k, []), {}, columns, wanted if part == largest else UNCUT)
+            _component(
+                problem, own, tied, guests, edges.get(k, []), {}, columns, wanted if part == largest else UNCUT, behind
+            )
         )
     if alone and not (few and connected):
         parts.append(_unconnected(problem, [units[u] for u in alone]))
@@ -135,11 +142,12 @@ def _component(
     pair: Mapping[int, int],
     columns: AbstractSet[int],
     wanted: Wanted,
+    behind: Sequence[tuple[int, int]],
 ) -> ComponentLayout:
     everyone = [*units, *guests]
     here = {m for unit in units for m in unit.members}
     columns = {box for box in columns if here.issuperset(problem.boxes[box][1])}
-    rank = _ranks(problem, units, bonds, edges)
+    rank = _ranks(problem, units, bonds, edges, behind)
     if pair:
         rank = _one_on_axis(units, bonds, rank, pair)
     folds = folded(problem, units, bonds, rank, edges, pair)
@@ -221,7 +229,13 @@ def _passage(place: Point, before: float, behind: float) -> Waypoint:
     return Waypoint(place[0], place[1] + (behind - before) / 2, (before + behind) / 2)
 
 
-def _ranks(problem: LayoutProblem, units: Sequence[Unit], bonds: Sequence[int], edges: Sequence[int]) -> list[int]:
+def _ranks(
+    problem: LayoutProblem,
+    units: Sequence[Unit],
+    bonds: Sequence[int],
+    edges: Sequence[int],
+    behind: Sequence[tuple[int, int]],
+) -> list[int]:
     numbers = {bond: number for number, bond in enumerate(dict.fromkeys(bonds))}
     owner = {m: numbers[bond] for unit, bond in zip(units, bonds, strict=True) for m in unit.members}
     arcs: dict[tuple[int, int], float] = {}
@@ -230,6 +244,7 @@ def _ranks(problem: LayoutProblem, units: Sequence[Unit], bonds: Sequence[int], 
         ends = owner[edge.source], owner[edge.target]
         if ends[0] != ends[1]:
             arcs[ends] = arcs.get(ends, 0.0) + (INSTANT if edge.delay == 0 else 1.0)
+    arcs.update({(owner[a], owner[b]): _ROW for a, b in behind if a in owner and b in owner and owner[a] != owner[b]})
     first = {owner[m] for m in problem.entries if m in owner}
     last = {owner[m] for m in problem.exits if m in owner}
     ranks = ranks_of(len(numbers), arcs, first, last)

@@ -11,10 +11,11 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 from neurovis_layouts.label_room import covered, flipped, roomy, sides_of
 from neurovis_layouts.layered.bands import FEW, Wanted
-from neurovis_layouts.layered.compact import NONE, WHOLE, Shape, ShapeKey, compact, may_be_folded
+from neurovis_layouts.layered.compact import NONE, RANKS, WHOLE, Fold, Shape, ShapeKey, compact, may_be_folded
 from neurovis_layouts.layered.component_layout import ComponentLayout, planned
 from neurovis_layouts.layered.drawing import Drawing, FrameMove, Piece, entitled
 from neurovis_layouts.layered.frame_routing import linked
@@ -44,8 +45,8 @@ class Composer:
         self._kinds: dict[tuple[int, Direction, ShapeKey], Drawing] = {}
         self._shape = Shape()
         self._wholes: dict[ShapeKey, _Standing] = {}
-        #: at how many places a kind of instance can be cut into bands
-        self._cuts: dict[int, int] = {}
+        #: what can be folded, and how often at most
+        self._most: dict[Fold, int] = {}
 
     def whole(self, routed: bool = True) -> Drawing:
         """The drawing of the problem; without ``routed`` that of its neurons and frames alone, which stand where they
@@ -53,7 +54,7 @@ class Composer:
         problem = self._book.whole()
         problem = replace(problem, pins=self._with_origins(problem))
         if may_be_folded(problem):
-            self._shape = compact(problem, self._in_shape, self._cuts)
+            self._shape = compact(problem, self._in_shape, self._most)
         return self.compose(problem, routed)
 
     def _in_shape(self, problem: LayoutProblem, shape: Shape) -> Drawing:
@@ -162,13 +163,23 @@ class Composer:
         for piece in pieces:
             if piece.part.family:
                 families.setdefault((piece.part.family, piece.part.kind), []).append(min(piece.part.members))
-        units, bonds = bonded(problem, _spread(problem, units), pair, list(families.values()))
+        rows: list[list[int]] = []
+        behind: list[tuple[int, int]] = []
+        lines = {m for line in problem.align for m in line}
+        held = {piece.part.kind for piece in pieces if lines.intersection(piece.part.members)}
+        for (_, make), family in families.items():
+            if make not in held:
+                self._most[kind, make] = max(len(family), self._most.get((kind, make), 1))
+            own = in_rows(family, self._shape.count(kind, make))
+            behind += [(before[0], after[0]) for before, after in pairwise(own)]
+            rows += own
+        units, bonds = bonded(problem, _spread(problem, units), pair, rows)
         # a ring or a line of which a box holds some alone can be in no strip of its own
         columns = {box for box in columns if _whole(units, problem.boxes[box][1])}
         few = FEW if kind >= 0 or problem.modules else 1
-        wanted = Wanted(self._shape.bands.get(kind, 1), few)
-        plan = planned(problem, units, bonds, pair, columns, wanted)
-        self._cuts[kind] = plan.cuts
+        wanted = Wanted(self._shape.count(kind), few)
+        plan = planned(problem, units, bonds, pair, columns, wanted, behind)
+        self._most[kind, RANKS] = plan.cuts + 1
 
         def redraw(piece: Piece, pins: Mapping[int, Point]) -> Piece:
             inner = (
@@ -296,6 +307,16 @@ def _boxed(problem: LayoutProblem, part: Part, pair: Mapping[int, int]) -> Layou
         mirrors=(LayoutMirror(-1, pairs),) if pairs else (),
         align=tuple(line for line in lines if len(line) > 1),
     )
+
+
+def in_rows(family: Sequence[int], rows: int) -> list[list[int]]:
+    """Those declared together in so many rows, as they are numbered, the first ones longer where they are not equal.
+
+    >>> in_rows([1, 2, 3, 4, 5], 2)
+    [[1, 2, 3], [4, 5]]
+    """
+    ends = [-(-len(family) * (row + 1) // rows) for row in range(rows)]
+    return [list(family[a:b]) for a, b in pairwise([0, *ends]) if b > a]
 
 
 @dataclass(frozen=True, slots=True)
