@@ -35,11 +35,11 @@ def drawn(text: str) -> tuple[LayoutProblem, Layout]:
     return problem, lay_out_problem(problem, "layered")
 
 
-def stretched(layout: Layout) -> float:
+def stretched(layout: Layout, aspect: float = 4 / 3) -> float:
     """How much wider or higher than a page neurons stand."""
     xs, ys = [x for x, _ in layout.positions.values()], [y for _, y in layout.positions.values()]
     wide, high = max(xs) - min(xs) + 1, max(ys) - min(ys) + 1
-    return max(wide / high * 3 / 4, high / wide * 4 / 3)
+    return max(wide / high / aspect, high / wide * aspect)
 
 
 @pytest.mark.parametrize("direction", ["down", "up", "right", "left"])
@@ -78,6 +78,13 @@ def test_legs_of_fifteen_ranks_fold_alike_and_mirror_images_are_exact() -> None:
 def test_what_is_near_to_a_page_runs_one_way() -> None:
     problem, layout = drawn(LINE.replace("30", "11"))
     assert metrics(layout, problem)["flow"] == 1
+
+
+def test_the_size_of_the_picture_is_that_of_the_page() -> None:
+    _, wide = drawn(f"{LINE}render: {{size: [1200, 400]}}\n")
+    _, high = drawn(f"{LINE}render: {{size: [400, 1200]}}\n")
+    assert stretched(wide, 3) < 2
+    assert stretched(high, 1 / 3) < 2
 
 
 def test_pins_keep_ranks_uncut() -> None:

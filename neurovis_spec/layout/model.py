@@ -115,6 +115,8 @@ class LayoutProblem:
     boxes: tuple[tuple[str, tuple[int, ...]], ...] = ()
     neuron_spacing: float = 1.0
     rank_spacing: float = 2.0
+    #: width by height that a page comes near to: that of a screen or a slide, where nothing else is asked for
+    aspect: float = 4 / 3
     #: where signals enter and leave the network: a hint on what comes first in a loop
     entries: tuple[int, ...] = ()
     exits: tuple[int, ...] = ()

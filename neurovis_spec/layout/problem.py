@@ -53,6 +53,7 @@ def canonical(
     places: Mapping[str, Point] | None = None,
     labels: Mapping[str, Point] | None = None,
     memory: Layout | None = None,
+    aspect: float = 4 / 3,
 ) -> LayoutProblem:
     """The problem made of these parts, in canonical order.
 
@@ -63,7 +64,7 @@ def canonical(
     these, ``mirrors`` the scope's path, the
     pairs of neurons and the pairs of instances; ``plan`` the path of the instance that is divided, what
     stands in which row and column of it, and how many of them that spans; ``places`` where neurons are as data;
-    ``labels`` how wide and high are those that discs cannot hold.
+    ``labels`` how wide and high are those that discs cannot hold; ``aspect`` the width of the page by its height.
     """
     names = tuple(sorted(neurons, key=natural_key))
     index = {name: i for i, name in enumerate(names)}
@@ -97,6 +98,7 @@ def canonical(
         boxes=framed,
         neuron_spacing=spacing[0],
         rank_spacing=spacing[1],
+        aspect=aspect,
         entries=members(entries),
         exits=members(exits),
         modules=instances,
@@ -175,6 +177,7 @@ def problem_of(network: Network, memory: Layout | None = None) -> LayoutProblem:
         _places(network),
         dict(zip(names, label_room(network), strict=False)),
         memory,
+        aspect=4 / 3 if network.render.size is None else network.render.size[0] / network.render.size[1],
     )
 
 

@@ -20,8 +20,6 @@ from neurovis_spec.layout.model import Direction, LayoutProblem
 WHOLE, NONE = -1, -2
 #: What is folded where ranks are.
 RANKS = -1
-#: Width by height of a page: that of a screen or a slide.
-ASPECT = 4 / 3
 #: What is longer than a page by this is folded, if that is worth so much of what it costs as it is.
 _STRETCHED, _WORTH = 2.0, 0.5
 #: Each single fold has to be worth this.
@@ -77,7 +75,7 @@ def compact(problem: LayoutProblem, drawn: Drawn, most: Mapping[Fold, int]) -> S
     """The shape that costs least. ``most`` says, once it has been drawn, what can be folded, and how often at most."""
     shape = Shape()
     drawing = drawn(problem, shape)
-    if _stretched(drawing, problem.direction) < _STRETCHED or max(_size(drawing, problem.direction)) < _SHORT:
+    if _stretched(problem, drawing) < _STRETCHED or max(_size(drawing, problem.direction)) < _SHORT:
         return shape
     first = least = _cost(problem, drawing)
     for _ in range(_ROUNDS):
@@ -114,17 +112,17 @@ def _size(drawing: Drawing, direction: Direction) -> tuple[float, float]:
     return (x1 - x0, y1 - y0) if direction in ("down", "up") else (y1 - y0, x1 - x0)
 
 
-def _stretched(drawing: Drawing, direction: Direction) -> float:
+def _stretched(problem: LayoutProblem, drawing: Drawing) -> float:
     """How much wider or higher than a page a drawing is."""
-    wide, high = _size(drawing, direction)
-    return max(wide / (ASPECT * high), ASPECT * high / wide)
+    wide, high = _size(drawing, problem.direction)
+    return max(wide / (problem.aspect * high), problem.aspect * high / wide)
 
 
 def _cost(problem: LayoutProblem, drawing: Drawing) -> float:
     """How large a page is that holds a drawing, times how long straight lines between the ends of its connections
     are, times what those cost that run back."""
     wide, high = _size(drawing, problem.direction)
-    page = max(wide, ASPECT * high) ** 2
+    page = max(wide, problem.aspect * high) ** 2
     lengths = [distance(drawing.places[edge.source], drawing.places[edge.target]) for edge in problem.edges]
     back = sum(drawing.places[edge.source][1] > drawing.places[edge.target][1] for edge in problem.edges)
     return page * math.fsum(lengths) * (1 + _BACK * back / max(1, len(problem.edges)))

@@ -24,8 +24,6 @@ Drawn = Callable[[Part, Direction], Piece]
 _Members: TypeAlias = tuple[int, ...]
 #: Columns across and rows along, in the engine's frame.
 _Span: TypeAlias = tuple[range, range]
-#: Width by height that a page, or the frame of an instance, comes near to: that of a screen or a slide.
-_ASPECT = 4 / 3
 #: Between parts that share a cell, in units of the layout.
 _BESIDE = 0.5
 #: Rounds in which each part may turn to face the others; after the second hardly any does.
@@ -160,7 +158,7 @@ def facing(
         high = max(r[3] for r in rects) - min(r[1] for r in rects)
         if problem.direction in ("right", "left"):
             wide, high = high, wide
-        stretched = max(wide / (_ASPECT * high), _ASPECT * high / wide)
+        stretched = max(wide / (problem.aspect * high), problem.aspect * high / wide)
         return (wide + high + sum(distance(at[a], at[b]) for a, b in between)) * stretched
 
     def turn(own: Sequence[int], direction: Direction) -> None:
