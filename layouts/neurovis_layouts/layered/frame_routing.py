@@ -20,8 +20,8 @@ from neurovis_layouts.routing.obstacles import REACH
 from neurovis_layouts.routing.rounded import rounded
 from neurovis_layouts.routing.route_cost import Judge
 from neurovis_layouts.routing.simplify_routes import MOST_EASED, eased, told_apart
-from neurovis_spec.layout.geometry import Rect, snap
-from neurovis_spec.layout.model import LayoutEdge, LayoutProblem, Point, Route
+from neurovis_spec.layout.geometry import Rect, distance, snap
+from neurovis_spec.layout.model import GRID, LayoutEdge, LayoutProblem, Point, Route
 
 #: With more connections than this nobody can tell them apart.
 _MOST = 1000
@@ -131,7 +131,8 @@ def _cut(problem: LayoutProblem, links: Sequence[int], plan: ComponentLayout, re
             if not any(_beside(place, line[0], line[2][0]) for place in rests.places):
                 line = [line[0], _aslant(line), *line[3:]]
             line.reverse()
-        found[k] = rounded(line, lambda _: True)
+        apart = [a for a, b in pairwise(line) if distance(a, b) > GRID]
+        found[k] = rounded([*apart, line[-1]], lambda _: True)
     return found
 
 
