@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from neurovis_layouts.routing.channel_routing import channels
+from neurovis_layouts.routing.channel_search import way
 from neurovis_layouts.routing.lines import CutLines, crossed
+from neurovis_layouts.routing.rows import OccupiedRows
 
 import neurovis_spec as nv
 from neurovis_spec.layout import LayoutEdge
@@ -97,3 +100,37 @@ def test_full_layers_beside_a_frame_run_as_if_there_were_none(sources: int, targ
         if not name.endswith("x.a"):
             high, low = route[0][1], route[-1][1]
             assert all(high - 0.5 <= y <= low + 0.5 for _, y in sampled(route, 0.1)), name
+
+
+@given(
+    st.lists(points, min_size=2, max_size=12, unique=True),
+    st.lists(st.lists(points, min_size=2, max_size=4), max_size=4),
+    st.floats(0.5, 2.0),
+)
+@settings(deadline=None)
+def test_a_way_is_given_up_only_where_it_costs_more_than_the_limit(
+    centres: list[tuple[float, float]], drawn: list[list[tuple[float, float]]], share: float
+) -> None:
+    rows = OccupiedRows(centres, [], 1)
+    for line in drawn:
+        rows.lines.add(line)
+        rows.use((x, y) for (x, _), y in zip(line, rows.between(-9, 9, frozenset()), strict=False))
+    cost, path = way(rows, (0, 1))
+    found = way(rows, (0, 1), limit=cost * share)
+    assert found == (cost, path) if share >= 1 else found[0] in (cost, math.inf)
+
+
+def test_a_search_ends_where_the_limit_is_reached(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A way through twenty rows that may cost no more than the straight line sees few of them, where it has to go round
+    the first neuron."""
+    rows = OccupiedRows([(0.0, 0.0), (0.0, 20.0), *((0.0, float(y)) for y in range(1, 20))], [], 1)
+    asked: list[float] = []
+    free = rows.free
+
+    def counted(y: float, own: frozenset[int]) -> list[tuple[float, float]]:
+        asked.append(y)
+        return free(y, own)
+
+    monkeypatch.setattr(rows, "free", counted)
+    assert math.isinf(way(rows, (0, 1), limit=20.0)[0])
+    assert len(set(asked)) < 4

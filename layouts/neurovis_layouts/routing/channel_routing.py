@@ -134,7 +134,7 @@ class _Network:
         else:
             cost, path = way(self._down, ends)
             least = straight(self._centres[ends[0]], self._centres[ends[1]]) * _ACROSS
-            other, aside = way(self._side, ends) if cost > least else (math.inf, [])
+            other, aside = way(self._side, ends, limit=cost / _ACROSS) if cost > least else (math.inf, [])
             if math.isinf(min(cost, other)):
                 return  # and then so it is for those with the same ends
             along = cost <= other * _ACROSS or self._round_it_all(ends, aside)
@@ -155,7 +155,9 @@ class _Network:
         first, last = sorted((aside[0][0], aside[-1][0]))
         if all(first - _BEYOND <= x <= last + _BEYOND for x, _ in aside):
             return False
-        cost, path = way(self._down, ends, 0.0)
+        if _length_of(aside) <= _MUCH * math.dist(aside[0], aside[-1]):
+            return False
+        cost, path = way(self._down, ends, 0.0, WALLED)
         length = _length_of(path)
         return cost < WALLED and length <= _HARDLY * math.dist(path[0], path[-1]) and _length_of(aside) > _MUCH * length
 

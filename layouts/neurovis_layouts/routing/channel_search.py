@@ -27,6 +27,8 @@ _APART = 0.22
 #: What it costs to share a gap, to squeeze between two discs, to run through a wall, and to cross a line.
 _SHARED, _SQUEEZED, _WALL, _CROSSING = 1.5, 0.4, 60.0, 4.0
 _LEAST = 0.75
+#: By how much the cost of a way may be rounded.
+_ROUNDED = 1e-9
 #: What costs more leads through a wall.
 WALLED = _WALL
 #: Places tried in a row, about; ways closer than this to the straight line are kept apart from, but for so many on
@@ -41,17 +43,19 @@ def straight(a: Point, b: Point) -> float:
     return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2) * (1 - 1e-9)
 
 
-def way(rows: OccupiedRows, ends: tuple[int, int], crossing: float = _CROSSING) -> tuple[float, list[Point]]:
-    """The cost of the best way, infinite where the ends are level, and its points: both ends, one in each row.
-    ``crossing`` is what it costs to cross a line."""
+def way(
+    rows: OccupiedRows, ends: tuple[int, int], crossing: float = _CROSSING, limit: float = math.inf
+) -> tuple[float, list[Point]]:
+    """The cost of the best way, infinite where the ends are level or it costs more than the limit, and its points: both
+    ends, one in each row. ``crossing`` is what it costs to cross a line."""
     start, end = rows.centres[ends[0]], rows.centres[ends[1]]
     if abs(end[1] - start[1]) < _LEAST:
         return math.inf, []
     own = rows.own(*ends)
     if start[1] > end[1]:
-        cost, path = _down(rows, end, start, own, crossing)
+        cost, path = _down(rows, end, start, own, crossing, limit)
         return cost, path[::-1]
-    return _down(rows, start, end, own, crossing)
+    return _down(rows, start, end, own, crossing, limit)
 
 
 def through(rows: OccupiedRows, ends: tuple[int, int], gates: Sequence[Waypoint]) -> list[Point]:
@@ -71,38 +75,52 @@ def through(rows: OccupiedRows, ends: tuple[int, int], gates: Sequence[Waypoint]
 
 
 def _down(
-    rows: OccupiedRows, start: Point, end: Point, own: Own, crossing: float = _CROSSING
+    rows: OccupiedRows,
+    start: Point,
+    end: Point,
+    own: Own,
+    crossing: float = _CROSSING,
+    limit: float = math.inf,
 ) -> tuple[float, list[Point]]:
     """The cost of the best way down from one point to another, and its points: both ends, one in each row."""
+    limit *= 1 + _ROUNDED
     heights = [*rows.between(start[1], end[1], own), end[1]]
     line = [(_at(start, end, y), y) for y in heights]
     if _open(rows, [start, *line], own):
         # nothing is shorter
         return _cost([start, *line]), [start, *line]
-    layers: list[tuple[list[float], IntArray]] = []
-    cost, across, before = np.zeros(1), [start[0]], start[1]
+    layers: list[tuple[FloatArray, IntArray]] = []
+    cost, across, before = np.zeros(1), np.array(start[:1]), start[1]
     for middle, y in line:
-        places, extra = [end[0]], [0.0]
+        if limit < math.inf and _least(cost, across, end, before) > limit:
+            return math.inf, []
+        places, extra = np.array(end[:1]), np.zeros(1)
         if y != end[1]:
-            kept = [across[k] for k in np.argsort(cost, kind="stable")[:_KEPT].tolist()]
+            kept = across[np.argsort(cost, kind="stable")[:_KEPT]].tolist()
             places, extra = _places(rows.free(y, own), rows.used(y), middle, (start[0], end[0]), kept)
-        ways = cost[None, :] + _step(np.array(across), np.array(places), y - before)
+        ways = cost[None, :] + _step(across, places, y - before)
         limits = min(across[0], places[0]), max(across[-1], places[-1])
         walls = rows.walls(before, y, own, limits)
         if walls:
-            ways = ways + _WALL * _sides(np.array(across), np.array(places), walls)
+            ways = ways + _WALL * _sides(across, places, walls)
         lines = rows.lines.between(before, y)
         if len(lines[0]) and crossing:
-            ways = ways + crossing * crossed(np.array(across), np.array(places), lines)
-        chosen = np.argmin(ways, axis=1)
+            ways = ways + crossing * crossed(across, places, lines)
+        chosen = ways.argmin(axis=1)
         layers.append((places, chosen))
-        cost, across, before = ways[np.arange(len(places)), chosen] + np.array(extra), places, y
+        cost, across, before = ways[np.arange(len(places)), chosen] + extra, places, y
     path: list[Point] = []
     k = 0
     for (places, chosen), y in zip(layers[::-1], heights[::-1], strict=True):
-        path.append((places[k], y))
+        path.append((float(places[k]), y))
         k = int(chosen[k])
     return float(cost[0]), [start, *path[::-1]]
+
+
+def _least(cost: FloatArray, across: FloatArray, end: Point, y: float) -> float:
+    """What a way costs at least that has come as far as these places in a row."""
+    aside, down = across - end[0], end[1] - y
+    return float((cost + np.sqrt(aside * aside + down * down)).min())
 
 
 def _open(rows: OccupiedRows, line: Sequence[Point], own: Own) -> bool:
@@ -141,15 +159,14 @@ def _at(start: Point, end: Point, y: float) -> float:
 def _sides(a: FloatArray, b: FloatArray, walls: Sequence[Span]) -> FloatArray:
     """How many walls a step leads through, from one side to the other: (to b, from a)."""
     low, high = np.minimum(a[None, :], b[:, None]), np.maximum(a[None, :], b[:, None])
-    total = np.zeros(low.shape)
-    for x0, x1 in walls:
-        total += (low <= x0) & (x1 <= high)
+    x0, x1 = np.array(walls).T[:, :, None, None]
+    total: FloatArray = ((low <= x0) & (x1 <= high)).sum(axis=0, dtype=np.float64)
     return total
 
 
 def _places(
     free: Sequence[Span], used: Sequence[float], line: float, ends: Span, kept: Sequence[float]
-) -> tuple[list[float], list[float]]:
+) -> tuple[FloatArray, FloatArray]:
     """Where a way may run through a row, in order, and what that costs: the places nearest to the straight line, and
     straight on from the best ones before (``kept``)."""
     at = bisect_left(used, line)
@@ -166,7 +183,7 @@ def _places(
         if number < len(free) and free[number][0] <= x:
             _try(free[number], wishes, kept, used, found)
     places = sorted(found)
-    return places, [found[x] for x in places]
+    return np.array(places), np.array([found[x] for x in places])
 
 
 def _outward(free: Sequence[Span], line: float) -> Iterator[int]:

@@ -58,6 +58,8 @@ class CutLines:
 
     def between(self, top: float, bottom: float) -> tuple[FloatArray, FloatArray]:
         """Where the lines that pass two heights pass the first, and the second."""
+        if not self._runs:
+            return np.zeros(0), np.zeros(0)
         above, below = self.passing((top, bottom))
         both = ~np.isnan(above + below)
         return above[both], below[both]

@@ -130,8 +130,9 @@ class Polylines:
             i, j = close_segments(places, places, mates.a[first:last], mates.b[first:last], _NEAR)
             j += first
             (x, y), (ux, uy) = (places[i] - mates.a[j]).T, mates._way[j].T
-            near = np.unique(i[squared_distances(x, y, ux, uy) < _CLOSE * _CLOSE])
-            share = np.maximum(share, np.bincount(owner[near], minlength=len(self)))
+            near = np.zeros(len(places), dtype=np.bool_)
+            near[i[squared_distances(x, y, ux, uy) < _CLOSE * _CLOSE]] = True
+            share = np.maximum(share, np.bincount(owner, near, len(self)))
         share /= np.maximum(np.bincount(owner, minlength=len(self)), 1)
         most = np.minimum(1.0, _RUN / _SHARE / np.maximum(self.lengths() - 2 * _DISC, _FINE))
         beyond: FloatArray = np.maximum(share / most - _SHARE / 2, 0.0)

@@ -161,7 +161,9 @@ class Judge:
         drawn = self.cell_edges >= 0
         cells, many = self.cells[drawn], max(self.routes, default=0) + 1
         number = np.cumsum(np.append(False, cells[1:] != cells[:-1]))[: len(cells)]
-        cell, edge = np.divmod(np.unique(number * many + self.cell_edges[drawn]), many)
+        # each edge once in a cell
+        places = np.sort(number * many + self.cell_edges[drawn], kind="stable")
+        cell, edge = np.divmod(places[np.append(True, places[1:] != places[:-1])[: len(places)]], many)
         shared = np.zeros(len(cell), dtype=np.bool_)
         shared[1:] |= cell[1:] == cell[:-1]
         shared[:-1] |= cell[1:] == cell[:-1]
