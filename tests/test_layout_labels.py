@@ -206,3 +206,11 @@ def test_a_label_needs_no_more_room_than_it_has_beside_its_disc() -> None:
     assert label_rect((0.0, 0.0), (1.0, 0.2), "left")[2] < -0.3
     assert label_rect((0.0, 0.0), (1.0, 0.2), "below")[1] > 0.3
     assert label_rect((0.0, 0.0), (1.0, 0.2), "above")[3] < -0.3
+
+
+@pytest.mark.parametrize("engine", ["circular", "grid"])
+def test_formations_keep_room_for_labels(engine: str) -> None:
+    for seed in range(6):
+        text = generated(seed)
+        network = nv.compile_text(text[: text.index(", mirror")] + "}\n" if ", mirror" in text else text)
+        assert overlaps(network, network.layout(engine).value) == 0

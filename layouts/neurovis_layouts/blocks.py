@@ -8,6 +8,7 @@ included, and copied by steps of the grid.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 from neurovis_layouts.layered.drawing import Drawing
@@ -16,10 +17,11 @@ from neurovis_layouts.pins import fit
 from neurovis_layouts.routing import route_all
 from neurovis_layouts.routing.ends import Key, keys_of
 from neurovis_spec.layout.geometry import Rect, shifted, snap
-from neurovis_spec.layout.model import LayoutEdge, LayoutProblem, Point, Route
+from neurovis_spec.layout.labels import instance_titles, label_rects
+from neurovis_spec.layout.model import LayoutEdge, LayoutProblem, Point, Route, Side
 
-#: Places for these neurons, around (0, 0).
-Formation: TypeAlias = Callable[[Sequence[int]], list[Point]]
+#: Places for these neurons, around (0, 0), and on which sides their labels stand that their discs cannot hold.
+Formation: TypeAlias = Callable[[Sequence[int]], tuple[list[Point], list[Side | None]]]
 
 #: Between frames.
 _BETWEEN = 1.0
@@ -32,6 +34,7 @@ class Blocks:
         self._problem = problem
         self._formation = formation
         self._drawn: dict[str, Drawing] = {}
+        self._titles = instance_titles((module.path, module.module) for module in problem.modules)
         self._within: dict[int, list[int]] = {}
         around: list[set[int]] = [set() for _ in problem.neurons]
         for number, module in enumerate(problem.modules):
@@ -68,14 +71,16 @@ class Blocks:
             (self._problem.modules[inner].members, self._instance(inner)) for inner in within
         ]
         if loose:
-            blocks.insert(0, (loose, Drawing(tuple(self._formation(loose)), {}, ())))
+            blocks.insert(0, (loose, self.formed(loose)))
         rects = [drawing.rect() for _, drawing in blocks]
         corners = packed([(r[2] - r[0], r[3] - r[1]) for r in rects], _BETWEEN) if blocks else []
         free: list[Point] = [(0.0, 0.0)] * len(members)
+        sides: list[Side | None] = [None] * len(members)
         shifts = [(snap(x - r[0]), snap(y - r[1])) for (x, y), r in zip(corners, rects, strict=True)]
         for (own, drawing), shift in zip(blocks, shifts, strict=True):
-            for member, point in zip(own, drawing.places, strict=True):
+            for member, point, side in zip(own, drawing.places, drawing.sides, strict=True):
                 free[place[member]] = _moved(point, shift)
+                sides[place[member]] = side
         places, whole, bent = fit(free, {place[m]: point for m, point in pins.items()})
         routes: dict[Key, Route] = {}
         frames: list[tuple[tuple[int, ...], Rect]] = []
@@ -93,7 +98,23 @@ class Blocks:
                 (tuple(here[m] for m in inside), shifted(r, (sx, sy))) for inside, r in (*around, *drawing.frames)
             ]
         local = [LayoutEdge(e.name, place[e.source], place[e.target], e.delay) for e in edges]
-        return routed(Drawing(tuple(places), routes, tuple(frames)), local)
+        title = self._titles[number] if number >= 0 else 0.0
+        labels = self._labels(members, places, sides)
+        return routed(
+            Drawing(tuple(places), routes, tuple(frames), sides=tuple(sides), labels=labels, title=title), local
+        )
+
+    def formed(self, neurons: Sequence[int]) -> Drawing:
+        """Neurons in their formation."""
+        places, sides = self._formation(neurons)
+        return Drawing(tuple(places), {}, sides=tuple(sides), labels=self._labels(neurons, places, sides))
+
+    def _labels(
+        self, members: Sequence[int], places: Sequence[Point], sides: Sequence[Side | None]
+    ) -> tuple[Rect, ...]:
+        """What labels cover that stand beside their discs."""
+        rooms = [self._problem.labels[member] for member in members] if self._problem.labels else []
+        return tuple(rect for rect in label_rects(places, rooms, sides) if rect is not None)
 
     def _bent(self, number: int, here: Sequence[int], places: Sequence[Point]) -> dict[Key, Route]:
         """Routes within an instance that pins around it have bent: by themselves, so that others bent so are alike."""
@@ -105,7 +126,7 @@ class Blocks:
         inside = [LayoutEdge(e.name, at[e.source], at[e.target], e.delay) for e in self._inside.get(number, ())]
         return {
             (here[a], here[b], k): tuple((px + x, py + y) for px, py in route)
-            for (a, b, k), route in routed(Drawing(there, {}, ()), inside).routes.items()
+            for (a, b, k), route in routed(Drawing(there, {}), inside).routes.items()
         }
 
 
@@ -118,7 +139,7 @@ def routed(drawing: Drawing, edges: Sequence[LayoutEdge]) -> Drawing:
     routes = dict(drawing.routes)
     for i, route in zip(new, made, strict=True):
         routes[keys[i]] = (route[0], *((snap(x), snap(y)) for x, y in route[1:-1]), route[-1])
-    return Drawing(drawing.places, routes, drawing.frames)
+    return replace(drawing, routes=routes)
 
 
 def _moved(point: Point, shift: Point) -> Point:

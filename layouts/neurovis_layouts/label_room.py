@@ -87,26 +87,30 @@ def covered(
     return {i: padded(rect_of(problem.labels[i], side, problem.direction, places[i]), PAD_LABEL) for i, side in beside}
 
 
-def roomy(problem: LayoutProblem, places: Mapping[int, Point], sides: Sequence[Side | None]) -> dict[int, Point]:
-    """Places of a formation, those of its neurons farther apart in the direction of reading where labels would lie on
-    discs or on each other otherwise."""
-    labelled = {i: side for i in places if (side := sides[i]) is not None}
-    if not labelled:
-        return dict(places)
-    level = problem.direction in ("right", "left")
-    factor = 1.0
-    for _ in range(_STEPS):
-        grown = {i: (x, y * factor) if level else (x * factor, y) for i, (x, y) in places.items()}
-        rects = {i: rect_of(problem.labels[i], s, problem.direction, grown[i]) for i, s in labelled.items()}
-        if not any(_met(rect, i, grown, rects) for i, rect in rects.items()):
-            return grown
+def roomy(
+    rooms: Sequence[Point],
+    places: Mapping[int, Point],
+    sides: Mapping[int, Side | None],
+    grows: tuple[bool, bool],
+    air: float = AIR / 2,
+) -> dict[int, Point]:
+    """Places of a formation in the picture, farther apart across or down, as it ``grows``, where labels would come
+    nearer than ``air`` to discs or to each other otherwise."""
+    beside = {i: side for i in places if (side := sides[i]) is not None}
+    factor, grown = 1.0, dict(places)
+    for _ in range(_STEPS if beside else 0):
+        rects = {i: label_rect(grown[i], rooms[i], side) for i, side in beside.items()}
+        if not any(_met(rect, i, grown, rects, air) for i, rect in rects.items()):
+            break
         factor *= _STEP
+        across, down = (factor if free else 1.0 for free in grows)
+        grown = {i: (x * across, y * down) for i, (x, y) in places.items()}
     return grown
 
 
-def _met(rect: Rect, own: int, places: Mapping[int, Point], rects: Mapping[int, Rect]) -> bool:
+def _met(rect: Rect, own: int, places: Mapping[int, Point], rects: Mapping[int, Rect], air: float) -> bool:
     """Whether a label comes near another neuron's disc or label."""
     discs = ((x - RADIUS, y - RADIUS, x + RADIUS, y + RADIUS) for i, (x, y) in places.items() if i != own)
-    return any(meet(rect, disc, AIR / 2) for disc in discs) or any(
-        meet(rect, other, AIR / 2) for i, other in rects.items() if i != own
+    return any(meet(rect, disc, air) for disc in discs) or any(
+        meet(rect, other, air) for i, other in rects.items() if i != own
     )

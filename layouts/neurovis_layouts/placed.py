@@ -11,14 +11,18 @@ from neurovis_layouts.blocks import Blocks, routed
 from neurovis_layouts.formations import offsets
 from neurovis_layouts.frame import to_picture
 from neurovis_layouts.incremental import kept
+from neurovis_layouts.label_room import roomy
 from neurovis_layouts.layered.drawing import Drawing
 from neurovis_layouts.pins import fit, with_origins
 from neurovis_layouts.routing.ends import keys_of
-from neurovis_spec.layout.geometry import shifted
-from neurovis_spec.layout.model import Arrangement, Layout, LayoutProblem, Point
+from neurovis_spec.layout.frames import BOX_ACROSS, PAD_LABEL
+from neurovis_spec.layout.geometry import shifted, snap
+from neurovis_spec.layout.model import RADIUS, Arrangement, Layout, LayoutProblem, Point, Side
 
 #: So many neurons are arranged around pins frame by frame.
 _MOST_AROUND_PINS = 5000
+#: From labels to other discs: lines of boxes run between them.
+_AIR = BOX_ACROSS - RADIUS + PAD_LABEL
 
 
 def boxes_together(problem: LayoutProblem) -> list[int]:
@@ -44,19 +48,21 @@ def place(problem: LayoutProblem, engine: str, how: Arrangement, spacing: float)
     """The layout in which all neurons stand in one formation, those of an instance in one of their own."""
     order = {neuron: i for i, neuron in enumerate(boxes_together(problem))}
 
-    def formation(neurons: Sequence[int]) -> list[Point]:
-        """Places for these, members of a box one after the other."""
-        found: dict[int, Point] = {}
+    def formation(neurons: Sequence[int]) -> tuple[list[Point], list[Side | None]]:
+        """Places for these, members of a box one after the other; labels outside of a ring, else to the right."""
+        there: dict[int, Point] = {}
+        sides: dict[int, Side | None] = dict.fromkeys(neurons)
         for neuron, point in zip(
             sorted(neurons, key=order.__getitem__), offsets(how, len(neurons), spacing), strict=True
         ):
-            found[neuron] = to_picture(point, problem.direction)
-        return [found[neuron] for neuron in neurons]
+            there[neuron] = to_picture(point, problem.direction)
+            if problem.labels and problem.labels[neuron][0]:
+                sides[neuron] = "left" if how == "ring" and there[neuron][0] < 0 else "right"
+        found = roomy(problem.labels, there, sides, (True, how == "ring"), _AIR)
+        return [(snap(found[neuron][0]), snap(found[neuron][1])) for neuron in neurons], [sides[n] for n in neurons]
 
-    if problem.modules:
-        free = Blocks(problem, formation).whole()
-    else:
-        free = Drawing(tuple(formation(range(len(problem.neurons)))), {}, ())
+    blocks = Blocks(problem, formation)
+    free = blocks.whole() if problem.modules else blocks.formed(range(len(problem.neurons)))
     pins = with_origins(problem, free.places)
     around = bool(problem.modules) and len(problem.neurons) <= _MOST_AROUND_PINS
     drawing = routed(free if around else _pinned(free, pins), problem.edges)
@@ -69,6 +75,7 @@ def _layout(problem: LayoutProblem, engine: str, drawing: Drawing) -> Layout:
         engine,
         dict(zip(problem.neurons, drawing.places, strict=True)),
         {edge.name: drawing.routes[key] for edge, key in zip(problem.edges, keys_of(problem.edges), strict=True)},
+        {name: side for name, side in zip(problem.neurons, drawing.sides, strict=True) if side is not None},
     )
 
 
@@ -86,4 +93,5 @@ def _pinned(drawing: Drawing, pins: Mapping[int, Point]) -> Drawing:
             if not (key[0] in broken or key[1] in broken)
         },
         tuple((own, shifted(r, (dx, dy))) for own, r in drawing.frames if not bent.intersection(own)),
+        sides=drawing.sides,
     )

@@ -13,6 +13,7 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
+from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.label_room import covered, flipped, roomy, sides_of
 from neurovis_layouts.layered.bands import FEW, Wanted
 from neurovis_layouts.layered.compact import NONE, RANKS, WHOLE, Fold, Shape, ShapeKey, compact, may_be_folded
@@ -433,8 +434,10 @@ def _spread(problem: LayoutProblem, units: Sequence[Unit]) -> list[Unit]:
     result: list[Unit] = []
     for unit in units:
         if unit.places is not None and unit.reach is None and any(sides[m] is not None for m in unit.members):
-            grown = roomy(problem, dict(zip(unit.members, unit.places, strict=True)), sides)
-            unit = replace(unit, places=tuple((snap(grown[m][0]), snap(grown[m][1])) for m in unit.members))
+            there = {m: to_picture(p, problem.direction) for m, p in zip(unit.members, unit.places, strict=True)}
+            grown = roomy(problem.labels, there, dict(enumerate(sides)), (True, False))
+            places = (from_picture(grown[m], problem.direction) for m in unit.members)
+            unit = replace(unit, places=tuple((snap(x), snap(y)) for x, y in places))
         result.append(unit)
     return result
 
