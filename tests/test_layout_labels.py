@@ -201,6 +201,24 @@ def test_a_remembered_layout_keeps_its_sides() -> None:
     assert after.value.labels == {**before.value.labels, "Q": after.value.labels["Q"]}
 
 
+def test_boxes_that_pins_leave_no_room_for_their_titles_are_drawn_without_that() -> None:
+    network = nv.compile_text("""
+neurovis: 1
+name: pinned
+neurons:
+  A: {box: "a box with a title that is long"}
+  B: {box: "another with a title that is long"}
+  C: {}
+connections: {A -> B: 1, B -> C: 1}
+layout: {engine: layered, positions: {A: [0, 0], B: [1.7, 0]}}
+""")
+    assert not network.layout().warnings
+    _, _, _, frames = shown(network)
+    assert len(frames) == 2
+    one, other = (around(frame) for frame in frames.values())
+    assert not meet(one, other)
+
+
 def test_a_label_needs_no_more_room_than_it_has_beside_its_disc() -> None:
     assert label_rect((0.0, 0.0), (1.0, 0.2), "right")[0] > 0.3
     assert label_rect((0.0, 0.0), (1.0, 0.2), "left")[2] < -0.3

@@ -35,7 +35,7 @@ def remembered(problem: LayoutProblem, fresh: Sequence[Point], routes: Mapping[i
     if not placed:
         return list(fresh)
     wanted, put = resolved(problem, fresh, placed, by_hand(problem))
-    frames = Frames(problem)
+    frames = Frames(problem, problem.memory.labels if problem.memory else None)
     before = {**placed, **put, **wanted}
     old = carried(problem, problem.memory, before)
     newly = put.keys() | {i for i, point in problem.pins.items() if known.get(i) != point}

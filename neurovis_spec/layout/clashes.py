@@ -34,7 +34,7 @@ class Clash:
 def clashes(problem: LayoutProblem, layout: Layout) -> list[Clash]:
     """Pairs of frames, then frames with a neuron that is none of theirs; instances come before boxes, which are frames
     in the drawings of some engines alone: in others they are around what happens to stand there."""
-    frames = Frames(problem, layout.labels)
+    frames = Frames(problem, layout.labels, tight_boxes=True)
     boxed = layout.engine in engines_that(lambda can: can.frames)
     count = len(frames.members) if boxed else frames.instances
     if not 0 < count <= _MOST:

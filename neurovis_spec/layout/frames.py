@@ -29,16 +29,20 @@ SLACK = 1 / 32
 class Frames:
     """Who is in which frame: ``members`` by number; an instance has its number among the problem's."""
 
-    def __init__(self, problem: LayoutProblem, sides: Mapping[str, Side] | None = None) -> None:
-        """``sides`` are those on which labels stand for which there is room."""
+    def __init__(
+        self, problem: LayoutProblem, sides: Mapping[str, Side] | None = None, tight_boxes: bool = False
+    ) -> None:
+        """``sides`` are those on which labels stand for which there is room. With ``tight_boxes`` boxes are around their
+        neurons alone, as they are drawn where labels and titles have no room."""
         self._problem = problem
         beside = [(i, (sides or {}).get(problem.neurons[i])) for i in range(len(problem.labels))]
         self._sides = {i: side for i, side in beside if side is not None and problem.labels[i][0]}
         self._titles = instance_titles((module.path, module.module) for module in problem.modules)
-        self._titles += [title_room(name, BOX_WEIGHT) for name, _ in problem.boxes]
+        self._titles += [0.0 if tight_boxes else title_room(name, BOX_WEIGHT) for name, _ in problem.boxes]
         self.instances = len(problem.modules)
         self.members: list[frozenset[int]] = [frozenset(module.members) for module in problem.modules]
         self.members += [frozenset(own) for _, own in problem.boxes]
+        self._labelled = self.instances if tight_boxes else len(self.members)
         self.around: dict[int, list[int]] = {}
         for number, own in enumerate(self.members):
             for neuron in own:
@@ -70,7 +74,7 @@ class Frames:
             labels = [
                 padded(label_rect(placed[i], self._problem.labels[i], side), PAD_LABEL)
                 for i, side in self._sides.items()
-                if i in placed and i in self.members[number]
+                if number < self._labelled and i in placed and i in self.members[number]
             ]
             if instance:
                 rect = enclosing(bounds(at), bounds(lines) if lines else None, held, labels)
