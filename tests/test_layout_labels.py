@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import random
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import pytest
 
@@ -169,6 +169,21 @@ def test_instances_of_one_make_and_mirror_images_keep_room_alike() -> None:
     assert {layout.labels[f"left{n}.A"] for n in (1, 2)} == {"right"}
     assert {layout.labels[f"right{n}.A"] for n in (1, 2)} == {"left"}
     assert metrics(layout, problem)["symmetry"] == 1
+
+
+@pytest.mark.parametrize("direction", ["down", "right", "up", "left"])
+@pytest.mark.parametrize("boxed", [False, True])
+def test_a_chain_that_is_folded_keeps_room_for_its_labels(direction: str, boxed: bool) -> None:
+    names = [f"N{i}" for i in range(24)]
+    own = ["", "", ", box: one box of three", ", box: another one"]
+    neurons = [f'  {name}: {{label: "{random.Random(i).choice(WORDS)} of joint {i}"{own[i // 6] if boxed else ""}}}'
+               for i, name in enumerate(names)]  # fmt: skip
+    links = [f"  {a} -> {b}: 1" for a, b in pairwise(names)]
+    network = nv.compile_text(
+        "\n".join(["neurovis: 1", "name: chain", "neurons:", *neurons, "connections:", *links,
+                   f"layout: {{direction: {direction}}}"]) + "\n"
+    )  # fmt: skip
+    assert overlaps(network, network.layout("layered").value) == 0
 
 
 def test_short_names_and_numbers_take_no_room() -> None:

@@ -32,8 +32,8 @@ class Frames:
     def __init__(
         self, problem: LayoutProblem, sides: Mapping[str, Side] | None = None, tight_boxes: bool = False
     ) -> None:
-        """``sides`` are those on which labels stand for which there is room. With ``tight_boxes`` boxes are around their
-        neurons alone, as they are drawn where labels and titles have no room."""
+        """``sides`` are those on which labels stand for which there is room. With ``tight_boxes`` boxes hold neurons
+        alone, as they are drawn where labels and titles have no room."""
         self._problem = problem
         beside = [(i, (sides or {}).get(problem.neurons[i])) for i in range(len(problem.labels))]
         self._sides = {i: side for i, side in beside if side is not None and problem.labels[i][0]}

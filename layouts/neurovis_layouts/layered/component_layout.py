@@ -182,9 +182,6 @@ def _component(
             plan.places[member] = (x + dx, y + dy)
         if node.framed:
             plan.corners += [(x - node.reach[0], y - node.reach[1]), (x + node.reach[0], y + node.reach[1])]
-    sides = {**dict(enumerate(sides_of(problem))), **plan.sides}
-    for rect in covered(problem, plan.places, sides, sorted(plan.places)).values():
-        plan.corners += [(rect[0], rect[1]), (rect[2], rect[3])]
     spans = list(zip(*reaches(levels, order), strict=True))
     for i, passages in levels.passages.items():
         plan.ways[i] = [_passage(places[n], *spans[levels.nodes[n].rank]) for n in passages]
@@ -195,6 +192,9 @@ def _component(
         plan.cuts, found = banded(problem, levels, places, folds.ranks, wanted)
         if wanted.bands > 1:
             _in_bands(problem, plan, levels, found)
+    sides = {**dict(enumerate(sides_of(problem))), **plan.sides}
+    for rect in covered(problem, plan.places, sides, sorted(plan.places)).values():
+        plan.corners += [(rect[0], rect[1]), (rect[2], rect[3])]
     return plan
 
 
