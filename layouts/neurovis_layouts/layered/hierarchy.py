@@ -28,7 +28,7 @@ from neurovis_layouts.layered.same_rank import bonded
 from neurovis_layouts.layered.templates import Book, restricted
 from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.routing.ends import Key, keys_of
-from neurovis_spec.layout.frames import BOX_DOWN, SLACK
+from neurovis_spec.layout.frames import BOX_DOWN, PAD_LABEL, SLACK
 from neurovis_spec.layout.geometry import Rect, bounds, distance, meet, padded, snap, united
 from neurovis_spec.layout.labels import BOX_WEIGHT, title_room
 from neurovis_spec.layout.model import RADIUS, Direction, LayoutMirror, LayoutProblem, Point, Route, Side
@@ -401,8 +401,10 @@ class _Standing:
         links = [i for i, key in enumerate(keys) if key not in routes]
         drawn = list(routes.values())
         if routed:
+            # to routes a label is the frame of its neuron
+            boxes = (*self.boxes, *(((i,), padded(rect, -PAD_LABEL)) for i, rect in self.labels.items()))
             routes.update(
-                linked(problem, links, keys, self.plan, self.rests, self.units, self.frames, self.boxes, pair, drawn)
+                linked(problem, links, keys, self.plan, self.rests, self.units, self.frames, boxes, pair, drawn)
             )
         axis = self.rests.axis if pair else None
         fixed = bool(problem.pins)
