@@ -9,11 +9,10 @@ is not symmetric either, nothing moves.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from collections.abc import Set as AbstractSet
+from collections.abc import Iterable, Mapping, Sequence
 
-from neurovis_layouts.occupancy import CentreCells
-from neurovis_spec.layout.model import RADIUS, LayoutMirror, LayoutModule, LayoutProblem, Point
+from neurovis_layouts.occupancy import overlapping
+from neurovis_spec.layout.model import LayoutModule, LayoutProblem, Point
 
 #: Differences up to this are rounding.
 _SLACK = 1e-6
@@ -30,7 +29,7 @@ def resolved(
     _follow_makes(problem, fresh, where, moved)
     put = set(hand) - moved
     _follow_mirrors(problem, fresh, where, moved, hand, put)
-    both = whole(problem, _on_each_other(put, where, problem.pins)) & put
+    both = whole(problem, overlapping({i: where[i] for i in put}, problem.pins)) & put
     put -= both
     moved |= both
     moved -= problem.pins.keys() | put
@@ -99,18 +98,15 @@ def _follow_mirrors(
     put: set[int],
 ) -> None:
     across = 0 if problem.direction in ("down", "up") else 1
-    scopes: dict[int, list[LayoutMirror]] = {}
-    for mirror in problem.mirrors:
-        scopes.setdefault(mirror.scope, []).append(mirror)
-    for mirrors in scopes.values():
-        pairs = [(a, b) for mirror in mirrors for a, b in mirror.pairs if a in where and b in where]
-        twice = _twice(pairs, fresh, across)
+    for mirrored in pairs_by_axis(problem):
+        pairs = [(a, b) for a, b in mirrored if a in where and b in where]
+        twice = twice_axis(pairs, fresh, across)
         pairs = [(a, b) for a, b in pairs if _mirrored(fresh[a], fresh[b], twice, across)]
         if not pairs:
             continue
         # what was moved by hand does not take the axis along, unless all was
         firm = [(a, b) for a, b in pairs if a not in hand or b not in hand]
-        twice = _twice(firm or pairs, {**where, **hand} if firm else where, across)
+        twice = twice_axis(firm or pairs, {**where, **hand} if firm else where, across)
         followed: list[int] = []
         for a, b in pairs:
             if _mirrored(where[a], where[b], twice, across):
@@ -126,25 +122,22 @@ def _follow_mirrors(
         moved.update(whole(problem, followed) & where.keys())
 
 
-def _twice(pairs: Sequence[tuple[int, int]], where: Mapping[int, Point] | Sequence[Point], across: int) -> float:
-    """Twice where the axis stands: the median of the pairs."""
+def pairs_by_axis(problem: LayoutProblem) -> list[list[tuple[int, int]]]:
+    """The pairs of mirror images, those about one axis together."""
+    found: dict[int, list[tuple[int, int]]] = {}
+    for mirror in problem.mirrors:
+        found.setdefault(mirror.scope, []).extend(mirror.pairs)
+    return list(found.values())
+
+
+def twice_axis(pairs: Sequence[tuple[int, int]], where: Mapping[int, Point] | Sequence[Point], across: int) -> float:
+    """Twice where the axis of these pairs stands: their median."""
     totals = sorted(where[a][across] + where[b][across] for a, b in pairs)
     return totals[len(totals) // 2] if totals else 0.0
 
 
 def _mirrored(one: Point, other: Point, twice: float, across: int) -> bool:
     return abs(one[across] + other[across] - twice) <= _SLACK and abs(one[1 - across] - other[1 - across]) <= _SLACK
-
-
-def _on_each_other(put: AbstractSet[int], where: Mapping[int, Point], pins: Mapping[int, Point]) -> Iterator[int]:
-    """Those put somewhere whose discs would overlap, such as an instance moved on to the axis, and its image."""
-    cells = CentreCells()
-    for point in pins.values():
-        cells.add(point)
-    for i in sorted(put):
-        if not cells.free(where[i], 2 * RADIUS):
-            yield i
-        cells.add(where[i])
 
 
 def whole(problem: LayoutProblem, neurons: Iterable[int]) -> set[int]:

@@ -13,16 +13,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from neurovis_layouts.alike import Alike, Move
-from neurovis_layouts.conflicts import resolved, whole
+from neurovis_layouts.conflicts import pairs_by_axis, resolved, twice_axis, whole
 from neurovis_layouts.manual_edits import by_hand, carried, giving_way
-from neurovis_layouts.occupancy import AxisSide, Body, CentreCells, Occupancy, Wish, instance_of, lone
+from neurovis_layouts.occupancy import AxisSide, Body, Occupancy, Wish, instance_of, lone, overlapping
 from neurovis_layouts.rows import GroupRows
 from neurovis_spec.layout.frames import Frames
 from neurovis_spec.layout.geometry import Rect, bounds, snap
-from neurovis_spec.layout.model import RADIUS, LayoutMirror, LayoutModule, LayoutProblem, Point, Route
-
-#: Discs that touch do not overlap, whatever rounding says.
-_SLACK = 1e-6
+from neurovis_spec.layout.model import LayoutModule, LayoutProblem, Point, Route
 
 
 def remembered(problem: LayoutProblem, fresh: Sequence[Point], routes: Mapping[int, Route]) -> list[Point]:
@@ -42,7 +39,10 @@ def remembered(problem: LayoutProblem, fresh: Sequence[Point], routes: Mapping[i
     for i in whole(problem, giving_way(problem, before, newly, old)) & before.keys():
         if i not in problem.pins and i not in put:
             wanted.setdefault(i, before[i])
-    placed = _apart(problem, {i: point for i, point in before.items() if i not in wanted})
+    stay = {i: point for i, point in before.items() if i not in wanted}
+    # what stands on a pin, or in a file edited by hand on one before it, has to find another place, like what is new
+    lost = overlapping({i: point for i, point in stay.items() if i not in problem.pins}, problem.pins)
+    placed = {i: point for i, point in sorted(stay.items()) if i not in lost}
     shapes = _Shapes(problem, frames, fresh, routes, before, old)
     there = Occupancy(frames, placed, frames.rects(placed, old), _sides(problem, fresh, before), old.values())
     wishes = _Wishes(problem, fresh, placed)
@@ -57,22 +57,6 @@ def remembered(problem: LayoutProblem, fresh: Sequence[Point], routes: Mapping[i
         for neuron in (i for copy in piece for i in copy.members):
             wishes.note(neuron, there.placed[neuron])
     return [there.placed[i] for i in range(len(problem.neurons))]
-
-
-def _apart(problem: LayoutProblem, placed: dict[int, Point]) -> dict[int, Point]:
-    """Without what stands on a pin, or in a file edited by hand on one before it: that has to find another place, like
-    what is new."""
-    taken = CentreCells()
-    for point in problem.pins.values():
-        taken.add(point)
-    found: dict[int, Point] = {}
-    for i in sorted(placed):
-        if i in problem.pins:
-            found[i] = placed[i]
-        elif taken.free(placed[i], 2 * RADIUS - _SLACK):
-            found[i] = placed[i]
-            taken.add(placed[i])
-    return found
 
 
 def _innermost(problem: LayoutProblem) -> dict[int, LayoutModule]:
@@ -146,17 +130,12 @@ def _median(values: list[float]) -> float:
 def _sides(problem: LayoutProblem, fresh: Sequence[Point], before: Mapping[int, Point]) -> dict[int, AxisSide]:
     """For neurons with a mirror image the axis, and on which side of it they are, as in the fresh layout."""
     across = 0 if problem.direction in ("down", "up") else 1
-    scopes: dict[int, list[LayoutMirror]] = {}
-    for mirror in problem.mirrors:
-        scopes.setdefault(mirror.scope, []).append(mirror)
     sides: dict[int, AxisSide] = {}
-    for mirrors in scopes.values():
-        pairs = [pair for mirror in mirrors for pair in mirror.pairs]
+    for pairs in pairs_by_axis(problem):
         there = [(a, b) for a, b in pairs if a in before and b in before]
         if not there:
             continue
-        axis = _median([before[a][across] + before[b][across] for a, b in there]) / 2
-        other = _median([fresh[a][across] + fresh[b][across] for a, b in pairs]) / 2
+        axis, other = twice_axis(there, before, across) / 2, twice_axis(pairs, fresh, across) / 2
         agree = sum(_sign(before[a][across] - axis) * _sign(fresh[a][across] - other) for a, b in there)
         for a, b in pairs:
             side = _sign(fresh[a][across] - other) * (-1 if agree < 0 else 1)

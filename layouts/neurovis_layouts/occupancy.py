@@ -29,6 +29,8 @@ _ASIDE, _OFF, _STEP, _MOST = 4.0, 0.5, 0.25, 50_000
 _CELL, _COUNTED = 4.0, 4096
 #: Discs that touch do not overlap, whatever rounding says.
 _TOUCHING = 2 * RADIUS - 1e-9
+#: The same, of coordinates that have been rounded to be written into a file.
+_WRITTEN = 2 * RADIUS - 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +120,7 @@ class Occupancy:
         self._frames, self._sides = frames, sides
         self._members = [] if frames is None else frames.members
         self._rects = list(rects) or [None] * len(self._members)
-        self._cells, self._discs, self._walls = CentreCells(), _Field(), _Field()
+        self._cells, self._discs, self._walls = _CentreCells(), _Field(), _Field()
         self._bounds: Rect | None = None
         for neuron, point in placed.items():
             self._enter(neuron, point)
@@ -132,7 +134,7 @@ class Occupancy:
             if rect is not None and next(self._strangers(number, rect), None) is not None
         }
         points = [point for route in routes for point in sampled(route, _STEP)]
-        self._lines = CentreCells()
+        self._lines = _CentreCells()
         for point in points if len(points) <= _MOST else ():
             self._lines.add(point)
         self._rules = (_CLEAR, _AMPLE, _TIGHT, _DISCS) if points else (_AMPLE, _TIGHT, _DISCS)
@@ -216,7 +218,7 @@ class Occupancy:
 
     def _free(self, piece: Sequence[Body], anchor: Point, rules: _Rules) -> bool:
         """Whether all copies of a piece have room where they would stand."""
-        inside = CentreCells()
+        inside = _CentreCells()
         points: list[tuple[int, Point]] = []
         for copy in piece:
             side = self._sides.get(copy.offsets[0][0])
@@ -347,13 +349,26 @@ def _steps(along: tuple[bool, bool]) -> Sequence[Point]:
     return found
 
 
+def overlapping(where: Mapping[int, Point], pins: Mapping[int, Point]) -> set[int]:
+    """The neurons that would stand on a pin, or on one before them that does not."""
+    taken, found = _CentreCells(), set[int]()
+    for point in pins.values():
+        taken.add(point)
+    for i, point in sorted(where.items()):
+        if taken.free(point, _WRITTEN):
+            taken.add(point)
+        else:
+            found.add(i)
+    return found
+
+
 def instance_of(problem: LayoutProblem, members: Iterable[int]) -> int:
     """The instance that these are the neurons of, −1 where there is none."""
     own = set(members)
     return next((k for k, module in enumerate(problem.modules) if own == set(module.members)), -1)
 
 
-class CentreCells:
+class _CentreCells:
     """Centres in square cells, to ask whether a place is free."""
 
     def __init__(self) -> None:

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from neurovis_layouts.axes import shift_of
-from neurovis_layouts.occupancy import CentreCells, Occupancy, Wish, lone
+from neurovis_layouts.occupancy import Occupancy, Wish, lone, overlapping
 from neurovis_spec.layout.geometry import snap
-from neurovis_spec.layout.model import RADIUS, LayoutProblem, Point
+from neurovis_spec.layout.model import LayoutProblem, Point
 
 
 def fit(free: Sequence[Point], pins: Mapping[int, Point]) -> tuple[list[Point], Point, frozenset[int]]:
@@ -35,9 +35,6 @@ def with_origins(problem: LayoutProblem, free: Sequence[Point]) -> dict[int, Poi
 
     The origin of an instance whose module pins nothing is where its smallest x and y are.
     """
-    taken = CentreCells()
-    for point in problem.pins.values():
-        taken.add(point)
     found: dict[int, Point] = {}
     for module in problem.modules:
         if module.origin is None or not module.members:
@@ -46,9 +43,6 @@ def with_origins(problem: LayoutProblem, free: Sequence[Point]) -> dict[int, Poi
         x, y = module.origin[0] - min(a for a, _ in own), module.origin[1] - min(b for _, b in own)
         for member, (a, b) in list(module.pins.items())[:1]:
             x, y = module.origin[0] + a - free[member][0], module.origin[1] + b - free[member][1]
-        places = {i: (x + a, y + b) for i, (a, b) in zip(module.members, own, strict=True) if i not in problem.pins}
-        places = {i: place for i, place in places.items() if taken.free(place, 2 * RADIUS)}
-        for place in places.values():
-            taken.add(place)
-        found.update(places)
-    return dict(sorted({**found, **problem.pins}.items()))
+        found |= {i: (x + a, y + b) for i, (a, b) in zip(module.members, own, strict=True) if i not in problem.pins}
+    lost = overlapping(found, problem.pins)
+    return dict(sorted({**{i: place for i, place in found.items() if i not in lost}, **problem.pins}.items()))
