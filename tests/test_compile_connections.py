@@ -217,7 +217,7 @@ def test_edge_files(tmp_path: Path) -> None:
         ("[]", ["wrong-size"]),
         ("[[A1]]", ["wrong-type"]),
         ("[[A1, B1, 1, 1, 1]]", ["wrong-type"]),
-        ("[A1, B1]", ["wrong-type", "wrong-type"]),
+        ("[A1, B1]", ["wrong-type"]),
         ("[[A1, 3]]", ["wrong-type"]),
         ("[[A1, O], [A3, B1]]", ["edge-outside", "edge-outside"]),
         ("[[A1, B1, 1, null]]", ["wrong-type"]),
