@@ -29,7 +29,7 @@ from neurovis_spec.language.data.files import read_data
 from neurovis_spec.language.expressions.tree import Name, names, walk
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.model import names_of
-from neurovis_spec.language.unknown import UNKNOWN
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 
 #: More steps of a body within one of the network are a mistake.
 MOST_SUBSTEPS: Final = 1_000_000
@@ -149,7 +149,7 @@ def _sensed(
         if index is None:
             _report_input(name, key.span, around, findings)
         sizes = [_size(sensor, ports, "sensor", findings) for sensor in sensors]
-        known = [size for size in sizes if size is not None]
+        known = [size for size in sizes if size is not UNKNOWN]
         if index is None or len(known) < len(sizes):
             continue
         size = around.inputs[index].size
@@ -178,8 +178,8 @@ def _report_input(name: str, span: Span, around: Surroundings, findings: Finding
         findings.error("unknown-input", span, message, partial(known_inputs, name, known))
 
 
-def _size(name: Located[str], ports: Sequence[Port] | None, what: str, findings: Findings) -> int | None:
-    """How many numbers a name stands for (0 where the body is not known); None, and a finding, where the body has
+def _size(name: Located[str], ports: Sequence[Port] | None, what: str, findings: Findings) -> int | Unknown:
+    """How many numbers a name stands for (0 where the body is not known); UNKNOWN, and a finding, where the body has
     nothing of that name."""
     if ports is None:
         return 0
@@ -195,12 +195,12 @@ def _size(name: Located[str], ports: Sequence[Port] | None, what: str, findings:
             f"the body has no {what} '{shorten(name.value)}'",
             lambda: suggest(base, sizes, f"{what}s") or f"a {what} needs a name in the model, and this has none",
         )
-        return None
+        return UNKNOWN
     if int(one[2]) < sizes[base]:
         return 1
     has = "which is one number" if sizes[base] == 1 else f"of {base}[0] to {base}[{sizes[base] - 1}]"
     findings.error("wrong-size", name.span, f"there is no number {int(one[2])} in the {what} '{shorten(base)}', {has}")
-    return None
+    return UNKNOWN
 
 
 def _called(name: str, ports: Sequence[Port] | None) -> str:
@@ -220,7 +220,7 @@ def _moved(
     for name, formula in model.actuators.items():
         key = key_of(model.source, "actuators", name)
         size = _size(key, ports, "actuator", findings)
-        if size is not None and size > 1:
+        if size is not UNKNOWN and size > 1:
             message = f"the actuator '{shorten(name)}' takes {size} numbers, and a command is one"
             findings.error("wrong-size", key.span, message, f"command each of them: {shorten(name)}[0], …")
         called = _called(name, ports)
@@ -229,19 +229,19 @@ def _moved(
             message = f"the actuator '{shorten(name)}' is commanded twice: first as '{shorten(first)}'"
             findings.error("repeated-reference", key.span, message, "a body takes one command for each actuator")
         command = _command(called, formula, around, constants)
-        if command is not None and size is not None:
+        if command is not UNKNOWN and size is not UNKNOWN:
             yield command
 
 
-def _command(actuator: str, formula: Formula, around: Surroundings, constants: Constants) -> Moved | None:
-    """The command of an actuator; None, and a finding, where it is invalid."""
+def _command(actuator: str, formula: Formula, around: Surroundings, constants: Constants) -> Moved | Unknown:
+    """The command of an actuator; UNKNOWN, and a finding, where it is invalid."""
     findings = constants.findings
     made = {output.name: output for output in around.outputs}
     outputs = names_of(around.spec, "outputs", {**dict.fromkeys(around.spec.outputs, UNKNOWN), **made})
     known = _Bases(Together((outputs, constants.names, ALWAYS)))
     tree = parse_formula(formula, known, findings, what="outputs and parameters", subscripts=True)
     if tree is UNKNOWN:
-        return None
+        return UNKNOWN
     constants.read |= names(tree)
     found: dict[str, tuple[str, int, int]] = {}
     indices = {output.name: index for index, output in enumerate(around.outputs)}
@@ -263,29 +263,29 @@ def _command(actuator: str, formula: Formula, around: Surroundings, constants: C
             unknown = True
         else:
             place = _number(around.outputs[indices[base]], int(number.rstrip("]")) if bracket else None, span, findings)
-            if place is not None:
+            if place is not UNKNOWN:
                 found[node.name] = (node.name, indices[base], place)
     if findings.errors > before or unknown:
-        return None
+        return UNKNOWN
     if not found and is_constant(tree, (*ALWAYS, *constants.parameters)) and constants.value(formula) is UNKNOWN:
-        return None
+        return UNKNOWN
     parameters = tuple((name, slot) for name, slot in places_of(tree, constants.settable).items() if name not in found)
     return Moved(actuator, tree, tuple(found.values()), parameters, str(formula.value))
 
 
-def _number(output: Output, number: int | None, span: Span, findings: Findings) -> int | None:
-    """The place of a number in an output; None, and a finding, where it is not one, or is not there."""
+def _number(output: Output, number: int | None, span: Span, findings: Findings) -> int | Unknown:
+    """The place of a number in an output; UNKNOWN, and a finding, where it is not one, or is not there."""
     if number is None and output.size == 1:
         return 0
     if number is None:
         message = f"the output '{output.name}' is {output.size} numbers, and a command is one"
         findings.error("wrong-size", span, message, f"take one of them: {output.name}[0] to [{output.size - 1}]")
-        return None
+        return UNKNOWN
     if number < output.size:
         return number
     has = "it is one number" if output.size == 1 else f"it has {output.name}[0] to {output.name}[{output.size - 1}]"
     findings.error("wrong-size", span, f"there is no number {number} in the output '{output.name}': {has}")
-    return None
+    return UNKNOWN
 
 
 @dataclass(frozen=True, slots=True)

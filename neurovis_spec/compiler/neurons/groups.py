@@ -32,7 +32,7 @@ from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, said, too_long
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
-from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
+from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown, known
 from neurovis_spec.language.values import Choice, FormulaList, Initial
 from neurovis_spec.language.yaml.source import AnyList, Scalar
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
@@ -160,7 +160,7 @@ class Builder:
             kind=kind,
             model=model,
             names=names,
-            labels=labels or names,
+            labels=known(labels, names),
             bias=_unsaid(n).bias if bias is UNKNOWN else bias,
             initial=_unsaid(n).initial if initial is UNKNOWN else initial,
             input=_unsaid(n).input if input_index is UNKNOWN else input_index,
@@ -308,15 +308,15 @@ class Builder:
         findings.error("wrong-size", model.input.span, message, "an input has one component, or one for each neuron")
         return UNKNOWN
 
-    def _labels(self, model: GroupModel, names: tuple[str, ...]) -> tuple[str, ...] | None:
+    def _labels(self, model: GroupModel, names: tuple[str, ...]) -> tuple[str, ...] | Unknown:
         if model.label is None:
-            return None
+            return names
         node = model.source.get("label")
         if node is None or isinstance(node, Scalar) or len(model.label) == len(names):
             return labels_of(model.label, len(names), self.scope)
         message = f"'label' has {plural(len(model.label), 'text')} for {plural(len(names), 'neuron')}"
         self.constants.findings.error("wrong-size", node.span, message)
-        return None
+        return UNKNOWN
 
 
 def _spikes(kind: Kind) -> bool:

@@ -19,8 +19,8 @@ from neurovis_spec.language.templates import Hole, pieces
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 
 
-def labels_of(texts: Sequence[Located[str]], n: int, scope: Scope) -> tuple[str, ...] | None:
-    """The labels of n neurons: of one text, or of one each; None where an expression has none."""
+def labels_of(texts: Sequence[Located[str]], n: int, scope: Scope) -> tuple[str, ...] | Unknown:
+    """The labels of n neurons: of one text, or of one each; UNKNOWN where an expression has none."""
     parts = [pieces(text.value) for text in texts]
     if all(isinstance(piece, str) for part in parts for piece in part):
         plain = tuple("".join(map(str, part)) for part in parts)
@@ -31,33 +31,34 @@ def labels_of(texts: Sequence[Located[str]], n: int, scope: Scope) -> tuple[str,
     found = [
         _filled(*both, each[place : place + 1], n, scope) for place, both in enumerate(zip(texts, parts, strict=True))
     ]
-    return None if None in found else tuple(label for labels in found if labels is not None for label in labels)
+    sound = [labels for labels in found if labels is not UNKNOWN]
+    return tuple(label for labels in sound for label in labels) if len(sound) == len(found) else UNKNOWN
 
 
 def _filled(
     text: Located[str], parts: Sequence[str | Hole], i: FloatArray, n: int, scope: Scope
-) -> tuple[str, ...] | None:
+) -> tuple[str, ...] | Unknown:
     """A text for each of the neurons ``i``."""
-    columns: list[list[str] | None] = [
+    columns: list[list[str] | Unknown] = [
         [piece] * len(i) if isinstance(piece, str) else _values(text, piece, i, n, scope) for piece in parts
     ]
-    known = [column for column in columns if column is not None]
-    return tuple(map("".join, zip(*known, strict=True))) if len(known) == len(columns) else None
+    known = [column for column in columns if column is not UNKNOWN]
+    return tuple(map("".join, zip(*known, strict=True))) if len(known) == len(columns) else UNKNOWN
 
 
-def _values(text: Located[str], hole: Hole, i: FloatArray, n: int, scope: Scope) -> list[str] | None:
+def _values(text: Located[str], hole: Hole, i: FloatArray, n: int, scope: Scope) -> list[str] | Unknown:
     """What an expression gives for each of the neurons ``i``, as a text."""
     constants = scope.constants
     if not hole.closed:
         place = text.node.at(hole.start - 1, hole.start)
         constants.findings.error("unbalanced-parenthesis", place, "'{' is not closed", "write {{ for a brace")
-        return None
+        return UNKNOWN
     extra: dict[str, Value | Unknown] = {"i": i, "n": float(n)}
     if scope.module is not None and "number" not in constants.parameters:
         extra["number"] = float(scope.number or 1)
     formula: Formula = Located(text.value[hole.start : hole.end], text.node.part(hole.start, hole.end))
     value = constants.value(formula, extra)
-    return None if value is UNKNOWN else [_written(one) for one in np.broadcast_to(value, i.shape).tolist()]
+    return UNKNOWN if value is UNKNOWN else [_written(one) for one in np.broadcast_to(value, i.shape).tolist()]
 
 
 def _written(value: float) -> str:
