@@ -112,9 +112,10 @@ class Refusals:
             span = Span(span.file, span.line, span.column, span.line, span.column + 1)
         kind = "a mapping" if isinstance(key, Mapping) else "a list"
         hint = None
-        if isinstance(key, Sequence) and all(isinstance(item, Scalar) for item in key.items):
-            names = [str(item.value) for item in key.items if isinstance(item, Scalar)]
-            hint = f"several neurons in one key are joined with '+': {_short(' + '.join(names))}" if names else None
+        items = key.items if isinstance(key, Sequence) else ()
+        names = [item.value for item in items if isinstance(item, Scalar) and isinstance(item.value, str)]
+        if names and len(names) == len(items):
+            hint = f"several neurons in one key are joined with '+': {_short(' + '.join(names))}"
         self._error("key-not-text", span, f"a key is a text, not {kind}", hint)
 
     def cut_text(self, whole: Scalar, first: str) -> None:
