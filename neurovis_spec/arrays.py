@@ -5,7 +5,7 @@ In: an array. Out: the same, which nobody can write to any more; or what reads t
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -13,11 +13,13 @@ import numpy.typing as npt
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.int64]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
+Array = TypeVar("Array", bound="npt.NDArray[Any]")
 
 
-def frozen(array: npt.NDArray[np.generic]) -> None:
-    """Make an array read-only."""
+def frozen(array: Array) -> Array:
+    """The same array, made read-only."""
     array.flags.writeable = False
+    return array
 
 
 def subscript(indices: IntArray) -> slice | IntArray | None:

@@ -1,6 +1,6 @@
 """Skeletons as texts (JSON), in recordings and on the wire.
 
-In: a Skeleton, or a text that nobody vouches for. Out: the other.
+In: a Skeleton, or a text from anywhere, which is checked. Out: the other.
 """
 
 from __future__ import annotations

@@ -154,9 +154,7 @@ def _column(parts: list[tuple[Mapping[str, FloatArray], IntArray]]) -> Mapping[s
     """The parameters of a block, each from rows of its groups' arrays."""
     result: dict[str, FloatArray] = {}
     for name in parts[0][0]:
-        values = np.concatenate([parameters[name][rows] for parameters, rows in parts])
-        frozen(values)
-        result[name] = values
+        result[name] = frozen(np.concatenate([parameters[name][rows] for parameters, rows in parts]))
     return result
 
 

@@ -246,8 +246,7 @@ class Network:
         result = np.full(len(self.neurons), -1, dtype=np.int64)
         for noise in self.noises:
             result[noise.members] = np.arange(noise.start, noise.start + len(noise.members))
-        frozen(result)
-        return result
+        return frozen(result)
 
     @cached_property
     def mark(self) -> str:
@@ -271,9 +270,7 @@ class Network:
         for binding in self.set_by_events:
             if binding.weights:
                 can[binding.indices] = True
-        result = np.flatnonzero(can).astype(np.int64)
-        frozen(result)
-        return result
+        return frozen(np.flatnonzero(can).astype(np.int64))
 
     @cached_property
     def connection_names(self) -> tuple[str, ...]:

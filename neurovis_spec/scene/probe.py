@@ -1,7 +1,7 @@
 """The probe: a run whose only purpose is to see how far the values of a network go.
 
-In: a network. Out: Gains. The run is the network's own (its inputs, its default length, within a bound). Where a
-recording is drawn, its gains are those of the whole of it: what comes from outside is in no run of ours.
+In: a network. Out: Gains. The run is the network's own: its inputs, its default length as far as ``BUDGET`` allows.
+Where a recording is drawn, its gains are those of all its steps: inputs without a source have values in it alone.
 """
 
 from __future__ import annotations

@@ -89,34 +89,19 @@ def _ends(
 
 def join(bundles: tuple[Bundle, ...], rules: IntArray) -> Connections:
     """All entries as one structure of arrays; ``rules`` says, for each connection, which plasticity it has."""
-    empty = np.zeros(0)
-    none = empty.astype(np.int64)
     sizes = [len(bundle.sources) for bundle in bundles]
-    result = Connections(
-        sources=np.concatenate([bundle.sources for bundle in bundles] or [none]),
-        targets=np.concatenate([bundle.targets for bundle in bundles] or [none]),
-        weights=np.concatenate([bundle.weights for bundle in bundles] or [empty]),
-        centres=np.concatenate([bundle.centres for bundle in bundles] or [empty]),
-        delays=np.concatenate([bundle.delays for bundle in bundles] or [none]),
-        rules=rules,
-        entry=np.repeat(np.arange(len(bundles), dtype=np.int64), sizes),
-        low=np.repeat(np.array([bundle.low for bundle in bundles], dtype=np.float64), sizes),
-        high=np.repeat(np.array([bundle.high for bundle in bundles], dtype=np.float64), sizes),
+    return Connections(
+        sources=frozen(np.concatenate([bundle.sources for bundle in bundles] or [_NONE])),
+        targets=frozen(np.concatenate([bundle.targets for bundle in bundles] or [_NONE])),
+        weights=frozen(np.concatenate([bundle.weights for bundle in bundles] or [np.zeros(0)])),
+        centres=frozen(np.concatenate([bundle.centres for bundle in bundles] or [np.zeros(0)])),
+        delays=frozen(np.concatenate([bundle.delays for bundle in bundles] or [_NONE])),
+        rules=frozen(rules),
+        entry=frozen(np.repeat(np.arange(len(bundles), dtype=np.int64), sizes)),
+        low=frozen(np.repeat(np.array([bundle.low for bundle in bundles], dtype=np.float64), sizes)),
+        high=frozen(np.repeat(np.array([bundle.high for bundle in bundles], dtype=np.float64), sizes)),
         entries=tuple(bundle.name for bundle in bundles),
         descriptions=tuple(bundle.description for bundle in bundles),
         learns=tuple(None if bundle.learning is None else title_of(bundle.learning) for bundle in bundles),
         labels=tuple(bundle.label for bundle in bundles),
     )
-    for array in (
-        result.sources,
-        result.targets,
-        result.weights,
-        result.centres,
-        result.delays,
-        result.rules,
-        result.entry,
-        result.low,
-        result.high,
-    ):
-        frozen(array)
-    return result

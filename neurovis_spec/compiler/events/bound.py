@@ -79,18 +79,14 @@ def make_settable(
         if one.array != "weights":
             place, size = variables[one.array]
             indices = place + (one.places if size == len(arrays[one.array]) else one.places[:1])
-        for array in (indices, one.places):
-            frozen(array)
-        part = one.part
+        part, places = one.part, frozen(one.places)
         bindings.append(
-            Binding(part.formula, one.array == "weights", indices, one.array, one.places, part.low, part.high)
+            Binding(part.formula, one.array == "weights", frozen(indices), one.array, places, part.low, part.high)
         )
     least = ParameterFormula(Number(0.0), {})
     for noise in noises:
         bindings += (Binding(width, False, NO_INDICES, "noise", NO_INDICES, least) for width in noise.widths)
-    begin = np.concatenate([*initial, np.zeros(0)])
-    frozen(begin)
-    return Settable(slots, tuple(bindings), variables, begin)
+    return Settable(slots, tuple(bindings), variables, frozen(np.concatenate([*initial, np.zeros(0)])))
 
 
 def own_weights(slots: tuple[Slot, ...], bundles: tuple[Bundle, ...], weights: FloatArray) -> FloatArray | None:
@@ -109,8 +105,7 @@ def own_weights(slots: tuple[Slot, ...], bundles: tuple[Bundle, ...], weights: F
             if part.field in ("weights", "first"):
                 result[start + part.within(count)] = part.formula.values(own)
         start += count
-    frozen(result)
-    return result
+    return frozen(result)
 
 
 def _of_neurons(population: Population, blocks: tuple[Block, ...]) -> Iterator[_Found]:

@@ -15,8 +15,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.events.settable import ParameterFormula
 
-NO_INDICES: IntArray = np.zeros(0, dtype=np.int64)
-frozen(NO_INDICES)
+NO_INDICES: IntArray = frozen(np.zeros(0, dtype=np.int64))
 
 
 class Clamp(NamedTuple):

@@ -89,9 +89,7 @@ def _indices(found: Sequence[IntArray]) -> IntArray:
     """All of these indices, ascending; of one array that one."""
     if len(found) < 2:
         return found[0] if found else NO_INDICES
-    result = np.unique(np.concatenate(found))
-    frozen(result)
-    return result
+    return frozen(np.unique(np.concatenate(found)))
 
 
 def _formula(formula: Formula, constants: Constants) -> ParameterFormula:

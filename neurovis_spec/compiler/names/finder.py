@@ -46,8 +46,7 @@ class Finder:
             found = resolve_end(text, self.directory, self.findings)
             if found is UNKNOWN:
                 return UNKNOWN
-            self.known_neurons[text.value] = np.unique(np.array(found, dtype=np.int64))
-            frozen(self.known_neurons[text.value])
+            self.known_neurons[text.value] = frozen(np.unique(np.array(found, dtype=np.int64)))
         return self.known_neurons[text.value]
 
     def connections(self, text: Located[str]) -> IntArray | Unknown:
@@ -61,8 +60,7 @@ class Finder:
                 message = f"there is no connection '{shorten(text.value)}'"
                 self.findings.error("no-connection", text.span, message, lambda: self._other(arrow, text))
                 return UNKNOWN
-            frozen(found)
-            self.known_connections[text.value] = found
+            self.known_connections[text.value] = frozen(found)
         return self.known_connections[text.value]
 
     def _between(self, arrow: Arrow, text: Located[str], back: bool = False) -> IntArray | Unknown:

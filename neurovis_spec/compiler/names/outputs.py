@@ -53,9 +53,7 @@ class _Reader:
         neurons = resolve(reference.parts, self.finder.directory, self.findings)
         if neurons is UNKNOWN:
             return UNKNOWN
-        array = np.array(neurons, dtype=np.int64)
-        frozen(array)
-        return Output(name, array, len(neurons) == 1)
+        return Output(name, frozen(np.array(neurons, dtype=np.int64)), len(neurons) == 1)
 
     def _of_states(self, name: str, named: list[tuple[Part, Located[str], StateName | None]]) -> Output | Unknown:
         found: list[StateOf] = []
@@ -84,6 +82,5 @@ class _Reader:
             found.append(one)
         if failed:
             return UNKNOWN
-        neurons = np.unique(np.concatenate([one.neurons for one in found]))
-        frozen(neurons)
+        neurons = frozen(np.unique(np.concatenate([one.neurons for one in found])))
         return Output(name, neurons, sum(one.size for one in found) == 1, tuple(found))

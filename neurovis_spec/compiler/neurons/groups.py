@@ -87,10 +87,7 @@ class _Unsaid(NamedTuple):
 @lru_cache(maxsize=64)
 def _unsaid(n: int) -> _Unsaid:
     """The default arrays, read-only and shared by all groups of a size: instances make many of these."""
-    result = _Unsaid(np.zeros(n), np.full(n, np.nan), np.full(n, -1, dtype=np.int64))
-    for array in result:
-        frozen(array)
-    return result
+    return _Unsaid(frozen(np.zeros(n)), frozen(np.full(n, np.nan)), frozen(np.full(n, -1, dtype=np.int64)))
 
 
 #: What groups are that are the same in all instances of a module, by the module, the group and its count.

@@ -85,8 +85,7 @@ def _expression(formula: Formula, constants: Constants) -> Tree | Unknown:
 
 
 def _tabled(name: str, start: int, table: FloatArray) -> Input:
-    frozen(table)
-    return Input(name, start, table.shape[1], table=table)
+    return Input(name, start, table.shape[1], table=frozen(table))
 
 
 def _inline(node: AnyList, constants: Constants) -> FloatArray | Unknown:

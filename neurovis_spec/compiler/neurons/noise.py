@@ -37,8 +37,7 @@ def make_noises(population: Population, inputs: int) -> tuple[Noise, ...]:
         if formula is None or tree is UNKNOWN:
             continue
         widths = _check_deviations(tree, formula, group.count, constants)
-        members = np.arange(group.start, group.start + group.count, dtype=np.int64)
-        frozen(members)
+        members = frozen(np.arange(group.start, group.start + group.count, dtype=np.int64))
         slots = places_of(tree, constants.settable)
         result.append(Noise(group.name, members, start, tree, dict(constants.parameters), slots, widths))
         start += group.count

@@ -197,14 +197,12 @@ def _join(settled: list[_Settled]) -> Population:
         names=tuple(names),
         labels=tuple(chain.from_iterable(item.labels for item in built)),
         groups=tuple(item.group for item in built),
-        bias=np.concatenate([item.bias for item in built] or [empty]),
-        initial=np.concatenate([item.initial for item in built] or [empty]),
-        input=np.concatenate([item.input for item in built] or [empty.astype(np.int64)]),
-        position=np.concatenate([_placed(item) for item in built] or [np.zeros((0, 2))]),
+        bias=frozen(np.concatenate([item.bias for item in built] or [empty])),
+        initial=frozen(np.concatenate([item.initial for item in built] or [empty])),
+        input=frozen(np.concatenate([item.input for item in built] or [empty.astype(np.int64)])),
+        position=frozen(np.concatenate([_placed(item) for item in built] or [np.zeros((0, 2))])),
         starts=_starts(built, len(names)),
     )
-    for array in (neurons.bias, neurons.initial, neurons.input, neurons.position, *neurons.starts.values()):
-        frozen(array)
     return Population(neurons, tuple(built), _directories(settled, len(names)))
 
 
@@ -215,7 +213,7 @@ def _starts(built: list[Built], total: int) -> dict[str, FloatArray]:
         for state, values in item.starts.items():
             array = result.setdefault(state, np.full(total, np.nan))
             array[item.group.start : item.group.start + item.group.count] = values
-    return result
+    return {state: frozen(array) for state, array in result.items()}
 
 
 def _placed(item: Built) -> FloatArray:
