@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from neurovis_layouts.routing import route_all
+from neurovis_layouts.routing.corners import rounded
 from neurovis_layouts.routing.detours import Detours
-from neurovis_layouts.routing.rounded import rounded
 from neurovis_layouts.routing.walls import Walls, meet, touch
 
 import neurovis_spec as nv

@@ -14,10 +14,9 @@ from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.routing import Waypoint, route_all
 from neurovis_layouts.routing.arcs import Arcs, even
 from neurovis_layouts.routing.channel_routing import channels
-from neurovis_layouts.routing.corners import reflected
+from neurovis_layouts.routing.corners import reflected, rounded
 from neurovis_layouts.routing.ends import Key
 from neurovis_layouts.routing.obstacles import REACH
-from neurovis_layouts.routing.rounded import rounded
 from neurovis_layouts.routing.route_cost import Judge
 from neurovis_layouts.routing.simplify_routes import MOST_EASED, eased, told_apart
 from neurovis_spec.layout.geometry import Rect, distance, snap

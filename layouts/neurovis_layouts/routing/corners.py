@@ -5,7 +5,7 @@ In: a route, or the points of a line. Out: the other of the two.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -23,6 +23,8 @@ _HEAD, _SHARE = 0.5, 0.8
 _UNEVEN = 2.5
 #: Where on the way to the corner the control points stand: about as on an arc of a circle.
 _HOLD = 0.62
+#: How much of a corner is cut off, at most, the roundest first.
+_CUTS = (3.0, 1.5, 0.8, 0.4, 0.2, 0.1)
 #: Shorter pieces are left out.
 _SHORT = 1e-3
 _PER_UNIT = round(1 / GRID)
@@ -62,6 +64,13 @@ def smooth(line: Sequence[Point], cut: float) -> Route:
     pieces, _ = smoothed([(line, cut)])
     first, *rest = ((x, y) for x, y in np.concatenate([pieces[0, :1], *pieces[:, 1:]]).tolist())
     return first, *rest
+
+
+def rounded(line: Sequence[Point], free: Callable[[Route], bool]) -> Route:
+    """The route along a line of at least two points with the roundest corners with which it is ``free``; with sharp
+    ones where it never is."""
+    routes = (smooth(line, cut) for cut in _CUTS)
+    return next(filter(free, routes), smooth(line, _CUTS[-1]))
 
 
 def smoothed(ways: Sequence[tuple[Sequence[Point], float]]) -> tuple[FloatArray, IntArray]:

@@ -16,9 +16,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from neurovis_layouts.routing.corners import rounded
 from neurovis_layouts.routing.ends import shared_ends
 from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
-from neurovis_layouts.routing.rounded import rounded
 from neurovis_layouts.routing.walls import Walls, blocked, meet
 from neurovis_spec.layout import BoolArray, FloatArray, IntArray
 from neurovis_spec.layout.geometry import distance, sampled
@@ -144,9 +144,12 @@ class Detours:
     def _take(self, source: int, target: int, path: Sequence[Point], rects: FloatArray) -> Route:
         """The route along a line, which others are to keep off."""
 
-        def free(piece: Route) -> bool:
+        def clear(piece: Route) -> bool:
             line = np.array(sampled(piece, 0.1), dtype=np.float64)
             return not _blocked(line[:-1], line[1:], rects).any()
+
+        def free(route: Route) -> bool:
+            return all(clear(route[start : start + 4]) for start in range(0, len(route) - 1, 3))
 
         self._taken.add(path)
         self._between.setdefault((min(source, target), max(source, target)), []).extend(path[1:-1])
