@@ -79,6 +79,16 @@ def test_instances_whose_drawings_lie_on_each_other_are_bent_so_that_both_have_r
     assert not (apart and clashes(problem, layout))
 
 
+@pytest.mark.parametrize("engine", ["layered", "grid"])
+def test_pins_of_an_instance_may_be_as_far_apart_as_pins_may_be(engine: str) -> None:
+    """What is looked up by place is so by the number of things, not by the area of the frame around them."""
+    pins = {"left1.S1": (-900_000.0, -900_000.0), "left1.T": (900_000.0, 900_000.0)}
+    said = ", ".join(f"{name}: [{x}, {y}]" for name, (x, y) in pins.items())
+    drawn = legs(f"{{positions: {{{said}}}}}").layout(engine)
+    assert {name: drawn.positions[name] for name in pins} == pins
+    assert drawn.metrics()["overlaps"] == 0
+
+
 def corner(layout: Layout, path: str) -> Point:
     """The smallest x and y of an instance's neurons."""
     own = [point for name, point in layout.positions.items() if name.startswith(f"{path}.")]
