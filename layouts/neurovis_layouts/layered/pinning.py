@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -156,8 +157,9 @@ def _best(
                 return best
     if best is not None and (best.crowd.refusal is not None or best.crowd.depth):
         bent = {**best.pins, **_bent(problem, best, pair)}
-        other = _tried(problem, free, pieces, pair, redraw, best.axis, reflected, bent)
-        best = min(best, other, key=lambda trial: trial.crowd.order)
+        with suppress(LayoutRefusalError):  # around these pins it cannot be drawn
+            other = _tried(problem, free, pieces, pair, redraw, best.axis, reflected, bent)
+            best = min(best, other, key=lambda trial: trial.crowd.order)
     if best is None or best.crowd.refusal is not None:
         assert refusal is not None  # the first speaks of the drawings as they are
         raise refusal
