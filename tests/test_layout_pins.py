@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import combinations
+from unittest.mock import patch
 
 import layout_conformance as suite
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from neurovis_layouts.occupancy import Occupancy
 
 import neurovis_spec as nv
 from neurovis_spec.layout import Layout, LayoutProblem, LayoutRefusalError, Point
@@ -87,6 +89,20 @@ def test_pins_of_an_instance_may_be_as_far_apart_as_pins_may_be(engine: str) -> 
     drawn = legs(f"{{positions: {{{said}}}}}").layout(engine)
     assert {name: drawn.positions[name] for name in pins} == pins
     assert drawn.metrics()["overlaps"] == 0
+
+
+def test_many_pinned_instances_that_cannot_stay_alike_are_each_drawn_as_there_is_room() -> None:
+    """To look for one place that suits all of them took as long as there are places, times as many as they are."""
+    paths = [f"x{i}" for i in range(1, 21)]
+    pairs = [(f"{path}.{a}", f"{path}.{b}") for path in paths for a, b in ("ab", "bc", "ca")]
+    pins = {f"{path}.a": (1.6 * (i % 5), 1.5 * (i // 5)) for i, path in enumerate(paths[:10])}
+    modules = [(path, "col") for path in paths]
+    names = [f"{path}.{n}" for path in paths for n in "abc"]
+    problem = canonical("x", names, edges=suite.named(pairs), pins=pins, modules=modules)
+    with patch.object(Occupancy, "_free", autospec=True, side_effect=Occupancy._free) as looked:
+        layout = lay_out_problem(problem, "grid")
+    check_pins(problem, layout)
+    assert looked.call_count < 20_000
 
 
 def corner(layout: Layout, path: str) -> Point:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import chain, takewhile
 from types import MappingProxyType
@@ -25,6 +25,9 @@ _REACHES = ((0.25, 4), (0.25, 16), (0.5, 32), (1.0, 64))
 #: How far off the wish a place off all lines may be, how far off lines that is, and how far apart points on them are
 #: looked at, of which there are so many at most.
 _ASIDE, _OFF, _STEP, _MOST = 4.0, 0.5, 0.25, 50_000
+#: How far off their wish more than two bodies are placed alike: looking for a place that all of them have farther off
+#: takes their number times as long, and what is so far off is not seen to be alike.
+_TOGETHER = 8.0
 #: Side of the cells in which rectangles are looked up; one that covers more cells than this is near everything.
 _CELL, _COUNTED = 4.0, 4096
 #: Discs that touch do not overlap, whatever rounding says.
@@ -151,9 +154,14 @@ class Occupancy:
     def put(self, wish: Wish, stay: bool = False, in_row: bool = False) -> bool:
         """Place bodies as near to their wish as possible, with ``stay`` exactly there, if that is free, and say whether
         there is a place. They keep off the lines that are drawn, unless they continue a row (``in_row``)."""
-        anchor = wish.anchor if stay and self.fits(wish.bodies, wish.anchor) else self._found(wish, in_row)
+        bodies = wish.bodies
+        together = len(bodies) <= 2 or any(body.offsets[0][0] in self._sides for body in bodies)
+        anchor = wish.anchor if stay and self.fits(bodies, wish.anchor) else self._found(wish, in_row, together)
+        if anchor is None and not together:
+            placed = [self.put(replace(wish, bodies=(body,))) for body in bodies]
+            return all(placed)
         if anchor is not None:
-            self.enter(wish.bodies, anchor)
+            self.enter(bodies, anchor)
         return anchor is not None
 
     def fits(self, bodies: Sequence[Body], anchor: Point) -> bool:
@@ -181,10 +189,13 @@ class Occupancy:
         self._walls.add(number, rect)
         self._bounds = united([rect, self._bounds or rect])
 
-    def _found(self, wish: Wish, in_row: bool) -> Point | None:
-        beyond = list(self._beyond(wish))
-        for rules in self._rules:
+    def _found(self, wish: Wish, in_row: bool, far: bool) -> Point | None:
+        """The free place nearest to a wish; if not ``far``, only one with ample room near it."""
+        beyond = list(self._beyond(wish)) if far else []
+        for rules in self._rules if far else self._rules[:-2]:
             steps: Iterable[Point] = _steps(wish.along)
+            if not far:
+                steps = takewhile(_near, steps)
             if rules.off_lines:
                 steps = () if in_row else takewhile(_aside, steps)
             places = ((wish.anchor[0] + x, wish.anchor[1] + y) for x, y in steps)
@@ -327,6 +338,11 @@ def _shared(one: Rect, other: Rect) -> float:
     """The area that two rectangles have in common."""
     across, along = (min(one[k + 2], other[k + 2]) - max(one[k], other[k]) for k in (0, 1))
     return max(0.0, across) * max(0.0, along)
+
+
+def _near(step: Point) -> bool:
+    """Whether a step from a wish is one that many bodies make together; else each goes its own way."""
+    return step[0] * step[0] + step[1] * step[1] <= _TOGETHER * _TOGETHER
 
 
 def _aside(step: Point) -> bool:
