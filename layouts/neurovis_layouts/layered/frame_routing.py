@@ -19,7 +19,7 @@ from neurovis_layouts.routing.ends import Key
 from neurovis_layouts.routing.obstacles import REACH
 from neurovis_layouts.routing.route_cost import Judge
 from neurovis_layouts.routing.simplify_routes import MOST_EASED, eased, told_apart
-from neurovis_spec.layout.geometry import Rect, distance, snap
+from neurovis_spec.layout.geometry import Rect, bounds, distance, meet, snap
 from neurovis_spec.layout.model import GRID, LayoutEdge, LayoutProblem, Point, Route
 
 #: With more connections than this nobody can tell them apart.
@@ -35,18 +35,19 @@ def linked(
     units: Sequence[Unit],
     frames: Sequence[tuple[tuple[int, ...], Rect]],
     boxes: Sequence[tuple[tuple[int, ...], Rect]],
+    labels: Sequence[tuple[tuple[int, ...], Rect]],
     pair: Mapping[int, int],
     drawn: Sequence[Route],
 ) -> dict[Key, Route]:
-    """Routes of these edges by key; ``boxes`` are drawn, though nothing had to make room for them; ``drawn`` are the
-    routes within the frames."""
+    """Routes of these edges by key; ``boxes`` are drawn, though nothing had to make room for them; to routes a label is
+    the frame of its neuron; ``drawn`` are the routes within the frames."""
     edges = [problem.edges[i] for i in links]
-    framed = [(frozenset(members), rect) for members, rect in (*frames, *boxes)]
+    framed = [(frozenset(members), rect) for members, rect in (*frames, *boxes, *labels)]
     # what has its waypoints from the plan crosses nothing, and what would be drawn anew beside it might
     firm: dict[int, list[Waypoint]] = {}
     lateral: dict[int, list[Waypoint]] = {}
     planned = _passing(problem, plan, rests)
-    begun = _cut(problem, links, plan, rests)
+    begun = _cut(problem, links, plan, rests, [rect for _, rect in labels])
     if frames:
         gates = {k: planned[i] for k, i in enumerate(links) if i in planned}
         firm = {k: gates[k] for k, i in enumerate(links) if k in gates and i in plan.firm and not rests.moved}
@@ -116,9 +117,11 @@ def _improved(
     return {keys[i]: tuple(_snapped(judge.routes[i])) for i in mended | better.keys()}
 
 
-def _cut(problem: LayoutProblem, links: Sequence[int], plan: ComponentLayout, rests: Settled) -> dict[int, Route]:
+def _cut(
+    problem: LayoutProblem, links: Sequence[int], plan: ComponentLayout, rests: Settled, labels: Sequence[Rect]
+) -> dict[int, Route]:
     """The routes from band to band, of edges whose ends stand where the plan has them; an end that has nothing between
-    it and the street is left straight for that."""
+    it and the street, and no label in the way, is left straight for that."""
     found: dict[int, Route] = {}
     dx, dy = rests.shift
     for k, i in enumerate(links):
@@ -127,8 +130,10 @@ def _cut(problem: LayoutProblem, links: Sequence[int], plan: ComponentLayout, re
             continue
         line = [rests.places[own[0]], *((x + dx, y + dy) for x, y in plan.cut[i]), rests.places[own[1]]]
         for _ in range(2):  # from either end
-            if not any(_beside(place, line[0], line[2][0]) for place in rests.places):
-                line = [line[0], _aslant(line), *line[3:]]
+            aslant = _aslant(line)
+            beside = any(_beside(place, line[0], line[2][0]) for place in rests.places)
+            if not beside and not any(meet(rect, bounds([line[0], aslant])) for rect in labels):
+                line = [line[0], aslant, *line[3:]]
             line.reverse()
         apart = [a for a, b in pairwise(line) if distance(a, b) > GRID]
         found[k] = rounded([*apart, line[-1]], lambda _: True)

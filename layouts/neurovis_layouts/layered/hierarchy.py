@@ -401,10 +401,11 @@ class _Standing:
         links = [i for i, key in enumerate(keys) if key not in routes]
         drawn = list(routes.values())
         if routed:
-            # to routes a label is the frame of its neuron
-            boxes = (*self.boxes, *(((i,), padded(rect, -PAD_LABEL)) for i, rect in self.labels.items()))
+            names = [((i,), padded(rect, -PAD_LABEL)) for i, rect in self.labels.items()]
             routes.update(
-                linked(problem, links, keys, self.plan, self.rests, self.units, self.frames, boxes, pair, drawn)
+                linked(
+                    problem, links, keys, self.plan, self.rests, self.units, self.frames, self.boxes, names, pair, drawn
+                )
             )
         axis = self.rests.axis if pair else None
         fixed = bool(problem.pins)
