@@ -172,8 +172,10 @@ class Polylines:
         if not len(self.points) or not len(c):
             return np.zeros(len(self))
         weight = np.ones(len(c)) if weight is None else weight
-        low, high = self.points.min(axis=0), self.points.max(axis=0)
-        near = ((np.maximum(c, d) >= low) & (np.minimum(c, d) <= high)).all(axis=1)
+        (x0, y0), (x1, y1) = self.points.min(axis=0), self.points.max(axis=0)
+        (cx, cy), (dx, dy) = c.T, d.T
+        near = (np.maximum(cx, dx) >= x0) & (np.minimum(cx, dx) <= x1)
+        near &= (np.maximum(cy, dy) >= y0) & (np.minimum(cy, dy) <= y1)
         i, j, share = _meetings(self.a, self.b, c[near], d[near])
         where, line = self.a[i] + share[:, None] * self._way[i], self.owner[i]
         seen = np.ones(len(i), dtype=np.bool_)
