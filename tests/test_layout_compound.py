@@ -197,6 +197,10 @@ def drawn(main: str = "{}", leg: str = "{}", knee: str = "{}", more: str = "") -
     return dict(layout.positions), layout
 
 
+#: A page that is as wide as six legs in a row.
+WIDE = "{}\nrender: {size: [1600, 400]}"
+
+
 def shape(at: Mapping[str, Point], path: str) -> dict[str, Point]:
     """An instance's neurons from the middle of its sensors."""
     x, y = at[f"{path}.S2"]
@@ -204,7 +208,7 @@ def shape(at: Mapping[str, Point], path: str) -> dict[str, Point]:
 
 
 def test_instances_declared_together_stand_side_by_side_in_order() -> None:
-    at, _ = drawn()
+    at, _ = drawn(WIDE)
     for side in ("left", "right"):
         tops = [at[f"{side}{i}.S2"] for i in (1, 2, 3)]
         assert len({y for _, y in tops}) == 1
@@ -212,7 +216,7 @@ def test_instances_declared_together_stand_side_by_side_in_order() -> None:
 
 
 def test_instances_that_drive_one_another_stand_in_stairs() -> None:
-    at, _ = drawn(more=", left1.T -> left2.S2: 1, left2.T -> left3.S2: 1, right1.S2 -> right2.S2: 1")
+    at, _ = drawn(WIDE, more=", left1.T -> left2.S2: 1, left2.T -> left3.S2: 1, right1.S2 -> right2.S2: 1")
     assert at["right1.S2"][1] < at["right2.S2"][1] < at["right1.T"][1]
     assert at["left1.T"][1] < at["left2.S2"][1]
 

@@ -9,9 +9,10 @@ import layout_conformance as suite
 import pytest
 
 import neurovis_spec as nv
-from neurovis_spec.layout import Direction, Point
+from neurovis_spec.layout import Direction, LayoutRefusalError, Point
 from neurovis_spec.layout.arrange import lay_out_problem
-from neurovis_spec.layout.problem import problem_of
+from neurovis_spec.layout.model import Seat
+from neurovis_spec.layout.problem import canonical, problem_of
 
 LEG = """\
   leg:
@@ -151,3 +152,16 @@ def test_the_promises_of_the_engine_hold(network: str) -> None:
     suite.check_routes(problem, layout)
     assert not suite.frames_meet(layout, problem)
     assert suite.through_frames(layout, problem) == []
+
+
+@pytest.mark.parametrize(("width", "fits"), [(2, True), (3, False)])
+def test_empty_cells_say_where_the_middle_of_the_page_is(width: int, fits: bool) -> None:
+    plan = [("", [name], Seat(0, column, 1, 1, 1, width)) for column, name in enumerate("AB")]
+    problem = canonical("pair", ["A", "B"], plan=plan, mirrors=[("", [("A", "B")], [])])
+    if fits:
+        (ax, ay), (bx, by) = lay_out_problem(problem, "layered").positions.values()
+        assert ax < bx
+        assert ay == by
+    else:
+        with pytest.raises(LayoutRefusalError, match="do not stand in cells of the plan that are mirror images"):
+            lay_out_problem(problem, "layered")

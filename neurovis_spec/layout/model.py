@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, Protocol, TypeAlias, get_args, runtime_checkable
 
+from neurovis_spec.compiler.drawing.drawing_settings import Seat as Seat
 from neurovis_spec.diagnostics import Diagnostic, Span
 from neurovis_spec.progress import Progress
 
@@ -86,14 +87,11 @@ class LayoutMirror:
 
 @dataclass(frozen=True, slots=True)
 class LayoutCell:
-    """Neurons that stand together in a cell of the page, or in several that are neighbours: the first of its rows and
-    columns, and how many it spans. ``scope`` is the instance whose frame is divided so, −1 for the page."""
+    """Neurons that stand together in a cell of the page, or in several that are neighbours. ``scope`` is the instance
+    whose frame is divided so, −1 for the page."""
 
     members: tuple[int, ...]
-    row: int
-    column: int
-    rows: int = 1
-    columns: int = 1
+    seat: Seat
     scope: int = -1
 
 

@@ -12,6 +12,7 @@ from typing import cast
 
 import numpy as np
 
+from neurovis_spec.compiler.drawing.drawing_settings import Seat
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.labels import label_room
 from neurovis_spec.layout.makes import modules_of
@@ -49,7 +50,7 @@ def canonical(
     origins: Mapping[str, Point] | None = None,
     mirrors: Iterable[tuple[str, Iterable[tuple[str, str]], Iterable[tuple[str, str]]]] = (),
     align: Iterable[Iterable[str]] = (),
-    plan: Iterable[tuple[str, Iterable[str], tuple[int, int, int, int]]] = (),
+    plan: Iterable[tuple[str, Iterable[str], Seat]] = (),
     places: Mapping[str, Point] | None = None,
     labels: Mapping[str, Point] | None = None,
     memory: Layout | None = None,
@@ -118,7 +119,7 @@ def canonical(
         align=tuple(sorted(members(line) for line in align)),
         plan=tuple(
             sorted(
-                (LayoutCell(members(of), *place, where.get(scope, -1)) for scope, of, place in plan),
+                (LayoutCell(members(of), seat, where.get(scope, -1)) for scope, of, seat in plan),
                 key=lambda cell: (cell.scope, cell.members),
             )
         ),
@@ -173,7 +174,7 @@ def problem_of(network: Network, memory: Layout | None = None) -> LayoutProblem:
             for mirror in settings.mirrors
         ],
         [named(line) for line in settings.align],
-        [(cell.scope, named(cell.members), (cell.row, cell.column, cell.rows, cell.columns)) for cell in settings.plan],
+        [(cell.scope, named(cell.members), cell.seat) for cell in settings.plan],
         _places(network),
         dict(zip(names, label_room(network), strict=False)),
         memory,

@@ -16,7 +16,7 @@ from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.layered.drawing import Drawing, FrameMove, Piece
 from neurovis_layouts.layered.parts import Part, imaged, part_of_module
 from neurovis_spec.layout.geometry import Rect, distance, snap
-from neurovis_spec.layout.model import Direction, LayoutProblem, LayoutRefusalError, Point
+from neurovis_spec.layout.model import Direction, LayoutProblem, LayoutRefusalError, Point, Seat
 
 #: A part drawn in a direction, with the frame around it.
 Drawn = Callable[[Part, Direction], Piece]
@@ -78,8 +78,8 @@ def _seats(problem: LayoutProblem, pair: Mapping[int, int]) -> dict[_Members, in
     for edge in problem.edges:
         near[owner[edge.source]][owner[edge.target]] += 1
         near[owner[edge.target]][owner[edge.source]] += 1
-    spans, below = _spans(problem), len(seat)
-    pulls = {members: _pull(near[members], seat, spans, _symmetric(members, pair)) for members in loose}
+    below = len(seat)
+    pulls = {members: _pull(problem, near[members], seat, _symmetric(members, pair)) for members in loose}
     while pulls:
         members = max(pulls, key=lambda one: (pulls[one][0], [-m for m in one]))
         many, to = pulls.pop(members)
@@ -87,29 +87,27 @@ def _seats(problem: LayoutProblem, pair: Mapping[int, int]) -> dict[_Members, in
         seat[members] = to if many else below
         seated = [members]
         if image in pulls:
-            seat[image] = _mirrored(to, spans) if many else below
+            seat[image] = _mirrored(problem, to) if many else below
             pulls.pop(image)
             seated.append(image)
         for other in {other for one in seated for other in near[one] if other in pulls}:
-            pulls[other] = _pull(near[other], seat, spans, _symmetric(other, pair))
+            pulls[other] = _pull(problem, near[other], seat, _symmetric(other, pair))
     return _together(problem, seat)
 
 
 def _pull(
-    near: Counter[_Members],
-    seat: Mapping[_Members, int],
-    spans: Sequence[_Span],
-    middle: bool,
+    problem: LayoutProblem, near: Counter[_Members], seat: Mapping[_Members, int], middle: bool
 ) -> tuple[int, int]:
     """How many connections something has with the cell with which it has most, and that cell; ``middle``: one that is
     its own mirror image."""
+    below = len(problem.plan)
     pulls: Counter[int] = Counter()
     for members, times in near.items():
-        cell = seat.get(members, len(spans))
-        if cell < len(spans) and (not middle or _mirrored(cell, spans) == cell):
+        cell = seat.get(members, below)
+        if cell < below and (not middle or _mirrored(problem, cell) == cell):
             pulls[cell] += times
     best = max(pulls.values(), default=0)
-    return best, min((i for i, times in pulls.items() if times == best), default=len(spans))
+    return best, min((i for i, times in pulls.items() if times == best), default=below)
 
 
 def _together(problem: LayoutProblem, seat: Mapping[_Members, int]) -> dict[_Members, int]:
@@ -257,7 +255,7 @@ def _slots(problem: LayoutProblem, parts: Sequence[Part], where: Mapping[int, in
     held: dict[int, list[int]] = {}
     for k, place in where.items():
         held.setdefault(place, []).append(k)
-    across, along = 1 + max(span[0][-1] for span in spans), 1 + max(span[1][-1] for span in spans)
+    across, along = _page(problem)
     spans.append((range(across), range(along, along + 1)))
     named = {cell.members for cell in problem.plan}
     slots: list[_Slot] = []
@@ -267,41 +265,40 @@ def _slots(problem: LayoutProblem, parts: Sequence[Part], where: Mapping[int, in
     return slots
 
 
+def _page(problem: LayoutProblem) -> tuple[int, int]:
+    """How many columns across and rows along there are, empty ones among them."""
+    seat = problem.plan[0].seat
+    return (seat.width, seat.height) if problem.direction in ("down", "up") else (seat.height, seat.width)
+
+
 def _spans(problem: LayoutProblem) -> list[_Span]:
     """The columns across and the rows along that each cell spans, in the engine's frame."""
-    rows = max(cell.row + cell.rows for cell in problem.plan)
-    columns = max(cell.column + cell.columns for cell in problem.plan)
-    return [_span(problem.direction, c.row, c.rows, c.column, c.columns, rows, columns) for c in problem.plan]
+    return [_span(problem.direction, cell.seat) for cell in problem.plan]
 
 
-def _span(
-    direction: Direction, row: int, rows: int, column: int, columns: int, height: int, width: int
-) -> tuple[range, range]:
+def _span(direction: Direction, seat: Seat) -> _Span:
     """From rows and columns of the page to the engine's frame."""
-    down, right = range(row, row + rows), range(column, column + columns)
+    down, right = range(seat.row, seat.row + seat.rows), range(seat.column, seat.column + seat.columns)
     match direction:
         case "down":
             return right, down
         case "up":
-            return right, range(height - row - rows, height - row)
+            return right, range(seat.height - down.stop, seat.height - down.start)
         case "right":
             return down, right
         case "left":
-            return down, range(width - column - columns, width - column)
+            return down, range(seat.width - right.stop, seat.width - right.start)
 
 
-def _mirrored(cell: int, spans: Sequence[_Span]) -> int:
+def _mirrored(problem: LayoutProblem, cell: int) -> int:
     """The cell that is the mirror image of one; −1 without one."""
-    own, along = spans[cell]
-    across = 1 + max(span[0][-1] for span in spans)
-    image = range(across - own.stop, across - own.start)
-    return next((i for i, span in enumerate(spans) if span == (image, along)), -1)
+    image = problem.plan[cell].seat.image(problem.direction)
+    return next((i for i, other in enumerate(problem.plan) if other.seat == image), -1)
 
 
 def _check_mirrors(
     problem: LayoutProblem, parts: Sequence[Part], where: Mapping[int, int], pair: Mapping[int, int]
 ) -> None:
-    spans = _spans(problem)
     for k, part in enumerate(parts):
         first = part.image_of
         if first < 0:
@@ -309,7 +306,7 @@ def _check_mirrors(
                 continue
             first = k
         place = where[first]
-        if where[k] != (place if place == len(spans) else _mirrored(place, spans)):
+        if where[k] != (place if place == len(problem.plan) else _mirrored(problem, place)):
             one = problem.neurons[min(part.members)]
             raise LayoutRefusalError(
                 "plan-mirror",
@@ -339,8 +336,12 @@ def _placed(
     middle of theirs."""
     sizes = [_size(slot, pieces) for slot in slots]
     street = problem.neuron_spacing
-    across = _edges([(slot.across, size[0]) for slot, size in zip(slots, sizes, strict=True)], street, True)
-    along = _edges([(slot.along, size[1]) for slot, size in zip(slots, sizes, strict=True)], street, False)
+    across = _edges(
+        [(slot.across, size[0]) for slot, size in zip(slots, sizes, strict=True)], street, _page(problem)[0], True
+    )
+    along = _edges(
+        [(slot.along, size[1]) for slot, size in zip(slots, sizes, strict=True)], street, _page(problem)[1], False
+    )
     moves: dict[int, FrameMove] = {}
     for slot, size in zip(slots, sizes, strict=True):
         x = _middle(across, slot.across)
@@ -368,9 +369,9 @@ def _size(slot: _Slot, pieces: Sequence[Piece]) -> Point:
     return max(widths), sum(heights) + _BESIDE * (len(heights) - 1)
 
 
-def _edges(taken: Sequence[tuple[range, float]], street: float, even: bool) -> list[tuple[float, float]]:
+def _edges(taken: Sequence[tuple[range, float]], street: float, count: int, even: bool) -> list[tuple[float, float]]:
     """Where each row or column begins and ends. ``even``: its mirror image is as wide, and 0 is the middle."""
-    count = 1 + max(span[-1] for span, _ in taken)
+    count = max(count, *(span.stop for span, _ in taken))  # what stands below all is in a row behind these
     size = [0.0] * count
     for span, need in sorted(taken, key=lambda one: len(one[0])):
         lack = need - sum(size[i] for i in span) - street * (len(span) - 1)

@@ -6,7 +6,7 @@ In: nothing; these are values of a Network. Nothing of them changes what the net
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from neurovis_spec.language.words import Direction
@@ -26,16 +26,31 @@ class Mirror:
 
 
 @dataclass(frozen=True, slots=True)
-class Cell:
-    """Neurons that stand together on the page, or in the frame of the instance whose path ``scope`` is: from which row
-    and column on, and how many of them they take."""
+class Seat:
+    """A cell of a plan, or several that are neighbours: from which row and column on, how many of them, and of how many
+    in all, empty ones among them."""
 
-    scope: str
-    members: tuple[int, ...]
     row: int
     column: int
     rows: int
     columns: int
+    height: int
+    width: int
+
+    def image(self, direction: str) -> Seat:
+        """Where the mirror image is: the axis runs along the direction, through the middle of the page."""
+        if direction in ("left", "right"):
+            return replace(self, row=self.height - self.row - self.rows)
+        return replace(self, column=self.width - self.column - self.columns)
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """Neurons that stand together on the page, or in the frame of the instance whose path ``scope`` is, and where."""
+
+    scope: str
+    members: tuple[int, ...]
+    seat: Seat
 
 
 @dataclass(frozen=True, slots=True)

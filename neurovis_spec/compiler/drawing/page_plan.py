@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal
 
-from neurovis_spec.compiler.drawing.drawing_settings import Cell, Mirror
+from neurovis_spec.compiler.drawing.drawing_settings import Cell, Mirror, Seat
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.names.references import Directory
 from neurovis_spec.diagnostics import Findings, shorten, suggest
@@ -63,7 +63,7 @@ def plan_of(
             findings.error("plan-cells", first.span, message, "a neuron stands in one cell")
             continue
         taken.update(dict.fromkeys(members, name))
-        cells.append(Cell(scope, tuple(sorted(members)), low[0], low[1], size[0], size[1]))
+        cells.append(Cell(scope, tuple(sorted(members)), Seat(*low, *size, len(rows), len(rows[0].cells))))
     return tuple(cells) if findings.errors == before else ()
 
 
@@ -97,25 +97,19 @@ def check_plan(
     """Mirror images that do not stand in mirrored cells, and lines from cell to cell, are findings."""
     if not cells:
         return
-    height, width = len(rows), len(rows[0].cells)
     skip = len(scope) + 1 if scope else 0
     names = tuple(name[skip:] for name in names)
     where = {m: cell for cell in cells for m in cell.members}
-    told: set[tuple[Place, Place]] = set()
+    told: set[tuple[Seat, Seat]] = set()
     for mirror in mirrors:
         for a, b in mirror.pairs if mirror.scope == scope else ():
             one, other = where.get(a), where.get(b)
             if one is None and other is None:
                 continue
             if one is not None and other is not None:
-                places = (one.row, one.column), (other.row, other.column)
-                if places in told or _mirrored(one, height, width, direction) == (
-                    *places[1],
-                    other.rows,
-                    other.columns,
-                ):
+                if (one.seat, other.seat) in told or one.seat.image(direction) == other.seat:
                     continue
-                told.add(places)
+                told.add((one.seat, other.seat))
             known = one or other
             assert known is not None
             message = f"'{names[a]}' and '{names[b]}' are mirror images and do not stand in mirrored cells"
@@ -127,7 +121,7 @@ def check_plan(
     for line in lines:
         held = {where[m] for m in line if m in where}
         if len(held) > 1 or (held and any(m not in where for m in line)):
-            cell = min(held, key=lambda one: (one.row, one.column))
+            cell = min(held, key=lambda one: (one.seat.row, one.seat.column))
             first = next(m for m in line if where.get(m) is cell)
             odd = next(m for m in line if where.get(m) is not cell)
             message = f"'{names[first]}' and '{names[odd]}' are aligned and stand in different cells"
@@ -137,13 +131,6 @@ def check_plan(
 
 
 def _span(rows: tuple[PlanRow, ...], cell: Cell) -> Located[str]:
-    found = rows[cell.row].cells[cell.column]
+    found = rows[cell.seat.row].cells[cell.seat.column]
     assert found is not None
     return found
-
-
-def _mirrored(cell: Cell, height: int, width: int, direction: str) -> tuple[int, int, int, int]:
-    """Where the image of a cell is: the axis runs along the direction, through the middle of the page."""
-    if direction in ("left", "right"):
-        return height - cell.row - cell.rows, cell.column, cell.rows, cell.columns
-    return cell.row, width - cell.column - cell.columns, cell.rows, cell.columns
