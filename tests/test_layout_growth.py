@@ -131,11 +131,11 @@ def lines_run(task: Callable[[], object], module: ModuleType) -> int:
     return count
 
 
-def test_what_turning_a_frame_costs_grows_with_its_connections() -> None:
+def test_what_reflecting_a_frame_costs_grows_with_its_connections() -> None:
     """Two frames, one below the other, their neurons connected in the opposite order: not every connection with every
     other, one by one."""
 
-    def turned(count: int) -> set[int]:
+    def reflected(count: int) -> set[int]:
         across = [float(i) for i in range(count)]
         nodes = [
             Node(
@@ -144,10 +144,10 @@ def test_what_turning_a_frame_costs_grows_with_its_connections() -> None:
             for rank in (0, 1)
         ]
         segments = [Segment(0, x, 1, -x, 1.0) for x in across]
-        return flips.turned(Levels(nodes, [[0], [1]], [segments]), [[0], [1]], {0})[1]
+        return flips.reflected(Levels(nodes, [[0], [1]], [segments]), [[0], [1]], {0})[1]
 
-    assert turned(20) == {0}
-    assert lines_run(lambda: turned(400), flips) < 3 * lines_run(lambda: turned(200), flips)
+    assert reflected(20) == {0}
+    assert lines_run(lambda: reflected(400), flips) < 3 * lines_run(lambda: reflected(200), flips)
 
 
 def test_what_is_boxed_is_routed_once() -> None:

@@ -62,16 +62,17 @@ def test_the_order_of_the_spec_does_not_show_in_the_layout(spec: Spec, seed: int
 @LAW
 @given(specs())
 def test_renaming_changes_nothing_else(spec: Spec) -> None:
-    """Every group takes a new name that keeps the order; draws, which depend on names, are replaced by numbers."""
+    """Every group takes a new name that keeps the order, and as wide a one, for which the same room is kept; draws,
+    which depend on names, are replaced by numbers."""
     text = json.dumps(spec).replace("uniform(-0.3, 0.3)", "0.1*sin(3*i + j)")
-    renamed = re.sub(r"\bG([a-e])", r"Other\1", text)
+    renamed = re.sub(r"\bG([a-e])", r"O\1", text)
     one, other = nv.compile(json.loads(text)), nv.compile(json.loads(renamed))
     first, second = one.run(STEPS), other.run(STEPS)
-    assert [name.replace("G", "Other") for name in first.neurons] == list(second.neurons)
+    assert [name.replace("G", "O") for name in first.neurons] == list(second.neurons)
     np.testing.assert_array_equal(first.activity, second.activity)
     np.testing.assert_array_equal(first.weights, second.weights)
     layouts = one.layout().positions, other.layout().positions
-    assert {name.replace("G", "Other"): at for name, at in layouts[0].items()} == dict(layouts[1])
+    assert {name.replace("G", "O"): at for name, at in layouts[0].items()} == dict(layouts[1])
 
 
 @LAW
