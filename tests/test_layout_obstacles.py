@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from neurovis_layouts.routing.bows import Wish, clear_bow, clear_bows
+from neurovis_layouts.routing.bows import BowSought, clear_bow, clear_bows
 from neurovis_layouts.routing.obstacles import REACH, Obstacles
 
 from neurovis_spec.layout.geometry import straight
@@ -49,7 +49,7 @@ def test_bows_found_together_are_those_found_one_by_one(centres: list[Point], da
     obstacles = Obstacles(centres)
     ends = st.lists(st.integers(0, len(centres) - 1), min_size=2, max_size=2, unique=True)
     wishes = [
-        Wish(centres[a], centres[b], (a, b), least, sided)
+        BowSought(centres[a], centres[b], (a, b), least, sided)
         for (a, b), least, sided in data.draw(
             st.lists(st.tuples(ends, st.sampled_from([0.0, 0.2, -0.4]), st.booleans()), min_size=1, max_size=6)
         )

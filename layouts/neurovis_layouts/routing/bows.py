@@ -36,7 +36,7 @@ def bow(start: Point, end: Point, height: float, hold: float = 0.3) -> Route:
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class BowSought:
     """A bow that is asked for: between which places and neurons, how high at least; ``sided`` keeps it on the side of
     ``least`` (one of a reciprocal pair must not change over); ``wide`` is by how much less of the way its control
     points stand from the ends."""
@@ -49,13 +49,13 @@ class Wish:
     wide: float = 0.0
 
 
-def clear_bow(wish: Wish, obstacles: Obstacles) -> tuple[Route, float, float]:
+def clear_bow(wish: BowSought, obstacles: Obstacles) -> tuple[Route, float, float]:
     """The flattest bow clear of foreign discs, else the clearest; its clearance and height."""
     return clear_bows([wish], obstacles)[0]
 
 
 def clear_bows(
-    wishes: Sequence[Wish], obstacles: Obstacles, tries: int = MANY_TRIES, highest: float = math.inf
+    wishes: Sequence[BowSought], obstacles: Obstacles, tries: int = MANY_TRIES, highest: float = math.inf
 ) -> list[tuple[Route, float, float]]:
     """For each wish the flattest bow clear of foreign discs, else the clearest; its clearance and height. ``tries`` is
     how many heights are tried on a side, up to ``highest`` times the way."""

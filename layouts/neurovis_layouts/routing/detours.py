@@ -19,6 +19,7 @@ import numpy as np
 from neurovis_layouts.routing.corners import rounded
 from neurovis_layouts.routing.ends import shared_ends
 from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
+from neurovis_layouts.routing.route_cost import ALONG, BENDING, ENTERING
 from neurovis_layouts.routing.walls import Walls, blocked, meet
 from neurovis_spec.layout import BoolArray, FloatArray, IntArray
 from neurovis_spec.layout.geometry import distance, sampled
@@ -33,8 +34,6 @@ _CLEAR = (0.1, 0.02)
 _HASTE = 1.5
 #: From a corner so many of the nearest frames are seen.
 _NEAREST = 24
-#: What a bend costs, a lane that is taken already, and a corner that an edge between the same neurons has taken.
-_BEND, _TAKEN, _SAME = 0.2, 0.6, 1e6
 #: Outwards, from each side of a rectangle, and from its corners.
 _OUT = np.array([-1.0, -1.0, 1.0, 1.0])
 _CORNERS = ((0, 1), (0, 3), (2, 1), (2, 3))
@@ -77,7 +76,8 @@ def detoured(
 @dataclass(frozen=True, slots=True)
 class _Taken:
     """Where detours run: how much it costs to bend at a corner that they bend at, and what stretches of which lines
-    across (0: at this x) and along (1: at this y) they run on."""
+    across (0: at this x) and along (1: at this y) they run on. Each corner and each stretch that is shared costs what a
+    unit ``ALONG`` another line does."""
 
     corners: dict[Point, float] = field(default_factory=dict)
     lines: dict[tuple[int, float], list[Point]] = field(default_factory=dict)
@@ -85,7 +85,7 @@ class _Taken:
     def add(self, path: Sequence[Point]) -> None:
         """Add a detour: later ones that use its corners or run along it cost more."""
         for point in path[1:-1]:
-            self.corners[point] = self.corners.get(point, 0.0) + _TAKEN
+            self.corners[point] = self.corners.get(point, 0.0) + ALONG
         for a, b in pairwise(path):
             for axis in (0, 1):
                 if a[axis] == b[axis]:
@@ -103,7 +103,7 @@ class _Taken:
                 other, here = points[on, 1 - axis, None], at[1 - axis]
                 shared = (np.minimum(other, here) < high) & (np.maximum(other, here) > low)
                 times[on] += shared.sum(axis=1)
-        return _TAKEN * times.astype(np.float64)
+        return ALONG * times.astype(np.float64)
 
 
 class Detours:
@@ -159,7 +159,8 @@ class Detours:
         """The line that a detour follows, and what it keeps off."""
         ends = self._centres[[source, target]]
         same = self._between.get((min(source, target), max(source, target)), ())
-        bends = {**self._taken.corners, **dict.fromkeys(same, _SAME)}
+        # of all between the same ends each bends at corners of its own
+        bends = {**self._taken.corners, **dict.fromkeys(same, ENTERING)}
         foreign = self._walls.foreign(source, target)
         # discs in foreign frames are behind the borders of these
         loose: BoolArray = self._walls.inside[:, ~foreign].sum(axis=1) == self._depth
@@ -196,7 +197,7 @@ class Detours:
         """The shortest line from the first end to the second by way of corners, which enters none of the rectangles."""
         points = corners.points
         places: list[Point] = [(x, y) for x, y in points.tolist()]
-        extra = np.array([0.0, 0.0, *(_BEND + bends.get(place, 0.0) for place in places[2:])])
+        extra = np.array([0.0, 0.0, *(BENDING + bends.get(place, 0.0) for place in places[2:])])
         ahead = _HASTE * _lengths(points - points[1])
         best = np.full(len(points), np.inf)
         best[0] = 0.0

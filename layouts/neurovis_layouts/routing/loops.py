@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
+from neurovis_layouts.routing.route_cost import ENTERING
 from neurovis_layouts.routing.walls import Walls
 from neurovis_spec.layout import FloatArray
 from neurovis_spec.layout.geometry import distance, pieces_of, points_on
@@ -37,8 +38,6 @@ _WAYS: tuple[tuple[Point, float], ...] = (
     ((-_DIAGONAL, _DIAGONAL), 0.2),
 )
 _CROWDED = 0.35
-#: What it costs to enter a foreign frame, and to run over a disc, which is worse than all else.
-_ENTERING, _OVER = 8.0, 20.0
 #: An edge within some 50° of a loop's way runs along one of its legs, which stand 30° to either side.
 _LEGS = 0.64
 #: Shapes, the first of equals wins: how long the handles are (three quarters of it is how far the loop reaches) and how
@@ -114,7 +113,7 @@ class Loops:
     def _least(self, entering: Sequence[bool]) -> Route:
         """The cheapest loop; of equals the first way, and of its shapes the first."""
         costs = [
-            tried.crowd + (tried.nearing + _ENTERING * enters + tried.over) + _TOGETHER * close
+            tried.crowd + (tried.nearing + ENTERING * enters + tried.over) + _TOGETHER * close
             for tried, enters, close in zip(self._choice, entering, self._close, strict=True)
         ]
         return self._choice[min(range(len(costs)), key=lambda number: (costs[number], number))].route
@@ -128,7 +127,7 @@ class Loops:
                 route,
                 self._crowds[number // len(shapes)] + 0.12 * (number % len(shapes)),
                 8 * max(0.0, REACH - clear[number]),
-                _OVER * (clear[number] <= TOUCH),
+                ENTERING * (clear[number] <= TOUCH),
             )
             for number, route in enumerate(routes)
         ]

@@ -19,11 +19,12 @@ from neurovis_spec.layout import BoolArray, FloatArray, IntArray
 from neurovis_spec.layout.geometry import distance, padded, straight
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
-# What a route costs, in units that only compare: a crossing is about one. Each figure was set to zero in turn, on
+# What a route costs, in units that only compare: a crossing is about one. Those without an underscore are what detours
+# and self-loops cost as well. Each figure was set to zero in turn, on
 # twelve networks of 15 to 80 neurons with 426 crossings; what became worse is said.
 
 #: To enter a foreign frame or a disc: more than all else together, since it reads as a connection with what is there.
-_ENTERING = 1000.0
+ENTERING = 1000.0
 #: To be a unit closer to a disc than ``REACH``: so much that the middle of a gap is taken (without: 2 % more on
 #: others).
 _NEARING = 10.0
@@ -36,7 +37,7 @@ _CROSSING = 1.2
 _KIN = 2.4
 #: To run on others for a unit: as bad as a crossing, since they are one line there (without: 1059 instead of 828 cells
 #: that several lines share, and 456 crossings).
-_ALONG = 1.5
+ALONG = 1.5
 #: To run on another between the same ends, times the share of the line that does: then one of the two is not seen at
 #: all (without: a sheaf of six between two neurons, which a test draws, is not told apart).
 _SAME = 12.0
@@ -51,7 +52,7 @@ _LONGER = 0.1
 #: To be longer by the straight way: twice as long is a crossing (without: 428).
 _RATIO = 1.0
 #: To turn by a chord of one: a right angle is most of a crossing (without: 9 % more turning, and 433 crossings).
-_BENDING = 0.5
+BENDING = 0.5
 #: The same in a bend of radius 1, which is hard to follow where it is tight (without: 430, and 2 % more turning).
 _TIGHT = 0.25
 #: To run back a unit along the direction, where the route did not: more than two crossings, since the direction is what
@@ -313,7 +314,7 @@ class Pen:
         """(n,) what they cost whatever there is around them."""
         (low, high), (bends, tight), lengths = lines.extents(), lines.bends(), lines.lengths()
         outside = np.maximum(self._judge.low - low, 0.0) + np.maximum(high - self._judge.high, 0.0)
-        cost = _LONGER * lengths + _RATIO * (lengths / self._far - 1) + _BENDING * bends + _TIGHT * tight
+        cost = _LONGER * lengths + _RATIO * (lengths / self._far - 1) + BENDING * bends + _TIGHT * tight
         cost += _OUTSIDE * (outside[:, 0] + outside[:, 1])
         if self._onward:
             cost += _BACK * lines.backward()
@@ -324,7 +325,7 @@ class Pen:
         clear = lines.clearances(self._discs, REACH)
         grazing, entering = lines.enter(self._margins), lines.enter(self._foreign)
         cost: FloatArray = _NEARING * (REACH - clear) + _GRAZING * grazing.astype(np.float64)
-        cost += _ENTERING * (entering.astype(np.float64) + (clear < TOUCH + _SLACK))
+        cost += ENTERING * (entering.astype(np.float64) + (clear < TOUCH + _SLACK))
         return cost
 
     def _beside(self, lines: Polylines) -> FloatArray:
@@ -340,7 +341,7 @@ class Pen:
         cells, owner = lines.cells()
         if len(self._cells):
             there = self._cells[np.minimum(np.searchsorted(self._cells, cells), len(self._cells) - 1)] == cells
-            cost += _ALONG * STEP * np.bincount(owner[there], minlength=len(lines))
+            cost += ALONG * STEP * np.bincount(owner[there], minlength=len(lines))
         return cost
 
     def _across(self, lines: Polylines) -> FloatArray:

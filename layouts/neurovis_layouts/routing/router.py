@@ -11,7 +11,7 @@ from collections.abc import Set as AbstractSet
 
 import numpy as np
 
-from neurovis_layouts.routing.bows import FEW_TRIES, MANY_TRIES, Wish, clear_bow, clear_bows
+from neurovis_layouts.routing.bows import FEW_TRIES, MANY_TRIES, BowSought, clear_bow, clear_bows
 from neurovis_layouts.routing.curves import Waypoint, curve
 from neurovis_layouts.routing.detours import detoured
 from neurovis_layouts.routing.ends import shared_ends
@@ -144,7 +144,7 @@ def _curves(
                 best, clearance = others[other], clearances[other]
         if clearance < TOUCH + 0.02:
             least = heights.get(owns[k], 0.0) + 0.3
-            bowed, found, height = clear_bow(Wish(start, end, owns[k], least, owns[k] in shared), obstacles)
+            bowed, found, height = clear_bow(BowSought(start, end, owns[k], least, owns[k] in shared), obstacles)
             if found > clearance + 0.02:
                 best, heights[owns[k]] = bowed, height
         routes[chosen[k]] = best
@@ -195,7 +195,7 @@ def _bows(
     for place in range(max((len(equal) for equal in between.values()), default=0)):
         # each further one outside those before it, wherever obstacles have sent these
         wishes = {
-            ends: Wish(
+            ends: BowSought(
                 centres[ends[0]],
                 centres[ends[1]],
                 ends,
