@@ -7,7 +7,6 @@ each side where that can be: bows, or ways round what stands on either side of t
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 
@@ -105,9 +104,9 @@ class Arcs:
         return len({self._above(route) for route in there}) < 2
 
     def _above(self, route: Route) -> bool:
-        """Whether an arc bows to where the direction comes from."""
-        heights = [y for _, y in route]
-        return math.fsum(heights) / len(heights) < route[0][1]
+        """Whether an arc bows, on the axis, to where the direction comes from."""
+        half = len(route) // 2
+        return route[half][1] + route[-half - 1][1] < 2 * route[0][1]
 
     def _candidates(self, source: int, target: int) -> Iterator[Route]:
         """Bows to either side, and ways round."""
