@@ -138,7 +138,7 @@ def test_in_a_notebook_they_draw_themselves(network: nv.CompiledNetwork) -> None
 
 def test_no_picture_is_wider_than_the_cell_of_a_notebook(network: nv.CompiledNetwork) -> None:
     """A pixel a unit, and where that is wider, as wide as the cell."""
-    parts = "layout: {direction: right}\nneurons: {A: {count: 20}}\nconnections: {A -> A: {pattern: chain}}"
+    parts = "neurons: {A: {count: 20, position: [i, 0]}}\nconnections: {A -> A: {pattern: chain}}"
     chain = nv.compile_text(f"neurovis: 1\nname: chain\n{parts}")
     for shown, wide in ((network, 736), (network.layout(), 736), (chain.layout(), 900)):
         assert f' width="{wide}" ' in shown._repr_svg_()[:200]

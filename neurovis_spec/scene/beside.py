@@ -1,10 +1,10 @@
 """Beside: which labels stand beside their discs, and on which side.
 
-In: labels by importance, discs and lines in layout units, the scale. Out: a Slot for each label that has room. A label
-that is shown at a scale is shown at every larger one, on the same side: the scales from the smallest on are gone
-through in fixed steps, and at each of them labels find room among those that are there already. What a label claims,
-from its disc on, gets smaller in layout units from step to step, so that those that are there stay free of each other
-(active ranges: Been, Daiches and Yap 2006).
+In: labels by importance, discs and lines in layout units, the scale. Out: a Slot for each label that has room. A
+label that is shown at a scale is shown at every larger one, on the same side, unless a title takes its place there:
+the scales from the smallest on are gone through in fixed steps, and at each of them labels find room among those that
+are there already. What a label claims, from its disc on, gets smaller in layout units from step to step, so that
+those that are there stay free of each other (active ranges: Been, Daiches and Yap 2006).
 """
 
 from __future__ import annotations

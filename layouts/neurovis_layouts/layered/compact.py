@@ -31,7 +31,7 @@ _BACK = 10.0
 #: So many numbers of bands one after the other are tried in vain.
 _IN_VAIN = 2
 #: In no more bands or rows than this, nor more neurons and connections; nor are all kinds tried more often.
-_MOST_FOLDS, _MOST, _ROUNDS = 8, 3000, 2
+_MOST_FOLDS, _MOST, _ROUNDS = 8, 3000, 1
 
 
 #: What can be folded: the ranks of a kind of instance, or of the whole (its number, RANKS), or the rows of instances of
