@@ -127,7 +127,7 @@ def corner(title: Text, frame: Rectangle) -> tuple[bool, bool]:
 
 
 @pytest.mark.parametrize("direction", ["down", "right"])
-def test_titles_of_all_boxes_stand_in_one_corner_in_mirrored_pictures_too(direction: str) -> None:
+def test_titles_of_all_boxes_stand_in_one_place_in_mirrored_pictures_too(direction: str) -> None:
     network = nv.compile_text(f"""
 neurovis: 1
 name: mirrored

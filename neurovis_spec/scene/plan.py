@@ -43,7 +43,7 @@ from neurovis_spec.scene.shown import shown
 from neurovis_spec.scene.teachers import Teacher, dash, dotted, label_of, room_of, teachers_of
 from neurovis_spec.scene.themes import theme_of
 from neurovis_spec.scene.tints import tints_of
-from neurovis_spec.scene.titles import Titled, elsewhere, in_one_corner, outline
+from neurovis_spec.scene.titles import Titled, elsewhere, in_one_place, outline
 
 #: how high a line is that says what is left out; what texts keep of the picture's edge
 _NOTE_LINE, _EDGE = 16.0, 6.0
@@ -154,7 +154,7 @@ def plan(
     spots: list[Point] = [(x, y) for x, y in centres.tolist()]
     sizes = {unit: size for unit, size in enumerate(drawn.sizes.tolist()) if drawn.glyph[unit]}
     titled = _titled(boxes, frame, picture)
-    titles = in_one_corner(titled, obstacles, theme, [_mapped(rect, frame) for rect in rooms.values()])
+    titles = in_one_place(titled, obstacles, theme, [_mapped(rect, frame) for rect in rooms.values()])
     labels: list[Label | None] = [None] * len(spots)
     if settings.labels:
         around = [outline(box.rect, 4 / UNIT) if box.sector is None else box.sector.border(4 / UNIT) for box in boxes]

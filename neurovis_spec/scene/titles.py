@@ -1,7 +1,7 @@
-"""Titles of boxes: in the same corner of all boxes of a picture, that in which the fewest lines cross them.
+"""Titles of boxes: in the same place of all boxes of a picture, that in which the fewest lines cross them.
 
 In: boxes in user units, what is in the way. Out: a Text for each box, or None where there is no room for any. A title
-that has no room in the corner of the others stands elsewhere, in or beside its box. Boxes of one name and size, as
+that has no room in the place of the others stands elsewhere, in or beside its box. Boxes of one name and size, as
 instances of a module have them, are alike, and so are the instances themselves; their titles are worded alike, and
 elsewhere stand in the same place or in its mirror image.
 """
@@ -45,29 +45,31 @@ class Titled:
     foreign: tuple[Rect, ...] = ()
 
 
-def in_one_corner(
+def in_one_place(
     boxes: Sequence[Titled], obstacles: Obstacles, theme: Theme, kept: Sequence[Rect] = ()
 ) -> dict[int, Text]:
-    """The titles, by the place of their boxes, of one size and in the corner that has room for the most of them; the
-    largest of such sizes, and of its corners that in which they cover least. None is on what is ``kept`` for others."""
+    """The titles, by number of their boxes, of one size and in the one place that has room for the most of them; of
+    several that in which they cover least, rather within the frames and not too small. None is on what is ``kept`` for
+    others."""
     around = [obstacles.near(_grown(item, _WEIGHTS[item.box.kind])) for item in boxes]
-    best: tuple[int, int, int, dict[int, _Title]] | None = None
-    for place, inside in enumerate(_INSIDE):
-        for corner in _CORNERS:
+    best: tuple[int, int, dict[int, _Title]] | None = None
+    for closer, inside in enumerate(_INSIDE):
+        for at in _PLACES:
+            each = _CLOSER * closer + (_BEYOND if at[1] in _OUTSIDE else 0)
             found: dict[int, _Title] = {}
             for members in _alike(boxes):
                 taken = [*kept, *(title.place.taken for title in found.values())]
                 wordings: list[dict[int, _Title]] = []
                 for whole in (True, False):
-                    worded = {i: _in_corner(boxes[i], whole, inside, corner, around[i], taken) for i in members}
+                    worded = {i: _in_place(boxes[i], whole, inside, at, around[i], taken) for i in members}
                     wordings.append({i: title for i, title in worded.items() if title is not None})
                 chosen: dict[int, _Title] = min(wordings, key=_worth)
                 found.update(chosen)
             missing, hits = _worth(found)
-            if best is None or (missing, place, hits) < best[:3]:
-                best = missing, place, hits, found
+            if best is None or (missing, hits + each * len(found)) < best[:2]:
+                best = missing, hits + each * len(found), found
     result: dict[int, Text] = {}
-    for index, title in best[3].items() if best else ():
+    for index, title in best[2].items() if best else ():
         text = _drawn(title, title.place.hits, _WEIGHTS[boxes[index].box.kind], obstacles, theme)
         if text is not None:
             result[index] = text
@@ -75,7 +77,7 @@ def in_one_corner(
 
 
 def elsewhere(boxes: Sequence[Titled], obstacles: Obstacles, theme: Theme) -> list[Text | None]:
-    """Titles that have no room in one corner, in the order of the boxes: inside, then just outside; the name alone
+    """Titles that have no room in one place, in the order of the boxes: inside, then just outside; the name alone
     where the whole finds no room, or as much of the name as finds it."""
     result: list[Text | None] = [None] * len(boxes)
     for members in _alike(boxes):
@@ -141,26 +143,35 @@ def _worth(titles: Mapping[int, _Title]) -> tuple[int, int]:
     return -len(titles), sum(title.place.hits for title in titles.values())
 
 
-def _in_corner(
+def _in_place(
     item: Titled,
     whole: bool,
     inside: tuple[float, Point],
-    corner: Point,
+    at: tuple[float, int],
     obstacles: Obstacles,
     taken: Sequence[Rect],
 ) -> _Title | None:
-    """A title in a corner of its frame; None where a disc or a text is in the way, or the frame is not as wide."""
+    """A title in one of the places; None where a disc or a text is in the way, the frame is not as wide, or there is no
+    room beyond it."""
     (size, inset), weight, (x0, y0, x1, y1) = inside, _WEIGHTS[item.box.kind], item.rect
     text = item.box.title if whole else item.box.name
     width = texts.width(text, size, weight)
     if width > x1 - x0 - 2 * inset[0] + 1e-6:
         return None
-    x = x1 - inset[0] - width if corner[0] else x0 + inset[0]
-    y = y1 - inset[1] - _DEPTH * size if corner[1] else y0 + inset[1] + _HEIGHT * size
+    x = x0 + inset[0] + at[0] * (x1 - x0 - 2 * inset[0] - width)
+    y = _baseline(y0, y1, inset[1], size)[at[1]]
     rect = (x - 1, y - _HEIGHT * size, x + width + 1, y + _DEPTH * size)
+    if rect[1] < item.room[1] or rect[3] > item.room[3]:
+        return None
     hits = obstacles.hits(rect, _CROSSED)
     hits += _TOO_MUCH * sum(meet(rect, other) for other in (*taken, *item.foreign))
     return _Title(text, size, _Place((x, y), rect, hits)) if hits < _TOO_MUCH else None
+
+
+def _baseline(top: float, bottom: float, gap: float, size: float) -> tuple[float, ...]:
+    """The baseline of a title inside its frame at the top and at the bottom, above and below it."""
+    rise, drop = gap + _HEIGHT * size, gap + _DEPTH * size
+    return top + rise, bottom - drop, top - drop, bottom + rise
 
 
 def _together(boxes: list[Titled], obstacles: Obstacles, theme: Theme) -> list[Text | None]:
@@ -222,14 +233,18 @@ def _drawn(title: _Title, hits: int, weight: int, obstacles: Obstacles, theme: T
 
 
 _CLOSE = 5.0
-#: how large all titles are in their corners, and how far from the sides of their frames
+#: how large all titles are in one place, and how far from the sides of their frames
 _INSIDE: tuple[tuple[float, Point], ...] = (
     (_SIZE, (TITLE_INSET, 5.0)),
     (_SIZE, (_CLOSE, 2.0)),
     *((size, (_CLOSE, 2.0)) for size in _SMALLER),
 )
-#: the corners of a frame, across and down: upper left first
-_CORNERS: tuple[Point, ...] = ((0, 0), (1, 0), (0, 1), (1, 1))
+#: where titles stand in one place: how far across their frames, from 0 to 1, and in which of the rows ``_baseline`` has
+_PLACES = tuple((across, row) for row in range(4) for across in (0.0, 1.0, 0.5))
+_OUTSIDE = (2, 3)
+#: what it costs a title to stand outside of its frame: less than a line that it covers; and to be closer to it or
+#: smaller, by one step
+_BEYOND, _CLOSER = 10, 1
 #: how far letters reach above and below their baseline, by their size
 _HEIGHT, _DEPTH = 0.78, 0.22
 #: rows: inside at the top and at the bottom, above, below
