@@ -20,9 +20,10 @@ from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.geometry import near_pairs, snap, straight
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point
 
-#: With more connections than this, going round discs only moves the crowd.
+#: With more connections than this, routes do not go round discs: they would only run over others.
 _CAREFUL = 1000
-#: So many neurons are arranged around pins frame by frame: of more, frames lie upon too many others to be quick.
+#: With at most so many neurons, instances without pins are moved off the frames of those with pins; with more, too
+#: many frames overlap for that to be quick.
 _MOST_AROUND_PINS = 300
 
 
@@ -35,10 +36,10 @@ def drawn(
     highest: float = math.inf,
     symmetry: Symmetry | None = None,
 ) -> Layout:
-    """The layout with the neurons at the first of ``places`` (n, 2), where no pin says otherwise. Instances without a
-    pin are kept off the ``frames`` of those that have one. The edges ``clear``, by index, run straight, as the caller
-    knows that nothing is in their way. The others bow at most ``highest`` times as high as they are long. With a
-    ``symmetry`` images, and routes between them, are exact reflections."""
+    """The layout with the neurons at ``places`` (n, 2; there may be more rows than neurons), where no pin says
+    otherwise. Instances without a pin are kept off the ``frames`` of those that have one. The edges ``clear``, by
+    index, run straight, as the caller knows that nothing is in their way. The others bow at most ``highest`` times as
+    high as they are long. With a ``symmetry`` images, and routes between them, are exact reflections."""
     flat: list[Point] = [(snap(x), snap(y)) for x, y in places[: len(problem.neurons)].tolist()]
     pins = with_origins(problem, [to_picture(point, problem.direction) for point in flat])
     centres, _, _ = fit(flat, {i: from_picture(point, problem.direction) for i, point in pins.items()})

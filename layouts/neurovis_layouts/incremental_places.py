@@ -32,7 +32,7 @@ def remembered(problem: LayoutProblem, fresh: Sequence[Point], routes: Mapping[i
     if not placed:
         return list(fresh)
     wanted, put = resolved(problem, fresh, placed, by_hand(problem))
-    frames = Frames(problem, problem.memory.labels if problem.memory else None)
+    frames = Frames(problem, problem.memory.labels)
     before = {**placed, **put, **wanted}
     old = carried(problem, problem.memory, before)
     newly = put.keys() | {i for i, point in problem.pins.items() if known.get(i) != point}
@@ -40,7 +40,7 @@ def remembered(problem: LayoutProblem, fresh: Sequence[Point], routes: Mapping[i
         if i not in problem.pins and i not in put:
             wanted.setdefault(i, before[i])
     stay = {i: point for i, point in before.items() if i not in wanted}
-    # what stands on a pin, or in a file edited by hand on one before it, has to find another place, like what is new
+    # neurons that overlap a pin (or, in a file edited by hand, a neuron before them) are placed anew, like new ones
     lost = overlapping({i: point for i, point in stay.items() if i not in problem.pins}, problem.pins)
     placed = {i: point for i, point in sorted(stay.items()) if i not in lost}
     shapes = _Shapes(problem, frames, fresh, routes, before, old)
@@ -189,7 +189,7 @@ def _pieces(
     wanted: frozenset[int],
 ) -> Iterator[tuple[Body, ...]]:
     """What is placed together, each with its copies: instances as a piece, then neurons one by one; what has been
-    there before comes first, then what instances lack of which a part is there."""
+    in the earlier layout and has to move comes first, then what partly placed instances lack, then what is new."""
     done = set(placed)
     alike = Alike(problem, before)
 
@@ -223,7 +223,8 @@ def _pieces(
 
 
 def _copies(alike: Alike, module: LayoutModule) -> Iterator[tuple[tuple[int, ...], Move]]:
-    """The same instance in instances around it that are drawn alike, and mirror images; not all of its make."""
+    """The counterparts of an instance within other instances of the template around it, or its mirror image; not every
+    instance of its own template."""
     if module.parent < 0:
         image = alike.image(module)
         if image is not None:

@@ -58,7 +58,7 @@ def rotation(text: str) -> Rotation | None:
 
 
 def refusal(path: Path, ros: Ros | None = None) -> str | None:
-    """Why there can be no recording of this ROS (of any) at a path; None where there can."""
+    """Why no recording for this ROS (None: for any) can be written to a path; None where one can."""
     known = _FORMATS.get(path.suffix.lower())
     if known is None:
         return f"recordings are '.mcap', '.bag' or a folder without suffix, not '{path.suffix}'"
@@ -68,8 +68,8 @@ def refusal(path: Path, ros: Ros | None = None) -> str | None:
 
 
 def in_the_way(path: Path, force: bool) -> list[Path]:
-    """The files of an earlier recording at a path. Raises OSError where there can be no recording, FileExistsError also
-    where there is one, unless by ``force``."""
+    """The files of an earlier recording at a path. Raises OSError where none can be written, and without ``force``
+    FileExistsError where there is one."""
     folder = path.parent
     if not folder.is_dir():
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(folder))
@@ -82,7 +82,7 @@ def in_the_way(path: Path, force: bool) -> list[Path]:
     while place(path, number).exists():
         old.append(place(path, number))
         number += 1
-    if path.suffix and place(path, 1).exists() and not place(path, 0).exists():
+    if path.suffix and place(path, 1).exists() and not place(path, 0).exists():  # the first may have been moved away
         old.append(place(path, 1))
     there = [one for one in dict.fromkeys(old) if one.exists()]
     if there and not force:

@@ -24,7 +24,7 @@ class BagFormat:
         return self.load_run(path, None)
 
     def load_run(self, path: Path, run: int | None) -> Recording:
-        """Read a run of a bag. Messages that are none of its network's arrays are left out, with a warning."""
+        """Read a run of a bag. Messages that do not fit its network's arrays are left out, with a warning."""
         from dataclasses import replace
 
         from neurovis_spec.ros.announced import compiled_from
@@ -43,7 +43,7 @@ class BagFormat:
             raise RecordingError(f"{path}: it does not say of which network it is: no topic 'spec' is in it")
         text, base = found
         compiled = compiled_from(text, str(path))
-        # what a bag holds of a body it does not name: only a recording says which sensors these are
+        # sensors and pose are skipped: a bag does not say of which body they are, nor which sensors
         kinds = {f"{base}/{kind}": place for place, kind in enumerate(KINDS) if kind not in ("sensors", "pose")}
         arrived, left_out = Arrived(frame(compiled)), 0
         for message in bag.messages():

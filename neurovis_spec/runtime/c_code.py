@@ -31,8 +31,8 @@ _NONE: Mapping[str, Made] = {}
 
 
 class Tables:
-    """Constant arrays, each once. Those of more than ``longest`` items are not written into the text but handed to it:
-    ``given`` holds them in order."""
+    """Constant arrays, each once. Those of more than ``longest`` items are not written into the text but passed in at
+    run time: ``given`` holds them in order."""
 
     def __init__(self, real: str, longest: int | None) -> None:
         self._real, self._longest = real, longest
@@ -73,18 +73,19 @@ class Tables:
         return "\n\n".join(text for name, text in self._text.items() if name in used)
 
     def taken(self) -> dict[str, str]:
-        """For each array that is handed over, the line that gives it its name."""
+        """For each array that is passed in, the line that declares a pointer to it."""
         return self._taken
 
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """What a step looks after. ``written_out``: neuron by neuron, without loops. ``first``: neurons with ``initial``
-    take it at step 0 (``first`` is not 0). ``held``: neurons whose byte of ``held`` is set have the activity
-    ``holding``. ``gone`` and ``still``: connections whose byte is set are left out, do not learn. ``fused``: what
-    arrives after one step along weights that stay is formed where it arrives, from the activities ``before`` and the
-    weights ``packed`` in that order; it is not sent. ``watched``: what loops over connections store is checked:
-    the number ``odd`` is NaN after the step where some of it is not finite, else 0."""
+    """What a step has to handle. ``written_out``: neuron by neuron, without loops. ``first``: neurons with ``initial``
+    take it at step 0, where the argument ``first`` is not 0. ``held``: neurons whose byte of ``held`` is set have the
+    activity ``holding``. ``gone`` and ``still``: connections whose byte is set are left out, do not learn. ``fused``:
+    what arrives after one step along weights that do not change is summed by the neuron it arrives at, from the
+    activities of the step ``before`` and the weights ``packed`` in its order, instead of being sent. ``watched``: what
+    loops over connections store is checked: the number ``odd`` is NaN after the step where some of it is not finite,
+    else 0."""
 
     written_out: bool = False
     first: bool = False
@@ -96,7 +97,7 @@ class Form:
 
 
 class Code:
-    """Lines of a function, one level deep."""
+    """Lines of a function, indented by one level."""
 
     def __init__(self, emitter: Emitter, tables: Tables, dt: float, variables: Mapping[str, Variable]) -> None:
         self.emitter, self.tables, self._variables = emitter, tables, variables
@@ -180,7 +181,8 @@ class Code:
         return float(values[0]) if (bits == bits[0]).all() else f"{self.tables.name(values)}[{place}]"
 
     def settable(self, array: str, values: FloatArray, members: IntArray | None, place: Place) -> Value:
-        """An element of an array of the network, of its ``members`` or of all: where it can be set as it is by now."""
+        """An element of an array of the network, of its ``members`` or of all; its current value where it can be
+        set in a run."""
         variable = self._variables.get(array)
         if variable is None:
             return self.number(values if members is None else values[members], place)

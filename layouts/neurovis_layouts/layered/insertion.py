@@ -26,7 +26,7 @@ Counts = npt.NDArray[np.int32]
 CROSSING = 64
 #: The cost of a slot that nothing may take.
 _SHUT = 1 << 22
-#: Work is counted as operations on arrays; one on so many numbers takes twice as long as one on a few.
+#: Work is counted in operations on small arrays; one on so many numbers counts as two.
 _NUMBERS = 4096
 
 
@@ -216,7 +216,7 @@ class Insertion:
         return sum(self._route(c) for c in (*ups, *downs))
 
     def _first(self, node: int) -> int:
-        """The first rank in which a node may stand, what is taken out having room before it."""
+        """The first rank in which a node may stand, with a rank left for each node before it that is taken out."""
         if node not in self.free:
             return self.rank[node]
         above = {self.links[c].upper for c in self.ups[node]}
@@ -363,8 +363,8 @@ class Insertion:
         return crossed, [a, *slots[::-1], b]
 
     def _shut(self, r: int, box: int) -> Counts:
-        """For each slot of a rank what it costs that it lies within a block, or within a box that is not this one; or,
-        where this one is in the rank, outside of it."""
+        """For each slot of a rank ``_SHUT`` where it lies within a block or another box, or outside of ``box`` though
+        that is in the rank; else 0."""
         owners = [self.owner(entry) for entry in self.order[r]]
         boxes = [self._box[node] if node >= 0 else self.links[link].box for node, link in owners]
         found = np.zeros(len(owners) + 1, dtype=np.int32)

@@ -1,4 +1,4 @@
-"""Halves: the units of a problem that is to be symmetric: those on one side, those on the axis, and reflections.
+"""Mirror units: the units of a problem that is to be symmetric: those on one side, those on the axis, and reflections.
 
 In: a problem, its frames, whose mirror image each neuron is. Out: units of which each is its own image or has one.
 """
@@ -52,12 +52,11 @@ def _pure(unit: Unit, pair: Mapping[int, int]) -> Iterator[Unit]:
     """A unit as it is if all of its neurons have an image or none has, else in pieces."""
     with_image = tuple(m for m in unit.members if m in pair)
     if len(with_image) in (0, len(unit.members)):
-        # a block on the axis that is not symmetric in itself would pull its neurons off it
         yield unit
     elif unit.places is None:
         yield Unit(with_image)
         yield Unit(tuple(m for m in unit.members if m not in pair))
-    else:
+    else:  # a block that is not symmetric in itself would pull its neurons off the axis
         yield from (Unit((m,)) for m in unit.members)
 
 

@@ -2,7 +2,7 @@
 
 In: units and the connections between them. Out: a rank for each, from 0. Connections that go back against the ranks
 are as few as a greedy choice and moves of single units make them; the ranks are those with the shortest connections in
-all (``simplex``); what could stand earlier without making them longer does.
+all (``simplex``); units that can stand in an earlier rank without making them longer do.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from neurovis_layouts.layered.sifting import sifted
 from neurovis_layouts.layered.simplex import shortened
 
-#: A connection within a step outweighs any number of delayed ones: what runs within a step runs forward.
+#: The weight of a connection without delay: it is reversed only where a loop of such connections leaves no choice.
 INSTANT = 1000.0
 #: Loops of more units are cut greedily only.
 _SIFTED = 1500
@@ -72,7 +72,7 @@ def _component_order(graph: nx.DiGraph[int]) -> list[int]:
 def _cut(
     loop: Sequence[int], arcs: Arcs, graph: nx.DiGraph[int], first: AbstractSet[int], last: AbstractSet[int]
 ) -> list[int]:
-    """An order of a loop's units that few arcs run against (Eades, Lin and Smyth 1993), ties by canonical order."""
+    """An order of a loop's units that few arcs run against (Eades, Lin and Smyth 1993), ties by number."""
     inside = set(loop)
     surplus = {unit: (0.5 if unit in first else 0.0) - (0.5 if unit in last else 0.0) for unit in loop}
     came, went = dict.fromkeys(loop, 0), dict.fromkeys(loop, 0)

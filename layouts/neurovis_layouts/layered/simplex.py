@@ -14,7 +14,7 @@ import numpy as np
 
 from neurovis_layouts.layered.crossings import Ints
 
-#: Pivots for each node, and a few: more are needed only where a tie is turned over and over.
+#: At most so many pivots for each node, and a few more: a limit against cycling where pivots change nothing.
 _PIVOTS = 8
 
 
@@ -50,7 +50,8 @@ class _Tree:
         return self.rank[self.heads[arcs]] - self.rank[self.tails[arcs]] - 1
 
     def grow(self) -> None:
-        """A tree of tight arcs from the first node; where it ends it is moved to the nearest arc that leads on."""
+        """A tree of tight arcs (as short as may be) from the first node; where none leads on from it, all of it is
+        moved until the arc with the least slack that does is tight."""
         beside: list[list[tuple[int, int]]] = [[] for _ in self.near]
         for arc, (tail, head) in enumerate(zip(self.tails.tolist(), self.heads.tolist(), strict=True)):
             beside[tail].append((head, arc))
@@ -75,7 +76,8 @@ class _Tree:
             waiting = np.flatnonzero(inside).tolist()
 
     def pivot(self) -> bool:
-        """Exchange the tree's arc that it costs most to keep short for the tightest that goes the other way."""
+        """Replace the tree's arc with the most negative cut value by the arc with the least slack that runs the other
+        way between its two sides; False where no cut value is negative: then the ranks are optimal."""
         order, size, by = self._numbered()
         place = np.empty(len(order), dtype=np.int64)
         place[order] = np.arange(len(order))

@@ -1,4 +1,5 @@
-"""Definitions that are surely not meant: unused, read by nothing, hidden by others, replacing what they should change.
+"""Definitions that are most likely mistakes: unused, read by nothing, hidden by others, replacing what they should
+change.
 
 In: the activations, models, rules and modules of a spec and of the files that it includes. Out: warnings where they are
 declared, or where they are named.
@@ -8,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from collections.abc import Mapping as AnyMapping
+from itertools import chain
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -112,13 +114,21 @@ def _check_parts(definition: _Definition, wanted: frozenset[str], what: str, fin
 
 def _first(unused: AnyMapping[str, _Part]) -> Iterator[str]:
     """Of unused parts those that no other reads, and one of those that read each other."""
+    readers: dict[str, set[str]] = {name: set() for name in unused}
+    for other, part in unused.items():
+        for name in part.reads & unused.keys() - {other}:
+            readers[name].add(other)
     left = dict(unused)
     while left:
-        read_by_others = {name for other, part in left.items() for name in part.reads if name != other}
-        first = next((name for name in left if name not in read_by_others), next(iter(left)))
+        alone = (name for name in left if not readers[name])
+        cyclic = (name for name in left if readers[name] <= _reached((name,), unused))
+        first = next(chain(alone, cyclic))
         yield first
-        for name in _reached((first,), unused):
-            left.pop(name, None)
+        gone = _reached((first,), unused) & left.keys()
+        for name in gone:
+            del left[name]
+        for name in left:
+            readers[name] -= gone
 
 
 # Weights that are replaced where a change is meant
@@ -126,8 +136,8 @@ def _first(unused: AnyMapping[str, _Part]) -> Iterator[str]:
 
 def _check_replaced(model: RuleModel, rule: Rule, defaults: Defaults, findings: Findings) -> None:
     """``weight: {each_step: 0.01 * pre * post}``: a formula that reads what is active but nothing that outlasts the
-    step, neither the weight nor a state that builds up, and that is 0 in silence, as a change is. A weight that follows
-    states, the time or a signal, or that has a value in silence, is let be."""
+    step, neither the weight nor a state that builds up, and that is 0 where all activities are 0, as a change would be.
+    A weight that follows states, the time or a signal, or that has a value then, is not reported."""
     parts = _parts_of(model)
     for formula, tree, when in (
         (model.weight.each_step, rule.each_step, "each step"),
