@@ -8,8 +8,9 @@ is not in.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.layout.geometry import Rect, bounds, padded, sampled, united
 from neurovis_spec.layout.labels import BOX_WEIGHT, instance_titles, label_rect, title_room, widened
 from neurovis_spec.layout.model import LayoutProblem, Point, Route, Side
@@ -99,6 +100,13 @@ class Frames:
     def related(self, one: int, other: int) -> bool:
         """Whether frames have neurons in common, so that they cannot keep off each other."""
         return not self.members[one].isdisjoint(self.members[other])
+
+
+def entered(centres: FloatArray, rect: Rect, members: Collection[int]) -> bool:
+    """Whether a neuron that is foreign to a frame stands in it: then it is not drawn."""
+    x, y = centres.T
+    inside = (x > rect[0]) & (y > rect[1]) & (x < rect[2]) & (y < rect[3])
+    return bool(inside.sum() > inside[list(members)].sum())
 
 
 def enclosing(centres: Rect, lines: Rect | None, held: Iterable[Rect], labels: Iterable[Rect] = ()) -> Rect:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.layout.frames import Frames
+from neurovis_spec.layout.frames import Frames, entered
 from neurovis_spec.layout.geometry import Rect, meet
 from neurovis_spec.layout.labels import label_rect
 from neurovis_spec.layout.model import RADIUS, Layout, LayoutProblem
@@ -29,7 +29,7 @@ def label_overlaps(layout: Layout, problem: LayoutProblem) -> int:
     drawn = [
         (own, rect)
         for own, rect in zip(frames.members, frames.rects(dict(enumerate(places)), routes), strict=True)
-        if rect is not None and not _entered(centres, own, rect)
+        if rect is not None and not entered(centres, rect, own)
     ]
     return sum(i not in rects or _overlaps(i, rects, centres, drawn) for i in beside)
 
@@ -48,9 +48,3 @@ def _overlaps(own: int, rects: dict[int, Rect], centres: FloatArray, frames: lis
         elif x0 < left - _SLACK or y0 < top - _SLACK or x1 > right + _SLACK or y1 > bottom + _SLACK:
             return True
     return False
-
-
-def _entered(centres: FloatArray, own: frozenset[int], rect: Rect) -> bool:
-    """Whether a neuron that is none of its own stands in a frame, which is not drawn then."""
-    inside = ((centres > rect[:2]) & (centres < rect[2:])).all(axis=1)
-    return bool(set(np.flatnonzero(inside).tolist()) - own)

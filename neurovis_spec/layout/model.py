@@ -24,6 +24,8 @@ Arrangement = Literal["row", "column", "grid", "ring", "arc"]
 #: Where a label stands, in the picture, that its disc cannot hold.
 Side = Literal["right", "left", "below", "above"]
 SIDES: tuple[Side, ...] = get_args(Side)
+#: Width by height of a page: that of a screen or a slide.
+PAGE = 4 / 3
 #: How long an engine may look for fewer crossings.
 Effort = Literal["quick", "normal", "best"]
 EFFORTS: tuple[Effort, ...] = get_args(Effort)
@@ -113,8 +115,8 @@ class LayoutProblem:
     boxes: tuple[tuple[str, tuple[int, ...]], ...] = ()
     neuron_spacing: float = 1.0
     rank_spacing: float = 2.0
-    #: width by height that a page comes near to: that of a screen or a slide, where nothing else is asked for
-    aspect: float = 4 / 3
+    #: width by height that the drawing comes near to
+    aspect: float = PAGE
     #: where signals enter and leave the network: a hint on what comes first in a loop
     entries: tuple[int, ...] = ()
     exits: tuple[int, ...] = ()

@@ -17,6 +17,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.labels import label_room
 from neurovis_spec.layout.makes import modules_of
 from neurovis_spec.layout.model import (
+    PAGE,
     Arrangement,
     Direction,
     Layout,
@@ -54,7 +55,7 @@ def canonical(
     places: Mapping[str, Point] | None = None,
     labels: Mapping[str, Point] | None = None,
     memory: Layout | None = None,
-    aspect: float = 4 / 3,
+    aspect: float = PAGE,
 ) -> LayoutProblem:
     """The problem made of these parts, in canonical order.
 
@@ -178,7 +179,7 @@ def problem_of(network: Network, memory: Layout | None = None) -> LayoutProblem:
         _places(network),
         dict(zip(names, label_room(network), strict=False)),
         memory,
-        aspect=4 / 3 if network.render.size is None else network.render.size[0] / network.render.size[1],
+        aspect=PAGE if network.render.size is None else network.render.size[0] / network.render.size[1],
     )
 
 

@@ -11,12 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.layout.geometry import Rect, meet
+from neurovis_spec.layout.labels import ABOVE, ASIDE, BELOW, DROP, RISE
 
 #: The smallest scale (page units for a layout unit) at which there are labels, and the steps from it on.
 _FIRST, _STEP = 6.0, 1.25
@@ -25,6 +25,8 @@ _LINE = 2.5
 #: How far labels may reach beyond the discs at the rim, in page units; where more is asked for, so much and a share of
 #: the width.
 BEYOND, _ALWAYS, _SHARE = 20.0, 50.0, 0.3
+#: Between a disc and a label at its corner.
+_CORNER = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,26 +36,17 @@ class Slot:
     across: int
     down: int
 
-    #: how far letters rise over their baseline and hang below it, in sizes
-    RISE: ClassVar[float] = 0.8
-    DROP: ClassVar[float] = 0.25
-    #: gaps between a disc and its label: to the side, below, above, at a corner
-    ASIDE: ClassVar[float] = 5.0
-    _BELOW: ClassVar[float] = 4.0
-    _ABOVE: ClassVar[float] = 4.0
-    _CORNER: ClassVar[float] = 3.0
-
     def text(self, radius: float, width: float, size: float) -> Rect:
         """What the letters cover, from the centre of the disc."""
-        high = (self.RISE + self.DROP) * size
+        high = (RISE + DROP) * size
         if not self.across:
-            top = radius + self._BELOW if self.down > 0 else -radius - self._ABOVE - high
+            top = radius + BELOW if self.down > 0 else -radius - ABOVE - high
             return -width / 2, top, width / 2, top + high
         if not self.down:
-            left, top = radius + self.ASIDE, (0.36 - self.RISE) * size
+            left, top = radius + ASIDE, (0.36 - RISE) * size
         else:
-            left = 0.75 * radius + self._CORNER
-            top = left - 0.08 * size if self.down > 0 else self.DROP * size - left - high
+            left = 0.75 * radius + _CORNER
+            top = left - 0.08 * size if self.down > 0 else DROP * size - left - high
         x0, x1 = (left, left + width) if self.across > 0 else (-left - width, -left)
         return x0, top, x1, top + high
 

@@ -24,9 +24,10 @@ from neurovis_spec.layout.frames import (
     PAD_LABEL,
     SLACK,
     enclosing,
+    entered,
     titled,
 )
-from neurovis_spec.layout.geometry import Rect, meet
+from neurovis_spec.layout.geometry import Rect, meet, padded, united
 from neurovis_spec.layout.labels import BOX_WEIGHT, TITLE_HIGH, instance_titles, title_room, widened
 from neurovis_spec.layout.model import RADIUS
 from neurovis_spec.scene import texts
@@ -70,7 +71,7 @@ def boxes_of(
     titles = _titles(network, named)
 
     def beside(item: _Named) -> list[Rect]:
-        return [_padded(labels[i], PAD_LABEL) for i in item.members if i in labels] if labels else []
+        return [padded(labels[i], PAD_LABEL) for i in item.members if i in labels] if labels else []
 
     rects: dict[_Named, Rect] = {}
     for tight in (False, True):
@@ -79,20 +80,20 @@ def boxes_of(
             if item.kind == "instance":
                 rect = _framed(positions, inner.get(item.path, []), item.members, held, beside(item))
                 wide = widened(rect, titles[item])
-                rects[item] = rect if _entered(positions, wide, item.members) else wide
+                rects[item] = rect if entered(positions, wide, item.members) else wide
             elif not tight or any(
                 meet(rects[item], rects[o])
                 for o in named
                 if not (within[o] <= within[item] or within[item] <= within[o])
             ):
                 rect = _around(network, positions, routes, item.members, held, tight)
-                rects[item] = rect if tight else widened(_union([rect, *beside(item)]), titles[item])
-    clean = [n for n in named if not _entered(positions, rects[n], n.members)]
+                rects[item] = rect if tight else widened(united([rect, *beside(item)]), titles[item])
+    clean = [n for n in named if not entered(positions, rects[n], n.members)]
     framed = [
         n
         for n in clean
         if n.kind == "instance"
-        or not any(meet(_padded(rects[n], -SLACK), rects[o]) and within[n].isdisjoint(within[o]) for o in clean)
+        or not any(meet(padded(rects[n], -SLACK), rects[o]) and within[n].isdisjoint(within[o]) for o in clean)
     ]
     sectors = _sectors(network, positions, named)
     if sectors.keys() <= set(framed):
@@ -119,7 +120,7 @@ def entitled(boxes: Sequence[Box], positions: FloatArray, scale: float) -> list[
     for index, box in enumerate(boxes):
         x0, y0, x1, y1 = box.rect
         top = (x0, y0 - more, x1, y0)
-        above = _padded(top, RADIUS)
+        above = padded(top, RADIUS)
         met = np.flatnonzero(((positions > above[:2]) & (positions < above[2:])).all(axis=1))
         others = (o for o in boxes if o is not box and not frozenset(box.members) <= frozenset(o.members))
         if (
@@ -200,30 +201,6 @@ def _framed(
     return titled(enclosing(centres, bounds(lines), held, beside))
 
 
-def _padded(rect: Rect, by: float) -> Rect:
-    return rect[0] - by, rect[1] - by, rect[2] + by, rect[3] + by
-
-
-def _union(rects: Sequence[Rect]) -> Rect:
-    return (
-        min(rect[0] for rect in rects),
-        min(rect[1] for rect in rects),
-        max(rect[2] for rect in rects),
-        max(rect[3] for rect in rects),
-    )
-
-
-def _entered(positions: FloatArray, rect: Rect, members: tuple[int, ...]) -> bool:
-    """Whether a neuron that is none of its members stands in a rectangle."""
-    inside = (
-        (positions[:, 0] > rect[0])
-        & (positions[:, 0] < rect[2])
-        & (positions[:, 1] > rect[1])
-        & (positions[:, 1] < rect[3])
-    )
-    return int(inside.sum()) > int(inside[list(members)].sum())
-
-
 def _around(
     network: Network,
     positions: FloatArray,
@@ -246,8 +223,8 @@ def _around(
         if source == target and source in chosen
     ]
     around = bounds(loops)
-    parts = [rect, *(_padded(r, BOX_TIGHT_FRAME if tight else BOX_FRAME) for r in held)]
-    return _union(parts if around is None else [*parts, _padded(around, BOX_LOOP)])
+    parts = [rect, *(padded(r, BOX_TIGHT_FRAME if tight else BOX_FRAME) for r in held)]
+    return united(parts if around is None else [*parts, padded(around, BOX_LOOP)])
 
 
 def _titled(network: Network, item: _Named) -> str:

@@ -19,9 +19,11 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.geometry import Rect
 from neurovis_spec.layout.labels import (
+    ASIDE,
     BESIDE,
     MOST,
     NUMBERED,
+    RISE,
     SMALLEST,
     TINY,
     UNIT,
@@ -215,7 +217,7 @@ def _beside(
         x, y = ground.centre(index)
         anchor: Literal["start", "middle", "end"] = ("end", "middle", "start")[slot.across + 1]
         start = x + x0 + width * (1 - slot.across) / 2
-        label = Label(said[index], "", size, (start, y + y0 + Slot.RISE * size), anchor, False)
+        label = Label(said[index], "", size, (start, y + y0 + RISE * size), anchor, False)
         result[index] = replace(label, crosses=obstacles.crossed(_rect(label)))
     return result
 
@@ -242,7 +244,7 @@ def margin_beside(network: Network, radius: float, rooms: Collection[int] = ()) 
     ):
         return 0.0
     said = [cut.shorten(label, 1.0, WIDEST) for label, _ in named]
-    return max((texts.width(text, _BESIDE_SMALLEST, WEIGHT) for text in said), default=0.0) + Slot.ASIDE + 3
+    return max((texts.width(text, _BESIDE_SMALLEST, WEIGHT) for text in said), default=0.0) + ASIDE + 3
 
 
 def room_beside(network: Network, radius: float) -> list[tuple[int, Point]]:
