@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
@@ -23,7 +24,7 @@ from neurovis_spec.ros.accept import ARRAY, STRING, Stream, anything, arrays
 from neurovis_spec.ros.bags import read_bag
 from neurovis_spec.ros.definitions import definition, written
 from neurovis_spec.ros.files import Files, Rotation, refusal
-from neurovis_spec.ros.logs import Stored, Topic, topic_of
+from neurovis_spec.ros.logs import BagLog, McapLog, Stored, Topic, topic_of
 from neurovis_spec.ros.middleware import Arrival, Ros
 from neurovis_spec.ros.recorder import Recorder
 from neurovis_spec.runtime import mcap_records as records
@@ -182,8 +183,27 @@ def test_an_existing_file_is_an_error_unless_forced(name: str, ros: Ros, tmp_pat
     forced.write(
         [Stored(topic_of(TOPIC, ARRAY, text_of_type(ARRAY, ros), ros), 0, START, START, sent(ros, range(1))[0])]
     )
-    left = [one for one in tmp_path.rglob("*") if one.suffix in (".mcap", ".bag")]
+    left = [one for one in tmp_path.rglob("*") if one.is_file() and one.name != "metadata.yaml"]
     assert len(left) == 1
+
+
+@KINDS
+def test_an_earlier_recording_stays_where_none_can_be_begun(
+    name: str, ros: Ros, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made(tmp_path / name, ros, 3000, Rotation(size=150_000))
+    before = {one: one.read_bytes() for one in tmp_path.rglob("*") if one.is_file()}
+    forced = files(tmp_path / name, ros, force=True)
+
+    def full(log: McapLog | BagLog, messages: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    for kind in (McapLog, BagLog):
+        monkeypatch.setattr(kind, "write", full)
+    message = Stored(topic_of(TOPIC, ARRAY, text_of_type(ARRAY, ros), ros), 0, START, START, sent(ros, range(1))[0])
+    with pytest.raises(OSError, match="No space"):
+        forced.write([message])
+    assert {one: one.read_bytes() for one in tmp_path.rglob("*") if one.is_file()} == before
 
 
 @KINDS

@@ -9,8 +9,8 @@ from __future__ import annotations
 import errno
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import monotonic
@@ -90,6 +90,20 @@ def in_the_way(path: Path, force: bool) -> list[Path]:
     return there
 
 
+@contextmanager
+def _out_of_the_way(paths: Iterable[Path]) -> Iterator[None]:
+    """The files have other names meanwhile. They are removed then, or are back where there was an error."""
+    moved = [(path, path.rename(path.with_name(f".{path.name}.old"))) for path in paths if path.exists()]
+    try:
+        yield
+    except BaseException:
+        for path, aside in moved:
+            aside.replace(path)
+        raise
+    for _, aside in moved:
+        aside.unlink()
+
+
 @dataclass(eq=False)
 class Files:
     """The files of a recording. ``first`` are the messages with which each file begins, at the time of its first one;
@@ -137,19 +151,20 @@ class Files:
     def _begin(self, message: Stored) -> None:
         format_, _ = _FORMATS[self.path.suffix.lower()]
         path = place(self.path, self._number)
-        while self._old:
-            self._old.pop().unlink(missing_ok=True)
-        log: Log = format_(path, self.ros, {**self.about, "recording": self._id, "part": str(self._number)}, self.frame)
         held = _Held(path)
         first = [Stored(topic, 0, message.log_time, message.publish_time, data) for topic, data in self.first]
-        if first:
-            try:
-                log.write(first)
-            except OSError:  # a file without them is of no use
-                log.finish()
-                path.unlink()
-                raise
-            held.add(first)
+        about = {**self.about, "recording": self._id, "part": str(self._number)}
+        with _out_of_the_way(self._old):
+            log: Log = format_(path, self.ros, about, self.frame)
+            if first:
+                try:
+                    log.write(first)
+                except OSError:  # a file without them is of no use
+                    log.finish()
+                    path.unlink()
+                    raise
+                held.add(first)
+        self._old = []
         self._log, self._since = log, self.clock()
         self._held.append(held)
         self._describe()
