@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, ValidationInf
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import PydanticCustomError, core_schema
 
-from neurovis_spec.diagnostics import shorten
+from neurovis_spec.diagnostics import listed, shorten
 from neurovis_spec.language.grammar import (
     ENDS,
     FORMULAS,
@@ -51,7 +51,7 @@ from neurovis_spec.language.located import (
     words,
 )
 from neurovis_spec.language.model import Filled, Keyed, KeysAreNames, Model, Named, Short
-from neurovis_spec.language.patterns import PatternField
+from neurovis_spec.language.patterns import PATTERNS, PatternField
 from neurovis_spec.language.values import (
     FILE,
     ActivationField,
@@ -245,6 +245,14 @@ class ConnectionModel(Model):
     ] = Field(None, description="[low, high] for plastic weights.")
     label: TextField | None = Field(None, description="What it is called in pictures and tooltips.")
     description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
+
+    @classmethod
+    def _foreign(cls, name: str) -> tuple[str, str] | None:
+        taken_by = [one.name for one in PATTERNS.values() if name in one.settings]
+        if not taken_by:
+            return None
+        hint = f"write pattern: {{{taken_by[0]}: {{{name}: …}}}}"
+        return f"'{name}' is a setting of {listed(taken_by)}, and stands in the pattern", hint
 
 
 _AT = Needs(("at", "from"), "at which step? 'at' is missing", "write at: STEP", "bad-event")
