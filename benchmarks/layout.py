@@ -4,10 +4,11 @@ In: nothing; ``--graphs FOLDER`` (see ``networks.py``), ``--sample SEED`` for th
 ``1,2,3`` for several times thirty; constants were set on sample 11), ``--all`` for the large ones, ``--only WORD`` for
 rows whose name holds it, ``--peers "dot;sfdp"``, ``--engines layered,large``, ``--limit SECONDS`` for a peer. Out: a
 table, in Markdown, on standard output: crossings of the routes as drawn, discs that overlap, routes over foreign discs,
-the share of connections along the direction (of those in no loop), area, area for each neuron, CPU seconds, our
-crossings by the best peer's: of ``layered`` by the best of dot's and ELK's, which draw ranks as well, of the others by
-the best of all; and our area by dot's with clusters. Sets of graphs are summed up, flow is averaged. Only ratios of one
-run can be compared. ELK needs node and what ``package.json`` names (``make node_modules/made``).
+the share of connections along the direction (of those in no loop), area, area for each neuron, CPU seconds, those of
+the slowest graph of a set, our crossings by the best peer's (of ``layered`` by the best of dot's and ELK's, which draw
+ranks as well, of the others by the best of all), and our area by dot's with clusters. Sets of graphs are summed up,
+flow is averaged. Only ratios of one run can be compared. ELK needs node and what ``package.json`` names (``make
+node_modules/made``).
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from layout_peers import PEERS
-from networks import connectome, layers, reservoir, sample, small_worlds
+from networks import boxed, connectome, coupled, layers, reservoir, sample, small_worlds, star, tangle
 
 import neurovis_spec as nv
 from neurovis_spec.layout import LayoutGroup, LayoutProblem, LayoutRefusalError
@@ -43,10 +44,13 @@ _HEAD = (
     "area",
     "per neuron",
     "CPU",
+    "slowest",
     "ratio",
     "area ratio",
 )
 _FRAMED = ("dot", "dot, clusters", "elk", "elk, clusters", "sfdp")
+#: Neurons and connections of networks without any order.
+TANGLES = ((30, 50), (40, 80), (40, 100), (50, 120))
 _HURRIED = ("dot, hurried", "sfdp", "spring", "multipartite")
 
 
@@ -71,6 +75,7 @@ class Worth:
     area: float
     neurons: int
     seconds: float
+    slowest: float
 
 
 def cases(folder: Path | None, slow: bool, seeds: Sequence[int | None] = (None,)) -> Iterator[Case]:
@@ -91,10 +96,16 @@ def cases(folder: Path | None, slow: bool, seeds: Sequence[int | None] = (None,)
             # the peers know no page, no mirrors and no lines; without them ours, too, lets everything run along
             plain = replace(problem, plan=(), mirrors=(), align=())
             yield Case(f"{path.name}, without plan, mirror and align", [plain], engines, _FRAMED)
+    tangles = [tangle(units, connections, seed) for units, connections in TANGLES for seed in (1, 2, 3)]
+    yield Case("tangles of 30/50 to 50/120", tangles, peers=("dot", "dot, polylines", "sfdp"))
+    yield Case("30 instances, 200 links", [coupled(30, 200)], peers=_FRAMED)
+    yield Case("60 instances, 600 links", [coupled(60, 600)], peers=("dot, clusters", "sfdp"))
+    yield Case("star of 3,000", [star(3000)], ("grid",), ("sfdp",))
     yield Case("small worlds 300/2,500", [small_worlds(300, 2500)], ("layered", "large"), _HURRIED)
     if slow:
         worm, name = connectome(folder)
         yield Case(f"{name} 302/2,194", [worm], ("layered", "auto"), _HURRIED)
+        yield Case("small worlds 302/3,709 in three boxes", [boxed(small_worlds(302, 3709), 3)], peers=("sfdp",))
         yield Case("reservoir 300/1,700", [reservoir(300)], ("layered", "auto"), _HURRIED)
         peers = ("sfdp",)
         yield Case("small worlds 2,000/10,000", [small_worlds(2000, 10_000)], ("large", "layered"), peers)
@@ -129,7 +140,7 @@ def _worth(of: dict[str, float | int], seconds: float) -> Worth:
     crossings, overlaps, over, neurons = (
         int(of[name]) for name in ("crossings", "overlaps", "edges_over_neurons", "neurons")
     )
-    return Worth(crossings, overlaps, over, of["flow"], of["area"], neurons, seconds)
+    return Worth(crossings, overlaps, over, of["flow"], of["area"], neurons, seconds, seconds)
 
 
 def _sum(found: Sequence[Worth]) -> Worth:
@@ -141,15 +152,21 @@ def _sum(found: Sequence[Worth]) -> Worth:
         sum(worth.area for worth in found),
         sum(worth.neurons for worth in found),
         sum(worth.seconds for worth in found),
+        max(worth.slowest for worth in found),
     )
 
 
 def row(name: str, by: str, worth: Worth | None, ratio: float | None, area_ratio: float | None, limit: float) -> None:
     if worth is None:
-        print(f"| {name} | {by} | – | – | – | – | – | – | none in {limit:.0f} s | | |", flush=True)
+        print(f"| {name} | {by} | – | – | – | – | – | – | none in {limit:.0f} s | | | |", flush=True)
         return
     cells = [f"{worth.crossings:,}", f"{worth.overlaps:,}", f"{worth.over:,}", f"{worth.flow:.3f}"]
-    cells += [f"{worth.area:,.0f}", f"{worth.area / worth.neurons:.1f}", f"{worth.seconds:.2f} s"]
+    cells += [
+        f"{worth.area:,.0f}",
+        f"{worth.area / worth.neurons:.1f}",
+        f"{worth.seconds:.2f} s",
+        f"{worth.slowest:.2f} s",
+    ]
     cells += ["" if found is None else f"{found:.2f}" for found in (ratio, area_ratio)]
     print(f"| {name} | {by} | {' | '.join(cells)} |", flush=True)
 
@@ -179,7 +196,7 @@ def main() -> None:
             try:
                 worth = by_us(case, engine)
             except LayoutRefusalError as refusal:
-                print(f"| {case.name} | {engine}: {refusal} | | | | | | | | | |", flush=True)
+                print(f"| {case.name} | {engine}: {refusal} | | | | | | | | | | |", flush=True)
                 continue
             same = [w.crossings for peer, w in best.items() if peer in _RANKED or engine != "layered"]
             least = min(same, default=0)

@@ -11,12 +11,15 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from random import Random
 
+import neurovis_spec as nv
 from neurovis_spec.layout import LayoutEdge, LayoutGroup, LayoutProblem
 from neurovis_spec.layout.naming import edge_key, natural_key
+from neurovis_spec.layout.problem import problem_of
 
 Pair = tuple[str, str]
 _NODE = re.compile(r'<node id="([^"]+)"')
@@ -75,6 +78,50 @@ def small_worlds(units: int, connections: int, module: int = 25, seed: int = 1) 
         if len(found) >= connections:
             break
     return problem_of_pairs(f"small worlds {units}/{connections}", ((f"N{a + 1}", f"N{b + 1}") for a, b in found))
+
+
+def tangle(units: int, connections: int, seed: int) -> LayoutProblem:
+    """Connections between any two different units."""
+    random = Random(seed)
+    pairs: dict[Pair, None] = {}
+    while len(pairs) < connections:
+        a, b = random.randrange(units), random.randrange(units)
+        if a != b:
+            pairs[f"N{a}", f"N{b}"] = None
+    return problem_of_pairs(f"tangle {units}/{connections}", pairs, (f"N{i}" for i in range(units)))
+
+
+def star(units: int) -> LayoutProblem:
+    """A unit that drives all others."""
+    return problem_of_pairs(f"star {units}", (("N0", f"N{i}") for i in range(1, units)))
+
+
+def coupled(instances: int, links: int, seed: int = 1) -> LayoutProblem:
+    """Instances of a module of four neurons in a loop, and links between any neurons of any two of them."""
+    random = Random(seed)
+    found: dict[str, None] = {}
+    while len(found) < links:
+        a, b = random.randrange(instances), random.randrange(instances)
+        link = f"m{a}.{random.choice('ABCD')} -> m{b}.{random.choice('ABCD')}: {{weight: 1}}"
+        if a != b:
+            found[link] = None
+    loop = "A -> B: {weight: 1}, B -> C: {weight: 1}, C -> D: {weight: -1}, D -> A: {weight: 0.5}"
+    text = f"""
+neurovis: 1
+name: coupled
+modules: {{M: {{neurons: {{A: {{}}, B: {{}}, C: {{}}, D: {{}}}}, connections: {{{loop}}}}}}}
+instances: {{{", ".join(f"m{number}: {{module: M}}" for number in range(instances))}}}
+connections: {{{", ".join(found)}}}
+"""
+    return problem_of(nv.compile_text(text).network)
+
+
+def boxed(problem: LayoutProblem, boxes: int) -> LayoutProblem:
+    """The same with its neurons, in their order, in boxes of one size."""
+    count = len(problem.neurons)
+    bounds = [number * count // boxes for number in range(boxes + 1)]
+    parts = tuple((f"box {n}", tuple(range(*pair))) for n, pair in enumerate(pairwise(bounds), 1))
+    return replace(problem, boxes=parts)
 
 
 def sparse(units: int, connections: int, seed: int) -> LayoutProblem:
