@@ -27,7 +27,7 @@ SPECS = sorted(p for p in (ROOT / "specs").rglob("*.yaml") if "neurons:" in p.re
 
 
 @st.composite
-def bodies(draw: st.DrawFn, pinned: bool = False) -> LayoutProblem:
+def bodies(draw: st.DrawFn, pinned: bool = False, named: bool = False) -> LayoutProblem:
     """Legs with knees in them perhaps, boxes, neurons between them, connections anywhere, mirrors."""
     count, size, knees = draw(st.integers(1, 4)), draw(st.integers(1, 4)), draw(st.booleans())
     own = suite.members("S", size) + ([f"knee.{name}" for name in suite.members("K", 2)] if knees else [])
@@ -52,7 +52,11 @@ def bodies(draw: st.DrawFn, pinned: bool = False) -> LayoutProblem:
     edges = suite.named(pairs, draw(st.integers(0, 1)))
     directions: tuple[Direction, ...] = ("down", "up", "right", "left")
     direction = draw(st.sampled_from(directions))
-    return canonical("body", names, groups, edges, pins, direction, boxes=boxes, modules=modules, mirrors=mirrors)
+    wide = set(draw(st.lists(st.sampled_from(own + middle), max_size=3))) if named else set[str]()
+    labels = {name: (1.8, 0.3) for name in names if name in wide or name.partition(".")[2] in wide}
+    return canonical(
+        "body", names, groups, edges, pins, direction, boxes=boxes, modules=modules, mirrors=mirrors, labels=labels
+    )
 
 
 def attempt(problem: LayoutProblem) -> tuple[Layout | None, str]:
@@ -79,6 +83,12 @@ def test_no_route_runs_through_a_foreign_frame(problem: LayoutProblem) -> None:
     layout = suite.check(problem, "layered")
     assert layout is not None
     check(layout, problem)
+
+
+@settings(max_examples=60, deadline=None)
+@given(problem=bodies(named=True))
+def test_no_route_runs_through_a_disc_beside_a_long_name(problem: LayoutProblem) -> None:
+    check(lay_out_problem(problem, "layered"), problem)
 
 
 @settings(max_examples=60, deadline=None)
@@ -222,3 +232,13 @@ def test_a_disc_is_gone_round_as_a_frame_of_its_size_is() -> None:
         assert len(found) > 4
         assert found == frame.route(0, 1, False)
         assert min(distance(point, (5.0, 0.2)) for point in sampled(found, 0.05)) > 0.35
+
+
+def test_a_disc_beside_its_label_is_gone_round_with_it() -> None:
+    ends, disc = [(0.0, 0.5), (10.0, 0.5)], (5.0, 0.0)
+    label = frozenset({2}), (4.2, 0.4, 5.8, 0.7)
+    found = Detours(Walls([label], 3), [*ends, disc]).route(0, 1, True)
+    assert found is not None
+    line = sampled(found, 0.05)
+    assert min(distance(point, disc) for point in line) > 0.3
+    assert all(not (4.2 < x < 5.8 and 0.4 < y < 0.7) for x, y in line)

@@ -114,8 +114,10 @@ class Detours:
         self._centres: FloatArray = np.array(centres, dtype=np.float64).reshape(-1, 2)
         #: the frames, and behind them the discs
         self._rects: FloatArray = np.concatenate([walls.rects, np.tile(self._centres, 2) + RADIUS * _OUT])
-        #: (n,) in how many frames each neuron is
-        self._depth: IntArray = walls.inside.sum(axis=1)
+        #: (n, f) which neurons stand in which of their frames: beside the frames that are labels
+        x, y = self._centres.T[:, :, None]
+        x0, y0, x1, y1 = walls.rects.T
+        self._standing: BoolArray = walls.inside & (x > x0) & (x < x1) & (y > y0) & (y < y1)
         self._taken = _Taken()
         self._between: dict[tuple[int, int], list[Point]] = {}
 
@@ -163,7 +165,7 @@ class Detours:
         bends = {**self._taken.corners, **dict.fromkeys(same, ENTERING)}
         foreign = self._walls.foreign(source, target)
         # discs in foreign frames are behind the borders of these
-        loose: BoolArray = self._walls.inside[:, ~foreign].sum(axis=1) == self._depth
+        loose: BoolArray = self._standing[:, foreign].sum(axis=1) == 0
         loose[[source, target]] = False
         rects = self._rects[np.concatenate([foreign, loose])]
         for clear in _CLEAR:
