@@ -247,3 +247,64 @@ def test_formations_keep_room_for_labels(engine: str) -> None:
         text = generated(seed)
         network = nv.compile_text(text[: text.index(", mirror")] + "}\n" if ", mirror" in text else text)
         assert overlaps(network, network.layout(engine).value) == 0
+
+
+def without_mirror(text: str) -> str:
+    return text[: text.index(", mirror")] + "}\n" if ", mirror" in text else text
+
+
+@pytest.mark.parametrize("engine", ["organic", "large"])
+def test_engines_that_place_neurons_anywhere_keep_room_for_labels(engine: str) -> None:
+    for seed in range(10):
+        network = nv.compile_text(without_mirror(generated(seed)))
+        assert overlaps(network, network.layout(engine).value) == 0
+
+
+def test_labels_where_neurons_have_positions_choose_sides_and_move_nobody() -> None:
+    chooser = random.Random(7)
+    names = [f"N{i}" for i in range(30)]
+    spots = [(12.0 * (i % 6) + chooser.random(), 2.5 * (i // 6) + chooser.random()) for i in range(30)]
+    neurons = [
+        f'  {name}: {{label: "{label(chooser)}", position: [{x:.2f}, {y:.2f}]}}'
+        for name, (x, y) in zip(names, spots, strict=True)
+    ]
+    links = sorted({(chooser.randrange(i), i) for i in range(1, 30)})
+    text = "\n".join(["neurovis: 1", "name: here", "neurons:", *neurons, "connections:"]
+                     + [f"  N{a} -> N{b}: 1" for a, b in links]) + "\n"  # fmt: skip
+    network = nv.compile_text(text + "layout: {engine: spatial}\n")
+    layout = network.layout().value
+    assert layout.engine == "spatial"
+    assert overlaps(network, layout) == 0
+    assert len(set(layout.labels.values())) > 1
+    bare = nv.compile_text(text + "layout: {engine: spatial}\nrender: {labels: false}\n").layout().value
+    assert bare.positions == layout.positions
+
+
+def test_a_label_stands_where_no_line_runs() -> None:
+    network = nv.compile_text("""
+neurovis: 1
+name: aside
+neurons: {A: {label: "a rather long name"}, B: {}, C: {}, D: {}}
+connections: {A -> B: 1, A -> C: 1, A -> D: 1}
+layout: {engine: manual, positions: {A: [0, 0], B: [5, 0], C: [0, 5], D: [0, -5]}}
+""")
+    assert network.layout().value.labels == {"A": "left"}
+
+
+def test_labels_of_mirror_images_stand_on_mirrored_sides_in_organic_layouts() -> None:
+    network = nv.compile_text(
+        """
+neurovis: 1
+name: halves
+neurons:
+  A: {label: "a neuron between"}
+  LR
+connections: {L1 -> L2: 1, L2 -> L3: 1, L3 -> L4: 1, R1 -> R2: 1, R2 -> R3: 1, R3 -> R4: 1, L1 -> A: 1, R1 -> A: 1}
+layout: {engine: organic, mirror: [[L1, R1], [L2, R2], [L3, R3], [L4, R4]]}
+""".replace("LR", "\n  ".join(f'{side}{i}: {{label: "{i} of one half"}}' for side in "LR" for i in range(1, 5)))
+    )
+    layout = network.layout().value
+    flip = {"right": "left", "left": "right", "below": "below", "above": "above"}
+    assert overlaps(network, layout) == 0
+    assert [layout.labels[f"R{i}"] for i in range(1, 5)] == [flip[layout.labels[f"L{i}"]] for i in range(1, 5)]
+    assert metrics(layout, problem_of(network.network))["symmetry"] == 1

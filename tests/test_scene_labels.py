@@ -57,8 +57,8 @@ def test_where_signals_run_across_names_stand_at_the_ends() -> None:
 
 def test_a_label_across_the_line_of_a_box_keeps_it_away() -> None:
     found = labels(
-        "neurons: {a_neuron_with_a_long_name: {box: b}, B: {}}\nconnections: {a_neuron_with_a_long_name -> B: 1}\n"
-        "layout: {engine: manual, positions: {a_neuron_with_a_long_name: [0, 0], B: [0, 2]}}\n"
+        "neurons: {a_neuron_with_a_long_name: {}, B: {box: b}, C: {box: c}}\nconnections: {B -> C: 1}\n"
+        "layout: {engine: manual, positions: {a_neuron_with_a_long_name: [0, 0], B: [-1.4, 0], C: [1.4, 0]}}\n"
     )
     assert found["a_neuron_with_a_long_name"].text == "a_neuron_with_a_long_name"
     assert found["a_neuron_with_a_long_name"].halo

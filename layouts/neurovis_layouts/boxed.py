@@ -9,14 +9,17 @@ their neurons move as one.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from neurovis_layouts.apart import apart
+from neurovis_layouts.frame import turned
 from neurovis_layouts.symmetry import Symmetry
 from neurovis_spec.layout import BoolArray, FloatArray, IntArray
-from neurovis_spec.layout.frames import BOX_ACROSS, BOX_DOWN, TITLE
+from neurovis_spec.layout.frames import BOX_ACROSS, BOX_DOWN, BOX_FRAME, PAD, PAD_LABEL, TITLE
+from neurovis_spec.layout.geometry import Rect
+from neurovis_spec.layout.labels import BOX_WEIGHT, instance_titles, title_room
 from neurovis_spec.layout.model import RADIUS, LayoutProblem
 
 #: Half of what is free between two frames: one line of a title fits.
@@ -30,69 +33,117 @@ ROOM, _LONG = 7.0, 1.5
 _MOST_BOXES = 1000
 #: Steps in which frames push each other off; after so many of them the whole grows a little with each.
 _ROUNDS, _PATIENCE, _GROWTH = 400, 60, 1.02
-#: So often at most neurons leave foreign frames and are then kept off each other, which may push some of them back.
-_TURNS = 8
-#: From centres to the line of a frame.
-_LINE = np.array([BOX_ACROSS, BOX_DOWN])
+#: So often at most neurons leave foreign frames and are then kept off each other, which may push some of them back;
+#: after so many times the whole grows a little with each; who moves less than this has settled.
+_TURNS, _TRIES, _SETTLED = 40, 4, 0.01
+#: From centres to the line of a box, and of an instance with its title.
+_LINE: Rect = (-BOX_ACROSS, -BOX_DOWN, BOX_ACROSS, BOX_DOWN)
+_INSTANCE: Rect = (-PAD, -PAD - TITLE, PAD, PAD)
 
 
 @dataclass(frozen=True, slots=True)
 class _Box:
-    """The neurons of a box, and the boxes within it."""
+    """The neurons of a box or an instance, and the boxes within it; how far its line is from centres (4,), and how
+    large it is for its title (2,), at least."""
 
     members: IntArray
     within: Sequence[_Box]
+    line: FloatArray
+    title: FloatArray
+
+    def rect(self, places: FloatArray, labels: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The frame around neurons at these places: its upper left corner, and its lower right one."""
+        own, beside = places[self.members], labels[self.members]
+        low = (own + np.fmin(self.line[:2], beside[:, :2] - PAD_LABEL)).min(axis=0)
+        high = (own + np.fmax(self.line[2:], beside[:, 2:] + PAD_LABEL)).max(axis=0)
+        for inner in self.within:
+            first, last = inner.rect(places, labels)
+            low, high = np.minimum(low, first - BOX_FRAME), np.maximum(high, last + BOX_FRAME)
+        more = np.maximum(self.title - (high - low), 0.0) / 2
+        return low - more, high + more
 
 
 @dataclass(frozen=True, slots=True)
 class _Sizes:
-    """How far discs are kept apart, and neurons are from each other on the whole."""
+    """How far discs are kept apart, and neurons are from each other on the whole; what ``labels`` cover around their
+    centres (n, 4), NaN where there is none."""
 
     apart: float
     spacing: float
+    labels: FloatArray
 
 
 def boxes_apart(
-    problem: LayoutProblem, places: FloatArray, spacing: float, symmetry: Symmetry | None = None
+    problem: LayoutProblem,
+    places: FloatArray,
+    spacing: float,
+    symmetry: Symmetry | None = None,
+    labels: FloatArray | None = None,
 ) -> FloatArray:
-    """The places (n, 2) of a problem's neurons, each box by itself, discs ``spacing`` apart. Pinned neurons stay, and
-    mirror images are such all the time."""
-    if not problem.boxes or len(problem.boxes) > _MOST_BOXES:
-        return places
+    """The places (n, 2) of a problem's neurons, each box and instance by itself, discs ``spacing`` apart, and
+    ``labels`` (``apart``) in the frames of their neurons. Pinned neurons stay, and mirror images are such all the
+    time."""
     count = len(problem.neurons)
+    boxes = _framed(problem)
+    if not boxes and labels is None:
+        return places
     places = places.copy()
     pinned = np.zeros(count, dtype=np.bool_)
     pinned[list(problem.pins)] = True
-    boxes = _within(_wholes([frozenset(members) for _, members in problem.boxes]))
     symmetry = symmetry or Symmetry(np.arange(count))
     pinned |= pinned[symmetry.image]
-    sizes = _Sizes(spacing, problem.neuron_spacing)
-    _divided(places, _Box(np.arange(count), boxes), pinned, sizes, symmetry)
+    sizes = _Sizes(spacing, problem.neuron_spacing, np.full((count, 4), np.nan) if labels is None else labels)
+    _divided(places, _Box(np.arange(count), boxes, np.zeros(4), np.zeros(2)), pinned, sizes, symmetry)
     return places
 
 
-def _wholes(boxes: Sequence[frozenset[int]]) -> list[frozenset[int]]:
+def _framed(problem: LayoutProblem) -> list[_Box]:
+    """The boxes and instances of a problem, the outermost of those within others; none where there are too many."""
+    titles = instance_titles((module.path, module.module) for module in problem.modules)
+    given = [(m.members, _INSTANCE, title) for m, title in zip(problem.modules, titles, strict=True)]
+    given += [(members, _LINE, title_room(name, BOX_WEIGHT)) for name, members in problem.boxes]
+    level = problem.direction in ("right", "left")
+    frames = [
+        _Box(
+            np.array(sorted(members), dtype=np.int64),
+            (),
+            np.array(turned(line, problem.direction)),
+            np.array((0.0, title) if level else (title, 0.0)),
+        )
+        for members, line, title in given
+    ]
+    return _within(_wholes(frames)) if len(frames) <= _MOST_BOXES else []
+
+
+def _wholes(boxes: Sequence[_Box]) -> list[_Box]:
     """Boxes of which any two share nothing, or one holds the other, the largest first: those that share some of their
     neurons are one."""
-    wholes: list[frozenset[int]] = []
+    wholes: dict[frozenset[int], _Box] = {}
     for box in boxes:
-        whole = box
-        while crossing := [one for one in wholes if one & whole and not (one <= whole or whole <= one)]:
-            wholes = [one for one in wholes if one not in crossing]
+        whole, line, title = frozenset(box.members.tolist()), box.line, box.title
+        while crossing := [
+            one for one in wholes if one == whole or not (one.isdisjoint(whole) or one < whole or whole < one)
+        ]:
+            found = [wholes.pop(one) for one in crossing]
             whole = whole.union(*crossing)
-        if whole and whole not in wholes:
-            wholes.append(whole)
-    return sorted(wholes, key=lambda whole: (-len(whole), min(whole)))
+            lines = np.array([line, *(one.line for one in found)])
+            line = np.concatenate([lines[:, :2].min(axis=0), lines[:, 2:].max(axis=0)])
+            title = np.max([title, *(one.title for one in found)], axis=0)
+        if whole:
+            wholes[whole] = _Box(np.array(sorted(whole), dtype=np.int64), (), line, title)
+    return [wholes[whole] for whole in sorted(wholes, key=lambda whole: (-len(whole), min(whole)))]
 
 
-def _within(wholes: Sequence[frozenset[int]]) -> list[_Box]:
+def _within(wholes: Sequence[_Box]) -> list[_Box]:
     """The outermost of these, each with those within it."""
     boxes: list[_Box] = []
     rest = list(wholes)
     while rest:
-        outer, inner = rest[0], [one for one in rest[1:] if one <= rest[0]]
-        boxes.append(_Box(np.array(sorted(outer), dtype=np.int64), _within(inner)))
-        rest = [one for one in rest[1:] if not one <= outer]
+        outer = rest[0]
+        inside = [bool(np.isin(one.members, outer.members).all()) for one in rest]
+        inner = [one for one, held in zip(rest[1:], inside[1:], strict=True) if held]
+        boxes.append(replace(outer, within=_within(inner)))
+        rest = [one for one, held in zip(rest, inside, strict=True) if not held]
     return boxes
 
 
@@ -109,40 +160,54 @@ def _divided(places: FloatArray, box: _Box, pinned: BoolArray, sizes: _Sizes, sy
         else:
             _divided(places, inner, pinned, sizes, symmetry)
     own, still = box.members, pinned.copy()
-    frames = _Frames(places, box, pinned, symmetry)
+    frames = _Frames(places, box, pinned, symmetry, sizes.labels)
     if box.within:
-        for inner, way in zip(box.within, frames.pushed(), strict=True):
-            places[inner.members] += way
-        places[:] = symmetry.kept(places)
+        _carry(places, box, frames.pushed(), symmetry)
         still[np.concatenate([inner.members for inner in box.within])] = True
     free = own[~still[own]]
     inside = symmetry.within(own)
+    covered = sizes.labels[free] + PAD_LABEL * np.array([-1, -1, 1, 1])
+    bodies = np.concatenate([np.fmin(covered[:, :2], -RADIUS), np.fmax(covered[:, 2:], RADIUS)], axis=1)
     for turn in range(_TURNS if len(free) else 0):
         before = places[free]
         if box.within:
-            places[free] = _outside(before, frames.centres, frames.half + RADIUS)
+            places[free] = _outside(before, frames.centres, frames.half, bodies)
             places[:] = symmetry.kept(places)
-        if turn and np.array_equal(places[free], before):
+        if turn and np.abs(places[free] - before).max() < _SETTLED:
             break
-        places[own] = apart(places[own], sizes.apart, np.flatnonzero(still[own]), kept=inside.kept)
+        if box.within and turn >= _TRIES:
+            places[free], ways = frames.grown(places[free])
+            _carry(places, box, ways, symmetry)
+        places[own] = apart(
+            places[own], sizes.apart, np.flatnonzero(still[own]), kept=inside.kept, labels=sizes.labels[own]
+        )
         places[:] = symmetry.kept(places)
+
+
+def _carry(places: FloatArray, box: _Box, ways: FloatArray, symmetry: Symmetry) -> None:
+    """Move the neurons of the boxes within a box these ways (k, 2)."""
+    for inner, way in zip(box.within, ways, strict=True):
+        places[inner.members] += way
+    places[:] = symmetry.kept(places)
 
 
 class _Frames:
     """The frames of the boxes in a box, among the pins there: ``centres`` and ``half`` of their sizes (k, 2)."""
 
-    def __init__(self, places: FloatArray, box: _Box, pinned: BoolArray, symmetry: Symmetry) -> None:
+    def __init__(
+        self, places: FloatArray, box: _Box, pinned: BoolArray, symmetry: Symmetry, labels: FloatArray
+    ) -> None:
         self._axis = symmetry.axis
         if not box.within:
             return
         alone = np.setdiff1d(box.members, np.concatenate([inner.members for inner in box.within]))
         posts = places[alone[pinned[alone]]]
-        low = np.array([*(places[inner.members].min(axis=0) for inner in box.within), *posts])
-        high = np.array([*(places[inner.members].max(axis=0) for inner in box.within), *posts])
+        rects = [inner.rect(places, labels) for inner in box.within]
+        low = np.array([*(low for low, _ in rects), *(posts - RADIUS)])
+        high = np.array([*(high for _, high in rects), *(posts + RADIUS)])
         self._count = len(box.within)
         self._held = np.array([*(pinned[inner.members].any() for inner in box.within), *(True for _ in posts)])
-        self._half = (high - low) / 2 + _LINE
-        self._half[self._count :] = RADIUS
+        self._half = (high - low) / 2
         self._all = (low + high) / 2
         self._image = np.array([*(_image(box.within, inner, symmetry) for inner in box.within), *(-1 for _ in posts)])
 
@@ -176,14 +241,25 @@ class _Frames:
             if not len(close):
                 break
             if turn >= _PATIENCE:
-                grown = centres.mean(axis=0) + _GROWTH * (centres - centres.mean(axis=0))
-                centres = np.where(held[:, None], centres, grown)
+                middle = centres.mean(axis=0)
+                centres = np.where(held[:, None], centres, middle + _GROWTH * (centres - middle))
             axis = np.where(along[close], 1, np.argmin(missing[close], axis=1))
             step = 0.5 * missing[close, axis] + 1e-3
             step *= np.where(way[close, axis] < 0, -1.0, 1.0)
             np.add.at(centres, (other[close], axis), (1 - share[close]) * step)
             np.add.at(centres, (one[close], axis), -share[close] * step)
             centres = self._kept(centres)
+        return self._moved(centres)
+
+    def grown(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Points, and how far the frames have moved, farther apart, each frame as a whole."""
+        middle = self._all.mean(axis=0)
+        if (self._image >= 0).any():
+            middle[0] = self._axis
+        centres = np.where(self._held[:, None], self._all, middle + _GROWTH * (self._all - middle))
+        return middle + _GROWTH * (points - middle), self._moved(centres)
+
+    def _moved(self, centres: FloatArray) -> FloatArray:
         moved: FloatArray = (centres - self._all)[: self._count]
         self._all = centres
         return moved
@@ -221,16 +297,18 @@ def _drawn_in(places: FloatArray, pinned: BoolArray, unit: float) -> FloatArray:
     return drawn
 
 
-def _outside(points: FloatArray, centres: FloatArray, half: FloatArray) -> FloatArray:
-    """Points that stand in a rectangle, put on the nearest of its sides; twice, as they may come into another."""
-    points = points.copy()
+def _outside(points: FloatArray, centres: FloatArray, half: FloatArray, bodies: FloatArray) -> FloatArray:
+    """Points whose ``bodies``, the rectangles around them, reach into a rectangle, put so that they touch the nearest
+    of its sides; twice, as they may come into another."""
+    middle = points + (bodies[:, :2] + bodies[:, 2:]) / 2
+    points, own = middle.copy(), (bodies[:, 2:] - bodies[:, :2]) / 2
     for _ in range(2):
-        for centre, reach in zip(centres, half, strict=True):
-            way = points - centre
+        for centre, frame in zip(centres, half, strict=True):
+            way, reach = points - centre, frame + own
             inside = np.flatnonzero((np.abs(way) < reach).all(axis=1))
             if not len(inside):
                 continue
-            axis = np.argmin(reach - np.abs(way[inside]), axis=1)
+            axis = np.argmin(reach[inside] - np.abs(way[inside]), axis=1)
             side = np.where(way[inside, axis] < 0, -1.0, 1.0)
-            points[inside, axis] = centre[axis] + side * reach[axis]
-    return points
+            points[inside, axis] = centre[axis] + side * reach[inside, axis]
+    return points - (bodies[:, :2] + bodies[:, 2:]) / 2

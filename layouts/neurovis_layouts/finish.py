@@ -7,24 +7,31 @@ the direction, what is remembered kept.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 
 import numpy as np
 
+from neurovis_layouts.boxed import boxes_apart
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.incremental import kept
+from neurovis_layouts.label_room import rect_of
+from neurovis_layouts.label_sides import best_sides, sided
 from neurovis_layouts.pins import fit, with_origins
 from neurovis_layouts.routing import route_all
 from neurovis_layouts.symmetry import Symmetry, exact, routed_alike
 from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.geometry import near_pairs, snap, straight
-from neurovis_spec.layout.model import Layout, LayoutProblem, Point
+from neurovis_spec.layout.label_overlaps import label_overlaps
+from neurovis_spec.layout.model import Layout, LayoutProblem, Point, Side
 
 #: With more connections than this, routes do not go round discs: they would only run over others.
 _CAREFUL = 1000
 #: With at most so many neurons, instances without pins are moved off the frames of those with pins; with more, too
 #: many frames overlap for that to be quick.
 _MOST_AROUND_PINS = 300
+#: So often labels are given room at most, and how much more with each time.
+_TRIES, _GROWTH = 4, 1.1
 
 
 def drawn(
@@ -35,11 +42,13 @@ def drawn(
     clear: Iterable[int] = (),
     highest: float = math.inf,
     symmetry: Symmetry | None = None,
+    sides: Mapping[str, Side] = MappingProxyType({}),
 ) -> Layout:
     """The layout with the neurons at ``places`` (n, 2; there may be more rows than neurons), where no pin says
     otherwise. Instances without a pin are kept off the ``frames`` of those that have one. The edges ``clear``, by
     index, run straight, as the caller knows that nothing is in their way. The others bow at most ``highest`` times as
-    high as they are long. With a ``symmetry`` images, and routes between them, are exact reflections."""
+    high as they are long. With a ``symmetry`` images, and routes between them, are exact reflections. On these
+    ``sides`` labels have room."""
     flat: list[Point] = [(snap(x), snap(y)) for x, y in places[: len(problem.neurons)].tolist()]
     pins = with_origins(problem, [to_picture(point, problem.direction) for point in flat])
     centres, _, _ = fit(flat, {i: from_picture(point, problem.direction) for i, point in pins.items()})
@@ -59,8 +68,33 @@ def drawn(
             edge.name: route if turned == "down" else tuple(to_picture(point, turned) for point in route)
             for edge, route in zip(problem.edges, routes, strict=True)
         },
+        sides,
     )
-    return kept(problem, fresh, pins, frames and len(problem.neurons) <= _MOST_AROUND_PINS)
+    return sided(problem, kept(problem, fresh, pins, frames and len(problem.neurons) <= _MOST_AROUND_PINS))
+
+
+def drawn_apart(
+    problem: LayoutProblem, engine: str, places: FloatArray, spacing: float, symmetry: Symmetry | None = None
+) -> Layout:
+    """The layout at places near these (n, 2): discs ``spacing`` apart, nothing foreign in a frame, and labels on
+    nothing, as far as pins allow."""
+    if not any(wide for wide, _ in problem.labels):
+        return drawn(problem, engine, boxes_apart(problem, places, spacing, symmetry), symmetry=symmetry)
+    for _ in range(_TRIES):
+        there = [to_picture((x, y), problem.direction) for x, y in places.tolist()]
+        ways = {edge.name: straight(there[edge.source], there[edge.target]) for edge in problem.edges}
+        rough = Layout(problem.network, engine, dict(zip(problem.neurons, there, strict=True)), ways)
+        sides = best_sides(problem, rough, freely=True)
+        labels = np.full((len(places), 4), np.nan)
+        for i, name in enumerate(problem.neurons):
+            if name in sides:
+                labels[i] = rect_of(problem.labels[i], sides[name], problem.direction)
+        moved = boxes_apart(problem, places, spacing, symmetry, labels)
+        layout = drawn(problem, engine, moved, symmetry=symmetry, sides=sides)
+        if problem.pins or not label_overlaps(layout, problem):
+            break
+        places = _GROWTH * places  # such as where routes bow farther out of their frame than expected
+    return layout
 
 
 def pinned_places(problem: LayoutProblem) -> tuple[IntArray, FloatArray]:

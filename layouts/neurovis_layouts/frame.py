@@ -5,6 +5,7 @@ In and out: points. Engines that know a direction work as if it were ``down``; t
 
 from __future__ import annotations
 
+from neurovis_spec.layout.geometry import Rect, bounds
 from neurovis_spec.layout.model import Direction, Point
 
 
@@ -38,3 +39,8 @@ def from_picture(point: Point, direction: Direction) -> Point:
             return y, x
         case "left":
             return y, -x
+
+
+def turned(rect: Rect, direction: Direction) -> Rect:
+    """A rectangle of the picture in the frame of an engine."""
+    return bounds([from_picture(rect[:2], direction), from_picture(rect[2:], direction)])

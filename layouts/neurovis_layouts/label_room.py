@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from neurovis_layouts.frame import from_picture, to_picture
+from neurovis_layouts.frame import to_picture, turned
 from neurovis_spec.layout.frames import PAD_LABEL
-from neurovis_spec.layout.geometry import Rect, bounds, meet, padded
+from neurovis_spec.layout.geometry import Rect, meet, padded
 from neurovis_spec.layout.labels import label_rect
 from neurovis_spec.layout.model import RADIUS, Direction, LayoutProblem, Point, Side
 
@@ -48,8 +48,7 @@ def flipped(side: Side, direction: Direction) -> Side:
 
 def rect_of(room: Point, side: Side, direction: Direction, place: Point = (0.0, 0.0)) -> Rect:
     """What a label of this width and height covers, of a neuron at a place."""
-    rect = label_rect(to_picture(place, direction), room, side)
-    return bounds([from_picture((rect[0], rect[1]), direction), from_picture((rect[2], rect[3]), direction)])
+    return turned(label_rect(to_picture(place, direction), room, side), direction)
 
 
 def at_ends(problem: LayoutProblem, first: Iterable[int], last: Iterable[int]) -> dict[int, Side]:

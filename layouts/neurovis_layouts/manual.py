@@ -5,6 +5,7 @@ In: a problem in which everything is pinned. Out: the pins as they are, and rout
 
 from __future__ import annotations
 
+from neurovis_layouts.label_sides import sided
 from neurovis_layouts.routing import route_all
 from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem
 
@@ -21,9 +22,10 @@ class ManualEngine:
         """Keep every pin, route every edge."""
         centres = [problem.pins[i] for i in range(len(problem.neurons))]
         routes = route_all(problem.edges, centres)
-        return Layout(
+        layout = Layout(
             problem.network,
             self.name,
             dict(zip(problem.neurons, centres, strict=True)),
             {edge.name: route for edge, route in zip(problem.edges, routes, strict=True)},
         )
+        return sided(problem, layout)

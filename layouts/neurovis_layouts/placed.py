@@ -12,6 +12,7 @@ from neurovis_layouts.formations import offsets
 from neurovis_layouts.frame import to_picture
 from neurovis_layouts.incremental import kept
 from neurovis_layouts.label_room import roomy
+from neurovis_layouts.label_sides import sided
 from neurovis_layouts.layered.drawing import Drawing
 from neurovis_layouts.pins import fit, with_origins
 from neurovis_layouts.routing.ends import keys_of
@@ -66,7 +67,7 @@ def place(problem: LayoutProblem, engine: str, how: Arrangement, spacing: float)
     pins = with_origins(problem, free.places)
     around = bool(problem.modules) and len(problem.neurons) <= _MOST_AROUND_PINS
     drawing = routed(free if around else _pinned(free, pins), problem.edges)
-    return kept(problem, _layout(problem, engine, drawing), pins, around)
+    return sided(problem, kept(problem, _layout(problem, engine, drawing), pins, around))
 
 
 def _layout(problem: LayoutProblem, engine: str, drawing: Drawing) -> Layout:

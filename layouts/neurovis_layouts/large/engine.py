@@ -13,8 +13,8 @@ from functools import partial
 import numpy as np
 
 from neurovis_layouts.apart import apart
-from neurovis_layouts.boxed import ROOM, boxes_apart
-from neurovis_layouts.finish import drawn, nearest, pinned_places
+from neurovis_layouts.boxed import ROOM
+from neurovis_layouts.finish import drawn, drawn_apart, nearest, pinned_places
 from neurovis_layouts.large.field import GridField
 from neurovis_layouts.large.flow import downward, in_flow
 from neurovis_layouts.large.settle import Cooling, settle
@@ -59,9 +59,9 @@ class LargeEngine:
         places, planar = _free(wiring, problem.neuron_spacing, progress)
         if problem.pins:
             places = _around_pins(problem, wiring, places)
-        if problem.pins or problem.boxes:
+        if problem.pins or problem.boxes or any(wide for wide, _ in problem.labels):
             real = places[: len(problem.neurons)]
-            return drawn(problem, self.name, boxes_apart(problem, real, _APART * problem.neuron_spacing))
+            return drawn_apart(problem, self.name, real, _APART * problem.neuron_spacing)
         clear = [i for i, edge in enumerate(problem.edges) if planar[edge.source] and edge.source != edge.target]
         return drawn(problem, self.name, places, clear=_once(problem, clear))
 

@@ -33,9 +33,10 @@ class LayeredEngine:
         """Place every neuron and route every connection. Raises LayoutRefusalError for what cannot be met, such as
         lines that a formation cannot keep."""
         from neurovis_layouts.incremental import kept  # only here: who asks what it can do needs none of it
+        from neurovis_layouts.label_sides import sided
         from neurovis_layouts.layered.engine import drawn
 
-        return kept(problem, drawn(problem, self.name))
+        return sided(problem, kept(problem, drawn(problem, self.name)))
 
     def check(self, problem: LayoutProblem) -> None:
         """Raises the LayoutRefusalError that ``lay_out`` would."""

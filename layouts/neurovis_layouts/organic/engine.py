@@ -12,8 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from neurovis_layouts.apart import LEAST, apart, jitter
-from neurovis_layouts.boxed import boxes_apart
-from neurovis_layouts.finish import drawn, nearest
+from neurovis_layouts.finish import drawn_apart, nearest
 from neurovis_layouts.organic.paths import distances
 from neurovis_layouts.organic.stress import Arcs, least_stress
 from neurovis_layouts.packing import packed
@@ -68,8 +67,7 @@ class OrganicEngine:
                 symmetry, places = _at_pins(problem, wiring, chosen, symmetry, places)
             sizes.append(tuple((places[chosen].max(axis=0) - places[chosen].min(axis=0)).tolist()))
         _pack(places, part, numbers, sizes, max(_GAP * problem.neuron_spacing, LEAST))
-        places = boxes_apart(problem, places, _APART * problem.neuron_spacing, symmetry)
-        return drawn(problem, self.name, places, symmetry=symmetry)
+        return drawn_apart(problem, self.name, places, _APART * problem.neuron_spacing, symmetry)
 
     def check(self, problem: LayoutProblem) -> None:
         """Raises LayoutRefusalError for mirror images that it cannot draw."""
