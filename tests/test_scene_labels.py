@@ -141,3 +141,13 @@ def test_a_label_of_a_connection_stands_on_no_disc_and_on_no_other() -> None:
         for text in found.values()
     ]
     assert all(a[3] <= b[1] or b[3] <= a[1] or a[0] >= b[2] or b[0] >= a[2] for a in boxes for b in boxes if a != b)
+
+
+def test_a_name_that_is_too_long_for_its_disc_stands_beside_it_at_every_size() -> None:
+    for side in range(200, 700, 20):
+        found = labels(
+            "neurons: {A: {}, sensor: {}, B: {}}\nconnections: {A -> sensor: 1, B -> sensor: 1}\n"
+            f"layout: {{engine: manual, positions: {{A: [0, 0], B: [6, 0], sensor: [3, 3]}}}}\n"
+            f"render: {{size: [{side}, {side}], legend: false}}\n"
+        )
+        assert found["sensor"].text == "sensor"

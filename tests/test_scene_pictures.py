@@ -302,3 +302,38 @@ def test_the_dotted_line_of_a_rule_stays_in_the_picture_or_in_the_frame_of_its_i
         dots = sample(line.points, 40)
         (x0, y0), (x1, y1) = dots.min(axis=0), dots.max(axis=0)
         assert any(r[0] <= x0 and r[1] <= y0 and x1 <= r[2] and y1 <= r[3] for r in rooms)
+
+
+def test_dotted_lines_between_mirror_images_are_mirrored_and_names_keep_off_them() -> None:
+    network = nv.compile_text("""\
+neurovis: 1
+name: taught
+neurons:
+  LT: {bias: 1}
+  LM: {label: a name in the middle}
+  LO: {}
+  RT: {bias: 1}
+  RM: {label: a name in the middle}
+  RO: {}
+connections:
+  LM -> LO: {weight: 0, plasticity: {delta: {rate: 0.01, target: LT}}}
+  RM -> RO: {weight: 0, plasticity: {delta: {rate: 0.01, target: RT}}}
+layout:
+  mirror: [[LT, RT], [LM, RM], [LO, RO]]
+  positions: {LT: [0, 0], LM: [1.5, 0], LO: [3, 0], RO: [6, 0], RM: [7.5, 0], RT: [9, 0]}
+""")
+    scene = drawn(network, 3).scene
+    dots = {
+        group.data["signal"]: sample(shape.points, 60)
+        for group in scene.groups
+        for shape in group.shapes
+        if "signal" in group.data and isinstance(shape, Spline)
+    }
+    left, right = dots["LT -> LO"], dots["RT -> RO"]
+    assert np.allclose(left[:, 1], right[:, 1])
+    assert np.allclose(np.diff(left[:, 0]), -np.diff(right[:, 0]))
+    names = {group.data["neuron"]: s for group in scene.groups for s in group.shapes
+             if isinstance(s, Text) and group.data.get("neuron") in ("LM", "RM")}  # fmt: skip
+    for name, line in (("LM", left), ("RM", right)):
+        x0, y0, x1, y1 = text_rect(names[name])
+        assert not ((line[:, 0] > x0) & (line[:, 0] < x1) & (line[:, 1] > y0) & (line[:, 1] < y1)).any()

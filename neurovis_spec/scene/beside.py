@@ -183,13 +183,11 @@ class _Ground:
         return x + x0, y + y0, x + x1, y + y1
 
     def _best(self, one: Wanted) -> tuple[Slot, ...] | None:
-        """The sides that the layout kept free; else those that lie on the fewest lines, the best of these; None where
-        none are free."""
-        if one.kept and self._may(one, one.kept):
-            return one.kept
+        """The free sides that lie on the fewest lines, of these that for which the layout kept room, or the best; None
+        where none are free."""
         best: tuple[int, tuple[Slot, ...]] | None = None
-        for slot in _LEVEL if self._field.level else _SIDES:
-            sides = (slot, slot.mirrored(self._field.level))
+        usual = _LEVEL if self._field.level else _SIDES
+        for sides in (*((one.kept,) if one.kept else ()), *((slot, slot.mirrored(self._field.level)) for slot in usual)):
             if not self._may(one, sides):
                 continue
             lines = sum(self._lines(claim) for claim in self._all(one, sides))

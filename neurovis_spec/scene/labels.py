@@ -126,11 +126,10 @@ def labels_of(
     for one, other in partners.items():
         if result[other] is None:
             result[one] = None
-    across = [texts.width(base, NUMBERED, WEIGHT, subscript) for base, subscript in parts]
-    needed = {width: _radius_for(width) for width in set(across)}
+    needed = {both: _radius_for(both) for both in set(parts)}
     until = [
-        max(needed[width], _SMALLEST_NUMBERED if index in numbered else _SMALLEST_DISC) / float(radius)
-        for index, (width, radius) in enumerate(zip(across, ground.radii.tolist(), strict=True))
+        max(needed[both], _SMALLEST_NUMBERED if index in numbered else _SMALLEST_DISC) / float(radius)
+        for index, (both, radius) in enumerate(zip(parts, ground.radii.tolist(), strict=True))
     ]
     for group in neurons.groups:  # what is numbered together stands alike
         counted = [index for index in group.indices if parts[index][1]]
@@ -264,14 +263,15 @@ def _level(network: Network) -> bool:
     return network.layout.direction in ("right", "left")
 
 
-def _radius_for(width: float) -> float:
-    """The radius of the disc on which a label so wide is easy to read."""
+def _radius_for(parts: tuple[str, str]) -> float:
+    """The radius of the smallest disc that holds a label; infinite for one that none does."""
     low, high = 0.0, 100.0
-    if chord(high, NUMBERED) < width:
+    if not fits(parts, max(NUMBERED, least_on_disc(parts[1], high)), high):
         return np.inf
     for _ in range(24):
         middle = (low + high) / 2
-        low, high = (low, middle) if width <= chord(middle, NUMBERED) else (middle, high)
+        holds = fits(parts, max(NUMBERED, least_on_disc(parts[1], middle)), middle)
+        low, high = (low, middle) if holds else (middle, high)
     return high
 
 

@@ -31,7 +31,7 @@ from neurovis_spec.scene.gathered_layout import radius_of
 from neurovis_spec.scene.geometry import batches, bounds, samples
 from neurovis_spec.scene.glyphs import raised
 from neurovis_spec.scene.heading import CAPTION, CAPTION_Y, HEADER, TITLE, caption_text, title_text
-from neurovis_spec.scene.labels import Ground, Label, labels_of, margin_beside, room_beside
+from neurovis_spec.scene.labels import Ground, Label, labels_of, margin_beside, partners_of, room_beside
 from neurovis_spec.scene.legend_entry import LegendEntry
 from neurovis_spec.scene.lesions import Lesions, lesions_of
 from neurovis_spec.scene.line_labels import line_labels
@@ -140,11 +140,10 @@ def plan(
     bottom = frame.height - legend.height(items, frame.width - 2 * MARGIN) - (MARGIN if items else 4.0)
     picture = (6.0, top, frame.width - 6.0, bottom - (8.0 if items else 0.0))
     frames = [(box.members, _mapped(box.rect, frame)) for box in boxes]
-    dots = [
-        (teacher, dotted(teacher, centres, radius, gap, head, obstacles, room_of(teacher, frames, picture)))
-        for teacher in teachers
-    ]
-    for points in _dots([line for _, line in dots]):
+    around = [room_of(teacher, frames, picture) for teacher in teachers]
+    guides = dotted(teachers, partners_of(network), centres, radius, gap, head, obstacles, around)
+    dots = list(zip(teachers, guides, strict=True))
+    for points in _dots(guides):
         obstacles.add_line(points)
     for box in boxes:
         sector = box.sector
@@ -157,11 +156,19 @@ def plan(
     titles = in_one_place(titled, obstacles, theme, [_mapped(rect, frame) for rect in rooms.values()])
     labels: list[Label | None] = [None] * len(spots)
     if settings.labels:
-        around = [outline(box.rect, 4 / UNIT) if box.sector is None else box.sector.border(4 / UNIT) for box in boxes]
-        inner = np.concatenate([np.zeros((0, 2)), *samples([routes[i] for i in kept], 24), *around])
+        inner = [outline(box.rect, 4 / UNIT) if box.sector is None else box.sector.border(4 / UNIT) for box in boxes]
+        inner += [(points - (frame.left, frame.top)) / frame.scale for points in _dots(guides)]
+        inner += samples([routes[i] for i in kept], 24)
         reach = margin_beside(network, RADIUS * frame.scale, wanted.rooms) if margin > MARGIN else 0.0
         ground = Ground(
-            positions, factors, frame.scale, (frame.left, frame.top), inner, extent, reach, obstacles.texts()
+            positions,
+            factors,
+            frame.scale,
+            (frame.left, frame.top),
+            np.concatenate([np.zeros((0, 2)), *inner]),
+            extent,
+            reach,
+            obstacles.texts(),
         )
         sides = {index: layout.labels[network.neurons.names[index]] for index in rooms}
         labels = labels_of(network, ground, obstacles, (~seen.focus).tolist(), sizes, sides)

@@ -7,7 +7,7 @@ the neuron whose connections learn by it. Signals that come from inputs alone ha
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,28 +51,37 @@ def room_of(teacher: Teacher, frames: Iterable[tuple[Collection[int], Rect]], pi
 
 
 def dotted(
-    teacher: Teacher,
+    teachers: Sequence[Teacher],
+    images: Mapping[int, int],
     centres: FloatArray,
     radius: float,
     gap: float,
     head: float,
     obstacles: Obstacles,
-    room: Rect,
-) -> Line:
-    """The dotted line of a pair: straight, or bent where it would run over a disc or along other lines, but never out
-    of its ``room``."""
-    start, end = centres[teacher.source], centres[teacher.target]
-    best: tuple[float, Line] | None = None
-    for bend in _BENDS:
-        (line,) = trimmed([_bent(start, end, bend)], radius, gap + 1, head)
-        dots = sample(line.points, max(8, int(math.dist(start, end) / 6)))
-        if bend and not _within(dots, room):
+    rooms: Sequence[Rect],
+) -> list[Line]:
+    """The dotted lines of pairs: straight, or bent where they would run over a disc or along other lines, but never out
+    of their ``rooms``; between mirror ``images`` mirrored, by what both would run over."""
+    number = {(teacher.source, teacher.target): i for i, teacher in enumerate(teachers)}
+    found: dict[int, Line] = {}
+    for i, teacher in enumerate(teachers):
+        if i in found:
             continue
-        cost = obstacles.path_hits(dots[2:-2], (teacher.source, teacher.target)) + 4 * abs(bend)
-        if best is None or cost < best[0]:
-            best = (cost, line)
-    assert best is not None
-    return best[1]
+        image = number.get((images.get(teacher.source, -1), images.get(teacher.target, -1)), i)
+        best: tuple[float, dict[int, Line]] | None = None
+        for bend in _BENDS:
+            cost, lines = 4 * abs(bend), dict[int, Line]()
+            for k, side in {image: -1, i: 1}.items():
+                ends = (teachers[k].source, teachers[k].target)
+                start, end = centres[ends[0]], centres[ends[1]]
+                (lines[k],) = trimmed([_bent(start, end, side * bend)], radius, gap + 1, head)
+                dots = sample(lines[k].points, max(8, int(math.dist(start, end) / 6)))
+                out = bend and not _within(dots, rooms[k])
+                cost += math.inf if out else obstacles.path_hits(dots[2:-2], ends)
+            if best is None or cost < best[0]:
+                best = (cost, lines)
+        found |= best[1] if best is not None else {}
+    return [found[i] for i in range(len(teachers))]
 
 
 def _within(dots: FloatArray, room: Rect) -> bool:
