@@ -12,13 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from neurovis_layouts.routing import route_all
 from neurovis_layouts.routing.corners import rounded
-from neurovis_layouts.routing.detours import Detours
+from neurovis_layouts.routing.detours import Detours, detoured
+from neurovis_layouts.routing.obstacles import Obstacles
 from neurovis_layouts.routing.walls import Walls, meet, touch
 
 import neurovis_spec as nv
 from neurovis_spec.layout import Direction, Layout, LayoutEdge, LayoutProblem, LayoutRefusalError, Point
 from neurovis_spec.layout.arrange import lay_out_problem
-from neurovis_spec.layout.geometry import Rect, distance, sampled
+from neurovis_spec.layout.geometry import Rect, distance, sampled, straight
 from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.problem import canonical, problem_of
 
@@ -242,3 +243,14 @@ def test_a_disc_beside_its_label_is_gone_round_with_it() -> None:
     line = sampled(found, 0.05)
     assert min(distance(point, disc) for point in line) > 0.3
     assert all(not (4.2 < x < 5.8 and 0.4 < y < 0.7) for x, y in line)
+
+
+@pytest.mark.parametrize("lines", [0, 3])
+def test_a_detour_keeps_to_the_way_that_was_found_unless_another_crosses_less(lines: int) -> None:
+    edges, centres = [LayoutEdge("a", 0, 1, 1)], [(0.0, 0.0), (0.0, 10.0), (3.0, 5.0)]
+    walls = Walls([(frozenset({2}), (-2.0, 4.0, 8.0, 6.0))], 3)
+    ways = {0: [(8.5, 3.5), (8.5, 6.5)]}
+    drawn = [straight((8.0, 4.5 + i / 2), (20.0, 4.5 + i / 2)) for i in range(lines)]
+    routes = {0: straight(*centres[:2])}
+    found = detoured(edges, centres, routes, Obstacles(centres), walls, ways, drawn)[0]
+    assert max(x for x, _ in sampled(found)) > 8 if not lines else min(x for x, _ in sampled(found)) < -2

@@ -19,6 +19,7 @@ import numpy as np
 from neurovis_layouts.routing.corners import rounded
 from neurovis_layouts.routing.ends import shared_ends
 from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
+from neurovis_layouts.routing.polylines import polylines
 from neurovis_layouts.routing.route_cost import ALONG, BENDING, ENTERING
 from neurovis_layouts.routing.walls import Walls, blocked, meet
 from neurovis_spec.layout import BoolArray, FloatArray, IntArray
@@ -49,9 +50,13 @@ def detoured(
     routes: Mapping[int, Route],
     obstacles: Obstacles,
     walls: Walls,
+    ways: Mapping[int, Sequence[Point]],
+    drawn: Sequence[Route] = (),
 ) -> dict[int, Route]:
     """Detours by edge index for the routes that enter foreign frames or run over discs, where there are some: first
-    those between the farthest neurons, which so take the inner lanes round what they share with others."""
+    those between the farthest neurons, which so take the inner lanes round what they share with others. What has a way
+    already, from point to point, goes round what is in the way between two of these alone, unless the shortest detour
+    crosses fewer lines, of the routes and of others that are ``drawn``."""
     chosen = sorted(routes)
     own = [(edges[i].source, edges[i].target) for i in chosen]
     entered = walls.entered([routes[i] for i in chosen], own)
@@ -65,12 +70,26 @@ def detoured(
     if not wrong:
         return {}
     shared, detours, found = shared_ends(edges), Detours(walls, centres), dict[int, Route]()
+    number = {i: k for k, i in enumerate(chosen)}
+    lines = polylines([*(routes[i] for i in chosen), *drawn])
     for _, i, enters, clearance in sorted(wrong):
         ends = edges[i].source, edges[i].target
-        route = detours.route(*ends, ends not in shared)
+        line = detours.line(*ends, ends not in shared)
+        if line is not None and (way := detours.line(*ends, True, ways[i]) if ways.get(i) else None):
+            others = lines.owner != number[i]
+            both = polylines([_sharp(path) for path, _ in (way, line)])
+            crossed = both.crossed(lines.a[others], lines.b[others])
+            line = way if crossed[0] <= crossed[1] else line
+        route = None if line is None else detours.along(*ends, *line)
         if route is not None and (enters or obstacles.clearance(route, ends) > clearance):
             found[i] = route
+            lines = lines.replaced(number[i], polylines([route]))
     return found
+
+
+def _sharp(path: Sequence[Point]) -> Route:
+    """The route along a line, its corners as they are."""
+    return (path[0], *(point for a, b in pairwise(path) for point in (a, b, b)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,13 +143,13 @@ class Detours:
     def route(self, source: int, target: int, alone: bool) -> Route | None:
         """A way round, None where there is none; one that is not ``alone`` between its ends keeps off the straight
         line and off those before it."""
-        found = self._way(source, target, alone)
-        return None if found is None else self._take(source, target, *found)
+        found = self.line(source, target, alone)
+        return None if found is None else self.along(source, target, *found)
 
     def folded(self, source: int, target: int, twice: float) -> Route | None:
         """A way round from a neuron to its mirror image (the axis is at half of ``twice``, and what is in the way is
         the same on both sides) that is its own reflection, None where there is none; each keeps off those before it."""
-        found = self._way(source, target, False)
+        found = self.line(source, target, False)
         if found is None:
             return None
         path, rects = found
@@ -141,9 +160,9 @@ class Detours:
         if blocked(np.array([[ax, ay]]), np.array([[twice - ax, ay]]), rects)[0]:
             half = [*half, (twice / 2, ay + (by - ay) * (twice / 2 - ax) / (bx - ax))]
         path = [*half, *((twice - x, y) for x, y in half[::-1] if 2 * x != twice)]
-        return self._take(source, target, path, rects)
+        return self.along(source, target, path, rects)
 
-    def _take(self, source: int, target: int, path: Sequence[Point], rects: FloatArray) -> Route:
+    def along(self, source: int, target: int, path: Sequence[Point], rects: FloatArray) -> Route:
         """The route along a line, which others are to keep off."""
 
         def clear(piece: Route) -> bool:
@@ -157,9 +176,12 @@ class Detours:
         self._between.setdefault((min(source, target), max(source, target)), []).extend(path[1:-1])
         return rounded(path, free)
 
-    def _way(self, source: int, target: int, alone: bool) -> tuple[list[Point], FloatArray] | None:
-        """The line that a detour follows, and what it keeps off."""
+    def line(
+        self, source: int, target: int, alone: bool, by: Sequence[Point] = ()
+    ) -> tuple[list[Point], FloatArray] | None:
+        """The line that a detour follows, ``by`` these points, and what it keeps off."""
         ends = self._centres[[source, target]]
+        stops = np.concatenate([ends[:1], np.array(by, dtype=np.float64).reshape(-1, 2), ends[1:]])
         same = self._between.get((min(source, target), max(source, target)), ())
         # of all between the same ends each bends at corners of its own
         bends = {**self._taken.corners, **dict.fromkeys(same, ENTERING)}
@@ -170,8 +192,13 @@ class Detours:
         rects = self._rects[np.concatenate([foreign, loose])]
         for clear in _CLEAR:
             whole = rects + clear * _OUT
-            path = self._round(ends, rects, whole, bends, alone)
-            if path is not None:
+            path: list[Point] = []
+            for k in range(len(stops) - 1):
+                leg = self._round(stops[k : k + 2], rects, whole, bends, alone)
+                if leg is None:
+                    break
+                path += leg if k == 0 else leg[1:]
+            else:
                 return path, whole
         return None
 

@@ -82,7 +82,9 @@ def route_all(
     routes.update(bowed_over)
     walls = Walls(frames, len(centres))
     few = len(edges) <= min(careful, _MOST_AT_LENGTH)
-    routes.update(detoured(edges, centres, routes, obstacles if few else Obstacles(()), walls))
+    ways = {i: [(way.x, way.y) for way in line] for i, line in (waypoints or {}).items()}
+    ways |= {i: [(way.y, way.x) for way in line] for i, line in (lateral or {}).items()}
+    routes.update(detoured(edges, centres, routes, obstacles if few else Obstacles(()), walls, ways, drawn))
     if few:
         if there:
             routes.update((i, route) for i, route in there.items() if i in routes)
