@@ -144,7 +144,7 @@ def _curves(
         for other in tried[1:]:
             if clearances[other] > clearance + 0.02:
                 best, clearance = others[other], clearances[other]
-        if clearance < TOUCH + 0.02:
+        if clearance < TOUCH + 0.02 and not waypoints.get(chosen[k]):
             least = heights.get(owns[k], 0.0) + 0.3
             bowed, found, height = clear_bow(BowSought(start, end, owns[k], least, owns[k] in shared), obstacles)
             if found > clearance + 0.02:
