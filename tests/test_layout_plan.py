@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import layout_conformance as suite
 import pytest
 
 import neurovis_spec as nv
-from neurovis_spec.layout import Direction, LayoutRefusalError, Point
+from neurovis_spec.layout import Direction, Layout, LayoutProblem, LayoutRefusalError, Point
 from neurovis_spec.layout.arrange import lay_out_problem
+from neurovis_spec.layout.frames import Frames
+from neurovis_spec.layout.geometry import Rect
+from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.model import Seat
 from neurovis_spec.layout.problem import canonical, problem_of
 
@@ -165,3 +169,37 @@ def test_empty_cells_say_where_the_middle_of_the_page_is(width: int, fits: bool)
     else:
         with pytest.raises(LayoutRefusalError, match="do not stand in cells of the plan that are mirror images"):
             lay_out_problem(problem, "layered")
+
+
+def frames(layout: Layout, problem: LayoutProblem) -> dict[str, Rect]:
+    """The frames of boxes as they are drawn, by title."""
+    places = {i: layout.positions[name] for i, name in enumerate(problem.neurons)}
+    found = Frames(problem, layout.labels).rects(places, {})[len(problem.modules) :]
+    return {name: rect for (name, _), rect in zip(problem.boxes, found, strict=True) if rect is not None}
+
+
+def test_a_high_cell_takes_room_from_what_stands_above_and_below_it_alone() -> None:
+    chain = "A1 -> A2: 1, A2 -> A3: 1, B1 -> B2: 1, B1 -> B3: 1, B1 -> B4: 1, B1 -> B5: 1, B3 -> Q: 1, B4 -> R: 1, B5 -> S: 1"
+    text = f"""\
+neurovis: 1
+name: limb
+neurons: {{A: {{count: 3, bias: 1}}, B: {{count: 5, bias: 1}}, P: {{bias: 1}}, Q: {{}}, R: {{}}, S: {{}}}}
+connections: {{{chain}, A3 -> P: 1}}
+layout: {{boxes: {{above: [A], below: [B]}}, plan: [[above, P], [below, Q], [below, R], [below, S]]}}
+"""
+    compiled = nv.compile_text(text)
+    problem = problem_of(compiled.network)
+    layout = compiled.layout().value
+    at, boxes = layout.positions, frames(layout, problem)
+    assert 0 < boxes["below"][1] - boxes["above"][3] < 1.6, "a street, not the rest of the rows beside"
+    assert max(b - a for a, b in pairwise(at[name][1] for name in "QRS")) < 1.3, "as close as single neurons may be"
+    assert in_order(at, [["A", "P"], ["B", "Q", "R", "S"]], 1)
+
+
+@pytest.mark.parametrize("spacing", [(0.8, 1.2), (0.9, 1.2), (1.0, 1.3), (1.1, 1.3)])
+def test_whichever_the_spacing_few_routes_of_the_hexapod_cross(spacing: tuple[float, float]) -> None:
+    network = nv.compile("specs/hexapod/hexapod.yaml").network
+    problem = replace(problem_of(network), neuron_spacing=spacing[0], rank_spacing=spacing[1])
+    layout = lay_out_problem(problem, "layered")
+    assert metrics(layout, problem)["crossings"] <= 24
+    assert suite.through_frames(layout, problem) == []

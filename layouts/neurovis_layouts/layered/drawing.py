@@ -111,3 +111,25 @@ class Piece:
     drawing: Drawing
     middle: Point
     rect: Rect
+
+    @property
+    def framed(self) -> bool:
+        """Whether a line is drawn around it."""
+        return self.part.module >= 0 or self.part.box >= 0
+
+    def titled_above(self, flip: bool) -> Piece:
+        """The same where it is known whether it is reflected: with room for its title on its upper side alone."""
+        if not self.framed or self.drawing.direction in ("down", "up"):
+            return self
+        x0, y0, x1, y1 = self.rect
+        return _piece(self.part, self.drawing, (x0 + TITLE, y0, x1, y1) if flip else (x0, y0, x1 - TITLE, y1))
+
+
+def piece_of(part: Part, drawing: Drawing) -> Piece:
+    """A part as drawn."""
+    return _piece(part, drawing, drawing.rect())
+
+
+def _piece(part: Part, drawing: Drawing, rect: Rect) -> Piece:
+    x = (rect[0] + rect[2]) / 2 if drawing.axis is None else drawing.axis
+    return Piece(part, drawing, (x, (rect[1] + rect[3]) / 2), rect)

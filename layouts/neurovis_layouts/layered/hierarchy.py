@@ -18,7 +18,7 @@ from neurovis_layouts.label_room import covered, flipped, roomy, sides_of
 from neurovis_layouts.layered.bands import FEW, Wanted
 from neurovis_layouts.layered.compact import NONE, RANKS, WHOLE, Fold, Shape, ShapeKey, compact, may_be_folded
 from neurovis_layouts.layered.component_layout import ComponentLayout, planned
-from neurovis_layouts.layered.drawing import Drawing, FrameMove, Piece, entitled
+from neurovis_layouts.layered.drawing import Drawing, FrameMove, Piece, entitled, piece_of
 from neurovis_layouts.layered.frame_routing import linked
 from neurovis_layouts.layered.mirror_units import arranged_on_axis, symmetric_units
 from neurovis_layouts.layered.page_plan import facing, in_direction, parts_by_cell
@@ -115,7 +115,7 @@ class Composer:
         without ``routed`` no connection between its frames has a route."""
         pair = {a: b for mirror in problem.mirrors for one in mirror.pairs for a, b in (one, one[::-1])}
         if problem.plan:
-            return self._on_page(problem, pair, routed)
+            return self._on_page(problem, pair, routed, kind)
         key = self._shape.of(WHOLE, problem)
         if kind == WHOLE and key in self._wholes:
             return self._wholes[key].joined(problem, pair, routed)
@@ -186,14 +186,20 @@ class Composer:
             inner = (
                 self._book.problem_of(piece.part.kind) if piece.part.kind >= 0 else _boxed(problem, piece.part, pair)
             )
-            return _as_piece(
+            return piece_of(
                 piece.part, self.compose(replace(inner, pins=_around_pins(piece.drawing, pins, inner)), kind=NONE)
             )
 
         rests = settled(problem, plan, [_resting(plan, piece) for piece in pieces], pair, redraw)
         return _Standing.of(problem, plan, rests, units, columns)
 
-    def _on_page(self, problem: LayoutProblem, pair: Mapping[int, int], routed: bool) -> Drawing:
+    def _upright(self, kind: int) -> bool:
+        """Whether no frame around a kind of instance is reflected so that it stands on its head."""
+        whole = self._book.whole()
+        inner = {int(module.template) for module in whole.modules if module.parent >= 0}
+        return kind == WHOLE or (kind >= 0 and kind not in inner and whole.direction in ("down", "up"))
+
+    def _on_page(self, problem: LayoutProblem, pair: Mapping[int, int], routed: bool, kind: int) -> Drawing:
         """The drawing of a problem whose cells say what stands in which row and column."""
         known: dict[tuple[tuple[int, ...], Direction], Piece] = {}
 
@@ -206,18 +212,18 @@ class Composer:
                     inner = self._inside(problem, part, direction, pair)
                     drawing = inner if isinstance(inner, Drawing) else self.compose(inner, kind=NONE)
                     drawing = in_direction(drawing, direction, problem.direction)
-                known[key] = _as_piece(part, drawing)
+                known[key] = piece_of(part, drawing)
             return known[key]
 
         def redraw(piece: Piece, pins: Mapping[int, Point]) -> Piece:
             inner = self._inside(problem, piece.part, problem.direction, pair)
             inner = self._book.problem_of(piece.part.kind) if isinstance(inner, Drawing) else inner
-            return _as_piece(
+            return piece_of(
                 piece.part, self.compose(replace(inner, pins=_around_pins(piece.drawing, pins, inner)), kind=NONE)
             )
 
         parts, where = parts_by_cell(problem, pair)
-        pieces = facing(problem, parts, where, pair, drawn)
+        pieces = facing(problem, parts, where, pair, drawn, kind == WHOLE, self._upright(kind))
         plan = ComponentLayout()
         for piece, move in pieces:
             plan.places.update(zip(piece.part.members, map(move.point, piece.drawing.places), strict=True))
@@ -248,13 +254,7 @@ class Composer:
             if part not in known:
                 known[part] = self.compose(_boxed(problem, part, pair), kind=NONE)
             drawing = known[part]
-        return _as_piece(part, drawing)
-
-
-def _as_piece(part: Part, drawing: Drawing) -> Piece:
-    rect = drawing.rect()
-    x = (rect[0] + rect[2]) / 2 if drawing.axis is None else drawing.axis
-    return Piece(part, drawing, (x, (rect[1] + rect[3]) / 2), rect)
+        return piece_of(part, drawing)
 
 
 def _around_pins(drawing: Drawing, pins: Mapping[int, Point], inner: LayoutProblem) -> dict[int, Point]:

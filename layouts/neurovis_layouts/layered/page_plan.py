@@ -9,13 +9,17 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeAlias
+
+import numpy as np
 
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.layered.drawing import Drawing, FrameMove, Piece
 from neurovis_layouts.layered.parts import Part, imaged, part_of_module
-from neurovis_spec.layout.geometry import Rect, distance, snap
+from neurovis_layouts.layered.plan_places import Slot, placed
+from neurovis_spec.layout import FloatArray, IntArray
+from neurovis_spec.layout.geometry import Rect, crossing
 from neurovis_spec.layout.model import Direction, LayoutProblem, LayoutRefusalError, Point, Seat
 
 #: A part drawn in a direction, with the frame around it.
@@ -24,21 +28,11 @@ Drawn = Callable[[Part, Direction], Piece]
 _Members: TypeAlias = tuple[int, ...]
 #: Columns across and rows along, in the engine's frame.
 _Span: TypeAlias = tuple[range, range]
-#: Between parts that share a cell, in units of the layout.
-_BESIDE = 0.5
 #: Rounds in which each part may turn to face the others; after the second hardly any does.
 _ROUNDS = 3
+#: What it costs to cross a line, in units of the layout; of more lines than this crossings are not counted.
+_CROSSING, _MOST = 4.0, 300
 _OPPOSITE: Mapping[Direction, Direction] = {"down": "up", "up": "down", "right": "left", "left": "right"}
-
-
-@dataclass(frozen=True, slots=True)
-class _Slot:
-    """A cell in the engine's frame: which columns across and which rows along it spans, and the parts in it; two parts
-    in one line are mirror images of each other."""
-
-    across: range
-    along: range
-    lines: tuple[_Members, ...]
 
 
 def parts_by_cell(problem: LayoutProblem, pair: Mapping[int, int]) -> tuple[list[Part], dict[int, int]]:
@@ -125,15 +119,23 @@ def _together(problem: LayoutProblem, seat: Mapping[_Members, int]) -> dict[_Mem
 
 
 def facing(
-    problem: LayoutProblem, parts: Sequence[Part], where: Mapping[int, int], pair: Mapping[int, int], drawn: Drawn
+    problem: LayoutProblem,
+    parts: Sequence[Part],
+    where: Mapping[int, int],
+    pair: Mapping[int, int],
+    drawn: Drawn,
+    whole: bool,
+    upright: bool,
 ) -> list[tuple[Piece, FrameMove]]:
     """Each part in the direction, and as the mirror image, in which the connections between parts are short and the
     page has its proportions, and where it stands. Copies of one instance are drawn in one direction, so that they are
-    alike. Raises LayoutRefusalError where mirror images do not stand in mirrored cells."""
+    alike. ``upright``: nothing turns the whole upside down, and frames keep room for titles on their upper sides alone.
+    Raises LayoutRefusalError where mirror images do not stand in mirrored cells."""
     _check_mirrors(problem, parts, where, pair)
     slots = _slots(problem, parts, where)
     owner = {m: k for k, part in enumerate(parts) for m in part.members}
     between = [(e.source, e.target) for e in problem.edges if owner[e.source] != owner[e.target]]
+    apart = _apart(between)
     makes: dict[tuple[int, int], list[int]] = {}
     for k, part in enumerate(parts):
         if part.image_of < 0:
@@ -142,12 +144,13 @@ def facing(
     flips = [part.image_of >= 0 for part in parts]
 
     def pieces() -> list[Piece]:
-        return [drawn(part, turn) for part, turn in zip(parts, turns, strict=True)]
+        found = [drawn(part, turn) for part, turn in zip(parts, turns, strict=True)]
+        return [piece.titled_above(flip) for piece, flip in zip(found, flips, strict=True)] if upright else found
 
     def cost() -> float:
-        """How long straight lines between the ends of connections from part to part would be together, and how far the
-        page is from its proportions."""
-        moved = _placed(problem, slots, parts, pieces(), flips)
+        """How long straight lines between the ends of connections from part to part would be together, how often they
+        would cross, and how far the whole page is from its proportions."""
+        moved = _placed(problem, slots, parts, pieces(), flips, bool(pair))
         at: dict[int, Point] = {}
         for piece, move in moved:
             at.update(zip(piece.part.members, map(move.point, piece.drawing.places), strict=True))
@@ -156,8 +159,10 @@ def facing(
         high = max(r[3] for r in rects) - min(r[1] for r in rects)
         if problem.direction in ("right", "left"):
             wide, high = high, wide
-        stretched = max(wide / (problem.aspect * high), problem.aspect * high / wide)
-        return (wide + high + sum(distance(at[a], at[b]) for a, b in between)) * stretched
+        stretched = max(wide / (problem.aspect * high), problem.aspect * high / wide) if whole else 1.0
+        lines = np.array([(at[a], at[b]) for a, b in between], dtype=np.float64).reshape(-1, 2, 2)
+        length = float(np.sqrt(((lines[:, 1] - lines[:, 0]) ** 2).sum(axis=1)).sum())
+        return (wide + high + length + _CROSSING * _crossings(lines, *apart)) * stretched
 
     def turn(own: Sequence[int], direction: Direction) -> None:
         for k, part in enumerate(parts):
@@ -183,7 +188,21 @@ def facing(
                     turns[:], flips[:] = kept, held
         if best == before:
             break
-    return _placed(problem, slots, parts, pieces(), flips)
+    return _placed(problem, slots, parts, pieces(), flips, bool(pair))
+
+
+def _apart(lines: Sequence[tuple[int, int]]) -> tuple[IntArray, IntArray]:
+    """Every two lines that have no end in common; none where they are too many to be followed."""
+    one, other = np.triu_indices(len(lines) if len(lines) <= _MOST else 0, 1)
+    ends = np.array(lines, dtype=np.int64).reshape(-1, 2)
+    shared = (ends[one][:, :, None] == ends[other][:, None, :]).any(axis=(1, 2))
+    return one[~shared], other[~shared]
+
+
+def _crossings(lines: FloatArray, one: IntArray, other: IntArray) -> int:
+    """How many of these pairs of straight lines (n, 2, 2) cross."""
+    (a, b), (c, d) = lines[one].transpose(1, 2, 0), lines[other].transpose(1, 2, 0)
+    return int(crossing(*a, *(b - a), *c, *(d - c))[1].sum())
 
 
 def _flipped(
@@ -249,7 +268,7 @@ def in_direction(drawing: Drawing, of: Direction, frame: Direction) -> Drawing:
     )
 
 
-def _slots(problem: LayoutProblem, parts: Sequence[Part], where: Mapping[int, int]) -> list[_Slot]:
+def _slots(problem: LayoutProblem, parts: Sequence[Part], where: Mapping[int, int]) -> list[Slot]:
     """The cells with their parts, and where something stands below all, a row for that."""
     spans = _spans(problem)
     held: dict[int, list[int]] = {}
@@ -258,10 +277,10 @@ def _slots(problem: LayoutProblem, parts: Sequence[Part], where: Mapping[int, in
     across, along = _page(problem)
     spans.append((range(across), range(along, along + 1)))
     named = {cell.members for cell in problem.plan}
-    slots: list[_Slot] = []
+    slots: list[Slot] = []
     for i, own in sorted(held.items()):
         own.sort(key=lambda k: (parts[k].members not in named, k))  # what no cell names is behind what one does
-        slots.append(_Slot(*spans[i], tuple(_lines(parts, own))))
+        slots.append(Slot(*spans[i], tuple(_lines(parts, own))))
     return slots
 
 
@@ -327,65 +346,16 @@ def _lines(parts: Sequence[Part], held: Sequence[int]) -> Iterator[_Members]:
 
 def _placed(
     problem: LayoutProblem,
-    slots: Sequence[_Slot],
+    slots: Sequence[Slot],
     parts: Sequence[Part],
     pieces: Sequence[Piece],
     flips: Sequence[bool],
+    even: bool,
 ) -> list[tuple[Piece, FrameMove]]:
-    """Columns as wide and rows as high as what stands in them, with streets between for connections; parts in the
-    middle of theirs."""
-    sizes = [_size(slot, pieces) for slot in slots]
-    street = problem.neuron_spacing
-    across = _edges(
-        [(slot.across, size[0]) for slot, size in zip(slots, sizes, strict=True)], street, _page(problem)[0], True
-    )
-    along = _edges(
-        [(slot.along, size[1]) for slot, size in zip(slots, sizes, strict=True)], street, _page(problem)[1], False
-    )
-    moves: dict[int, FrameMove] = {}
-    for slot, size in zip(slots, sizes, strict=True):
-        x = _middle(across, slot.across)
-        y = _middle(along, slot.along) - size[1] / 2
-        for line in slot.lines:
-            piece = pieces[line[0]]
-            height = piece.rect[3] - piece.rect[1]
-            offset = (piece.rect[2] - piece.rect[0] + _BESIDE) / 2 if len(line) > 1 else 0.0
-            mx, my = FrameMove((0.0, 0.0), flips[line[0]]).point(piece.middle)
-            moves[line[0]] = FrameMove((snap(x - offset - mx), snap(y + height / 2 - my)), flips[line[0]])
-            y += height + _BESIDE
+    """Each of the pieces where it stands, mirror images as reflections of each other."""
+    moves = placed(problem, slots, _page(problem), pieces, flips, even)
     for k, part in enumerate(parts):
         if part.image_of >= 0:
             (dx, dy), flipped = moves[part.image_of].shift, moves[part.image_of].flip
             moves[k] = FrameMove((-dx + 0.0, dy), not flipped)
     return [(piece, moves[k]) for k, piece in enumerate(pieces)]
-
-
-def _size(slot: _Slot, pieces: Sequence[Piece]) -> Point:
-    """How much room the parts in a slot take across and along."""
-    widths = [
-        sum(pieces[k].rect[2] - pieces[k].rect[0] for k in line) + _BESIDE * (len(line) - 1) for line in slot.lines
-    ]
-    heights = [pieces[line[0]].rect[3] - pieces[line[0]].rect[1] for line in slot.lines]
-    return max(widths), sum(heights) + _BESIDE * (len(heights) - 1)
-
-
-def _edges(taken: Sequence[tuple[range, float]], street: float, count: int, even: bool) -> list[tuple[float, float]]:
-    """Where each row or column begins and ends. ``even``: its mirror image is as wide, and 0 is the middle."""
-    count = max(count, *(span.stop for span, _ in taken))  # what stands below all is in a row behind these
-    size = [0.0] * count
-    for span, need in sorted(taken, key=lambda one: len(one[0])):
-        lack = need - sum(size[i] for i in span) - street * (len(span) - 1)
-        for i in span:
-            size[i] += max(lack, 0.0) / len(span)
-    if even:
-        size = [max(one, other) for one, other in zip(size, reversed(size), strict=True)]
-    start = -(sum(size) + street * (count - 1)) / 2
-    found: list[tuple[float, float]] = []
-    for width in size:
-        found.append((start, start + width))
-        start += width + street
-    return found
-
-
-def _middle(edges: Sequence[tuple[float, float]], span: range) -> float:
-    return (edges[span[0]][0] + edges[span[-1]][1]) / 2 + 0.0

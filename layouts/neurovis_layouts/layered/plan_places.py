@@ -1,0 +1,189 @@
+"""Where the cells of a plan of the page stand: as close as what they hold and the streets between them allow.
+
+In: parts as drawn, and which rows and columns they span. Out: a move for each. Columns of the page are straight: all of
+one stand beside all of the next. Rows keep their neurons in order, but a frame takes room only from what stands above
+and below it: the rows beside a high one are no farther apart. What has room to spare stands in the middle of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from neurovis_layouts.layered.drawing import FrameMove, Piece
+from neurovis_spec.layout.geometry import Rect, bounds, padded, sampled, shifted, snap, united
+from neurovis_spec.layout.model import RADIUS, LayoutProblem, Point
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """A cell in the engine's frame: which columns across and which rows along it spans, and the parts in it; two parts
+    in one line are mirror images of each other."""
+
+    across: range
+    along: range
+    lines: tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Room:
+    """What something takes up around a point at 0: all of it, and the centres of its neurons."""
+
+    whole: Rect
+    centres: Rect
+
+    def shifted(self, by: Point) -> _Room:
+        return _Room(shifted(self.whole, by), shifted(self.centres, by))
+
+
+def placed(
+    problem: LayoutProblem,
+    slots: Sequence[Slot],
+    page: tuple[int, int],
+    pieces: Sequence[Piece],
+    flips: Sequence[bool],
+    even: bool,
+) -> dict[int, FrameMove]:
+    """How the first of each line of parts is moved; ``page`` is how many columns across and rows along there are.
+    ``even``: 0 is the middle across, and what is as far from it on either side stands alike."""
+    rooms: list[_Room] = []
+    shifts: list[dict[int, Point]] = []
+    for slot in slots:
+        room, own = _stacked(slot, pieces, flips, problem.neuron_spacing)
+        rooms.append(room)
+        shifts.append(own)
+    spans = [(slot.across, slot.along) for slot in slots]
+    streets = _streets(problem, slots, pieces)
+    rows = 1 if problem.direction in ("down", "up") else 0
+    at = [_axis(axis, spans, rooms, page[axis], streets, axis == rows, even and axis == 0) for axis in (0, 1)]
+    moves: dict[int, FrameMove] = {}
+    for slot, own in zip(slots, shifts, strict=True):
+        for k, (dx, dy) in own.items():
+            mx, my = FrameMove((0.0, 0.0), flips[k]).point(_anchor(pieces[k]))
+            x, y = at[0][slot.across] + dx - mx, at[1][slot.along] + dy - my
+            moves[k] = FrameMove((snap(x) + 0.0, snap(y)), flips[k])
+    return moves
+
+
+def _streets(problem: LayoutProblem, slots: Sequence[Slot], pieces: Sequence[Piece]) -> list[list[float]]:
+    """How far apart every two cells are at least: as neurons in a rank, but where neither is a frame and something
+    leads from the one to the other as ranks, so that its arrow is seen."""
+    slot_of = {k: number for number, slot in enumerate(slots) for line in slot.lines for k in line}
+    owner = {m: slot_of[k] for k, piece in enumerate(pieces) for m in piece.part.members if not piece.framed}
+    streets = [[problem.neuron_spacing] * len(slots) for _ in slots]
+    for edge in problem.edges:
+        if edge.source in owner and edge.target in owner:
+            one, other = owner[edge.source], owner[edge.target]
+            streets[one][other] = streets[other][one] = max(problem.neuron_spacing, problem.rank_spacing)
+    return streets
+
+
+def _stacked(
+    slot: Slot, pieces: Sequence[Piece], flips: Sequence[bool], street: float
+) -> tuple[_Room, dict[int, Point]]:
+    """The room that the parts in a slot take, one line behind the other, and where the first of each line stands."""
+    found: dict[int, Point] = {}
+    rooms: list[_Room] = []
+    end = 0.0
+    for line in slot.lines:
+        room, x = _room(pieces[line[0]], flips[line[0]]), 0.0
+        if len(line) > 1:
+            x = -street / 2 - room.whole[2]
+            room = room.shifted((x, 0.0))
+            room = _Room(
+                *(united([rect, (-rect[2], rect[1], -rect[0], rect[3])]) for rect in (room.whole, room.centres))
+            )
+        y = end - room.whole[1] if rooms else 0.0
+        rooms.append(room.shifted((0.0, y)))
+        found[line[0]] = x, y
+        end = rooms[-1].whole[3] + street
+    both = _Room(united(room.whole for room in rooms), united(room.centres for room in rooms))
+    up = -(both.whole[1] + both.whole[3]) / 2 if len(rooms) > 1 else 0.0
+    return both.shifted((0.0, up)), {k: (x, y + up) for k, (x, y) in found.items()}
+
+
+def _room(piece: Piece, flip: bool) -> _Room:
+    """What a part takes up around its anchor: its frame, or where none is drawn discs, labels and routes, from which
+    others keep off as neurons do from each other, from centre to centre."""
+    drawing, (x, y) = piece.drawing, _anchor(piece)
+    centres, whole = bounds(drawing.places), piece.rect
+    if not piece.framed:
+        drawn = [point for route in drawing.routes.values() for point in sampled(route)]
+        rects = [padded(centres, RADIUS), *drawing.labels, *(rect for _, rect in (*drawing.frames, *drawing.boxes))]
+        whole = padded(united([*rects, bounds(drawn)] if drawn else rects), -RADIUS)
+    move = FrameMove(FrameMove((0.0, 0.0), flip).point((-x, -y)), flip)
+    return _Room(move.rect(whole), move.rect(centres))
+
+
+def _anchor(piece: Piece) -> Point:
+    """The point of a part that stands in the middle of its cell: the middle of its frame, or of its neurons where no
+    frame is drawn."""
+    if piece.framed:
+        return piece.middle
+    x0, y0, x1, y1 = bounds(piece.drawing.places)
+    return (x0 + x1) / 2 if piece.drawing.axis is None else piece.drawing.axis, (y0 + y1) / 2
+
+
+def _axis(
+    axis: int,
+    spans: Sequence[tuple[range, range]],
+    rooms: Sequence[_Room],
+    count: int,
+    streets: Sequence[Sequence[float]],
+    rows: bool,
+    even: bool,
+) -> dict[range, float]:
+    """Where the middle of each span of rows or columns is: the mean of where it is with all as low, and with all as
+    high, as can be. The least distances between them are those at which nothing comes closer than a street; of ``rows``
+    that have no column in common only centres keep off each other."""
+    count = max(count, *(span[axis].stop for span in spans))  # what stands below all is in a row behind these
+    ends = {range(i, i + 1): (0.0, 0.0) for i in range(count)}
+    least: dict[tuple[range, range], float] = {}
+
+    def apart(one: range, other: range, far: float) -> None:
+        pairs = [(one, other), (_image(other, count), _image(one, count))] if even else [(one, other)]
+        for pair in pairs:
+            least[pair] = max(least.get(pair, 0.0), far)
+
+    def reaching(span: range, before: float, behind: float) -> None:
+        known = ends.get(span, (0.0, 0.0))
+        ends[span] = max(known[0], before), max(known[1], behind)
+
+    for i in range(count - 1):
+        apart(range(i, i + 1), range(i + 1, i + 2), streets[0][0])
+    for k, (span, room) in enumerate(zip(spans, rooms, strict=True)):
+        own = span[axis]
+        reaching(own, -room.whole[axis], room.whole[axis + 2])
+        if even:
+            reaching(_image(own, count), room.whole[axis + 2], -room.whole[axis])
+        if len(own) > 1:
+            apart(own[:1], own, 0.0)
+            apart(own, own[-1:], 0.0)
+        for other, beside, street in zip(spans, rooms, streets[k], strict=True):
+            if own.stop <= other[axis].start:
+                far = room.whole[axis + 2] - beside.whole[axis]
+                if rows and not set(span[1 - axis]) & set(other[1 - axis]):
+                    far = room.centres[axis + 2] - beside.centres[axis]
+                apart(own, other[axis], far + street)
+    low = _reached({span: before for span, (before, _) in ends.items()}, least)
+    high = _reached(
+        {span: behind for span, (_, behind) in ends.items()}, {(b, a): far for (a, b), far in least.items()}
+    )
+    middle = {span: (low[span] - high[span]) / 2 for span in ends}
+    return {span: (at - middle[_image(span, count)]) / 2 if even else at for span, at in middle.items()}
+
+
+def _image(span: range, count: int) -> range:
+    return range(count - span.stop, count - span.start)
+
+
+def _reached(first: dict[range, float], least: dict[tuple[range, range], float]) -> dict[range, float]:
+    """How far each span is from the beginning at least."""
+    found = dict(first)
+    for _ in found:
+        before = dict(found)
+        for (one, other), far in least.items():
+            found[other] = max(found[other], found[one] + far)
+        if found == before:
+            break
+    return found
