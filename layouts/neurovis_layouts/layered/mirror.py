@@ -8,12 +8,14 @@ an image get one that nothing passes, so that the room they take is the same on 
 
 from __future__ import annotations
 
-from bisect import bisect_right, insort
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 
+import numpy as np
+
+from neurovis_layouts.layered.crossings import Segments
 from neurovis_layouts.layered.levels import Levels, Node, Segment
-from neurovis_layouts.layered.order import ordered
+from neurovis_layouts.layered.order import ordered, places
 from neurovis_layouts.routing.ends import keys_of
 from neurovis_spec.layout.model import LayoutProblem
 
@@ -36,7 +38,7 @@ def mirrored(problem: LayoutProblem, levels: Levels, pair: Mapping[int, int]) ->
     half = _folded(levels, image, side)
     order = _unfolded(levels, ordered(half[0], effort=problem.effort)[1], half[1], image, side)
     if sum(len(gap) for gap in levels.segments) <= _MOST_SEGMENTS:
-        order = _improved(levels, order, image, side)
+        order = _improved(levels, order, side)
     for rank in order:
         _about(levels, rank, side, pair)
     result: list[int] = [0] * len(levels.nodes)
@@ -154,56 +156,29 @@ def _unfolded(
     return order
 
 
-def _improved(
-    levels: Levels, order: list[list[int]], image: Mapping[int, int], side: Mapping[int, int]
-) -> list[list[int]]:
+def _improved(levels: Levels, order: list[list[int]], side: Mapping[int, int]) -> list[list[int]]:
     """Swap neighbours, and their images, where that saves crossings of the whole."""
+    segments = Segments(levels)
+    place = places(len(levels.nodes), [np.array(rank, dtype=np.int64) for rank in order])
+    least = segments.count(place)
     for _ in range(_ROUNDS):
-        better = False
-        for r, rank in enumerate(order):
+        before = least
+        for rank in order:
             half = sum(side[n] < 0 for n in rank)
             last = half + sum(side[n] == 0 for n in rank) - 1
             for i in [*range(half - 1), *range(half, last)]:
                 a, b = levels.nodes[rank[i]], levels.nodes[rank[i + 1]]
                 if a.box != b.box or (a.kin >= 0 and a.kin == b.kin):
                     continue
-                now = _around(levels, order, r)
-                _swap(rank, i, half)
-                if _around(levels, order, r) < now:
-                    better = True
-                else:
-                    _swap(rank, i, half)
-        if not better:
+                j = len(rank) - 2 - i if i + 1 < half else i
+                swapped = place.copy()
+                for k in {i, j}:
+                    swapped[rank[k]], swapped[rank[k + 1]] = k + 1, k
+                count = segments.count(swapped)
+                if count < least:
+                    least, place = count, swapped
+                    for k in {i, j}:
+                        rank[k], rank[k + 1] = rank[k + 1], rank[k]
+        if least == before:
             break
     return order
-
-
-def _swap(rank: list[int], i: int, half: int) -> None:
-    rank[i], rank[i + 1] = rank[i + 1], rank[i]
-    if i + 1 < half:
-        j = len(rank) - 2 - i
-        rank[j], rank[j + 1] = rank[j + 1], rank[j]
-
-
-def _around(levels: Levels, order: Sequence[Sequence[int]], r: int) -> int:
-    """Crossings in the gaps above and below a rank."""
-    return sum(_crossings(levels, order, gap) for gap in (r - 1, r) if 0 <= gap < len(levels.segments))
-
-
-def _crossings(levels: Levels, order: Sequence[Sequence[int]], gap: int) -> int:
-    upper = {n: i for i, n in enumerate(order[gap])}
-    lower = {n: i for i, n in enumerate(order[gap + 1])}
-    nodes = levels.nodes
-    ends = sorted(
-        (
-            upper[s.upper] + 0.45 * s.a / (nodes[s.upper].reach[0] + 0.5),
-            lower[s.lower] + 0.45 * s.b / (nodes[s.lower].reach[0] + 0.5),
-        )
-        for s in levels.segments[gap]
-    )
-    seen: list[float] = []
-    total = 0
-    for _, end in ends:
-        total += len(seen) - bisect_right(seen, end)
-        insort(seen, end)
-    return total
