@@ -13,6 +13,7 @@ import pytest
 from click.testing import CliRunner, Result
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from neurovis_layouts.occupancy import Occupancy, Wish, lone
 
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
@@ -533,3 +534,9 @@ layout: {mirror: [[l, r]]}
     assert {name: route for name, route in now.routes.items() if name in before.routes} == before.routes
     z = now.positions["Z"]
     assert all(distance(z, point) >= 0.45 for route in before.routes.values() for point in sampled(route))
+
+
+def test_copies_that_would_stand_on_each_other_anywhere_each_find_a_place() -> None:
+    occupancy = Occupancy(placed={0: (0.0, 0.0)})
+    assert occupancy.put(Wish((lone(1), lone(2)), (0.0, 0.0)))
+    assert all(distance(a, b) >= 0.6 for a, b in combinations(occupancy.placed.values(), 2))

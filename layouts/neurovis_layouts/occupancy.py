@@ -157,7 +157,7 @@ class Occupancy:
         bodies = wish.bodies
         together = len(bodies) <= 2 or any(body.offsets[0][0] in self._sides for body in bodies)
         anchor = wish.anchor if stay and self.fits(bodies, wish.anchor) else self._found(wish, in_row, together)
-        if anchor is None and not together:
+        if anchor is None and len(bodies) > 1 and any(wish.along):
             placed = [self.put(replace(wish, bodies=(body,))) for body in bodies]
             return all(placed)
         if anchor is not None:
@@ -204,11 +204,13 @@ class Occupancy:
                     return anchor
         if not beyond:
             return None
-        # copies that cannot all be free together stand as far out as is needed for their discs
+        # as far out as is needed for the discs of all copies; these may stand on each other wherever they are
         (x, y), (dx, dy) = beyond[0]
-        while not self._free(wish.bodies, (x, y), _DISCS):
-            x, y = x + dx, y + dy
-        return x, y
+        x0, y0, x1, y1 = self._bounds or (x, y, x, y)
+        for step in range(2 * math.ceil(x1 - x0 + y1 - y0) + 2):
+            if self._free(wish.bodies, (x + step * dx, y + step * dy), _DISCS):
+                return x + step * dx, y + step * dy
+        return None
 
     def _beyond(self, wish: Wish) -> Iterator[tuple[Point, Point]]:
         """Places beside everything, on the side of a mirror's axis that is the first body's, and behind everything;
