@@ -2,14 +2,15 @@
 
 In: a problem, and how it is drawn in a shape. Out: the shape in which it takes least of a page: in how many bands (see
 ``bands``) the ranks of each kind of instance, and those of the whole, stand, and in how many rows the instances of a
-kind that are declared together. What is near to these proportions is left as it is, so that signals run one way.
+kind that are declared together. What is near to these proportions is left as it is, so that signals run one way. Shapes
+are tried as drafts, which show how large the whole becomes; only the one that is chosen is drawn in full.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from neurovis_layouts.layered.drawing import Drawing
@@ -37,15 +38,16 @@ _MOST_FOLDS, _MOST, _ROUNDS = 8, 3000, 1
 #: What can be folded: the ranks of a kind of instance, or of the whole (its number, RANKS), or the rows of instances of
 #: one kind (the second number) in another.
 Fold: TypeAlias = tuple[int, int]
-#: What of a shape concerns a drawing.
-ShapeKey: TypeAlias = tuple[tuple[Fold, int], ...]
+#: What of a shape concerns a drawing, and whether that is a draft.
+ShapeKey: TypeAlias = tuple[bool, tuple[tuple[Fold, int], ...]]
 
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """How many bands or rows there are of what is folded."""
+    """How many bands or rows there are of what is folded; of a ``draft`` only the size counts."""
 
     counts: Mapping[Fold, int] = field(default_factory=dict)
+    draft: bool = False
 
     def count(self, where: int, what: int = RANKS) -> int:
         """How many bands the ranks of a kind of instance stand in, or how many rows instances of one kind in it."""
@@ -54,11 +56,11 @@ class Shape:
     def of(self, kind: int, problem: LayoutProblem) -> ShapeKey:
         """What of it concerns one kind of instance, whose problem this is."""
         inside = {kind, *(int(module.template) for module in problem.modules)}
-        return tuple((fold, count) for fold, count in sorted(self.counts.items()) if fold[0] in inside)
+        return self.draft, tuple((fold, count) for fold, count in sorted(self.counts.items()) if fold[0] in inside)
 
     def changed(self, fold: Fold, count: int) -> Shape:
         """Another number of bands or rows."""
-        return Shape({**self.counts, fold: count})
+        return replace(self, counts={**self.counts, fold: count})
 
 
 #: How a problem is drawn in a shape.
@@ -73,10 +75,10 @@ def may_be_folded(problem: LayoutProblem) -> bool:
 
 def compact(problem: LayoutProblem, drawn: Drawn, most: Mapping[Fold, int]) -> Shape:
     """The shape that costs least. ``most`` says, once it has been drawn, what can be folded, and how often at most."""
-    shape = Shape()
+    shape = Shape(draft=True)
     drawing = drawn(problem, shape)
     if _stretched(problem, drawing) < _STRETCHED or max(_size(drawing, problem.direction)) < _SHORT:
-        return shape
+        return Shape()
     first = least = _cost(problem, drawing)
     for _ in range(_ROUNDS):
         before = least
@@ -84,7 +86,7 @@ def compact(problem: LayoutProblem, drawn: Drawn, most: Mapping[Fold, int]) -> S
             least, shape = _folded(problem, drawn, fold, most[fold], least, shape)
         if least == before:
             break
-    return shape if least < _WORTH * first else Shape()
+    return replace(shape, draft=False) if least < _WORTH * first else Shape()
 
 
 def _folded(

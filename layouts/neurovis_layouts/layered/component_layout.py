@@ -82,16 +82,19 @@ def planned(
     columns: AbstractSet[int] = frozenset(),
     wanted: Wanted = UNCUT,
     behind: Sequence[tuple[int, int]] = (),
+    draft: bool = False,
 ) -> ComponentLayout:
     """All components laid out and packed; units without connections beside the last rank of the largest component.
 
     ``bonds`` are numbers that units of one rank share. With ``pair`` (mirror images, both ways) all is one component,
     its axis at 0. ``columns`` are boxes to be drawn as such where that can be. The largest component stands in bands as
     ``wanted`` where it can be cut, which no axis can. ``behind`` are pairs of
-    neurons of which the second stands in a later rank.
+    neurons of which the second stands in a later rank. Of a ``draft`` only the size counts.
     """
     if pair:
-        return _component(problem, units, bonds, (), range(len(problem.edges)), pair, frozenset(), wanted, behind)
+        return _component(
+            problem, units, bonds, (), range(len(problem.edges)), pair, frozenset(), wanted, behind, draft
+        )
     connected, alone = components_of(problem, units, bonds)
     largest = max(connected, key=lambda part: sum(len(units[u].members) for u in part), default=None)
     parts: list[ComponentLayout] = []
@@ -108,9 +111,10 @@ def planned(
         own, tied = [units[u] for u in part], [bonds[u] for u in part]
         parts.append(
             _component(
-                problem, own, tied, guests, edges.get(k, []), {}, columns, wanted if part == largest else UNCUT, behind
+                problem, own, tied, guests, edges.get(k, []), {}, columns, wanted if part == largest else UNCUT, behind,
+                draft,
             )
-        )
+        )  # fmt: skip
     if alone and not (few and connected):
         parts.append(_unconnected(problem, [units[u] for u in alone]))
     plan = ComponentLayout()
@@ -143,6 +147,7 @@ def _component(
     columns: AbstractSet[int],
     wanted: Wanted,
     behind: Sequence[tuple[int, int]],
+    draft: bool,
 ) -> ComponentLayout:
     everyone = [*units, *guests]
     here = {m for unit in units for m in unit.members}
@@ -158,16 +163,17 @@ def _component(
     with_spines(problem, levels, columns)
     partner: list[int] | None = None
     if pair:
-        order, partner = mirrored(problem, levels, pair)
+        order, partner = mirrored(problem, levels, pair, draft)
     else:
         free = frozenset[int]() if columns or folds.ranks else _free(levels, units, bonds)
-        levels, order = ordered(levels, free, problem.effort)
+        levels, order = ordered(levels, free, problem.effort, draft)
         straight = straightened(levels, order, columns) if columns else None
         if straight is None:
             columns = frozenset()
         else:
             levels, order = tied(levels, straight, columns)
-    levels, flipped = reflected(levels, order, {min(unit.members) for unit in units if unit.turns})
+    may = {min(unit.members) for unit in units if unit.turns and not draft}
+    levels, flipped = reflected(levels, order, may)
     plan = ComponentLayout(reflected=flipped)
     plan.sides = at_ends(problem, _singles(levels, 0), _singles(levels, -1))
     for n, node in enumerate(levels.nodes):

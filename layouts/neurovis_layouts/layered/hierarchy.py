@@ -107,7 +107,7 @@ class Composer:
         problem = self._book.problem_of(number)
         key = number, direction, self._shape.of(number, problem)
         if key not in self._kinds:
-            self._kinds[key] = self.compose(replace(problem, direction=direction), kind=number)
+            self._kinds[key] = self.compose(replace(problem, direction=direction), not self._shape.draft, number)
         return self._kinds[key]
 
     def compose(self, problem: LayoutProblem, routed: bool = True, kind: int = WHOLE) -> Drawing:
@@ -179,7 +179,7 @@ class Composer:
         columns = {box for box in columns if _whole(units, problem.boxes[box][1])}
         few = FEW if kind >= 0 or problem.modules else 1
         wanted = Wanted(self._shape.count(kind), few)
-        plan = planned(problem, units, bonds, pair, columns, wanted, behind)
+        plan = planned(problem, units, bonds, pair, columns, wanted, behind, self._shape.draft)
         self._most[kind, RANKS] = plan.cuts + 1
 
         def redraw(piece: Piece, pins: Mapping[int, Point]) -> Piece:

@@ -24,8 +24,11 @@ _ROUNDS = 6
 _MOST_SEGMENTS = 3000
 
 
-def mirrored(problem: LayoutProblem, levels: Levels, pair: Mapping[int, int]) -> tuple[list[list[int]], list[int]]:
-    """The symmetric order, and the image of each node. Adds passages to the levels."""
+def mirrored(
+    problem: LayoutProblem, levels: Levels, pair: Mapping[int, int], draft: bool = False
+) -> tuple[list[list[int]], list[int]]:
+    """The symmetric order, and the image of each node; of a ``draft`` only lengths matter. Adds passages to the
+    levels."""
     left = _left_of(problem, pair)
     where = {m: n for n, node in enumerate(levels.nodes) for m, _, _ in node.members}
     image = {
@@ -36,8 +39,8 @@ def mirrored(problem: LayoutProblem, levels: Levels, pair: Mapping[int, int]) ->
     side = {n: 0 if image[n] == n else -1 if levels.nodes[n].members[0][0] in left else 1 for n in image}
     _match_passages(problem, levels, pair, where, image, side)
     half = _folded(levels, image, side)
-    order = _unfolded(levels, ordered(half[0], effort=problem.effort)[1], half[1], image, side)
-    if sum(len(gap) for gap in levels.segments) <= _MOST_SEGMENTS:
+    order = _unfolded(levels, ordered(half[0], effort=problem.effort, draft=draft)[1], half[1], image, side)
+    if not draft and sum(len(gap) for gap in levels.segments) <= _MOST_SEGMENTS:
         order = _improved(levels, order, side)
     for rank in order:
         _about(levels, rank, side, pair)

@@ -32,15 +32,20 @@ _SWEEPS, _PLAIN_SWEEPS = 4, 14
 _LONG = 100_000
 
 
-def ordered(levels: Levels, free: AbstractSet[int] = frozenset(), effort: Effort = "normal") -> tuple[Levels, Order]:
-    """The ranks in order; ``free`` nodes may have moved to others. Deterministic: every tie falls to the order before,
-    in the end to that of the names."""
+def ordered(
+    levels: Levels, free: AbstractSet[int] = frozenset(), effort: Effort = "normal", draft: bool = False
+) -> tuple[Levels, Order]:
+    """The ranks in order; ``free`` nodes may have moved to others. A ``draft`` is one start, sifted once: as wide,
+    about, as what is drawn in full. Deterministic: every tie falls to the order before, in the end to that of the
+    names."""
     natural = [_grouped_start(levels, rank) for rank in levels.ranks]
     if not any(levels.segments):
         return levels, natural
     segments = Segments(levels)
-    held = _Search(levels, segments, True, effort)
     starts = [natural, _by_descent(levels, natural)]
+    if draft:
+        return levels, _Search(levels, segments, False, effort).best(starts[1:], 0)[1]
+    held = _Search(levels, segments, True, effort)
     if segments.ports > 1:  # blocks are not turned round with the order around them
         starts.append([rank[::-1] for rank in natural])
     strict = held.best(starts)
@@ -82,16 +87,17 @@ class _Search:
         self._settled: dict[bytes, tuple[int, list[Ints]]] = {}
         self._swept: dict[tuple[bytes, bool], list[Ints]] = {}
 
-        self.sifts = self.work <= _SIFTED and max(len(rank) for rank in self.ids) ** 2 <= _SIFTED
+        self.sifts = max(self.work, max(len(rank) for rank in self.ids) ** 2) <= _SIFTED
 
-    def best(self, starts: Sequence[Order]) -> tuple[int, Order]:
-        """The best order that sweeps and sifting lead to, and its crossings."""
+    def best(self, starts: Sequence[Order], sweeps: int = _SWEEPS) -> tuple[int, Order]:
+        """The best order that so many sweeps and sifting lead to, and its crossings; what is too large to be sifted is
+        swept more often, from one start."""
         sift = self.sifts
         best: tuple[int, list[Ints]] | None = None
-        for start in starts if sift else starts[1:2]:
+        for start in starts if sift else starts[1:2] or starts:
             state = _State(self, [np.array(rank, dtype=np.int64) for rank in start])
             state.group()
-            for sweep in range((_SWEEPS if sift else _PLAIN_SWEEPS) + 1):
+            for sweep in range((sweeps if sift else _PLAIN_SWEEPS) + 1):
                 if sweep and sift:
                     state = self._after(state, sweep % 2 == 1)
                 elif sweep:

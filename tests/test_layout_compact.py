@@ -1,0 +1,64 @@
+"""Compact of the layered engine: shapes are tried as drafts, and the one that is chosen is drawn in full."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+from neurovis_layouts.layered import component_layout, hierarchy
+from neurovis_layouts.layered.compact import RANKS, WHOLE, Shape
+from neurovis_layouts.layered.levels import Levels
+from neurovis_layouts.layered.order import Order, ordered
+
+import neurovis_spec as nv
+from neurovis_spec.layout.model import Effort, LayoutProblem
+from neurovis_spec.layout.problem import problem_of
+
+#: Thirty instances that are declared together, with two links each: in one row they are nine times as wide as high.
+RING = (
+    "neurovis: 1\nname: ring\n"
+    "modules: {m: {neurons: {x: {count: 3}, y: {}}, connections: {x -> y: 1, y -> x1: 1}}}\n"
+    "instances: {"
+    + ", ".join(f"i{k}: {{module: m}}" for k in range(30))
+    + "}\nconnections: {"
+    + ", ".join(f"i{k}.y -> i{(k + far) % 30}.x{port}: 1" for k in range(30) for port, far in ((2, 1), (3, 7)))
+    + "}\n"
+)
+
+
+@pytest.fixture(scope="module")
+def problem() -> LayoutProblem:
+    return problem_of(nv.compile_text(RING).network)
+
+
+def test_the_order_is_improved_once_for_each_kind_of_frame(
+    problem: LayoutProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: Counter[bool] = Counter()
+
+    def counted(levels: Levels, free: frozenset[int], effort: Effort, draft: bool) -> tuple[Levels, Order]:
+        drawn[draft] += 1
+        return ordered(levels, free, effort, draft)
+
+    monkeypatch.setattr(component_layout, "ordered", counted)
+    hierarchy.Composer(problem).whole()
+    assert drawn[False] == 2  # the whole, and its one kind of instance
+    assert drawn[True] > 4
+
+
+def test_what_is_chosen_is_drawn_as_if_nothing_else_had_been_tried(
+    problem: LayoutProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    composer = hierarchy.Composer(problem)
+    found = composer.whole()
+    shape = composer._shape
+    assert shape.count(WHOLE, 0) > 1
+    assert not shape.draft
+    monkeypatch.setattr(hierarchy, "compact", lambda *_: shape)
+    assert hierarchy.Composer(problem).whole() == found
+
+
+def test_a_draft_is_no_drawing(problem: LayoutProblem) -> None:
+    draft, drawing = Shape({(WHOLE, 0): 2}, draft=True), Shape({(WHOLE, 0): 2})
+    assert draft.of(WHOLE, problem) != drawing.of(WHOLE, problem)
+    assert draft.changed((WHOLE, RANKS), 2) == Shape({(WHOLE, 0): 2, (WHOLE, RANKS): 2}, draft=True)
