@@ -9,19 +9,20 @@ from neurovis_layouts.layered import component_layout, hierarchy
 from neurovis_layouts.layered.compact import RANKS, WHOLE, Shape
 from neurovis_layouts.layered.levels import Levels
 from neurovis_layouts.layered.order import Order, ordered
+from neurovis_layouts.layered.templates import Book
 
 import neurovis_spec as nv
 from neurovis_spec.layout.model import Effort, LayoutProblem
 from neurovis_spec.layout.problem import problem_of
 
-#: Thirty instances that are declared together, with two links each: in one row they are nine times as wide as high.
+#: Sixteen instances that are declared together, with two links each: in one row they are five times as wide as high.
 RING = (
     "neurovis: 1\nname: ring\n"
     "modules: {m: {neurons: {x: {count: 3}, y: {}}, connections: {x -> y: 1, y -> x1: 1}}}\n"
     "instances: {"
-    + ", ".join(f"i{k}: {{module: m}}" for k in range(30))
+    + ", ".join(f"i{k}: {{module: m}}" for k in range(16))
     + "}\nconnections: {"
-    + ", ".join(f"i{k}.y -> i{(k + far) % 30}.x{port}: 1" for k in range(30) for port, far in ((2, 1), (3, 7)))
+    + ", ".join(f"i{k}.y -> i{(k + far) % 16}.x{port}: 1" for k in range(16) for port, far in ((2, 1), (3, 7)))
     + "}\n"
 )
 
@@ -59,6 +60,7 @@ def test_what_is_chosen_is_drawn_as_if_nothing_else_had_been_tried(
 
 
 def test_a_draft_is_no_drawing(problem: LayoutProblem) -> None:
+    whole = Book(problem).whole()
     draft, drawing = Shape({(WHOLE, 0): 2}, draft=True), Shape({(WHOLE, 0): 2})
-    assert draft.of(WHOLE, problem) != drawing.of(WHOLE, problem)
+    assert draft.of(WHOLE, whole) != drawing.of(WHOLE, whole)
     assert draft.changed((WHOLE, RANKS), 2) == Shape({(WHOLE, 0): 2, (WHOLE, RANKS): 2}, draft=True)
