@@ -89,9 +89,9 @@ def route_all(
         if there:
             routes.update((i, route) for i, route in there.items() if i in routes)
         free = routes.keys() - there.keys() if there else routes.keys()
-        if improve and free:
+        if improve and free and len(edges) <= MOST_EASED:
             judge = Judge(edges, centres, routes, frames, drawn)
-            if ease and len(edges) <= MOST_EASED:
+            if ease:
                 routes.update(eased(judge, free))
             routes.update(told_apart(judge, free))
     routes.update(_loops(edges, centres, routes, near, walls, there or {}))

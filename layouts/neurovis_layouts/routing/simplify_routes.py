@@ -36,7 +36,7 @@ _HOPELESS = 0.7
 #: More than so many connections between two neurons are a fan, in which each has its place.
 _FAN = 3
 #: How many routes are checked, at most, by how many there are: in a crowd nobody follows one. How many in vain.
-_LEAST, _MOST, _WORK, _VAIN = 15, 40, 5000, 12
+_LEAST, _MOST, _WORK, _VAIN = 15, 40, 3000, 12
 _ROUNDS, _PASSES = 2, 4
 #: A step on the way there is worth this at least.
 _GAIN = 0.05
@@ -52,7 +52,7 @@ _UNCLEAR = 1_200_000
 #: What it costs there that an arrival and a departure are one line: more than a crossing, which can be followed. Where
 #: whole lines are searched it would keep them on long ways.
 _ARRIVING = 3.0
-#: With more routes than this none is drawn anew: they cross too much to be followed.
+#: With more routes than this none is drawn anew or told apart: they cross too much to be followed.
 MOST_EASED = 300
 _DIAGONAL = 0.7071067811865476
 _AROUND = (
