@@ -179,12 +179,13 @@ def frames(layout: Layout, problem: LayoutProblem) -> dict[str, Rect]:
 
 
 def test_a_high_cell_takes_room_from_what_stands_above_and_below_it_alone() -> None:
-    chain = "A1 -> A2: 1, A2 -> A3: 1, B1 -> B2: 1, B1 -> B3: 1, B1 -> B4: 1, B1 -> B5: 1, B3 -> Q: 1, B4 -> R: 1, B5 -> S: 1"
+    within = "A1 -> A2: 1, A2 -> A3: 1, B1 -> B2: 1, B1 -> B3: 1, B1 -> B4: 1, B1 -> B5: 1"
+    across = "A3 -> P: 1, B3 -> Q: 1, B4 -> R: 1, B5 -> S: 1"
     text = f"""\
 neurovis: 1
 name: limb
 neurons: {{A: {{count: 3, bias: 1}}, B: {{count: 5, bias: 1}}, P: {{bias: 1}}, Q: {{}}, R: {{}}, S: {{}}}}
-connections: {{{chain}, A3 -> P: 1}}
+connections: {{{within}, {across}}}
 layout: {{boxes: {{above: [A], below: [B]}}, plan: [[above, P], [below, Q], [below, R], [below, S]]}}
 """
     compiled = nv.compile_text(text)
