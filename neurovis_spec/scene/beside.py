@@ -187,7 +187,8 @@ class _Ground:
         where none are free."""
         best: tuple[int, tuple[Slot, ...]] | None = None
         usual = _LEVEL if self._field.level else _SIDES
-        for sides in (*((one.kept,) if one.kept else ()), *((slot, slot.mirrored(self._field.level)) for slot in usual)):
+        mirrored = ((slot, slot.mirrored(self._field.level)) for slot in usual)
+        for sides in (*((one.kept,) if one.kept else ()), *mirrored):
             if not self._may(one, sides):
                 continue
             lines = sum(self._lines(claim) for claim in self._all(one, sides))
