@@ -107,12 +107,13 @@ class Composer:
         problem = self._book.problem_of(number)
         key = number, direction, self._shape.of(number, problem)
         if key not in self._kinds:
-            self._kinds[key] = self.compose(replace(problem, direction=direction), not self._shape.draft, number)
+            self._kinds[key] = self.compose(replace(problem, direction=direction), kind=number)
         return self._kinds[key]
 
     def compose(self, problem: LayoutProblem, routed: bool = True, kind: int = WHOLE) -> Drawing:
         """The drawing of one problem, that of a ``kind`` of instance or of the whole, its modules named by their kinds;
-        without ``routed`` no connection between its frames has a route."""
+        without ``routed``, and in a draft, no connection between its frames has a route."""
+        routed = routed and not self._shape.draft
         pair = {a: b for mirror in problem.mirrors for one in mirror.pairs for a, b in (one, one[::-1])}
         if problem.plan:
             return self._on_page(problem, pair, routed, kind)
