@@ -13,6 +13,7 @@ import numpy as np
 
 from neurovis_layouts.layered.levels import Levels, Segment
 from neurovis_layouts.layered.place import placed
+from neurovis_spec.layout import FloatArray
 
 #: With more segments in a gap than this nobody sees the difference.
 _MOST = 1500
@@ -24,16 +25,22 @@ def reflected(levels: Levels, order: Sequence[Sequence[int]], may: AbstractSet[i
     frames = [n for n in frames if any(dx for _, dx, _ in levels.nodes[n].members)]
     if not frames:
         return levels, set()
-    x = [place[0] for place in placed(levels, order, 1.0, 2.0)]
-    flipped: set[int] = set()
+    x = np.array([place[0] for place in placed(levels, order, 1.0, 2.0)])
+    gaps = [_Gap(gap, x) for gap in levels.segments]
+    #: for each node −1 where it is reflected, else 1
+    side = np.ones(len(levels.nodes))
     for _ in range(2):
-        before = set(flipped)
+        before = side.copy()
         for node in frames:
-            now, other = (_crossings(levels, x, flipped ^ change, node) for change in (set(), {node}))
-            if other < now:
-                flipped ^= {node}
-        if flipped == before:
+            rank = levels.nodes[node].rank
+            beside = [gap for gap in gaps[max(rank - 1, 0) : rank + 1] if len(gap.upper) <= _MOST]
+            now = sum(gap.crossings(node, side) for gap in beside)
+            side[node] = -side[node]
+            if sum(gap.crossings(node, side) for gap in beside) >= now:
+                side[node] = -side[node]
+        if (side == before).all():
             break
+    flipped = set(np.flatnonzero(side < 0).tolist())
     return _reflect(levels, flipped), {_first(levels, node) for node in flipped}
 
 
@@ -41,21 +48,24 @@ def _first(levels: Levels, node: int) -> int:
     return min(member for member, _, _ in levels.nodes[node].members)
 
 
-def _crossings(levels: Levels, x: Sequence[float], flipped: AbstractSet[int], node: int) -> int:
-    """Crossings of the segments at a node, as straight lines."""
-    total = 0
-    rank = levels.nodes[node].rank
-    for gap in (rank - 1, rank):
-        if not 0 <= gap < len(levels.segments) or len(levels.segments[gap]) > _MOST:
-            continue
-        segments = levels.segments[gap]
-        start = np.array([x[s.upper] + _offset(s.upper, s.a, flipped) for s in segments])
-        end = np.array([x[s.lower] + _offset(s.lower, s.b, flipped) for s in segments])
-        own = np.array([node in (s.upper, s.lower) for s in segments], dtype=np.bool_)
+class _Gap:
+    """The segments between two ranks as straight lines."""
+
+    def __init__(self, segments: Sequence[Segment], x: FloatArray) -> None:
+        self.upper = np.array([s.upper for s in segments], dtype=np.int64)
+        self._lower = np.array([s.lower for s in segments], dtype=np.int64)
+        self._a = np.array([s.a for s in segments], dtype=np.float64)
+        self._b = np.array([s.b for s in segments], dtype=np.float64)
+        self._x = x
+
+    def crossings(self, node: int, side: FloatArray) -> int:
+        """How many crossings those at a node have, which ``side`` tells whether it is reflected."""
+        start = self._x[self.upper] + self._a * side[self.upper]
+        end = self._x[self._lower] + self._b * side[self._lower]
+        own = (self.upper == node) | (self._lower == node)
         met = (start[own, None] - start) * (end[own, None] - end) < 0
         # two at the node meet in both of their rows, others in one
-        total += 2 * int(met.sum()) - int(met[:, own].sum())
-    return total
+        return 2 * int(met.sum()) - int(met[:, own].sum())
 
 
 def _offset(node: int, offset: float, flipped: AbstractSet[int]) -> float:

@@ -65,9 +65,11 @@ class Insertion:
         nodes = levels.nodes
         self.free, self._height = free, len(order)
         self.rank = [node.rank for node in nodes]
-        self._box = [node.box for node in nodes]
-        self._kin = [node.kin if strict else -1 for node in nodes]
-        self._natural = {n: place for rank in levels.ranks for place, n in enumerate(rank)}
+        self._box: Counts = np.array([node.box for node in nodes], dtype=np.int32)
+        self._kin: Counts = np.array([node.kin if strict else -1 for node in nodes], dtype=np.int32)
+        self._natural: Counts = np.zeros(len(nodes), dtype=np.int32)
+        for rank in levels.ranks:
+            self._natural[rank] = np.arange(len(rank), dtype=np.int32)
         self._points: list[list[int]] = [[] for _ in nodes]
         self._owner: list[int] = []
         self.ups: list[list[int]] = [[] for _ in nodes]
@@ -75,6 +77,9 @@ class Insertion:
         self.links: list[Link] = []
         self.ends: list[tuple[int, float, int, float]] = []
         self._find_links(levels)
+        # the node of each point, the box of each connection
+        self._node_of: Counts = np.array(self._owner, dtype=np.int32)
+        self._box_of: Counts = np.array([*(link.box for link in self.links), -1], dtype=np.int32)
         #: the cells of each connection from above to below; None while it is taken out
         self.cells: list[tuple[int, ...] | None] = [
             tuple(self._cell(number, nodes[n].rank) for n in link.passages) for number, link in enumerate(self.links)
@@ -365,31 +370,36 @@ class Insertion:
     def _shut(self, r: int, box: int) -> Counts:
         """For each slot of a rank ``_SHUT`` where it lies within a block or another box, or outside of ``box`` though
         that is in the rank; else 0."""
-        owners = [self.owner(entry) for entry in self.order[r]]
-        boxes = [self._box[node] if node >= 0 else self.links[link].box for node, link in owners]
-        found = np.zeros(len(owners) + 1, dtype=np.int32)
-        for p, (one, other) in enumerate(pairwise(zip(owners, boxes, strict=True)), 1):
-            if one[0] == other[0] or (one[1] == other[1] >= 0 and one[1] != box):
-                found[p] = _SHUT
-        if box >= 0 and box in boxes:
-            found[: boxes.index(box)] = _SHUT
-            found[len(boxes) + 1 - boxes[::-1].index(box) :] = _SHUT
+        node, boxes = self._owners(r)
+        within = (node[1:] == node[:-1]) & (node[1:] >= 0)
+        within |= (boxes[1:] == boxes[:-1]) & (boxes[1:] >= 0) & (boxes[1:] != box)
+        found = np.zeros(len(node) + 1, dtype=np.int32)
+        found[1:-1][within] = _SHUT
+        own = np.flatnonzero(boxes == box)
+        if box >= 0 and len(own):
+            found[: own[0]] = _SHUT
+            found[own[-1] + 2 :] = _SHUT
         return found
 
     def _shut_to(self, r: int, node: int) -> Counts:
         """``_shut`` for a node, which also has to keep its place in the order of its group."""
-        found = self._shut(r, self._box[node])
-        for p, entry in enumerate(self.order[r]):
-            other = self.owner(entry)[0]
-            if self._kin[node] >= 0 and other >= 0 and self._alike(node, other):
-                if self._natural[other] < self._natural[node]:
-                    found[: p + 1] = _SHUT
-                else:
-                    found[p + 1 :] = _SHUT
+        found = self._shut(r, int(self._box[node]))
+        if self._kin[node] >= 0:
+            other, boxes = self._owners(r)
+            alike = (other >= 0) & (self._kin[other] == self._kin[node]) & (boxes == self._box[node])
+            before = alike & (self._natural[other] < self._natural[node])
+            found[: np.flatnonzero(before).max(initial=-1) + 1] = _SHUT
+            found[np.flatnonzero(alike & ~before).min(initial=len(other)) + 1 :] = _SHUT
         return found
 
-    def _alike(self, one: int, other: int) -> bool:
-        return (self._kin[one], self._box[one]) == (self._kin[other], self._box[other])
+    def _owners(self, r: int) -> tuple[Counts, Counts]:
+        """The node of each entry of a rank, or -1, and its box, or that of its connection."""
+        entries = np.array(self.order[r], dtype=np.int64)
+        count = len(self._owner)
+        point = entries < count
+        node = np.where(point, self._node_of[np.minimum(entries, count - 1)], -1)
+        link = np.where(point, -1, (entries - count) // self._height)
+        return node, np.where(point, self._box[node], self._box_of[link])
 
 
 def _between(before: Counts, i: int, j: int) -> int:

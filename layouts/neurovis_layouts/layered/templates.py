@@ -65,6 +65,7 @@ class Book:
         self._copies: dict[int, list[int]] = {}
         for number in range(len(modules)):
             self._copies.setdefault(self._find(number), []).append(number)
+        self._problems: dict[int, LayoutProblem] = {}
 
     def _find(self, number: int) -> int:
         while self._root[number] != number:
@@ -132,6 +133,11 @@ class Book:
 
     def problem_of(self, kind: int) -> LayoutProblem:
         """The problem of drawing one instance of this kind alone, its neurons numbered from 0."""
+        if kind not in self._problems:
+            self._problems[kind] = self._of(kind)
+        return self._problems[kind]
+
+    def _of(self, kind: int) -> LayoutProblem:
         copies = self._copies[kind]
         modules = self._problem.modules
         local = {number: {n: i for i, n in enumerate(modules[number].members)} for number in copies}
