@@ -23,7 +23,7 @@ from neurovis_layouts.routing.polylines import polylines
 from neurovis_layouts.routing.route_cost import ALONG, BENDING, ENTERING
 from neurovis_layouts.routing.walls import Walls, blocked, meet
 from neurovis_spec.layout import BoolArray, FloatArray, IntArray
-from neurovis_spec.layout.geometry import distance, sampled
+from neurovis_spec.layout.geometry import distance
 from neurovis_spec.layout.model import RADIUS, LayoutEdge, Point, Route
 
 #: How far off a frame's border lanes run.
@@ -165,12 +165,9 @@ class Detours:
     def along(self, source: int, target: int, path: Sequence[Point], rects: FloatArray) -> Route:
         """The route along a line, which others are to keep off."""
 
-        def clear(piece: Route) -> bool:
-            line = np.array(sampled(piece, 0.1), dtype=np.float64)
-            return not _blocked(line[:-1], line[1:], rects).any()
-
         def free(route: Route) -> bool:
-            return all(clear(route[start : start + 4]) for start in range(0, len(route) - 1, 3))
+            line = polylines([route])
+            return not _blocked(line.a, line.b, rects).any()
 
         self._taken.add(path)
         self._between.setdefault((min(source, target), max(source, target)), []).extend(path[1:-1])
@@ -193,8 +190,8 @@ class Detours:
         for clear in _CLEAR:
             whole = rects + clear * _OUT
             path: list[Point] = []
-            for k in range(len(stops) - 1):
-                leg = self._round(stops[k : k + 2], rects, whole, bends, alone)
+            for k, hit in enumerate(meet(stops[:-1], stops[1:], whole)):
+                leg = self._round(stops[k : k + 2], hit, rects, whole, bends, alone)
                 if leg is None:
                     break
                 path += leg if k == 0 else leg[1:]
@@ -203,21 +200,25 @@ class Detours:
         return None
 
     def _round(
-        self, ends: FloatArray, rects: FloatArray, whole: FloatArray, bends: Mapping[Point, float], alone: bool
+        self,
+        ends: FloatArray,
+        hit: BoolArray,
+        rects: FloatArray,
+        whole: FloatArray,
+        bends: Mapping[Point, float],
+        alone: bool,
     ) -> list[Point] | None:
-        """The shortest line round what is in its way: at first nothing, then whatever the last one ran into. It keeps
-        off rectangles ``whole`` and bends at the corners of ``rects``."""
-        met = np.zeros(len(rects), dtype=np.bool_)
-        if not alone:
-            met |= meet(ends[:1], ends[1:], rects + _OUT)[0]
-        path: list[Point] | None = [(x, y) for x, y in ends.tolist()]
-        while path is not None:
+        """The shortest line round what is in its way: at first what the straight line has ``hit``, then whatever the
+        last one ran into. It keeps off rectangles ``whole`` and bends at the corners of ``rects``."""
+        if alone and not hit.any():
+            return [(x, y) for x, y in ends.tolist()]
+        met = hit if alone else hit | meet(ends[:1], ends[1:], rects + _OUT)[0]
+        while path := self._shortest(_Corners(ends, rects[met]), whole[met], bends, alone):
             line = np.array(path, dtype=np.float64)
             new = meet(line[:-1], line[1:], whole).any(axis=0) & ~met
             if len(path) > 2 - alone and not new.any():
                 return path
             met |= new
-            path = self._shortest(_Corners(ends, rects[met]), whole[met], bends, alone)
         return None
 
     def _shortest(
