@@ -33,7 +33,7 @@ _ROUNDED = 1e-9
 WALLED = _WALL
 #: Places tried in a row, about; ways closer than this to the straight line are kept apart from, but for so many on
 #: either side.
-_CHOICES, _NEAR, _MOST_NEAR, _KEPT = 12, 2.0, 8, 2
+_CHOICES, _NEAR, _MOST_NEAR, _KEPT = 16, 2.0, 8, 2
 #: Where a way is pulled straight: over how many rows, how far aside, and how close to another.
 _FARTHEST, _ASIDE, _BESIDE_WAY = 40, 0.6, 0.12
 
