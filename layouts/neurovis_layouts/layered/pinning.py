@@ -1,17 +1,15 @@
 """Pinning: from a layout without pins to final places, with the pins exact and everything else moved off them.
 
 In: a ComponentLayout, the frames in it, pins. Out: a place for every neuron, a move for every frame. A frame with pins
-is moved to them, or drawn anew around them where they do not fit its drawing, or where that would lie on something else
-that is pinned; mirror images of pinned neurons follow; all else is moved as a whole, and then off what is pinned
-(``occupancy``).
+is moved to them, as it is or reflected. Where they do not fit its drawing, or where that would lie on something else
+that is pinned, its neurons are placed one by one around the pins, and it is drawn anew. Mirror images of pinned neurons
+follow; all else is moved as a whole, and then off what is pinned (``occupancy``).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from collections.abc import Set as AbstractSet
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -19,10 +17,10 @@ from neurovis_layouts.alike import Move
 from neurovis_layouts.axes import axes, imaged, shift_of
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.layered.component_layout import ComponentLayout
-from neurovis_layouts.layered.drawing import Drawing, FrameMove, Piece
+from neurovis_layouts.layered.drawing import FrameMove, Piece
 from neurovis_layouts.layered.parts import images_of
 from neurovis_layouts.occupancy import AxisSide, Body, Occupancy, Wish, instance_of, lone
-from neurovis_spec.layout.frames import Frames
+from neurovis_spec.layout.frames import PAD, Frames, titled
 from neurovis_spec.layout.geometry import Rect, bounds, meet, padded, shifted, snap
 from neurovis_spec.layout.model import GRID, RADIUS, LayoutProblem, LayoutRefusalError, Point
 
@@ -31,8 +29,9 @@ _SLACK = 1e-9
 _DISCS = 2 * RADIUS - 1e-9
 #: How far frames should keep off each other, so that lines find a way between them.
 _BETWEEN = 0.4
-#: Trials with frames reflected, and frames of which every two are reflected together, at most.
-_MOST_REFLECTED, _FEW = 500, 6
+#: So often it is asked of each frame whether it lies less on the others when it is reflected.
+_ROUNDS = 5
+_HERE = (0.0, 0.0)
 
 #: A part drawn anew, around pins of its neurons.
 Redraw = Callable[[Piece, Mapping[int, Point]], Piece]
@@ -51,34 +50,31 @@ class Settled:
 
 
 @dataclass(frozen=True, slots=True)
-class _Crowd:
-    """What is wrong with the places of what is pinned: a neuron stands among those of a frame that it is not in
-    (``refusal``); how deep frames lie on other things, in all, and how much too near to others they are. ``bodies`` are
-    those that lie on each other."""
+class _Trial:
+    """What pins make of the pieces with the axis at one place: pins with their images, how the plan moves, where the
+    pieces, then other neurons, would like to stand in the picture (a piece that its pins do not fit: these alone).
 
+    Of what is pinned: whether a neuron stands among those of a frame that it is not in (``refusal``), how deep frames
+    lie on other things, in all, and how much too near to others they are; the pieces that do not fit, and all that lie
+    on each other.
+    """
+
+    axis: float
+    pins: Mapping[int, Point]
+    shift: Point
+    pieces: list[Piece]
+    moves: list[FrameMove]
+    wishes: list[Wish]
     refusal: LayoutRefusalError | None
     depth: float
     near: float
-    bodies: frozenset[int]
+    unfit: frozenset[int]
+    crowded: frozenset[int]
 
     @property
     def order(self) -> tuple[bool, float, float]:
         """The less, the better."""
         return self.refusal is not None, self.depth, self.near
-
-
-@dataclass(frozen=True, slots=True)
-class _Trial:
-    """What pins make of the pieces with the axis at one place: pins with their images, how the plan moves, where the
-    pieces, then other neurons, would like to stand in the picture, and how what is pinned does there."""
-
-    axis: float
-    pins: Mapping[int, Point]
-    shift: Point
-    held: list[Piece]
-    moves: list[FrameMove]
-    wishes: list[Wish]
-    crowd: _Crowd
 
 
 def settled(
@@ -92,12 +88,12 @@ def settled(
     free = [plan.places[i] for i in range(len(problem.neurons))]
     if not problem.pins:
         return Settled(free, list(pieces))
-    trial = _best(problem, free, pieces, pair, _remembering(redraw))
+    trial = _best(problem, free, pieces, pair, redraw)
     found = {i: from_picture(point, problem.direction) for i, point in _arranged(problem, trial, pair).items()}
     done: list[tuple[Piece, FrameMove]] = []
-    for piece, move in zip(trial.held, trial.moves, strict=True):
+    for piece, move in zip(trial.pieces, trial.moves, strict=True):
         first = piece.part.members[0]
-        (x, y), (dx, dy) = found[first], FrameMove((0.0, 0.0), move.flip).point(piece.drawing.places[0])
+        (x, y), (dx, dy) = found[first], FrameMove(_HERE, move.flip).point(piece.drawing.places[0])
         pinned = not trial.pins.keys().isdisjoint(piece.part.members)
         done.append((piece, move if pinned else replace(move, shift=(x - dx, y - dy))))
     found.update(trial.pins)
@@ -107,25 +103,6 @@ def settled(
     return Settled(places, done, trial.shift, frozenset(range(len(free))) - kept, trial.axis)
 
 
-def _remembering(redraw: Redraw) -> Redraw:
-    """A redraw that draws nothing twice."""
-    known: dict[tuple[tuple[int, ...], tuple[tuple[int, Point], ...]], Piece | LayoutRefusalError] = {}
-
-    def remembering(piece: Piece, pins: Mapping[int, Point]) -> Piece:
-        key = piece.part.members, tuple(sorted(pins.items()))
-        if key not in known:
-            try:
-                known[key] = redraw(piece, pins)
-            except LayoutRefusalError as refusal:
-                known[key] = refusal
-        found = known[key]
-        if isinstance(found, LayoutRefusalError):
-            raise found
-        return found
-
-    return remembering
-
-
 def _best(
     problem: LayoutProblem,
     free: Sequence[Point],
@@ -133,51 +110,33 @@ def _best(
     pair: Mapping[int, int],
     redraw: Redraw,
 ) -> _Trial:
-    """The first trial in which nothing that is pinned lies on anything else; if there is none the one in which least
-    does: first with the axis elsewhere, then with frames reflected, then with frames drawn so that they make room."""
+    """The first place of the axis at which nothing that is pinned lies on anything else, or that at which least does;
+    with frames drawn anew where pins do not fit them, and where that makes room."""
     best: _Trial | None = None
     refusal: LayoutRefusalError | None = None
     wide = 2 + max((piece.rect[2] - piece.rect[0] for piece, _ in pieces), default=0.0)
-    reflected: AbstractSet[int] = frozenset()
-    places = list(axes(problem, free, pair, wide))
-    reflecting = [frozenset([number]) for number in _reflecting(problem, pieces, pair)]
-    reflecting += [one | other for one, other in combinations(reflecting[:_FEW], 2)]
-    for change in (frozenset[int](), *reflecting):
-        changed = reflected ^ change
-        for axis in places[: max(1, _MOST_REFLECTED // len(reflecting))] if change else places:
-            try:
-                pins = imaged(problem, pair, axis)
-                trial = _tried(problem, free, pieces, pair, redraw, axis, changed, pins)
-                refusal = refusal or trial.crowd.refusal
-                if best is None or trial.crowd.order < best.crowd.order:
-                    best, reflected = trial, changed
-            except LayoutRefusalError as found:
-                refusal = refusal or found
-            if best is not None and best.crowd.order == (False, 0.0, 0.0):
-                return best
-    if best is not None and (best.crowd.refusal is not None or best.crowd.depth):
-        bent = {**best.pins, **_bent(problem, best, pair)}
-        with suppress(LayoutRefusalError):  # around these pins it cannot be drawn
-            other = _tried(problem, free, pieces, pair, redraw, best.axis, reflected, bent)
-            best = min(best, other, key=lambda trial: trial.crowd.order)
-    if best is None or best.crowd.refusal is not None:
+    for axis in axes(problem, free, pair, wide):
+        try:
+            trial = _tried(problem, free, pieces, pair, axis)
+        except LayoutRefusalError as found:
+            refusal = refusal or found
+            continue
+        refusal = refusal or trial.refusal
+        if best is None or trial.order < best.order:
+            best = trial
+        if best.order == (False, 0.0, 0.0):
+            break
+    if best is not None and (best.unfit or best.refusal is not None or best.depth):
+        try:
+            bent = _bent(problem, free, best, pair, redraw)
+            refusal = refusal or bent.refusal
+            best = bent if best.unfit else min(best, bent, key=lambda trial: trial.order)
+        except LayoutRefusalError as found:  # around these pins it cannot be drawn
+            best, refusal = None if best.unfit else best, refusal or found
+    if best is None or best.refusal is not None:
         assert refusal is not None  # the first speaks of the drawings as they are
         raise refusal
     return best
-
-
-def _reflecting(
-    problem: LayoutProblem, pieces: Sequence[tuple[Piece, FrameMove]], pair: Mapping[int, int]
-) -> Iterator[int]:
-    """The pieces of which one neuron is pinned, itself or by its image, and that may be drawn as their mirror images
-    instead."""
-    pinned = problem.pins.keys() | {pair[i] for i in problem.pins if i in pair}
-    for number, (piece, _) in enumerate(pieces):
-        part = piece.part
-        if part.image_of < 0 and len(pinned.intersection(part.members)) == 1:
-            images = images_of(part, pair)
-            if not images or set(images) != set(part.members):
-                yield number
 
 
 def _tried(
@@ -185,76 +144,132 @@ def _tried(
     free: Sequence[Point],
     pieces: Sequence[tuple[Piece, FrameMove]],
     pair: Mapping[int, int],
-    redraw: Redraw,
     axis: float,
-    reflected: AbstractSet[int],
-    pins: Mapping[int, Point],
 ) -> _Trial:
-    """Raises LayoutRefusalError where a pin is not on its line."""
+    """Every piece with its move: those with pins moved to them, images as their images; where a frame may be reflected,
+    whichever lies less on others. Raises LayoutRefusalError where a pin is not on its line."""
+    pins = imaged(problem, pair, axis)
     across, along = shift_of(free, pins)
-    shift = (axis if pair else across, along)
-    held, moves = _held(pieces, pins, shift, axis, redraw, reflected)
-    wishes = [*_frames(problem, held, moves), *_neurons(problem, held, free, pins, shift)]
-    wishes = _on_lines(problem, wishes, pins)
-    return _Trial(axis, pins, shift, held, moves, wishes, _crowd(problem, wishes, pins))
-
-
-def _held(
-    pieces: Sequence[tuple[Piece, FrameMove]],
-    pins: Mapping[int, Point],
-    shift: Point,
-    axis: float,
-    redraw: Redraw,
-    reflected: AbstractSet[int],
-) -> tuple[list[Piece], list[FrameMove]]:
-    """Every piece with its move; those with pins moved to them, or drawn anew. The pieces ``reflected``, and their
-    images, are drawn as their mirror images if the pins allow that."""
-    found: list[Piece] = []
-    moves: list[FrameMove] = []
+    shift = axis if pair else across, along
+    framed = {m for piece, _ in pieces for m in piece.part.members}
+    taken: list[Rect] = [padded((*point, *point), RADIUS) for m, point in pins.items() if m not in framed]
+    options: list[list[FrameMove]] = []
+    unfit: set[int] = set()
+    rects: dict[int, list[list[Rect]]] = {}
     for number, (piece, move) in enumerate(pieces):
         own = {place: pins[m] for place, m in enumerate(piece.part.members) if m in pins}
         wish = FrameMove((move.shift[0] + shift[0], move.shift[1] + shift[1]), move.flip)
-        if own:
-            fitting = [
-                at for flip in (move.flip, not move.flip) if (at := _fitted(piece.drawing, own, flip)) is not None
-            ]
+        fitting: list[FrameMove] = []
+        if own and piece.part.image_of < 0:
+            fitted = [_fitted(piece, own, flip) for flip in (move.flip, not move.flip)]
+            fitting = [at for at, off in fitted if off <= _SLACK]
+            images = images_of(piece.part, pair)
+            two = bool(images) and set(images) != set(piece.part.members)
             if fitting:
-                original = number if piece.part.image_of < 0 else piece.part.image_of
-                wish = fitting[-1 if original in reflected else 0]
-            elif piece.part.image_of >= 0:
-                piece = replace(found[piece.part.image_of], part=piece.part)
-                wish = FrameMove(
-                    (2 * axis - moves[piece.part.image_of].shift[0], 0.0), not moves[piece.part.image_of].flip
-                )
+                rects[number] = [
+                    [m.rect(piece.rect) for m in ((at, _image(at, axis)) if two else (at,))] for at in fitting
+                ]
             else:
-                piece, wish = redraw(piece, own), FrameMove((0.0, 0.0))
-        found.append(piece)
-        moves.append(wish)
-    return found, moves
+                mean = fitted[0][0].shift
+                unfit.add(number)
+                wish = replace(wish, shift=mean if two or not images else (wish.shift[0], mean[1]))
+        options.append(fitting or [wish])
+    chosen = dict.fromkeys(rects, 0)
+    for number, own_rects in [*rects.items()] * _ROUNDS:
+        rest = taken + [rect for n, k in chosen.items() if n != number for rect in rects[n][k]]
+        chosen[number] = min(range(len(own_rects)), key=lambda k: _meeting([*rest, *own_rects[k]], len(rest)))
+    moves = [own[chosen.get(number, 0)] for number, own in enumerate(options)]
+    for number, (piece, _) in enumerate(pieces):
+        if piece.part.image_of >= 0 and not pins.keys().isdisjoint(piece.part.members):
+            moves[number] = _image(moves[piece.part.image_of], axis)
+            unfit |= {number} if piece.part.image_of in unfit else set()
+    return _trial(problem, free, [piece for piece, _ in pieces], moves, pins, shift, axis, pair, frozenset(unfit))
 
 
-def _fitted(drawing: Drawing, pins: Mapping[int, Point], flip: bool) -> FrameMove | None:
-    """The move that takes a drawing to its pins, if one does."""
-    reflection = FrameMove((0.0, 0.0), flip)
-    apart = []
+def _image(move: FrameMove, axis: float) -> FrameMove:
+    """The move of a mirror image."""
+    return FrameMove((2 * axis - move.shift[0], move.shift[1]), not move.flip)
+
+
+def _meeting(rects: Sequence[Rect], first: int) -> float:
+    """How deep those from the ``first`` on lie on others, and on each other."""
+    pairs = ((one, other) for k, one in enumerate(rects) if k >= first for other in rects[:k])
+    return math.fsum(max(0.0, _depth(one, other) + _BETWEEN) for one, other in pairs)
+
+
+def _fitted(piece: Piece, pins: Mapping[int, Point], flip: bool) -> tuple[FrameMove, float]:
+    """The move that takes a drawing to its pins, in the mean, and how far off it is from one of them at most."""
+    reflection = FrameMove(_HERE, flip)
+    apart: list[Point] = []
     for place, (x, y) in sorted(pins.items()):
-        px, py = reflection.point(drawing.places[place])
+        px, py = reflection.point(piece.drawing.places[place])
         apart.append((x - px, y - py))
-    x, y = apart[0]
-    if any(abs(x - dx) > _SLACK or abs(y - dy) > _SLACK for dx, dy in apart):
-        return None
-    return FrameMove((snap(x), snap(y)), flip)
+    (x, y), count = apart[0], len(apart)
+    off = max(max(abs(x - dx), abs(y - dy)) for dx, dy in apart)
+    if off > _SLACK:
+        x, y = math.fsum(dx for dx, _ in apart) / count, math.fsum(dy for _, dy in apart) / count
+    return FrameMove((snap(x), snap(y)), flip), off
 
 
-def _frames(problem: LayoutProblem, pieces: Sequence[Piece], moves: Sequence[FrameMove]) -> Iterator[Wish]:
-    number = {box: len(problem.modules) + k for k, box in enumerate(_boxes(pieces))}
-    for piece, move in zip(pieces, moves, strict=True):
-        part, reflection = piece.part, FrameMove((0.0, 0.0), move.flip)
+def _trial(
+    problem: LayoutProblem,
+    free: Sequence[Point],
+    pieces: list[Piece],
+    moves: list[FrameMove],
+    pins: Mapping[int, Point],
+    shift: Point,
+    axis: float,
+    pair: Mapping[int, int],
+    unfit: frozenset[int] = frozenset(),
+) -> _Trial:
+    """How what is pinned lies on each other; single neurons that do are refused before."""
+    wishes = list(_frames(problem, pieces, moves, pins, unfit))
+    framed = {m for piece in pieces for m in piece.part.members}
+    for i, (x, y) in enumerate(free):
+        if i not in framed:
+            place = pins.get(i, (x + shift[0], y + shift[1]))
+            wishes.append(Wish((lone(i),), to_picture(place, problem.direction)))
+    wishes = _on_lines(problem, wishes, pins)
+    pinned = [b for b, wish in enumerate(wishes) if not pins.keys().isdisjoint(wish.bodies[0].members)]
+    # what is pinned itself before images, so that a refusal speaks of what the spec says
+    pinned.sort(key=lambda b: problem.pins.keys().isdisjoint(wishes[b].bodies[0].members))
+    refusal: LayoutRefusalError | None = None
+    depths, nears = [0.0], [0.0]
+    crowded: set[int] = set()
+    for pairing in combinations(pinned, 2):
+        one, other = (wishes[b] for b in pairing)
+        if not (_is_frame(one) or _is_frame(other)):
+            continue
+        depth = _depth(_rect(one), _rect(other))
+        depths.append(max(0.0, depth))
+        nears.append(max(0.0, depth + (_BETWEEN if _is_frame(one) and _is_frame(other) else RADIUS)))
+        inside = meet(_neurons_of(one), _neurons_of(other), _DISCS)
+        if inside and refusal is None:
+            refusal = _refusal(problem, one, other)
+        if depth > 0 or inside:
+            crowded.update(pairing)
+    depth, near = math.fsum(depths), math.fsum(nears)
+    return _Trial(axis, pins, shift, pieces, moves, wishes, refusal, depth, near, unfit, frozenset(crowded))
+
+
+def _frames(
+    problem: LayoutProblem,
+    pieces: Sequence[Piece],
+    moves: Sequence[FrameMove],
+    pins: Mapping[int, Point],
+    unfit: frozenset[int],
+) -> Iterator[Wish]:
+    boxes = {box: len(problem.modules) + k for k, box in enumerate(_boxes(pieces))}
+    for number, (piece, move) in enumerate(zip(pieces, moves, strict=True)):
+        part, reflection, anchor = piece.part, FrameMove(_HERE, move.flip), to_picture(move.shift, problem.direction)
         places = (to_picture(reflection.point(place), problem.direction) for place in piece.drawing.places)
         offsets = tuple(zip(part.members, places, strict=True))
-        frame = part.module if part.module >= 0 else number.get(part.box, -1)
         rect = _in_picture(reflection.rect(piece.rect), problem)
-        yield Wish((Body(offsets, frame, rect),), to_picture(move.shift, problem.direction))
+        if number in unfit:
+            anchor = _HERE
+            offsets = tuple((m, to_picture(pins[m], problem.direction)) for m in part.members if m in pins)
+            rect = titled(padded(bounds(point for _, point in offsets), PAD))
+        yield Wish((Body(offsets, part.module if part.module >= 0 else boxes.get(part.box, -1), rect),), anchor)
 
 
 def _boxes(pieces: Sequence[Piece]) -> list[int]:
@@ -264,16 +279,6 @@ def _boxes(pieces: Sequence[Piece]) -> list[int]:
 
 def _in_picture(rect: Rect, problem: LayoutProblem) -> Rect:
     return bounds([to_picture(rect[:2], problem.direction), to_picture(rect[2:], problem.direction)])
-
-
-def _neurons(
-    problem: LayoutProblem, pieces: Sequence[Piece], free: Sequence[Point], pins: Mapping[int, Point], shift: Point
-) -> Iterator[Wish]:
-    framed = {m for piece in pieces for m in piece.part.members}
-    for i, (x, y) in enumerate(free):
-        if i not in framed:
-            place = pins[i] if i in pins else (x + shift[0], y + shift[1])
-            yield Wish((lone(i),), to_picture(place, problem.direction))
 
 
 def _across(problem: LayoutProblem) -> int:
@@ -293,6 +298,8 @@ def _on_lines(problem: LayoutProblem, wishes: list[Wish], pins: Mapping[int, Poi
     for line in problem.align:
         heights = [to_picture(pins[m], problem.direction)[along] for m in line if m in pins]
         for member in line:
+            if member not in owner:
+                continue
             b, offset = owner[member]
             wish = result[b]
             if heights:
@@ -310,35 +317,13 @@ def _on_lines(problem: LayoutProblem, wishes: list[Wish], pins: Mapping[int, Poi
     return result
 
 
-def _crowd(problem: LayoutProblem, wishes: Sequence[Wish], pins: Mapping[int, Point]) -> _Crowd:
-    """How what is pinned lies on each other where it would like to stand; single neurons that do are refused before."""
-    pinned = [b for b, wish in enumerate(wishes) if not pins.keys().isdisjoint(wish.bodies[0].members)]
-    # what is pinned itself before images, so that a refusal speaks of what the spec says
-    pinned.sort(key=lambda b: problem.pins.keys().isdisjoint(wishes[b].bodies[0].members))
-    frames = [b for b in pinned if _is_frame(wishes[b])]
-    single = [b for b in pinned if not _is_frame(wishes[b])]
-    refusal: LayoutRefusalError | None = None
-    depths: list[float] = []
-    nears: list[float] = []
-    found: set[int] = set()
-    for k, one in enumerate(frames):
-        own, tight = wishes[one].bodies[0].framed(wishes[one].anchor), _neurons_of(wishes[one])
-        for other in (*frames[k + 1 :], *single):
-            body = wishes[other].bodies[0]
-            theirs = body.framed(wishes[other].anchor) if _is_frame(wishes[other]) else _neurons_of(wishes[other])
-            depth = _depth(own, theirs)
-            depths.append(max(0.0, depth))
-            nears.append(max(0.0, depth + (_BETWEEN if _is_frame(wishes[other]) else RADIUS)))
-            inside = meet(tight, _neurons_of(wishes[other]), _DISCS)
-            if inside and refusal is None:
-                refusal = _refusal(problem, wishes[one], wishes[other])
-            if depth > 0 or inside:
-                found |= {one, other}
-    return _Crowd(refusal, math.fsum(depths), math.fsum(nears), frozenset(found))
-
-
 def _is_frame(wish: Wish) -> bool:
     return any(wish.bodies[0].rect)
+
+
+def _rect(wish: Wish) -> Rect:
+    """The frame, or, where there is none, the centre."""
+    return wish.bodies[0].framed(wish.anchor) if _is_frame(wish) else _neurons_of(wish)
 
 
 def _neurons_of(wish: Wish) -> Rect:
@@ -368,36 +353,22 @@ def _refusal(problem: LayoutProblem, one: Wish, other: Wish) -> LayoutRefusalErr
     )
 
 
-def _occupancy(problem: LayoutProblem, trial: _Trial, pair: Mapping[int, int]) -> Occupancy:
-    """Nothing yet, with the frames of this trial and the sides of the axis that mirror images are on."""
-    boxes = tuple(problem.boxes[box] for box in _boxes(trial.held))
-    across = _across(problem)
+def _arranged(problem: LayoutProblem, trial: _Trial, pair: Mapping[int, int]) -> Mapping[int, Point]:
+    """Where each neuron that has a wish stands in the picture: what is pinned first, then what is free where it would
+    like to be, then the rest, mirror images together. Raises LayoutRefusalError where a line has no room."""
+    wishes, across = trial.wishes, _across(problem)
+    owner = {m: b for b, wish in enumerate(wishes) for m in wish.bodies[0].members}
     sides: dict[int, AxisSide] = {}
-    for wish in trial.wishes:
+    for wish in wishes:
         for m, point in wish.bodies[0].spots(wish.anchor):
             if m in pair and point[across] != trial.axis:
                 sides[m] = AxisSide(across, trial.axis, 1 if point[across] > trial.axis else -1)
-    return Occupancy(Frames(replace(problem, boxes=boxes)), sides=sides)
-
-
-def _reflected(problem: LayoutProblem, axis: float, body: Body, members: Sequence[int], frame: int) -> Body:
-    """A body of these neurons that is the mirror image of another."""
-    offsets = tuple((m, offset) for m, (_, offset) in zip(members, body.offsets, strict=True))
-    across = _across(problem)
-    move = Move(_put((1.0, 1.0), across, -1.0), _put((0.0, 0.0), across, 2 * axis))
-    return Body(offsets, frame, body.rect, move)
-
-
-def _arranged(problem: LayoutProblem, trial: _Trial, pair: Mapping[int, int]) -> Mapping[int, Point]:
-    """Where each neuron stands in the picture: what is pinned first, then what is free where it would like to be, then
-    the rest, mirror images together. Raises LayoutRefusalError where a line has no room."""
-    wishes, across = trial.wishes, _across(problem)
-    owner = {m: b for b, wish in enumerate(wishes) for m in wish.bodies[0].members}
-    image = [owner[pair[m]] if (m := wish.bodies[0].members[0]) in pair else -1 for wish in wishes]
-    occupancy = _occupancy(problem, trial, pair)
+    boxes = tuple(problem.boxes[box] for box in _boxes(trial.pieces))
+    occupancy = Occupancy(Frames(replace(problem, boxes=boxes)), sides=sides)
     free: list[Wish] = []
     for b, wish in enumerate(wishes):
-        body, other = wish.bodies[0], image[b]
+        body = wish.bodies[0]
+        other = owner.get(pair.get(body.members[0], -1), -1)
         if not trial.pins.keys().isdisjoint(body.members):
             occupancy.enter(wish.bodies, wish.anchor)
         elif other == b or (other < 0 and pair and wish.anchor[across] == trial.axis):
@@ -411,7 +382,9 @@ def _arranged(problem: LayoutProblem, trial: _Trial, pair: Mapping[int, int]) ->
                 along = 1 - across
                 level = wish if not wish.along[along] else mate
                 wish = replace(wish, anchor=_put(wish.anchor, along, level.anchor[along]), along=level.along)
-            bodies = body, _reflected(problem, trial.axis, body, [pair[m] for m in body.members], mate.bodies[0].frame)
+            images = tuple((pair[m], offset) for m, offset in body.offsets)
+            move = Move(_put((1.0, 1.0), across, -1.0), _put(_HERE, across, 2 * trial.axis))
+            bodies = body, Body(images, mate.bodies[0].frame, body.rect, move)
             free.append(replace(wish, bodies=bodies, clear=wish.clear and mate.clear))
     lost = occupancy.settle(free)
     if lost:
@@ -420,45 +393,43 @@ def _arranged(problem: LayoutProblem, trial: _Trial, pair: Mapping[int, int]) ->
     return occupancy.placed
 
 
-def _bent(problem: LayoutProblem, trial: _Trial, pair: Mapping[int, int]) -> dict[int, Point]:
-    """Places for the neurons of frames that are pinned on each other, one by one around the pins, so that the frames
-    have room; those that a module pins stay where its drawing has them. In the engine's frame, as pins."""
-    first = {
-        n if (n := piece.part.image_of) >= 0 else b for b, piece in enumerate(trial.held) if b in trial.crowd.bodies
-    }
-    bending = first | {b for b, piece in enumerate(trial.held) if piece.part.image_of in first}
-    firm = trial.pins.keys() | {m for module in problem.modules for m in module.pins}
-    lined = {m for line in problem.align for m in line}
-    across, occupancy = _across(problem), _occupancy(problem, trial, pair)
-    for b, wish in enumerate(trial.wishes):
-        if b in bending:
-            for m, point in wish.bodies[0].spots(wish.anchor):
-                if m in firm:
-                    occupancy.enter((lone(m),), point)
-        elif not trial.pins.keys().isdisjoint(wish.bodies[0].members):
-            occupancy.enter(wish.bodies, wish.anchor)
-    for b in sorted(first):
-        where = dict(trial.wishes[b].bodies[0].spots(trial.wishes[b].anchor))
-        for body in _within(problem, trial.held[b], trial.moves[b], where, firm):
-            member, point = body.members[0], where[body.members[0]]
-            if member in occupancy.placed:
-                continue
-            images = [pair[m] for m in body.members if m in pair]
-            bodies = [body]
-            if len(images) == len(body.members):
-                bodies.append(_reflected(problem, trial.axis, body, images, instance_of(problem, images)))
-            on_axis = bool(pair) and not images and point[across] == trial.axis
-            free = not on_axis, lined.isdisjoint(body.members)
-            occupancy.put(Wish(bodies, point, free if across == 0 else free[::-1]))
-    bent = {m for b in bending for m in trial.held[b].part.members}
-    return {m: from_picture(point, problem.direction) for m, point in occupancy.placed.items() if m in bent}
+def _bent(
+    problem: LayoutProblem, free: Sequence[Point], trial: _Trial, pair: Mapping[int, int], redraw: Redraw
+) -> _Trial:
+    """The trial with pieces drawn anew that their pins do not fit, or that lie on others: their neurons where they are,
+    as far as there is room beside all that is pinned."""
+    pieces, moves, pins = list(trial.pieces), list(trial.moves), dict(trial.pins)
+    first = {n if (n := pieces[b].part.image_of) >= 0 else b for b in trial.unfit | trial.crowded if b < len(pieces)}
+    loose = first | {b for b, piece in enumerate(pieces) if piece.part.image_of in first}
+    wishes = [
+        wish
+        for b, wish in enumerate(trial.wishes)
+        if b not in loose and not pins.keys().isdisjoint(wish.bodies[0].members)
+    ]
+    for b in sorted(loose):
+        wishes += _within(problem, pieces[b], moves[b], pins)
+    found = _arranged(problem, replace(trial, wishes=_on_lines(problem, wishes, pins)), pair)
+    for b in sorted(loose):
+        part = pieces[b].part
+        pins.update({m: from_picture(found[m], problem.direction) for m in part.members})
+        if b in first:
+            own = {place: pins[m] for place, m in enumerate(part.members)}
+            pieces[b], moves[b] = redraw(pieces[b], own), FrameMove(_HERE)
+        else:
+            pieces[b], moves[b] = replace(pieces[part.image_of], part=part), FrameMove((2 * trial.axis, 0.0), True)
+    return _trial(problem, free, pieces, moves, dict(sorted(pins.items())), trial.shift, trial.axis, pair)
 
 
-def _within(
-    problem: LayoutProblem, piece: Piece, move: FrameMove, where: Mapping[int, Point], firm: AbstractSet[int]
-) -> Iterator[Body]:
-    """What of a piece is placed by itself: instances in it of which nothing is firm, then neurons."""
+def _within(problem: LayoutProblem, piece: Piece, move: FrameMove, pins: Mapping[int, Point]) -> Iterator[Wish]:
+    """What of a piece is placed by itself: what its module pins before all others, then instances in it of which
+    nothing is pinned, then neurons."""
     members = piece.part.members
+    where = {
+        m: to_picture(pins.get(m, move.point(place)), problem.direction)
+        for m, place in zip(members, piece.drawing.places, strict=True)
+    }
+    firm = [m for m in members if m in pins or any(m in module.pins for module in problem.modules)]
+    yield from (Wish((lone(m),), where[m]) for m in firm)
     done = set(firm)
     for own, rect in piece.drawing.frames:
         inside = [members[place] for place in own]
@@ -466,6 +437,8 @@ def _within(
         if frame >= 0 and done.isdisjoint(inside):
             x, y = where[inside[0]]
             offsets = tuple((m, (where[m][0] - x, where[m][1] - y)) for m in inside)
-            yield Body(offsets, frame, shifted(_in_picture(move.rect(rect), problem), (-x, -y)))
+            yield Wish(
+                (Body(offsets, frame, shifted(_in_picture(move.rect(rect), problem), (-x, -y))),), (x, y), clear=False
+            )
             done.update(inside)
-    yield from (lone(m) for m in members if m not in done)
+    yield from (Wish((lone(m),), where[m], clear=False) for m in members if m not in done)
