@@ -25,12 +25,30 @@ def shift_of(free: Sequence[Point], pins: Mapping[int, Point]) -> Point:
     )
 
 
-def axes(problem: LayoutProblem, free: Sequence[Point], pair: Mapping[int, int], wide: float) -> Iterator[float]:
-    """Where the axis may be, the best place first: one place where both of a pair are pinned, else also so far off that
-    nothing ``wide`` around a pin reaches it.
+def axes(
+    problem: LayoutProblem, free: Sequence[Point], pair: Mapping[int, int], wide: float
+) -> Iterator[tuple[float, dict[int, Point]]]:
+    """Where the axis may be, the best place first, each with the pins and their images: one place where both of a pair
+    are pinned, else also so far off that nothing ``wide`` around a pin reaches it.
 
-    Raises LayoutRefusalError where such pairs disagree.
+    Raises LayoutRefusalError where such pairs disagree, and where an image stands on a pin wherever the axis is.
     """
+    refusal: LayoutRefusalError | None = None
+    found = False
+    for axis in _places(problem, free, pair, wide):
+        try:
+            pins = _imaged(problem, pair, axis)
+        except LayoutRefusalError as error:
+            refusal = refusal or error
+        else:
+            found = True
+            yield axis, pins
+    if refusal is not None and not found:
+        raise refusal
+
+
+def _places(problem: LayoutProblem, free: Sequence[Point], pair: Mapping[int, int], wide: float) -> Iterator[float]:
+    """Where the axis may be. Raises LayoutRefusalError where pinned pairs disagree."""
     pins = problem.pins
     both = sorted((a, b) for a, b in pair.items() if a < b and a in pins and b in pins)
     for a, b in both:
@@ -56,7 +74,7 @@ def axes(problem: LayoutProblem, free: Sequence[Point], pair: Mapping[int, int],
     yield snap(min(across) - wide)
 
 
-def imaged(problem: LayoutProblem, pair: Mapping[int, int], axis: float) -> dict[int, Point]:
+def _imaged(problem: LayoutProblem, pair: Mapping[int, int], axis: float) -> dict[int, Point]:
     """The pins with their images. Raises LayoutRefusalError where one of these stands on a pin."""
     images = {pair[i]: (2 * axis - x, y) for i, (x, y) in problem.pins.items() if i in pair}
     found = dict(sorted({**images, **problem.pins}.items()))

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from neurovis_layouts.axes import axes, imaged
+from neurovis_layouts.axes import axes
 from neurovis_layouts.frame import from_picture
 from neurovis_layouts.routing.ends import keys_of
 from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
@@ -103,19 +103,8 @@ def about_pins(problem: LayoutProblem, symmetry: Symmetry, places: FloatArray) -
     held by a pin, or by that of its image (p,), in order, and where (p, 2), in the engine's frame."""
     turned = replace(problem, pins={i: from_picture(point, problem.direction) for i, point in problem.pins.items()})
     pair = {i: int(symmetry.image[i]) for i in np.flatnonzero(symmetry.paired).tolist()}
-    axis, held = 0.0, dict(turned.pins)
-    refusal: LayoutRefusalError | None = None
-    if pair and held:
-        free = [(float(x), float(y)) for x, y in places[: len(problem.neurons)].tolist()]
-        for axis in axes(turned, free, pair, _WIDE * problem.neuron_spacing):
-            try:
-                held = imaged(turned, pair, axis)
-                break
-            except LayoutRefusalError as found:
-                refusal = found
-        else:
-            assert refusal is not None
-            raise refusal
+    free = [(float(x), float(y)) for x, y in places[: len(problem.neurons)].tolist()]
+    axis, held = next(axes(turned, free, pair, _WIDE * problem.neuron_spacing)) if turned.pins else (0.0, turned.pins)
     fixed = np.array(sorted(held), dtype=np.int64)
     there = np.array([held[i] for i in fixed.tolist()], dtype=np.float64).reshape(-1, 2)
     return replace(symmetry, axis=axis), fixed, there

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 from neurovis_layouts.alike import Move
-from neurovis_layouts.axes import axes, imaged, shift_of
+from neurovis_layouts.axes import axes, shift_of
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.layered.component_layout import ComponentLayout
 from neurovis_layouts.layered.drawing import FrameMove, Piece
@@ -115,9 +115,9 @@ def _best(
     best: _Trial | None = None
     refusal: LayoutRefusalError | None = None
     wide = 2 + max((piece.rect[2] - piece.rect[0] for piece, _ in pieces), default=0.0)
-    for axis in axes(problem, free, pair, wide):
+    for axis, pins in axes(problem, free, pair, wide):
         try:
-            trial = _tried(problem, free, pieces, pair, axis)
+            trial = _tried(problem, free, pieces, pair, axis, pins)
         except LayoutRefusalError as found:
             refusal = refusal or found
             continue
@@ -145,10 +145,10 @@ def _tried(
     pieces: Sequence[tuple[Piece, FrameMove]],
     pair: Mapping[int, int],
     axis: float,
+    pins: Mapping[int, Point],
 ) -> _Trial:
     """Every piece with its move: those with pins moved to them, images as their images; where a frame may be reflected,
     whichever lies less on others. Raises LayoutRefusalError where a pin is not on its line."""
-    pins = imaged(problem, pair, axis)
     across, along = shift_of(free, pins)
     shift = axis if pair else across, along
     framed = {m for piece, _ in pieces for m in piece.part.members}
