@@ -1,92 +1,146 @@
-"""Conflicts: where the places of an earlier layout break a symmetry of the spec, the symmetry wins.
+"""Conflicts: what of an earlier layout, which somebody may have edited by hand, can stay.
 
-In: a problem, a fresh layout of it, and the places of an earlier layout, which may have been edited by hand. Out: new
-places for the neurons that have to move: those of an instance follow the first instance of the same make; of a mirrored
-pair the one that was not moved by hand follows the other (else the second follows the first). Where the fresh layout
-is not symmetric either, nothing moves.
+In: a problem with an earlier layout, and a fresh one. Out: a place for each neuron that the earlier one knew or that is
+pinned, and who has to leave it. What was moved by hand differs from where the file's routes begin or end; it
+stays, and what it lies on then gives way. Where the earlier places break a symmetry of the spec, the symmetry wins:
+neurons of an instance follow the first instance of the same make; of a mirrored pair the one that was not moved by hand
+follows the other (else the second follows the first). Where the fresh layout is not symmetric either, nothing moves.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
-from neurovis_layouts.occupancy import overlapping
-from neurovis_spec.layout.model import LayoutModule, LayoutProblem, Point
+from neurovis_layouts.occupancy import Body, Occupancy, lone, overlapping
+from neurovis_spec.layout.frames import Frames
+from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.model import Layout, LayoutModule, LayoutProblem, Point, Route
 
 #: Differences up to this are rounding.
 _SLACK = 1e-6
+#: What bodies are anchored at that stand where they are.
+_HERE = (0.0, 0.0)
+_SAME = (1.0, 1.0)
 
 
-def resolved(
-    problem: LayoutProblem, fresh: Sequence[Point], known: Mapping[int, Point], hand: Mapping[int, Point]
-) -> tuple[dict[int, Point], dict[int, Point]]:
-    """Two mappings: the wanted places of neurons that cannot stay where they were, and of all that is placed together
-    with them; and the places given by hand (``hand`` says where these neurons were before) or derived from such places.
-    Both are empty where the earlier layout breaks no symmetry."""
-    where = dict(known)
-    moved: set[int] = set()
-    _follow_makes(problem, fresh, where, moved)
-    put = set(hand) - moved
-    _follow_mirrors(problem, fresh, where, moved, hand, put)
-    both = whole(problem, overlapping({i: where[i] for i in put}, problem.pins)) & put
+@dataclass(frozen=True, slots=True)
+class Earlier:
+    """Where neurons were, or are to be: those that ``stay`` there, those that are ``wanted`` there if there is room,
+    and others, which overlap one that stays; and the routes, by edge, that can be used between these places."""
+
+    where: Mapping[int, Point]
+    stay: frozenset[int]
+    wanted: frozenset[int]
+    routes: Mapping[int, Route]
+
+
+def earlier(problem: LayoutProblem, fresh: Sequence[Point]) -> Earlier:
+    """What the earlier layout of a problem says, and its pins, which go before that."""
+    assert problem.memory is not None
+    there, pins = problem.memory.positions, problem.pins
+    known = {i: there[name] for i, name in enumerate(problem.neurons) if name in there}
+    where, hand = {**known, **pins}, _by_hand(problem, known)
+    wanted: set[int] = set()
+    _follow_makes(problem, fresh, where, wanted)
+    put = set(hand) - wanted
+    _follow_mirrors(problem, fresh, where, wanted, hand, put)
+    both = whole(problem, overlapping({i: where[i] for i in put}, pins)) & put
     put -= both
-    moved |= both
-    moved -= problem.pins.keys() | put
-    return {i: where[i] for i in sorted(moved)}, {i: where[i] for i in sorted(put)}
+    wanted = (wanted | both) - put - pins.keys()
+    where.update(pins)
+    routes = carried(problem, problem.memory, where)
+    newly = put | {i for i, point in pins.items() if known.get(i) != point}
+    wanted |= (whole(problem, _giving_way(problem, where, newly, routes)) & where.keys()) - pins.keys() - put
+    # neurons that overlap a pin (or, in a file edited by hand, a neuron before them) are placed anew, like new ones
+    stay = where.keys() - wanted
+    stay -= overlapping({i: where[i] for i in stay - pins.keys()}, pins)
+    return Earlier(where, frozenset(stay), frozenset(wanted), routes)
+
+
+def carried(problem: LayoutProblem, layout: Layout, placed: Mapping[int, Point]) -> dict[int, Route]:
+    """The routes of a layout, by edge, whose two ends are where they were or were moved by the same amount; moved
+    along."""
+    found: dict[int, Route] = {}
+    for number, edge in enumerate(problem.edges):
+        route = layout.routes.get(edge.name)
+        if route is None or edge.source not in placed or edge.target not in placed:
+            continue
+        (x, y), (a, b) = placed[edge.source], placed[edge.target]
+        dx, dy = x - route[0][0], y - route[0][1]
+        if _equal((a, b), (route[-1][0] + dx, route[-1][1] + dy)):
+            found[number] = tuple((p + dx, q + dy) for p, q in route) if dx or dy else route
+    return found
+
+
+def _by_hand(problem: LayoutProblem, now: Mapping[int, Point]) -> dict[int, Point]:
+    """The neurons that were moved, with where they were. An instance of which only a part was moved is not among them:
+    it contradicts its template, which a file cannot change."""
+    before: dict[int, Point] = {}
+    for edge in problem.edges:
+        route = problem.memory.routes.get(edge.name) if problem.memory else None
+        if route is not None:
+            before.setdefault(edge.source, route[0])
+            before.setdefault(edge.target, route[-1])
+    before = {i: point for i, point in before.items() if i in now}
+    moved = {i: point for i, point in before.items() if distance(point, now[i]) > _SLACK}
+    for own in _outermost(problem).values():
+        known = own & before.keys()
+        if moved.keys().isdisjoint(known):
+            continue
+        shifts = [(now[i][0] - before[i][0], now[i][1] - before[i][1]) for i in known]
+        x, y = shifts[0]
+        rigid = all(_equal(shift, (x, y)) for shift in shifts)
+        moved = {i: point for i, point in moved.items() if i not in own}
+        moved |= {i: (now[i][0] - x, now[i][1] - y) for i in own if rigid and i in now}
+    return {i: moved[i] for i in sorted(moved.keys() - problem.pins.keys())}
 
 
 def _follow_makes(problem: LayoutProblem, fresh: Sequence[Point], where: dict[int, Point], moved: set[int]) -> None:
-    across = 0 if problem.direction in ("down", "up") else 1
-    mirrored = (-1.0, 1.0) if across == 0 else (1.0, -1.0)
+    across = _across(problem)
+    mirrored, upside_down = ((-1.0, 1.0), (1.0, -1.0))[:: 1 if across == 0 else -1]
     makes: dict[str, list[LayoutModule]] = {}
     for module in problem.modules:
         makes.setdefault(module.template, []).append(module)
     for make in makes.values():
         # what is pinned may be bent by its pins
-        make = sorted(make, key=lambda module: not problem.pins.keys().isdisjoint(module.members))
-        first = next((m for m in make if any(i in where for i in m.members)), None)
+        make.sort(key=lambda module: not problem.pins.keys().isdisjoint(module.members))
+        first = next((m for m in make if not where.keys().isdisjoint(m.members)), make[0])
         for other in make:
-            if first is None or other is first:
-                continue
             pairs = [(a, b) for a, b in zip(first.members, other.members, strict=True) if a in where and b in where]
-            if not pairs or not any(_alike(pairs, fresh, fresh, flip) for flip in ((1.0, 1.0), mirrored)):
+            if other is first or not any(_alike(pairs, fresh, flip) for flip in (_SAME, mirrored)):
                 continue
-            if any(_alike(pairs, where, where, flip) for flip in ((1.0, 1.0), mirrored, (mirrored[1], mirrored[0]))):
+            if any(_alike(pairs, where, flip) for flip in (_SAME, mirrored, upside_down)):
                 continue
-            flip, shift = _best_fit(pairs, where, ((1.0, 1.0), mirrored), problem.pins)
+            flip, shift = _best_fit(pairs, where, (_SAME, mirrored), problem.pins)
             for a, b in pairs:
                 where[b] = shift[0] + flip[0] * where[a][0], shift[1] + flip[1] * where[a][1]
             moved.update(whole(problem, [b for _, b in pairs]) & where.keys())
 
 
-def _alike(
-    pairs: Sequence[tuple[int, int]],
-    one: Mapping[int, Point] | Sequence[Point],
-    other: Mapping[int, Point] | Sequence[Point],
-    flip: Point,
-) -> bool:
+def _alike(pairs: Sequence[tuple[int, int]], where: Mapping[int, Point] | Sequence[Point], flip: Point) -> bool:
     """Whether the second of the pairs stand as the first do, but for a flip and a shift."""
-    shifts = [(other[b][0] - flip[0] * one[a][0], other[b][1] - flip[1] * one[a][1]) for a, b in pairs]
-    x, y = shifts[0]
-    return all(abs(a - x) <= _SLACK and abs(b - y) <= _SLACK for a, b in shifts)
+    shifts = [_shift(where[a], where[b], flip) for a, b in pairs]
+    return bool(shifts) and all(_equal(shift, shifts[0]) for shift in shifts)
+
+
+def _shift(one: Point, other: Point, flip: Point) -> Point:
+    return other[0] - flip[0] * one[0], other[1] - flip[1] * one[1]
 
 
 def _best_fit(
     pairs: Sequence[tuple[int, int]], where: Mapping[int, Point], flips: Sequence[Point], pins: Mapping[int, Point]
 ) -> tuple[Point, Point]:
     """The flip and the shift by which most stay where they are; those that are pinned count above all."""
-    best: tuple[int, Point, Point] | None = None
+    best: list[tuple[int, Point, Point]] = []
     for flip in flips:
         votes: Counter[Point] = Counter()
         for a, b in pairs:
-            shift = where[b][0] - flip[0] * where[a][0], where[b][1] - flip[1] * where[a][1]
-            votes[shift] += len(pairs) + 1 if b in pins else 1
+            votes[_shift(where[a], where[b], flip)] += len(pairs) + 1 if b in pins else 1
         shift, count = max(votes.items(), key=lambda vote: (vote[1], -abs(vote[0][0]), -abs(vote[0][1]), vote[0]))
-        if best is None or count > best[0]:
-            best = count, flip, shift
-    assert best is not None
-    return best[1], best[2]
+        best.append((count, flip, shift))
+    return max(best, key=lambda one: one[0])[1:]
 
 
 def _follow_mirrors(
@@ -97,11 +151,11 @@ def _follow_mirrors(
     hand: Mapping[int, Point],
     put: set[int],
 ) -> None:
-    across = 0 if problem.direction in ("down", "up") else 1
+    across = _across(problem)
     for mirrored in pairs_by_axis(problem):
         pairs = [(a, b) for a, b in mirrored if a in where and b in where]
         twice = twice_axis(pairs, fresh, across)
-        pairs = [(a, b) for a, b in pairs if _mirrored(fresh[a], fresh[b], twice, across)]
+        pairs = [(a, b) for a, b in pairs if _equal(_reflected(fresh[a], twice, across), fresh[b])]
         if not pairs:
             continue
         # what was moved by hand does not take the axis along, unless all was
@@ -109,12 +163,11 @@ def _follow_mirrors(
         twice = twice_axis(firm or pairs, {**where, **hand} if firm else where, across)
         followed: list[int] = []
         for a, b in pairs:
-            if _mirrored(where[a], where[b], twice, across):
+            if _equal(_reflected(where[a], twice, across), where[b]):
                 continue
             leads = [(i in problem.pins, i in hand) for i in (a, b)]
             first, second = (b, a) if leads[1] > leads[0] else (a, b)
-            x, y = where[first]
-            where[second] = (twice - x, y) if across == 0 else (x, twice - y)
+            where[second] = _reflected(where[first], twice, across)
             if first in put and second not in problem.pins:
                 put.add(second)
             else:
@@ -136,8 +189,17 @@ def twice_axis(pairs: Sequence[tuple[int, int]], where: Mapping[int, Point] | Se
     return totals[len(totals) // 2] if totals else 0.0
 
 
-def _mirrored(one: Point, other: Point, twice: float, across: int) -> bool:
-    return abs(one[across] + other[across] - twice) <= _SLACK and abs(one[1 - across] - other[1 - across]) <= _SLACK
+def _across(problem: LayoutProblem) -> int:
+    """The coordinate of the picture that is across the direction."""
+    return 0 if problem.direction in ("down", "up") else 1
+
+
+def _reflected(point: Point, twice: float, across: int) -> Point:
+    return (twice - point[0], point[1]) if across == 0 else (point[0], twice - point[1])
+
+
+def _equal(one: Point, other: Point) -> bool:
+    return abs(one[0] - other[0]) <= _SLACK and abs(one[1] - other[1]) <= _SLACK
 
 
 def whole(problem: LayoutProblem, neurons: Iterable[int]) -> set[int]:
@@ -145,8 +207,35 @@ def whole(problem: LayoutProblem, neurons: Iterable[int]) -> set[int]:
     found = set(neurons)
     images = {n: mate for mirror in problem.mirrors for a, b in mirror.pairs for n, mate in ((a, b), (b, a))}
     found |= {images[n] for n in found if n in images}
-    for module in problem.modules:
-        if module.parent < 0 and not found.isdisjoint(module.members):
-            found.update(module.members)
-    found |= {images[n] for n in found if n in images}
-    return found
+    for own in _outermost(problem).values():
+        if not found.isdisjoint(own):
+            found |= own
+    return found | {images[n] for n in found if n in images}
+
+
+def _giving_way(
+    problem: LayoutProblem, placed: Mapping[int, Point], put: set[int], routes: Mapping[int, Route]
+) -> set[int]:
+    """The neurons (with all others of their instances) that overlap a disc or a frame that was ``put`` by hand."""
+    if not put:
+        return set()
+    frames = Frames(replace(problem, boxes=()))
+    rects, outer = frames.rects(placed, routes), _outermost(problem)
+    framed = {i for own in outer.values() for i in own}
+    bodies = [lone(i, point) for i, point in sorted(placed.items()) if i not in framed]
+    for number, own in outer.items():
+        if (rect := rects[number]) is not None:
+            bodies.append(Body(tuple((i, placed[i]) for i in sorted(own & placed.keys())), number, rect))
+    firm = Occupancy(frames)
+    for body in bodies:
+        if not put.isdisjoint(body.members):
+            firm.enter((body,), _HERE)
+    held = put | problem.pins.keys()
+    return {
+        i for body in bodies if held.isdisjoint(body.members) and not firm.fits((body,), _HERE) for i in body.members
+    }
+
+
+def _outermost(problem: LayoutProblem) -> dict[int, frozenset[int]]:
+    """The neurons of each outermost instance, by its number."""
+    return {k: frozenset(module.members) for k, module in enumerate(problem.modules) if module.parent < 0}

@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from neurovis_layouts.alike import Alike, Move
+from neurovis_layouts.conflicts import carried
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.incremental_places import remembered
-from neurovis_layouts.manual_edits import carried
 from neurovis_layouts.routing import route_all
 from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
 from neurovis_layouts.routing.walls import Frame, Walls

@@ -13,9 +13,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from neurovis_layouts.alike import Alike, Move
-from neurovis_layouts.conflicts import pairs_by_axis, resolved, twice_axis, whole
-from neurovis_layouts.manual_edits import by_hand, carried, giving_way
-from neurovis_layouts.occupancy import AxisSide, Body, Occupancy, Wish, instance_of, lone, overlapping
+from neurovis_layouts.conflicts import Earlier, earlier, pairs_by_axis, twice_axis
+from neurovis_layouts.occupancy import AxisSide, Body, Occupancy, Wish, instance_of, lone
 from neurovis_layouts.rows import GroupRows
 from neurovis_spec.layout.frames import Frames
 from neurovis_spec.layout.geometry import Rect, bounds, snap
@@ -26,34 +25,22 @@ def remembered(problem: LayoutProblem, fresh: Sequence[Point], routes: Mapping[i
     """Positions by neuron: earlier ones where there are such, pins before them, new ones found; ``routes`` are the
     fresh ones by edge."""
     assert problem.memory is not None
-    earlier = problem.memory.positions
-    known = {i: earlier[name] for i, name in enumerate(problem.neurons) if name in earlier}
-    placed = {**known, **problem.pins}
-    if not placed:
+    before = earlier(problem, fresh)
+    if not before.where:
         return list(fresh)
-    wanted, put = resolved(problem, fresh, placed, by_hand(problem))
     frames = Frames(problem, problem.memory.labels)
-    before = {**placed, **put, **wanted}
-    old = carried(problem, problem.memory, before)
-    newly = put.keys() | {i for i, point in problem.pins.items() if known.get(i) != point}
-    for i in whole(problem, giving_way(problem, before, newly, old)) & before.keys():
-        if i not in problem.pins and i not in put:
-            wanted.setdefault(i, before[i])
-    stay = {i: point for i, point in before.items() if i not in wanted}
-    # neurons that overlap a pin (or, in a file edited by hand, a neuron before them) are placed anew, like new ones
-    lost = overlapping({i: point for i, point in stay.items() if i not in problem.pins}, problem.pins)
-    placed = {i: point for i, point in sorted(stay.items()) if i not in lost}
-    shapes = _Shapes(problem, frames, fresh, routes, before, old)
-    there = Occupancy(frames, placed, frames.rects(placed, old), _sides(problem, fresh, before), old.values())
+    placed = {i: before.where[i] for i in sorted(before.stay)}
+    shapes = _Shapes(problem, frames, fresh, routes, before)
+    sides = _sides(problem, fresh, before.where)
+    there = Occupancy(frames, placed, frames.rects(placed, before.routes), sides, before.routes.values())
     wishes = _Wishes(problem, fresh, placed)
-    for piece in _pieces(problem, shapes, before, frozenset(placed), frozenset(wanted)):
-        first = piece[0].offsets[0]
-        wish, row = wanted.get(first[0]), wishes.row(piece[0], there.placed)
-        if wish is None:
-            anchor = wishes.wish(piece[0], there.placed) if row is None else row
-            there.put(Wish(piece, anchor), in_row=row is not None)
+    for piece in _pieces(problem, shapes, before):
+        first = piece[0].members[0]
+        if first in before.wanted:
+            there.put(Wish(piece, before.where[first]), stay=True)
         else:
-            there.put(Wish(piece, wish), stay=True)
+            row = wishes.row(piece[0], there.placed)
+            there.put(Wish(piece, row or wishes.wish(piece[0], there.placed)), in_row=row is not None)
         for neuron in (i for copy in piece for i in copy.members):
             wishes.note(neuron, there.placed[neuron])
     return [there.placed[i] for i in range(len(problem.neurons))]
@@ -157,16 +144,15 @@ class _Shapes:
         frames: Frames,
         fresh: Sequence[Point],
         routes: Mapping[int, Route],
-        before: Mapping[int, Point],
-        old: Mapping[int, Route],
+        before: Earlier,
     ) -> None:
-        self._fresh, self._before = fresh, before
+        self._fresh, self._before = fresh, before.where
         self._fresh_rects = frames.rects(dict(enumerate(fresh)), routes)
-        self._rects = frames.rects(before, old)
+        self._rects = frames.rects(before.where, before.routes)
         self._makes: dict[str, int] = {}
         self._modules = problem.modules
         for number, module in enumerate(problem.modules):
-            if all(i in before for i in module.members):
+            if all(i in before.where for i in module.members):
                 self._makes.setdefault(module.template, number)
 
     def of(self, number: int) -> tuple[tuple[tuple[int, Point], ...], Rect]:
@@ -181,17 +167,11 @@ class _Shapes:
         return offsets, (rect[0] - x0, rect[1] - y0, rect[2] - x0, rect[3] - y0)
 
 
-def _pieces(
-    problem: LayoutProblem,
-    shapes: _Shapes,
-    before: Mapping[int, Point],
-    placed: frozenset[int],
-    wanted: frozenset[int],
-) -> Iterator[tuple[Body, ...]]:
+def _pieces(problem: LayoutProblem, shapes: _Shapes, before: Earlier) -> Iterator[tuple[Body, ...]]:
     """What is placed together, each with its copies: instances as a piece, then neurons one by one; what has been
     in the earlier layout and has to move comes first, then what partly placed instances lack, then what is new."""
-    done = set(placed)
-    alike = Alike(problem, before)
+    done, wanted = set(before.stay), before.wanted
+    alike = Alike(problem, before.where)
 
     def single(neuron: int) -> tuple[Body, ...]:
         found = [(mate, move) for mate, move in alike.of(neuron) if mate not in done]
@@ -205,14 +185,14 @@ def _pieces(
             if neuron not in done:
                 yield single(neuron)
         for number, module in enumerate(problem.modules):
-            if not module.members or any(i in done for i in module.members):
+            if not module.members or not done.isdisjoint(module.members):
                 continue
-            if again and not all(i in wanted for i in module.members):
+            if again and not wanted.issuperset(module.members):
                 continue
             offsets, rect = shapes.of(number)
             copies = [Body(offsets, number, rect)]
             for mates, move in _copies(alike, module):
-                if not any(i in done for i in mates) and not any(set(mates) & set(c.members) for c in copies):
+                if done.isdisjoint(mates) and all(set(mates).isdisjoint(copy.members) for copy in copies):
                     mirrored = tuple((i, offset) for i, (_, offset) in zip(mates, offsets, strict=True))
                     copies.append(Body(mirrored, instance_of(problem, mates), rect, move))
             done.update(i for copy in copies for i in copy.members)
