@@ -308,3 +308,16 @@ layout: {engine: organic, mirror: [[L1, R1], [L2, R2], [L3, R3], [L4, R4]]}
     assert overlaps(network, layout) == 0
     assert [layout.labels[f"R{i}"] for i in range(1, 5)] == [flip[layout.labels[f"L{i}"]] for i in range(1, 5)]
     assert metrics(layout, problem_of(network.network))["symmetry"] == 1
+
+
+def test_frames_hold_the_labels_of_their_neurons_in_reduced_pictures_too() -> None:
+    network = nv.compile_text("""
+neurovis: 1
+name: wide
+neurons: {A: {label: "coxa-trochanter load", box: b}, H: {}, B: {count: 40}}
+connections: {A -> H: 1, H -> B: 1}
+""")
+    labels, discs, _, frames = shown(network)
+    assert discs["A"].radius < 0.75 * 0.3 * 66
+    (left, top, right, bottom), (x0, y0, x1, y1) = around(frames["b"]), covers(labels["A"])
+    assert min(x0 - left, y0 - top, right - x1, bottom - y1) > 0

@@ -110,27 +110,43 @@ def boxes_of(
     return sorted(boxes, key=lambda b: (-(b.rect[2] - b.rect[0]) * (b.rect[3] - b.rect[1]), b.kind, b.path))
 
 
-def entitled(boxes: Sequence[Box], positions: FloatArray, scale: float) -> list[Box]:
+def entitled(boxes: Sequence[Box], positions: FloatArray, scale: float, rooms: Mapping[int, Rect]) -> list[Box]:
     """The boxes in a picture with so many page units for a layout unit, frames drawn higher where a title would have no
-    room above the discs in them, as far as nothing is there."""
+    room above the discs in them, and wider where labels, which get no smaller with the picture, would reach over their
+    lines (``rooms``: what these cover), as far as nothing is there."""
     more = TITLE_HIGH / scale - (BOX_DOWN - RADIUS)
-    if more <= 0:
-        return list(boxes)
     result = list(boxes)
     for index, box in enumerate(boxes):
-        x0, y0, x1, y1 = box.rect
-        top = (x0, y0 - more, x1, y0)
-        above = padded(top, RADIUS)
-        met = np.flatnonzero(((positions > above[:2]) & (positions < above[2:])).all(axis=1))
-        others = (o for o in boxes if o is not box and not frozenset(box.members) <= frozenset(o.members))
-        if (
-            box.kind == "box"
-            and box.sector is None
-            and set(met.tolist()) <= set(box.members)
-            and not any(meet(top, o.rect) for o in others)
-        ):
-            result[index] = replace(box, rect=(x0, y0 - more, x1, y1))
+        if box.sector is not None:
+            continue
+        rect, wanted = box.rect, [padded(rooms[i], PAD_LABEL) for i in box.members if i in rooms]
+        if more > 0 and box.kind == "box":
+            wanted.append((rect[0], rect[1] - more, rect[2], rect[1]))
+        for room in wanted:
+            if _free(grown := united([rect, room]), rect, box, result, positions):
+                rect = grown
+        result[index] = replace(box, rect=rect)
     return result
+
+
+def _free(grown: Rect, rect: Rect, box: Box, boxes: Sequence[Box], positions: FloatArray) -> bool:
+    """Whether nothing foreign is where a frame would grow: no disc, and no line of a frame that it does not reach over
+    already."""
+    around = padded(grown, RADIUS)
+    met = np.flatnonzero(((positions > around[:2]) & (positions < around[2:])).all(axis=1))
+    if not set(met.tolist()) <= set(box.members):
+        return False
+    own = frozenset(box.members)
+    others = (o for o in boxes if o.path != box.path or o.kind != box.kind)
+    return all(_over(grown, o, own) <= _over(rect, o, own) for o in others)
+
+
+def _over(rect: Rect, other: Box, own: frozenset[int]) -> bool:
+    """Whether a frame of these neurons reaches into that of others, or out of one that holds it."""
+    x0, y0, x1, y1 = other.rect
+    if own <= frozenset(other.members):
+        return rect[0] < x0 or rect[1] < y0 or rect[2] > x1 or rect[3] > y1
+    return not frozenset(other.members) <= own and meet(rect, other.rect)
 
 
 def _titles(network: Network, named: Sequence[_Named]) -> dict[_Named, float]:

@@ -173,7 +173,8 @@ def rank_of(network: Network) -> list[int]:
     return order
 
 
-def _size_beside(radius: float) -> float:
+def size_beside(radius: float) -> float:
+    """How large the letters are beside a disc of this radius, in page units."""
     return min(BESIDE, max(_BESIDE_SMALLEST, _BESIDE_SHARE * radius))
 
 
@@ -207,10 +208,10 @@ def _beside(
             wanted.append(Wanted(both, widths, max(until[index], until[partner]), kept(*both)))
     taken = (ground.taken - np.tile(ground.shift, 2)) / ground.scale
     field = Field(ground.places, ground.radii, ground.dots, ground.extent, ground.reach, _level(network), taken)
-    found = placed(wanted, field, _size_beside, ground.scale)
+    found = placed(wanted, field, size_beside, ground.scale)
     result: dict[int, Label] = {}
     for index, slot in found.items():
-        size = _size_beside(ground.radius(index))
+        size = size_beside(ground.radius(index))
         width = texts.width(said[index], size, WEIGHT)
         x0, y0, _, _ = slot.text(ground.radius(index), width, size)
         x, y = ground.centre(index)

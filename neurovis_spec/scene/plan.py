@@ -17,7 +17,7 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.geometry import Rect
-from neurovis_spec.layout.labels import UNIT, label_rects, label_room
+from neurovis_spec.layout.labels import BESIDE, UNIT, label_rects, label_room
 from neurovis_spec.layout.model import RADIUS, Layout, Point
 from neurovis_spec.layout.naming import natural_key
 from neurovis_spec.scene import delays, encoding, legend, texts
@@ -31,7 +31,7 @@ from neurovis_spec.scene.gathered_layout import radius_of
 from neurovis_spec.scene.geometry import batches, bounds, samples
 from neurovis_spec.scene.glyphs import raised
 from neurovis_spec.scene.heading import CAPTION, CAPTION_Y, HEADER, TITLE, caption_text, title_text
-from neurovis_spec.scene.labels import Ground, Label, labels_of, margin_beside, partners_of, room_beside
+from neurovis_spec.scene.labels import Ground, Label, labels_of, margin_beside, partners_of, room_beside, size_beside
 from neurovis_spec.scene.legend_entry import LegendEntry
 from neurovis_spec.scene.lesions import Lesions, lesions_of
 from neurovis_spec.scene.line_labels import line_labels
@@ -125,7 +125,7 @@ def plan(
     smallest = float(factors[seen.focus].min(initial=RADIUS))
     wanted = _Wanted(network, gains, settings, theme, teachers, seen.notes, extent, narrowest, frozenset(rooms))
     title, items, frame, unit, margin = _framed(wanted, smallest, encoding.clamped(widths[seen.lines]))
-    boxes = entitled(boxes, positions, frame.scale)
+    boxes = entitled(boxes, positions, frame.scale, _rooms(network, layout, frame.scale))
     gains = in_pages(gains, unit)
     centres = frame.map(positions)
     radii = factors * frame.scale
@@ -259,13 +259,15 @@ def _in_units(network: Network, layout: Layout) -> tuple[FloatArray, list[FloatA
     return positions, routes_of(network.connection_names, ends, layout)
 
 
-def _rooms(network: Network, layout: Layout) -> dict[int, Rect]:
-    """What labels cover for which the layout kept room, by neuron, in its units."""
+def _rooms(network: Network, layout: Layout, scale: float = UNIT) -> dict[int, Rect]:
+    """What labels cover for which the layout kept room, by neuron, in its units, in a picture of this scale."""
     if not layout.labels:
         return {}
     names = network.neurons.names
     sides = [layout.labels.get(name) for name in names]
-    rects = label_rects([layout.positions[name] for name in names], label_room(network), sides)
+    larger = size_beside(RADIUS * scale) / scale * UNIT / BESIDE
+    room = [(larger * wide, larger * high) for wide, high in label_room(network)]
+    rects = label_rects([layout.positions[name] for name in names], room, sides)
     return {index: rect for index, rect in enumerate(rects) if rect is not None}
 
 
