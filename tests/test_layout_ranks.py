@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from itertools import product
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from neurovis_layouts.layered.ranks import ranks_of
 from neurovis_layouts.layered.simplex import shortened
+
+import neurovis_spec as nv
 
 Arcs = dict[tuple[int, int], float]
 
@@ -80,3 +83,29 @@ def test_no_unit_of_a_loop_could_move_so_that_fewer_arcs_run_back(pairs: list[tu
             moved = [float(level) for level in rank]
             moved[unit] = there + 0.5
             assert back(moved) >= back([float(level) for level in rank])
+
+
+def fan(hidden: int, layout: str = "{}") -> nv.CompiledNetwork:
+    return nv.compile_text(f"""\
+neurovis: 1
+name: fan
+neurons: {{I: {{bias: 1}}, H: {{count: {hidden}}}, O: {{}}}}
+connections: {{I -> H: {{pattern: all_to_all}}, H -> O: {{pattern: all_to_all}}}}
+layout: {layout}
+""")
+
+
+@pytest.mark.parametrize("direction", ["down", "right"])
+def test_a_rank_much_wider_than_a_page_stands_in_two_rows_with_lines_in_the_gaps(direction: str) -> None:
+    layout = fan(64, f"{{direction: {direction}}}").layout()
+    found = layout.metrics()
+    assert (found["crossings"], found["edges_over_neurons"], found["overlaps"], found["flow"]) == (0, 0, 0, 1)
+    at = {name: point if direction == "down" else point[::-1] for name, point in layout.positions.items()}
+    assert len({at[f"H{i}"][1] for i in range(1, 65)}) == 2
+    assert max(x for x, _ in at.values()) - min(x for x, _ in at.values()) < 40
+
+
+@pytest.mark.parametrize(("hidden", "layout"), [(12, "{}"), (64, "{align: [[H]]}")])
+def test_a_rank_that_fits_or_is_a_line_stays_level(hidden: int, layout: str) -> None:
+    at = fan(hidden, layout).layout().positions
+    assert len({at[f"H{i}"][1] for i in range(1, hidden + 1)}) == 1

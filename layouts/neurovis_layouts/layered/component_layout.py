@@ -25,6 +25,7 @@ from neurovis_layouts.layered.mirror import mirrored, symmetric
 from neurovis_layouts.layered.order import crossings, ordered
 from neurovis_layouts.layered.place import placed, reaches
 from neurovis_layouts.layered.ranks import INSTANT, ranks_of
+from neurovis_layouts.layered.staggered import staggered, with_gaps
 from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.routing import Waypoint
 from neurovis_spec.layout.geometry import snap
@@ -179,9 +180,13 @@ def _component(
     for n, node in enumerate(levels.nodes):
         if node.members and node.members[0][0] in plan.sides:
             levels.nodes[n] = replace(node, reach=(node.reach[0], 0.0))
-    places = placed(
-        stacked(levels, folds), order, problem.neuron_spacing, problem.rank_spacing, partner, columns, folds.ranks
-    )
+    spacing = problem.neuron_spacing, problem.rank_spacing
+    places = placed(stacked(levels, folds), order, *spacing, partner, columns, folds.ranks)
+    uneven = frozenset[int]()
+    if partner is None and not columns and (lifted := staggered(problem, levels, order, places)):
+        levels = lifted
+        uneven = frozenset(r for r, rank in enumerate(order) if any(levels.nodes[n].lift for n in rank))
+        places = placed(stacked(levels, folds), order, *spacing, partner, columns, folds.ranks)
     _draw_in(levels, order, places, {m for unit in guests for m in unit.members}, problem.neuron_spacing)
     for node, (x, y) in zip(levels.nodes, places, strict=True):
         for member, dx, dy in node.members:
@@ -191,6 +196,7 @@ def _component(
     spans = list(zip(*reaches(levels, order), strict=True))
     for i, passages in levels.passages.items():
         plan.ways[i] = [_passage(places[n], *spans[levels.nodes[n].rank]) for n in passages]
+    plan.ways = with_gaps(levels, places, plan.ways, uneven)
     plan.ways, whole = with_exits(problem, edges, levels, places, spans, folds, plan.ways)
     if whole and not crossings(levels, order):
         plan.firm |= whole

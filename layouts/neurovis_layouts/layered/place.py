@@ -30,6 +30,8 @@ _Gap: TypeAlias = tuple[Ints, Ints, Floats, Floats]
 _BESIDE_DISC = 0.6
 _BESIDE_PASSAGE = 0.25
 _BETWEEN_BOXES = 0.6
+#: How far apart across neurons of a staggered rank stand, in spacings: those in one row then leave a gap for lines.
+_STAGGERED = 0.6
 _MOST_STRETCH = 2.0
 _NARROW = 0.4
 _FLAT, _FANNED = 14.0, 5.0
@@ -92,9 +94,16 @@ def _gap(levels: Levels, a: int, b: int, spacing: float) -> float:
         return _BESIDE_PASSAGE
     if not first.members or not second.members:
         return between + _BESIDE_DISC
+    if _apart(first, second) and between == 0:
+        return _STAGGERED * spacing
     if (_rigid(first) or _rigid(second)) and not (first.framed and second.framed):
         between += 0.5 * spacing
     return between + spacing + (_BETWEEN_BOXES if first.box != second.box else 0.0)
+
+
+def _apart(first: Node, second: Node) -> bool:
+    """Whether two single neurons of a rank stand on different sides of its line."""
+    return len(first.members) == len(second.members) == 1 and first.lift * second.lift < 0
 
 
 def _rigid(node: Node) -> bool:

@@ -1,0 +1,75 @@
+"""Staggered: ranks of very many neurons in two rows, every other neuron behind its neighbours, so that a network much
+wider than a page becomes narrower.
+
+In: levels with their order and where that places them, the proportions of a page. Out: the levels, of such ranks every
+other neuron lifted; and for connections to and from these a waypoint straight in front of them, where it leads through
+the gap between those that are before them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import replace
+
+from neurovis_layouts.layered.levels import Levels, Node
+from neurovis_layouts.routing import Waypoint
+from neurovis_spec.layout.geometry import snap
+from neurovis_spec.layout.model import LayoutProblem, Point
+
+#: What is wider than a page by this is staggered: its ranks of so many neurons and more, that make it so wide.
+_WIDE, _FEWEST, _PART = 2.0, 20, 0.5
+#: How far in front of a neuron its lines are side by side, how far apart, and how far the first is from the last.
+_BEFORE, _APART, _FREE = 0.5, 0.16, 0.2
+
+
+def staggered(
+    problem: LayoutProblem, levels: Levels, order: Sequence[Sequence[int]], places: Sequence[Point]
+) -> Levels | None:
+    """The levels with the widest ranks staggered; None where they are not much wider than a page."""
+    xs, ys = zip(*places, strict=True)
+    wide, high = max(xs) - min(xs) + 1, max(ys) - min(ys) + 1
+    page = problem.aspect if problem.direction in ("down", "up") else 1 / problem.aspect
+    if wide < _WIDE * page * high:
+        return None
+    lined = {m for line in problem.align for m in line}
+    nodes, rise = list(levels.nodes), snap(problem.neuron_spacing / 2)
+    for rank in order:
+        own = [n for n in rank if nodes[n].members]
+        across = [places[n][0] for n in own]
+        alone = all(_alone(nodes[n], lined) for n in own)
+        if alone and len(own) >= _FEWEST and max(across) - min(across) > _PART * wide:
+            for place, n in enumerate(own):
+                nodes[n] = replace(nodes[n], lift=rise if place % 2 else -rise)
+    return None if nodes == levels.nodes else replace(levels, nodes=nodes)
+
+
+def _alone(node: Node, lined: AbstractSet[int]) -> bool:
+    """Whether a node is a single neuron, as high as its disc, that nobody wants on a line."""
+    return len(node.members) == 1 and node.reach == (0.0, 0.0) and not node.lift and node.members[0][0] not in lined
+
+
+def with_gaps(
+    levels: Levels, places: Sequence[Point], ways: Mapping[int, list[Waypoint]], ranks: AbstractSet[int]
+) -> dict[int, list[Waypoint]]:
+    """The waypoints of the edges, from above to below; those to and from neurons of staggered ``ranks`` begin and end
+    straight in front of these, beside each other, where both rows of the rank are passed."""
+    leaving: dict[tuple[int, bool], list[tuple[float, int]]] = {}
+    for i, (upper, _, lower, _) in levels.ends.items():
+        line = [way.x for way in ways.get(i, ())]
+        if levels.nodes[lower].rank in ranks:
+            leaving.setdefault((lower, False), []).append(([places[upper][0], *line][-1], i))
+        if levels.nodes[upper].rank in ranks:
+            leaving.setdefault((upper, True), []).append(([*line, places[lower][0]][0], i))
+    found = {i: list(line) for i, line in ways.items()}
+    for (n, down), lines in leaving.items():
+        (x, y), lift = places[n], levels.nodes[n].lift
+        sign = 1 if down else -1
+        behind = sign * lift < 0
+        reach = _BEFORE + (2 * abs(lift) if behind else 0.0)
+        half = abs(lift) if behind else 0.0
+        apart = min(_APART, _FREE / max(1, len(lines) - 1))
+        for place, (_, i) in enumerate(sorted(lines)):
+            gate = Waypoint(x + (place - (len(lines) - 1) / 2) * apart, y + sign * (reach - half), half)
+            found[i] = [gate, *found.get(i, [])] if down else [*found.get(i, []), gate]
+    return found
