@@ -7,10 +7,10 @@ both measure here, as in a picture that is not reduced.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.layout.geometry import Rect
+from neurovis_spec.layout.geometry import Rect, shifted
 from neurovis_spec.layout.model import RADIUS, Point, Side
 from neurovis_spec.text_width import width, with_subscript
 
@@ -22,8 +22,8 @@ WEIGHT, INSTANCE_WEIGHT, BOX_WEIGHT = 600, 600, 400
 SMALLEST, NUMBERED, TINY = 9.0, 7.5, 6.0
 #: The largest beside a disc; and how far its letters rise over their baseline and hang below it, in sizes.
 BESIDE, RISE, DROP = 11.0, 0.8, 0.25
-#: Gaps between a disc and its label: to the side, below, above.
-ASIDE, BELOW, ABOVE = 5.0, 4.0, 4.0
+#: Gaps between a disc and its label: to the side, below, above, at a corner.
+ASIDE, BELOW, ABOVE, CORNER = 5.0, 4.0, 4.0, 3.0
 #: How long a name beside a disc may be, in sizes of its letters: it must not look like a title of those around.
 WIDEST = 18.0
 #: More labels than this are never beside discs.
@@ -123,19 +123,30 @@ def instance_titles(modules: Iterable[tuple[str, str]]) -> list[float]:
     return [widest[module] for _, module in given]
 
 
+def beside(across: int, down: int, radius: float, wide: float, size: float) -> Rect:
+    """What letters cover beside a disc, from its centre, in page units: to the left or right (``across`` is −1 or 1),
+    above or below (``down``), or at a corner."""
+    high = (RISE + DROP) * size
+    if not across:
+        top = radius + BELOW if down > 0 else -radius - ABOVE - high
+        return -wide / 2, top, wide / 2, top + high
+    near, top = radius + ASIDE, (0.36 - RISE) * size
+    if down:
+        near = 0.75 * radius + CORNER
+        top = near - 0.08 * size if down > 0 else DROP * size - near - high
+    x0, x1 = (near, near + wide) if across > 0 else (-near - wide, -near)
+    return x0, top, x1, top + high
+
+
+#: The sides of discs that layouts speak of: how far across and down.
+STEPS: Mapping[Side, tuple[int, int]] = {"right": (1, 0), "left": (-1, 0), "below": (0, 1), "above": (0, -1)}
+
+
 def label_rect(point: Point, room: Point, side: Side) -> Rect:
-    """What a label of this width and height covers on a side of the disc at a point."""
-    (x, y), (wide, high) = point, room
-    match side:
-        case "right" | "left":
-            near = RADIUS + ASIDE / UNIT
-            x0 = x + near if side == "right" else x - near - wide
-            return x0, y - high / 2, x0 + wide, y + high / 2
-        case "below":
-            top = y + RADIUS + BELOW / UNIT
-        case "above":
-            top = y - RADIUS - ABOVE / UNIT - high
-    return x - wide / 2, top, x + wide / 2, top + high
+    """What a label of this width and height covers on a side of the disc at a point, in units of a layout."""
+    wide, high = UNIT * room[0], UNIT * room[1]
+    x0, y0, x1, y1 = (each / UNIT for each in beside(*STEPS[side], UNIT * RADIUS, wide, high / (RISE + DROP)))
+    return shifted((x0, y0, x1, y1), point)
 
 
 def widened(rect: Rect, least: float) -> Rect:

@@ -16,7 +16,7 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.layout.geometry import Rect, meet
-from neurovis_spec.layout.labels import ABOVE, ASIDE, BELOW, DROP, RISE
+from neurovis_spec.layout.labels import beside
 
 #: The smallest scale (page units for a layout unit) at which there are labels, and the steps from it on.
 _FIRST, _STEP = 6.0, 1.25
@@ -25,8 +25,6 @@ _LINE = 2.5
 #: How far labels may reach beyond the discs at the rim, in page units; where more is asked for, so much and a share of
 #: the width.
 BEYOND, _ALWAYS, _SHARE = 20.0, 50.0, 0.3
-#: Between a disc and a label at its corner.
-_CORNER = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,17 +36,7 @@ class Slot:
 
     def text(self, radius: float, width: float, size: float) -> Rect:
         """What the letters cover, from the centre of the disc."""
-        high = (RISE + DROP) * size
-        if not self.across:
-            top = radius + BELOW if self.down > 0 else -radius - ABOVE - high
-            return -width / 2, top, width / 2, top + high
-        if not self.down:
-            left, top = radius + ASIDE, (0.36 - RISE) * size
-        else:
-            left = 0.75 * radius + _CORNER
-            top = left - 0.08 * size if self.down > 0 else DROP * size - left - high
-        x0, x1 = (left, left + width) if self.across > 0 else (-left - width, -left)
-        return x0, top, x1, top + high
+        return beside(self.across, self.down, radius, width, size)
 
     def claim(self, radius: float, width: float, size: float) -> Rect:
         """The same with a little air, and all between it and the disc."""

@@ -25,6 +25,7 @@ from neurovis_spec.layout.labels import (
     NUMBERED,
     RISE,
     SMALLEST,
+    STEPS,
     TINY,
     UNIT,
     WEIGHT,
@@ -53,10 +54,6 @@ _LEGIBLE = 8.0
 _SMALLEST_DISC = 7.0
 #: and one smaller than this no label beside a number
 _SMALLEST_NUMBERED = 16.0
-
-
-#: the sides that a layout speaks of
-_SLOTS: dict[Side, Slot] = {"right": Slot(1, 0), "left": Slot(-1, 0), "below": Slot(0, 1), "above": Slot(0, -1)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,7 +191,7 @@ def _beside(
     wanted: list[Wanted] = []
 
     def kept(*members: int) -> tuple[Slot, ...]:
-        return tuple(_SLOTS[sides[one]] for one in members) if all(one in sides for one in members) else ()
+        return tuple(Slot(*STEPS[sides[one]]) for one in members) if all(one in sides for one in members) else ()
 
     for index in [index for index in rank_of(network) if index in among][:MOST]:
         said[index] = cut.shorten(labels[index], 1.0, WIDEST)
