@@ -77,11 +77,8 @@ class Frames:
                 for i, side in self._sides.items()
                 if number < self._labelled and i in placed and i in self.members[number]
             ]
-            if instance:
-                rect = enclosing(bounds(at), bounds(lines) if lines else None, held, labels)
-            else:
-                parts = [_boxed(bounds(at)), *(padded(rect, BOX_FRAME) for rect in held), *labels]
-                rect = united([*parts, padded(bounds(lines), BOX_LOOP)] if lines else parts)
+            around = bounds(lines) if lines else None
+            rect = (enclosing if instance else boxed)(bounds(at), around, held, labels)
             rect = widened(rect, self._titles[number])
             found[number] = titled(rect) if instance else rect
         return found
@@ -95,7 +92,7 @@ class Frames:
     def single(self, number: int, point: Point) -> Rect:
         """What a frame is at least when it holds a neuron in no frame within it."""
         rect = (*point, *point)
-        return titled(padded(rect, PAD)) if number < self.instances else _boxed(rect)
+        return titled(padded(rect, PAD)) if number < self.instances else boxed(rect, None, ())
 
     def related(self, one: int, other: int) -> bool:
         """Whether frames have neurons in common, so that they cannot keep off each other."""
@@ -116,9 +113,16 @@ def enclosing(centres: Rect, lines: Rect | None, held: Iterable[Rect], labels: I
     return united(parts if lines is None else [*parts, padded(lines, PAD_ROUTE)])
 
 
-def _boxed(rect: Rect) -> Rect:
-    """The line of a box around centres."""
-    return rect[0] - BOX_ACROSS, rect[1] - BOX_DOWN, rect[2] + BOX_ACROSS, rect[3] + BOX_DOWN
+def boxed(
+    centres: Rect, loops: Rect | None, held: Iterable[Rect], labels: Iterable[Rect] = (), tight: bool = False
+) -> Rect:
+    """The frame of a box: around centres, self-loops, frames in it, and labels with the room around these; ``tight``
+    where it would touch another otherwise."""
+    across, down, gap = (BOX_TIGHT, BOX_TIGHT, BOX_TIGHT_FRAME) if tight else (BOX_ACROSS, BOX_DOWN, BOX_FRAME)
+    x0, y0, x1, y1 = centres
+    own = (x0 - across, y0 - down, x1 + across, y1 + down)
+    parts = [own, *(padded(rect, gap) for rect in held), *labels]
+    return united(parts if loops is None else [*parts, padded(loops, BOX_LOOP)])
 
 
 def titled(rect: Rect) -> Rect:

@@ -15,14 +15,10 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Group, Network
 from neurovis_spec.layout.frames import (
-    BOX_ACROSS,
     BOX_DOWN,
-    BOX_FRAME,
-    BOX_LOOP,
-    BOX_TIGHT,
-    BOX_TIGHT_FRAME,
     PAD_LABEL,
     SLACK,
+    boxed,
     enclosing,
     entered,
     titled,
@@ -67,7 +63,7 @@ def boxes_of(
     beside their discs) and titles are within their frames. Layout units."""
     named = _named(network)
     within = {n: frozenset(n.members) for n in named}
-    inner = _routes_within(network, routes, [n for n in named if n.kind == "instance"])
+    inner = _routes_within(network, routes, named)
     titles = _titles(network, named)
 
     def beside(item: _Named) -> list[Rect]:
@@ -77,17 +73,20 @@ def boxes_of(
     for tight in (False, True):
         for item in named:  # what is held by another comes before it
             held = [rects[o] for o in named if o is not item and o in rects and within[o] < within[item]]
+            centres, lines = bounds([positions[list(item.members)]]), bounds(inner.get(item, []))
+            assert centres is not None
             if item.kind == "instance":
-                rect = _framed(positions, inner.get(item.path, []), item.members, held, beside(item))
+                rect = titled(enclosing(centres, lines, held, beside(item)))
                 wide = widened(rect, titles[item])
                 rects[item] = rect if entered(positions, wide, item.members) else wide
-            elif not tight or any(
+            elif not tight:
+                rects[item] = widened(boxed(centres, lines, held, beside(item)), titles[item])
+            elif any(
                 meet(rects[item], rects[o])
                 for o in named
                 if not (within[o] <= within[item] or within[item] <= within[o])
             ):
-                rect = _around(network, positions, routes, item.members, held, tight)
-                rects[item] = rect if tight else widened(united([rect, *beside(item)]), titles[item])
+                rects[item] = boxed(centres, lines, held, tight=True)
     clean = [n for n in named if not entered(positions, rects[n], n.members)]
     framed = [
         n
@@ -189,58 +188,22 @@ def _sectors(network: Network, positions: FloatArray, named: Sequence[_Named]) -
 
 
 def _routes_within(
-    network: Network, routes: Sequence[FloatArray], instances: Sequence[_Named]
-) -> dict[str, list[FloatArray]]:
-    """Sampled routes between two neurons of an instance, by its path."""
-    starts = [(n.members[0], n.members[-1], n.path) for n in instances]
-    found: dict[str, list[FloatArray]] = {}
+    network: Network, routes: Sequence[FloatArray], named: Sequence[_Named]
+) -> dict[_Named, list[FloatArray]]:
+    """Sampled routes that frames are around: those between two neurons of an instance, the self-loops of a box."""
+    around: dict[int, list[_Named]] = {}
+    for item in named:
+        for member in item.members:
+            around.setdefault(member, []).append(item)
+    found: dict[_Named, list[FloatArray]] = {}
     ends = zip(network.connections.sources.tolist(), network.connections.targets.tolist(), strict=True)
-    for index, (source, target) in enumerate(ends if starts else ()):
+    for index, (source, target) in enumerate(ends if named else ()):
         line: FloatArray | None = None
-        for first, last, path in starts:
-            if first <= source <= last and first <= target <= last:
+        for item in around.get(source, ()):
+            if source == target or (item.kind == "instance" and item in around.get(target, ())):
                 line = sample(routes[index], 8) if line is None else line
-                found.setdefault(path, []).append(line)
+                found.setdefault(item, []).append(line)
     return found
-
-
-def _framed(
-    positions: FloatArray,
-    lines: Sequence[FloatArray],
-    inside: tuple[int, ...],
-    held: Sequence[Rect],
-    beside: Sequence[Rect],
-) -> Rect:
-    """The frame of an instance, as the layered engine keeps it free."""
-    centres = bounds([positions[list(inside)]])
-    assert centres is not None
-    return titled(enclosing(centres, bounds(lines), held, beside))
-
-
-def _around(
-    network: Network,
-    positions: FloatArray,
-    routes: Sequence[FloatArray],
-    inside: tuple[int, ...],
-    held: Sequence[Rect],
-    tight: bool,
-) -> Rect:
-    across, down = (BOX_TIGHT, BOX_TIGHT) if tight else (BOX_ACROSS, BOX_DOWN)
-    dots = bounds([positions[list(inside)]])
-    assert dots is not None
-    x0, y0, x1, y1 = dots
-    rect = (x0 - across, y0 - down, x1 + across, y1 + down)
-    connections, chosen = network.connections, set(inside)
-    loops = [
-        sample(routes[index], 8)
-        for index, (source, target) in enumerate(
-            zip(connections.sources.tolist(), connections.targets.tolist(), strict=True)
-        )
-        if source == target and source in chosen
-    ]
-    around = bounds(loops)
-    parts = [rect, *(padded(r, BOX_TIGHT_FRAME if tight else BOX_FRAME) for r in held)]
-    return united(parts if around is None else [*parts, padded(around, BOX_LOOP)])
 
 
 def _titled(network: Network, item: _Named) -> str:
