@@ -540,3 +540,23 @@ def test_copies_that_would_stand_on_each_other_anywhere_each_find_a_place() -> N
     occupancy = Occupancy(placed={0: (0.0, 0.0)})
     assert occupancy.put(Wish((lone(1), lone(2)), (0.0, 0.0)))
     assert all(distance(a, b) >= 0.6 for a, b in combinations(occupancy.placed.values(), 2))
+
+
+def test_new_mirror_images_of_what_is_known_stand_where_they_are_reflected() -> None:
+    network = legs(mirror="layout: {mirror: [[C1, C2], [left, right]]}")
+    problem, before = problem_of(network.network), network.layout("layered").value
+    left = {name: point for name, point in before.positions.items() if not name.startswith("right")}
+    earlier = replace(before, positions={**left, "C2": (left["C2"][0] + 3.0, left["C2"][1])}, routes={})
+    now = lay_out_problem(replace(problem, memory=earlier), "layered")
+    at = [now.positions[name] for name in problem.neurons]
+    assert len({at[a][0] + at[b][0] for mirror in problem.mirrors for a, b in mirror.pairs}) == 1
+    assert all(now.positions[name] == point for name, point in earlier.positions.items())
+
+
+@pytest.mark.parametrize("engine", ["layered", "grid", "circular"])
+def test_instances_that_are_drawn_around_their_pins_stay_so(engine: str) -> None:
+    """They are not made alike again: they were drawn otherwise because of their pins."""
+    pins = "left1.K1: [0, 0], left1.K3: [4, 3], right1.K1: [10, 0], right1.K3: [9, 5]"
+    network = legs(mirror=f"layout: {{positions: {{{pins}}}}}")
+    first = network.layout(engine).value
+    assert network.layout(engine, earlier=first).value == first

@@ -7,10 +7,10 @@ places already.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from neurovis_spec.layout.model import LayoutMirror, LayoutModule, LayoutProblem, Point
+from neurovis_spec.layout.model import LayoutModule, LayoutProblem, Point
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,12 +50,14 @@ class Alike:
             for place, neuron in enumerate(module.members):
                 self._around.setdefault(neuron, []).append((module, place))
         self._images: dict[int, tuple[int, Move]] = {}
-        for mirror in problem.mirrors:
-            move = self._reflection(mirror, 0 if problem.direction in ("down", "up") else 1)
-            if move is not None:
-                for a, b in mirror.pairs:
-                    self._images[a] = b, move
-                    self._images[b] = a, move
+        across = 0 if problem.direction in ("down", "up") else 1
+        for pairs in pairs_by_axis(problem):
+            there = [(a, b) for a, b in pairs if a in placed and b in placed]
+            twice = twice_axis(there, placed, across)
+            move = Move((-1.0, 1.0), (twice, 0.0)) if across == 0 else Move((1.0, -1.0), (0.0, twice))
+            for a, b in pairs if there else ():
+                self._images[a] = b, move
+                self._images[b] = a, move
 
     def of(self, neuron: int) -> list[tuple[int, Move]]:
         """The neurons drawn like this one, itself first, each with the move from its place."""
@@ -113,10 +115,16 @@ class Alike:
         move = Move((flips[0], flips[1]), (bx - flips[0] * ax, by - flips[1] * ay))
         return move if all(move.point(a) == b for a, b in pairs) else None
 
-    def _reflection(self, mirror: LayoutMirror, across: int) -> Move | None:
-        """The reflection on the axis of a mirror, where a pair is placed."""
-        for a, b in mirror.pairs:
-            if a in self._placed and b in self._placed:
-                total = self._placed[a][across] + self._placed[b][across]
-                return Move((-1.0, 1.0), (total, 0.0)) if across == 0 else Move((1.0, -1.0), (0.0, total))
-        return None
+
+def pairs_by_axis(problem: LayoutProblem) -> list[list[tuple[int, int]]]:
+    """The pairs of mirror images, those about one axis together."""
+    found: dict[int, list[tuple[int, int]]] = {}
+    for mirror in problem.mirrors:
+        found.setdefault(mirror.scope, []).extend(mirror.pairs)
+    return list(found.values())
+
+
+def twice_axis(pairs: Sequence[tuple[int, int]], where: Mapping[int, Point] | Sequence[Point], across: int) -> float:
+    """Twice where the axis of these pairs stands: their median."""
+    totals = sorted(where[a][across] + where[b][across] for a, b in pairs)
+    return totals[len(totals) // 2] if totals else 0.0

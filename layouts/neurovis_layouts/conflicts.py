@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from neurovis_layouts.alike import pairs_by_axis, twice_axis
 from neurovis_layouts.occupancy import Body, Occupancy, lone, overlapping
 from neurovis_spec.layout.frames import Frames
 from neurovis_spec.layout.geometry import distance
@@ -35,6 +36,10 @@ class Earlier:
     wanted: frozenset[int]
     routes: Mapping[int, Route]
 
+    def has(self, neurons: Iterable[int]) -> bool:
+        """Whether all of these have a place."""
+        return all(neuron in self.where for neuron in neurons)
+
 
 def earlier(problem: LayoutProblem, fresh: Sequence[Point]) -> Earlier:
     """What the earlier layout of a problem says, and its pins, which go before that."""
@@ -43,7 +48,7 @@ def earlier(problem: LayoutProblem, fresh: Sequence[Point]) -> Earlier:
     known = {i: there[name] for i, name in enumerate(problem.neurons) if name in there}
     where, hand = {**known, **pins}, _by_hand(problem, known)
     wanted: set[int] = set()
-    _follow_makes(problem, fresh, where, wanted)
+    _follow_makes(problem, fresh, where, wanted, known)
     put = set(hand) - wanted
     _follow_mirrors(problem, fresh, where, wanted, hand, put)
     both = whole(problem, overlapping({i: where[i] for i in put}, pins)) & put
@@ -97,7 +102,13 @@ def _by_hand(problem: LayoutProblem, now: Mapping[int, Point]) -> dict[int, Poin
     return {i: moved[i] for i in sorted(moved.keys() - problem.pins.keys())}
 
 
-def _follow_makes(problem: LayoutProblem, fresh: Sequence[Point], where: dict[int, Point], moved: set[int]) -> None:
+def _follow_makes(
+    problem: LayoutProblem,
+    fresh: Sequence[Point],
+    where: dict[int, Point],
+    moved: set[int],
+    known: Mapping[int, Point],
+) -> None:
     across = _across(problem)
     mirrored, upside_down = ((-1.0, 1.0), (1.0, -1.0))[:: 1 if across == 0 else -1]
     makes: dict[str, list[LayoutModule]] = {}
@@ -113,6 +124,9 @@ def _follow_makes(problem: LayoutProblem, fresh: Sequence[Point], where: dict[in
                 continue
             if any(_alike(pairs, where, flip) for flip in (_SAME, mirrored, upside_down)):
                 continue
+            pinned = whole(problem, other.members) & problem.pins.keys()
+            if pinned and all(known.get(i) == problem.pins[i] for i in pinned):
+                continue  # it was drawn around its pins
             flip, shift = _best_fit(pairs, where, (_SAME, mirrored), problem.pins)
             for a, b in pairs:
                 where[b] = shift[0] + flip[0] * where[a][0], shift[1] + flip[1] * where[a][1]
@@ -173,20 +187,6 @@ def _follow_mirrors(
             else:
                 followed += (a, b)
         moved.update(whole(problem, followed) & where.keys())
-
-
-def pairs_by_axis(problem: LayoutProblem) -> list[list[tuple[int, int]]]:
-    """The pairs of mirror images, those about one axis together."""
-    found: dict[int, list[tuple[int, int]]] = {}
-    for mirror in problem.mirrors:
-        found.setdefault(mirror.scope, []).extend(mirror.pairs)
-    return list(found.values())
-
-
-def twice_axis(pairs: Sequence[tuple[int, int]], where: Mapping[int, Point] | Sequence[Point], across: int) -> float:
-    """Twice where the axis of these pairs stands: their median."""
-    totals = sorted(where[a][across] + where[b][across] for a, b in pairs)
-    return totals[len(totals) // 2] if totals else 0.0
 
 
 def _across(problem: LayoutProblem) -> int:

@@ -12,8 +12,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from neurovis_layouts.alike import Alike, Move
-from neurovis_layouts.conflicts import Earlier, earlier, pairs_by_axis, twice_axis
+from neurovis_layouts.alike import STAY, Alike, Move, pairs_by_axis, twice_axis
+from neurovis_layouts.conflicts import Earlier, earlier
 from neurovis_layouts.occupancy import AxisSide, Body, Occupancy, Wish, instance_of, lone
 from neurovis_layouts.rows import GroupRows
 from neurovis_spec.layout.frames import Frames
@@ -34,10 +34,9 @@ def remembered(problem: LayoutProblem, fresh: Sequence[Point], routes: Mapping[i
     sides = _sides(problem, fresh, before.where)
     there = Occupancy(frames, placed, frames.rects(placed, before.routes), sides, before.routes.values())
     wishes = _Wishes(problem, fresh, placed)
-    for piece in _pieces(problem, shapes, before):
-        first = piece[0].members[0]
-        if first in before.wanted:
-            there.put(Wish(piece, before.where[first]), stay=True)
+    for piece, anchor in _pieces(problem, shapes, before, there.placed):
+        if anchor is not None:
+            there.put(Wish(piece, anchor), stay=True)
         else:
             row = wishes.row(piece[0], there.placed)
             there.put(Wish(piece, row or wishes.wish(piece[0], there.placed)), in_row=row is not None)
@@ -155,10 +154,11 @@ class _Shapes:
             if all(i in before.where for i in module.members):
                 self._makes.setdefault(module.template, number)
 
-    def of(self, number: int) -> tuple[tuple[tuple[int, Point], ...], Rect]:
-        """The neurons of an instance, each with its offset from the first, and its frame in relation to that."""
+    def of(self, number: int, like: int | None = None) -> tuple[tuple[tuple[int, Point], ...], Rect]:
+        """The neurons of an instance, each with its offset from the first, and its frame in relation to that; ``like``
+        another, else like the first of its make."""
         module = self._modules[number]
-        drawn = self._makes.get(module.template)
+        drawn = self._makes.get(module.template) if like is None else like
         where: Mapping[int, Point] | Sequence[Point] = self._fresh if drawn is None else self._before
         rect = self._fresh_rects[number] if drawn is None else self._rects[drawn]
         at = [where[i] for i in (module if drawn is None else self._modules[drawn]).members]
@@ -167,17 +167,21 @@ class _Shapes:
         return offsets, (rect[0] - x0, rect[1] - y0, rect[2] - x0, rect[3] - y0)
 
 
-def _pieces(problem: LayoutProblem, shapes: _Shapes, before: Earlier) -> Iterator[tuple[Body, ...]]:
+def _pieces(
+    problem: LayoutProblem, shapes: _Shapes, before: Earlier, placed: Mapping[int, Point]
+) -> Iterator[tuple[tuple[Body, ...], Point | None]]:
     """What is placed together, each with its copies: instances as a piece, then neurons one by one; what has been
-    in the earlier layout and has to move comes first, then what partly placed instances lack, then what is new."""
+    in the earlier layout and has to move comes first, then what partly placed instances lack, then what is new. Beside
+    it where it is to stand: where it was, or where it is drawn like what is ``placed`` by then."""
     done, wanted = set(before.stay), before.wanted
     alike = Alike(problem, before.where)
 
-    def single(neuron: int) -> tuple[Body, ...]:
-        found = [(mate, move) for mate, move in alike.of(neuron) if mate not in done]
-        singles = [replace(lone(mate), move=move) for mate, move in found]
+    def single(neuron: int) -> tuple[tuple[Body, ...], Point | None]:
+        found = alike.of(neuron)
+        lead = next((move.inverse().point(placed[mate]) for mate, move in found if mate in placed), None)
+        singles = tuple(replace(lone(mate), move=move) for mate, move in found if mate not in done)
         done.update(i for copy in singles for i in copy.members)
-        return tuple(singles)
+        return singles, before.where[neuron] if neuron in wanted else lead
 
     for again in (True, False):
         own = {} if again else _innermost(problem)
@@ -189,14 +193,20 @@ def _pieces(problem: LayoutProblem, shapes: _Shapes, before: Earlier) -> Iterato
                 continue
             if again and not wanted.issuperset(module.members):
                 continue
+            counterparts = list(_copies(alike, module))
+            anchor, back = before.where[module.members[0]] if again else None, STAY
             offsets, rect = shapes.of(number)
-            copies = [Body(offsets, number, rect)]
-            for mates, move in _copies(alike, module):
+            lead = next((one for one in counterparts if done.issuperset(one[0]) and before.has(one[0])), None)
+            if lead is not None and not again:
+                anchor, back = placed[lead[0][0]], lead[1].inverse()
+                offsets, rect = shapes.of(number, instance_of(problem, lead[0]))
+            copies = [Body(offsets, number, rect, back)]
+            for mates, move in counterparts:
                 if done.isdisjoint(mates) and all(set(mates).isdisjoint(copy.members) for copy in copies):
                     mirrored = tuple((i, offset) for i, (_, offset) in zip(mates, offsets, strict=True))
-                    copies.append(Body(mirrored, instance_of(problem, mates), rect, move))
+                    copies.append(Body(mirrored, instance_of(problem, mates), rect, back.then(move)))
             done.update(i for copy in copies for i in copy.members)
-            yield tuple(copies)
+            yield tuple(copies), anchor
         for neuron in range(len(problem.neurons)):
             if neuron not in done and (neuron in wanted or not again):
                 yield single(neuron)
