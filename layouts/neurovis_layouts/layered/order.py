@@ -46,8 +46,6 @@ def ordered(
     if draft:
         return levels, _Search(levels, segments, False, effort).best(starts[1:], 0)[1]
     held = _Search(levels, segments, True, effort)
-    if segments.ports > 1:  # blocks are not turned round with the order around them
-        starts.append([rank[::-1] for rank in natural])
     strict = held.best(starts)
     if strict[0] == 0 or not any(held.kin):
         return held.improved(*strict, free)[1:]
