@@ -35,7 +35,7 @@ WALLED = _WALL
 #: either side.
 _CHOICES, _NEAR, _MOST_NEAR, _KEPT = 16, 2.0, 8, 2
 #: Where a way is pulled straight: over how many rows, how far aside, and how close to another.
-_FARTHEST, _ASIDE, _BESIDE_WAY = 40, 0.6, 0.12
+_FARTHEST, _ASIDE, _BESIDE_WAY = 12, 0.6, 0.12
 
 
 def straight(a: Point, b: Point) -> float:
