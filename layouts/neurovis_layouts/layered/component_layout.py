@@ -25,7 +25,7 @@ from neurovis_layouts.layered.mirror import mirrored, symmetric
 from neurovis_layouts.layered.order import crossings, ordered
 from neurovis_layouts.layered.place import placed, reaches
 from neurovis_layouts.layered.ranks import INSTANT, ranks_of
-from neurovis_layouts.layered.staggered import staggered, with_gaps
+from neurovis_layouts.layered.staggered import staggered
 from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.routing import Waypoint
 from neurovis_spec.layout.geometry import snap
@@ -196,8 +196,7 @@ def _component(
     spans = list(zip(*reaches(levels, order), strict=True))
     for i, passages in levels.passages.items():
         plan.ways[i] = [_passage(places[n], *spans[levels.nodes[n].rank]) for n in passages]
-    plan.ways = with_gaps(levels, places, plan.ways, uneven)
-    plan.ways, whole = with_exits(problem, edges, levels, places, spans, folds, plan.ways)
+    plan.ways, whole = with_exits(problem, edges, levels, places, spans, folds, uneven, plan.ways)
     if whole and not crossings(levels, order):
         plan.firm |= whole
     if not pair:

@@ -2,25 +2,21 @@
 wider than a page becomes narrower.
 
 In: levels with their order and where that places them, the proportions of a page. Out: the levels, of such ranks every
-other neuron lifted; and for connections to and from these a waypoint straight in front of them, where it leads through
-the gap between those that are before them.
+other neuron lifted. Connections to and from these run in the gaps between those before them (``fold_ports``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
 
 from neurovis_layouts.layered.levels import Levels, Node
-from neurovis_layouts.routing import Waypoint
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import LayoutProblem, Point
 
 #: What is wider than a page by this is staggered: its ranks of so many neurons and more, that make it so wide.
 _WIDE, _FEWEST, _PART = 2.0, 20, 0.5
-#: How far in front of a neuron its lines are side by side, how far apart, and how far the first is from the last.
-_BEFORE, _APART, _FREE = 0.5, 0.16, 0.2
 
 
 def staggered(
@@ -47,29 +43,3 @@ def staggered(
 def _alone(node: Node, lined: AbstractSet[int]) -> bool:
     """Whether a node is a single neuron, as high as its disc, that nobody wants on a line."""
     return len(node.members) == 1 and node.reach == (0.0, 0.0) and not node.lift and node.members[0][0] not in lined
-
-
-def with_gaps(
-    levels: Levels, places: Sequence[Point], ways: Mapping[int, list[Waypoint]], ranks: AbstractSet[int]
-) -> dict[int, list[Waypoint]]:
-    """The waypoints of the edges, from above to below; those to and from neurons of staggered ``ranks`` begin and end
-    straight in front of these, beside each other, where both rows of the rank are passed."""
-    leaving: dict[tuple[int, bool], list[tuple[float, int]]] = {}
-    for i, (upper, _, lower, _) in levels.ends.items():
-        line = [way.x for way in ways.get(i, ())]
-        if levels.nodes[lower].rank in ranks:
-            leaving.setdefault((lower, False), []).append(([places[upper][0], *line][-1], i))
-        if levels.nodes[upper].rank in ranks:
-            leaving.setdefault((upper, True), []).append(([*line, places[lower][0]][0], i))
-    found = {i: list(line) for i, line in ways.items()}
-    for (n, down), lines in leaving.items():
-        (x, y), lift = places[n], levels.nodes[n].lift
-        sign = 1 if down else -1
-        behind = sign * lift < 0
-        reach = _BEFORE + (2 * abs(lift) if behind else 0.0)
-        half = abs(lift) if behind else 0.0
-        apart = min(_APART, _FREE / max(1, len(lines) - 1))
-        for place, (_, i) in enumerate(sorted(lines)):
-            gate = Waypoint(x + (place - (len(lines) - 1) / 2) * apart, y + sign * (reach - half), half)
-            found[i] = [gate, *found.get(i, [])] if down else [*found.get(i, []), gate]
-    return found
