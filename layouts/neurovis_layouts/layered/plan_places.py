@@ -14,6 +14,9 @@ from neurovis_layouts.layered.drawing import FrameMove, Piece
 from neurovis_spec.layout.geometry import Rect, bounds, padded, sampled, shifted, snap, united
 from neurovis_spec.layout.model import RADIUS, LayoutProblem, Point
 
+#: Single neurons are never closer, from centre to centre.
+_LEAST = 0.65
+
 
 @dataclass(frozen=True, slots=True)
 class Slot:
@@ -46,14 +49,15 @@ def placed(
 ) -> dict[int, FrameMove]:
     """How the first of each line of parts is moved; ``page`` is how many columns across and rows along there are.
     ``even``: 0 is the middle across, and what is as far from it on either side stands alike."""
+    street = max(problem.neuron_spacing, _LEAST)
     rooms: list[_Room] = []
     shifts: list[dict[int, Point]] = []
     for slot in slots:
-        room, own = _stacked(slot, pieces, flips, problem.neuron_spacing)
+        room, own = _stacked(slot, pieces, flips, street)
         rooms.append(room)
         shifts.append(own)
     spans = [(slot.across, slot.along) for slot in slots]
-    streets = _streets(problem, slots, pieces)
+    streets = _streets(problem, slots, pieces, street)
     rows = 1 if problem.direction in ("down", "up") else 0
     at = [_axis(axis, spans, rooms, page[axis], streets, axis == rows, even and axis == 0) for axis in (0, 1)]
     moves: dict[int, FrameMove] = {}
@@ -65,16 +69,18 @@ def placed(
     return moves
 
 
-def _streets(problem: LayoutProblem, slots: Sequence[Slot], pieces: Sequence[Piece]) -> list[list[float]]:
+def _streets(
+    problem: LayoutProblem, slots: Sequence[Slot], pieces: Sequence[Piece], street: float
+) -> list[list[float]]:
     """How far apart every two cells are at least: as neurons in a rank, but where neither is a frame and something
     leads from the one to the other as ranks, so that its arrow is seen."""
     slot_of = {k: number for number, slot in enumerate(slots) for line in slot.lines for k in line}
     owner = {m: slot_of[k] for k, piece in enumerate(pieces) for m in piece.part.members if not piece.framed}
-    streets = [[problem.neuron_spacing] * len(slots) for _ in slots]
+    streets = [[street] * len(slots) for _ in slots]
     for edge in problem.edges:
-        if edge.source in owner and edge.target in owner:
-            one, other = owner[edge.source], owner[edge.target]
-            streets[one][other] = streets[other][one] = max(problem.neuron_spacing, problem.rank_spacing)
+        one, other = owner.get(edge.source, -1), owner.get(edge.target, -1)
+        if min(one, other) >= 0 and one != other:
+            streets[one][other] = streets[other][one] = max(street, problem.rank_spacing)
     return streets
 
 
