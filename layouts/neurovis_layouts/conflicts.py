@@ -28,8 +28,8 @@ _SAME = (1.0, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class Earlier:
-    """Where neurons were, or are to be: those that ``stay`` there, those that are ``wanted`` there if there is room,
-    and others, which overlap one that stays; and the routes, by edge, that can be used between these places."""
+    """Where neurons were, or are to be: those that ``stay`` there, and others that are ``wanted`` there if there is
+    room; and the routes, by edge, that can be used between these places."""
 
     where: Mapping[int, Point]
     stay: frozenset[int]
@@ -57,11 +57,11 @@ def earlier(problem: LayoutProblem, fresh: Sequence[Point]) -> Earlier:
     where.update(pins)
     routes = carried(problem, problem.memory, where)
     newly = put | {i for i, point in pins.items() if known.get(i) != point}
-    wanted |= (whole(problem, _giving_way(problem, where, newly, routes)) & where.keys()) - pins.keys() - put
-    # neurons that overlap a pin (or, in a file edited by hand, a neuron before them) are placed anew, like new ones
-    stay = where.keys() - wanted
-    stay -= overlapping({i: where[i] for i in stay - pins.keys()}, pins)
-    return Earlier(where, frozenset(stay), frozenset(wanted), routes)
+    off = _giving_way(problem, where, newly, routes)
+    # in a file edited by hand neurons may overlap others without a word of that in its routes
+    off |= overlapping({i: where[i] for i in where.keys() - wanted - off - pins.keys()}, pins)
+    wanted |= (whole(problem, off) & where.keys()) - pins.keys() - (put - off)
+    return Earlier(where, frozenset(where.keys() - wanted), frozenset(wanted), routes)
 
 
 def carried(problem: LayoutProblem, layout: Layout, placed: Mapping[int, Point]) -> dict[int, Route]:
