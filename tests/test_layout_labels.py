@@ -13,11 +13,12 @@ from neurovis_spec import pipeline
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.layout import Layout
+from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.file import dump, parse
 from neurovis_spec.layout.geometry import Rect, meet
 from neurovis_spec.layout.labels import WIDEST, label_rect
 from neurovis_spec.layout.metrics import metrics
-from neurovis_spec.layout.problem import problem_of
+from neurovis_spec.layout.problem import canonical, problem_of
 from neurovis_spec.scene import Disc, Rectangle, Text
 from neurovis_spec.scene.texts import width
 
@@ -321,3 +322,14 @@ connections: {A -> H: 1, H -> B: 1}
     assert discs["A"].radius < 0.75 * 0.3 * 66
     (left, top, right, bottom), (x0, y0, x1, y1) = around(frames["b"]), covers(labels["A"])
     assert min(x0 - left, y0 - top, right - x1, bottom - y1) > 0
+
+
+def test_of_mirror_images_one_alone_may_have_a_label_beside_its_disc() -> None:
+    problem = canonical(
+        "x",
+        ["A", "B", "C"],
+        edges=[("A -> C", "A", "C", 1), ("B -> C", "B", "C", 1)],
+        mirrors=[("", [("A", "B")], [])],
+        labels={"A": (0.9, 0.25)},
+    )
+    assert lay_out_problem(problem, "layered").labels.keys() == {"A"}

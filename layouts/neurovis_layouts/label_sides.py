@@ -72,11 +72,11 @@ def _alike(problem: LayoutProblem, layout: Layout, beside: Sequence[int]) -> lis
     first."""
     alike = Alike(problem, {i: layout.positions[name] for i, name in enumerate(problem.neurons)})
     found: list[list[tuple[int, Move]]] = []
-    seen: set[int] = set()
+    left = set(beside)
     for neuron in beside:
-        if neuron not in seen:
-            found.append([(mate, move) for mate, move in alike.of(neuron) if mate not in seen])
-            seen.update(mate for mate, _ in found[-1])
+        if neuron in left:
+            found.append([(mate, move) for mate, move in alike.of(neuron) if mate in left])
+            left.difference_update(mate for mate, _ in found[-1])
     return found
 
 
