@@ -560,3 +560,16 @@ def test_instances_that_are_drawn_around_their_pins_stay_so(engine: str) -> None
     network = legs(mirror=f"layout: {{positions: {{{pins}}}}}")
     first = network.layout(engine).value
     assert network.layout(engine, earlier=first).value == first
+
+
+def test_an_instance_that_something_was_put_on_gives_way_as_a_whole() -> None:
+    network = legs(mirror="layout: {mirror: [[left, right]]}")
+    problem, before = problem_of(network.network), network.layout("layered").value
+    earlier = replace(before, positions={**before.positions, "M": before.positions["left1.K2"]}, routes={})
+    now = lay_out_problem(replace(problem, memory=earlier), "layered")
+    assert apart(now)
+    for leg in ("left1", "right1"):
+        own = [name for name in problem.neurons if name.startswith(leg)]
+        way = {tuple(now.positions[name][k] - before.positions[name][k] for k in (0, 1)) for name in own}
+        assert len(way) == 1
+    assert lay_out_problem(replace(problem, memory=now), "layered").positions == now.positions
