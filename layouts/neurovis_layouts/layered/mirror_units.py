@@ -12,7 +12,7 @@ from dataclasses import replace
 from neurovis_layouts.formations import offsets
 from neurovis_layouts.frame import from_picture
 from neurovis_layouts.layered.units import Unit, units_of
-from neurovis_spec.layout.model import LayoutProblem, LayoutRefusalError, Point
+from neurovis_spec.layout.model import Arrangement, LayoutProblem, LayoutRefusalError, Point
 
 
 def symmetric_units(problem: LayoutProblem, frames: Sequence[Unit], pair: Mapping[int, int]) -> list[Unit]:
@@ -66,7 +66,7 @@ def _reflected(unit: Unit, pair: Mapping[int, int]) -> Unit:
 
 
 def _arranged(
-    problem: LayoutProblem, members: Sequence[int], how: str, pair: Mapping[int, int], framed: AbstractSet[int]
+    problem: LayoutProblem, members: Sequence[int], how: Arrangement, pair: Mapping[int, int], framed: AbstractSet[int]
 ) -> Unit | None:
     """An arrangement that holds mirror images of each other: a block on the axis, in which these stand opposite."""
     own = set(members)
@@ -74,11 +74,7 @@ def _arranged(
         return None
     spacing = max(problem.neuron_spacing, 0.65)
     inner = any(e.source in own and e.target in own and e.source != e.target for e in problem.edges)
-    arrangement = next(h for m, h in problem.arrange if tuple(m) == tuple(members) and h == how)
-    points = [
-        from_picture(p, problem.direction)
-        for p in offsets(arrangement, len(members), spacing * (1.5 if inner else 1.0))
-    ]
+    points = [from_picture(p, problem.direction) for p in offsets(how, len(members), spacing * (1.5 if inner else 1.0))]
     left = sorted((p for p in points if p[0] < 0), key=points.index)
     middle = [p for p in points if p[0] == 0]
     first = {a for mirror in problem.mirrors for a, _ in mirror.pairs}
