@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from neurovis_layouts.frame import across_of
 from neurovis_spec.layout.model import LayoutModule, LayoutProblem, Point
 
 
@@ -38,6 +39,11 @@ class Move:
 STAY = Move()
 
 
+def reflection(across: int, twice: float) -> Move:
+    """The reflection on an axis, ``twice`` where it stands."""
+    return Move((-1.0, 1.0), (twice, 0.0)) if across == 0 else Move((1.0, -1.0), (0.0, twice))
+
+
 class Alike:
     """Looks up the counterparts of a neuron: those whose places follow from its place."""
 
@@ -50,11 +56,10 @@ class Alike:
             for place, neuron in enumerate(module.members):
                 self._around.setdefault(neuron, []).append((module, place))
         self._images: dict[int, tuple[int, Move]] = {}
-        across = 0 if problem.direction in ("down", "up") else 1
+        across = across_of(problem.direction)
         for pairs in pairs_by_axis(problem):
             there = [(a, b) for a, b in pairs if a in placed and b in placed]
-            twice = twice_axis(there, placed, across)
-            move = Move((-1.0, 1.0), (twice, 0.0)) if across == 0 else Move((1.0, -1.0), (0.0, twice))
+            move = reflection(across, twice_axis(there, placed, across))
             for a, b in pairs if there else ():
                 self._images[a] = b, move
                 self._images[b] = a, move

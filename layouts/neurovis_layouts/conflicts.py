@@ -13,7 +13,8 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from neurovis_layouts.alike import pairs_by_axis, twice_axis
+from neurovis_layouts.alike import pairs_by_axis, reflection, twice_axis
+from neurovis_layouts.frame import across_of
 from neurovis_layouts.occupancy import Body, Occupancy, lone, overlapping
 from neurovis_spec.layout.frames import Frames
 from neurovis_spec.layout.geometry import distance
@@ -109,7 +110,7 @@ def _follow_makes(
     moved: set[int],
     known: Mapping[int, Point],
 ) -> None:
-    across = _across(problem)
+    across = across_of(problem.direction)
     mirrored, upside_down = ((-1.0, 1.0), (1.0, -1.0))[:: 1 if across == 0 else -1]
     makes: dict[str, list[LayoutModule]] = {}
     for module in problem.modules:
@@ -165,37 +166,28 @@ def _follow_mirrors(
     hand: Mapping[int, Point],
     put: set[int],
 ) -> None:
-    across = _across(problem)
+    across = across_of(problem.direction)
     for mirrored in pairs_by_axis(problem):
         pairs = [(a, b) for a, b in mirrored if a in where and b in where]
-        twice = twice_axis(pairs, fresh, across)
-        pairs = [(a, b) for a, b in pairs if _equal(_reflected(fresh[a], twice, across), fresh[b])]
+        mirror = reflection(across, twice_axis(pairs, fresh, across))
+        pairs = [(a, b) for a, b in pairs if _equal(mirror.point(fresh[a]), fresh[b])]
         if not pairs:
             continue
         # what was moved by hand does not take the axis along, unless all was
         firm = [(a, b) for a, b in pairs if a not in hand or b not in hand]
-        twice = twice_axis(firm or pairs, {**where, **hand} if firm else where, across)
+        mirror = reflection(across, twice_axis(firm or pairs, {**where, **hand} if firm else where, across))
         followed: list[int] = []
         for a, b in pairs:
-            if _equal(_reflected(where[a], twice, across), where[b]):
+            if _equal(mirror.point(where[a]), where[b]):
                 continue
             leads = [(i in problem.pins, i in hand) for i in (a, b)]
             first, second = (b, a) if leads[1] > leads[0] else (a, b)
-            where[second] = _reflected(where[first], twice, across)
+            where[second] = mirror.point(where[first])
             if first in put and second not in problem.pins:
                 put.add(second)
             else:
                 followed += (a, b)
         moved.update(whole(problem, followed) & where.keys())
-
-
-def _across(problem: LayoutProblem) -> int:
-    """The coordinate of the picture that is across the direction."""
-    return 0 if problem.direction in ("down", "up") else 1
-
-
-def _reflected(point: Point, twice: float, across: int) -> Point:
-    return (twice - point[0], point[1]) if across == 0 else (point[0], twice - point[1])
 
 
 def _equal(one: Point, other: Point) -> bool:

@@ -44,3 +44,8 @@ def from_picture(point: Point, direction: Direction) -> Point:
 def turned(rect: Rect, direction: Direction) -> Rect:
     """A rectangle of the picture in the frame of an engine."""
     return bounds([from_picture(rect[:2], direction), from_picture(rect[2:], direction)])
+
+
+def across_of(direction: Direction) -> int:
+    """The coordinate of the picture that is across the direction."""
+    return 0 if direction in ("down", "up") else 1

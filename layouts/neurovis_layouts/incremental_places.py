@@ -14,6 +14,7 @@ from dataclasses import replace
 
 from neurovis_layouts.alike import STAY, Alike, Move, pairs_by_axis, twice_axis
 from neurovis_layouts.conflicts import Earlier, earlier
+from neurovis_layouts.frame import across_of
 from neurovis_layouts.occupancy import AxisSide, Body, Occupancy, Wish, instance_of, lone
 from neurovis_layouts.rows import GroupRows
 from neurovis_spec.layout.frames import Frames
@@ -115,7 +116,7 @@ def _median(values: list[float]) -> float:
 
 def _sides(problem: LayoutProblem, fresh: Sequence[Point], before: Mapping[int, Point]) -> dict[int, AxisSide]:
     """For neurons with a mirror image the axis, and on which side of it they are, as in the fresh layout."""
-    across = 0 if problem.direction in ("down", "up") else 1
+    across = across_of(problem.direction)
     sides: dict[int, AxisSide] = {}
     for pairs in pairs_by_axis(problem):
         there = [(a, b) for a, b in pairs if a in before and b in before]

@@ -13,9 +13,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
-from neurovis_layouts.alike import Move
+from neurovis_layouts.alike import reflection
 from neurovis_layouts.axes import axes, shift_of
-from neurovis_layouts.frame import from_picture, to_picture
+from neurovis_layouts.frame import across_of, from_picture, to_picture
 from neurovis_layouts.layered.component_layout import ComponentLayout
 from neurovis_layouts.layered.drawing import FrameMove, Piece
 from neurovis_layouts.layered.parts import images_of
@@ -281,11 +281,6 @@ def _in_picture(rect: Rect, problem: LayoutProblem) -> Rect:
     return bounds([to_picture(rect[:2], problem.direction), to_picture(rect[2:], problem.direction)])
 
 
-def _across(problem: LayoutProblem) -> int:
-    """The coordinate of the picture that is across the direction."""
-    return 0 if problem.direction in ("down", "up") else 1
-
-
 def _put(point: Point, axis: int, value: float) -> Point:
     """A point with one of its coordinates replaced."""
     return (value, point[1]) if axis == 0 else (point[0], value)
@@ -293,7 +288,7 @@ def _put(point: Point, axis: int, value: float) -> Point:
 
 def _on_lines(problem: LayoutProblem, wishes: list[Wish], pins: Mapping[int, Point]) -> list[Wish]:
     """The wishes, those of what is on a line along it alone, and on the pin that is on it."""
-    result, along = list(wishes), 1 - _across(problem)
+    result, along = list(wishes), 1 - across_of(problem.direction)
     owner = {m: (b, offset[along]) for b, wish in enumerate(wishes) for m, offset in wish.bodies[0].offsets}
     for line in problem.align:
         heights = [to_picture(pins[m], problem.direction)[along] for m in line if m in pins]
@@ -356,7 +351,7 @@ def _refusal(problem: LayoutProblem, one: Wish, other: Wish) -> LayoutRefusalErr
 def _arranged(problem: LayoutProblem, trial: _Trial, pair: Mapping[int, int]) -> Mapping[int, Point]:
     """Where each neuron that has a wish stands in the picture: what is pinned first, then what is free where it would
     like to be, then the rest, mirror images together. Raises LayoutRefusalError where a line has no room."""
-    wishes, across = trial.wishes, _across(problem)
+    wishes, across = trial.wishes, across_of(problem.direction)
     owner = {m: b for b, wish in enumerate(wishes) for m in wish.bodies[0].members}
     sides: dict[int, AxisSide] = {}
     for wish in wishes:
@@ -383,7 +378,7 @@ def _arranged(problem: LayoutProblem, trial: _Trial, pair: Mapping[int, int]) ->
                 level = wish if not wish.along[along] else mate
                 wish = replace(wish, anchor=_put(wish.anchor, along, level.anchor[along]), along=level.along)
             images = tuple((pair[m], offset) for m, offset in body.offsets)
-            move = Move(_put((1.0, 1.0), across, -1.0), _put(_HERE, across, 2 * trial.axis))
+            move = reflection(across, 2 * trial.axis)
             bodies = body, Body(images, mate.bodies[0].frame, body.rect, move)
             free.append(replace(wish, bodies=bodies, clear=wish.clear and mate.clear))
     lost = occupancy.settle(free)
