@@ -191,8 +191,8 @@ class Insertion:
         first, last = self._first(node), self._last(node)
         ups = [c for c in self.ups[node] if links[c].upper not in self._out]
         downs = [c for c in self.downs[node] if links[c].lower not in self._out]
-        from_above = self._reach_down([(self.rank[links[c].upper], links[c].top) for c in ups], first, last)
-        from_below = self._reach_up([(self.rank[links[c].lower], links[c].bottom) for c in downs], first, last)
+        from_above = self._reach([(self.rank[links[c].upper], links[c].top) for c in ups], first, last, True)
+        from_below = self._reach([(self.rank[links[c].lower], links[c].bottom) for c in downs], first, last, False)
         best = slot = -1
         for r in range(first, last + 1):
             sums = [side[r] for side in (from_above, from_below) if side]
@@ -233,47 +233,30 @@ class Insertion:
         below = {self.links[c].lower for c in self.downs[node]}
         return min((self._last(n) if n in self._out else self.rank[n] for n in below), default=self._height) - 1
 
-    def _reach_down(self, starts: Sequence[tuple[int, int]], first: int, last: int) -> dict[int, Counts]:
-        """By rank from ``first`` to ``last``, for each slot: how many segments lines from all of these entries above
-        cross on their way to it."""
+    def _reach(self, starts: Sequence[tuple[int, int]], first: int, last: int, down: bool) -> dict[int, Counts]:
+        """By rank from ``first`` to ``last``, for each slot: how many segments lines from all of these entries above,
+        else below, cross on their way to it."""
         found: dict[int, Counts] = {}
         waiting = _by_rank(starts)
         lines: Counts | None = None
-        for r in range(min(waiting, default=last + 1), last + 1):
-            if lines is not None and r >= first:
+        step, end = (1, last) if down else (-1, first)
+        begin = (min if down else max)(waiting, default=end + step)
+        for r in range(begin, end + step, step):
+            if lines is not None and first <= r <= last:
                 found[r] = lines.sum(axis=0, dtype=np.int32)
-            if r == last:
+            if r == end:
                 break
+            gap = r if down else r - 1
             if lines is not None:
                 if self._tight[r]:
                     lines = lines + self._shut(r, -1)
-                lines = self._through(lines, self._cost_of(r))
+                costs = self._cost_of(gap)
+                lines = self._through(lines, costs if down else costs.T)
             if r in waiting:
                 at = [self.order[r].index(entry) for entry in waiting[r]]
-                before, after = self._before[r][at], self._before[r][[i + 1 for i in at]]
-                # what leaves before it and arrives behind, and what leaves behind it and arrives before
-                more = before[:, -1:] - before + self._before[r][-1] - after
-                lines = more if lines is None else np.concatenate((lines, more))
-        return found
-
-    def _reach_up(self, starts: Sequence[tuple[int, int]], first: int, last: int) -> dict[int, Counts]:
-        """``_reach_down`` in the other direction: lines from entries below."""
-        found: dict[int, Counts] = {}
-        waiting = _by_rank(starts)
-        lines: Counts | None = None
-        for r in range(max(waiting, default=first - 1), first - 1, -1):
-            if lines is not None and r <= last:
-                found[r] = lines.sum(axis=0, dtype=np.int32)
-            if r == first:
-                break
-            if lines is not None:
-                if self._tight[r]:
-                    lines = lines + self._shut(r, -1)
-                lines = self._through(lines, self._cost_of(r - 1).T)
-            if r in waiting:
-                at = [self.order[r].index(entry) for entry in waiting[r]]
-                whole = self._before[r - 1].T
+                whole = self._before[gap] if down else self._before[gap].T
                 before, after = whole[at], whole[[i + 1 for i in at]]
+                # what leaves before it and arrives behind, and what leaves behind it and arrives before
                 more = before[:, -1:] - before + whole[-1] - after
                 lines = more if lines is None else np.concatenate((lines, more))
         return found
