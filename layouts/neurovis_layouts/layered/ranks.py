@@ -2,7 +2,7 @@
 
 In: units and the connections between them. Out: a rank for each, from 0. Connections that go back against the ranks
 are as few as a greedy choice and moves of single units make them; the ranks are those with the shortest connections in
-all (``simplex``); units that can stand in an earlier rank without making them longer do.
+all (``simplex``).
 """
 
 from __future__ import annotations
@@ -55,7 +55,6 @@ def ranks_of(count: int, arcs: Arcs, first: AbstractSet[int], last: AbstractSet[
         arcs_within = [(number[a], number[b], int(weight)) for (a, b), weight in forward.items() if a in part]
         for unit, level in zip(number, shortened([rank[unit] for unit in number], arcs_within), strict=True):
             rank[unit] = level
-    _early(order, rank, forward, before)
     return rank
 
 
@@ -124,14 +123,3 @@ def _sifted(order: list[int], arcs: Arcs) -> list[int]:
             costs[number[a], number[b]] -= int(weight)
             costs[number[b], number[a]] += int(weight)
     return [order[i] for i in sifted(costs, np.arange(len(order), dtype=np.int64))[0].tolist()]
-
-
-def _early(order: Sequence[int], rank: list[int], forward: Arcs, before: Sequence[Sequence[int]]) -> None:
-    """Move units with equal pull from both sides to the lowest rank that they may have."""
-    pull = [0.0] * len(rank)
-    for (a, b), weight in forward.items():
-        pull[a] += weight
-        pull[b] -= weight
-    for unit in order:
-        if before[unit] and pull[unit] == 0:
-            rank[unit] = max(rank[other] + 1 for other in before[unit])
