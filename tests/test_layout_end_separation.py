@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from neurovis_layouts.routing.bows import bow
-from neurovis_layouts.routing.route_cost import Judge
-from neurovis_layouts.routing.simplify_routes import told_apart
+from neurovis_layouts.routing.improve import improved
+from neurovis_layouts.routing.route_cost import Drawn
 from test_layout_compound import attempt, walkers
 
 import neurovis_spec as nv
@@ -103,5 +103,5 @@ def test_where_ends_are_many_they_stay_as_even_as_they_are() -> None:
         pairs = [(a, b) for a in range(count) for b in range(count) if a != b]
         edges = [LayoutEdge(f"{a} -> {b}", a, b, 1) for a, b in pairs]
         routes = {i: bow(centres[a], centres[b], high) for i, (a, b) in enumerate(pairs)}
-        found = told_apart(Judge(edges, centres, routes), routes.keys())
+        found = improved(Drawn(edges, centres, routes), routes.keys())
         assert bool(found) == turned

@@ -58,36 +58,6 @@ def test_a_way_takes_the_longer_side_of_a_disc_rather_than_cross_a_line() -> Non
     assert all(way.x > 0.2 for way in wary)
 
 
-def test_a_line_that_is_dropped_is_not_there_any_more() -> None:
-    lines = CutLines()
-    first = lines.add([(0.0, 0.0), (0.0, 9.0)])
-    lines.add([(1.0, 0.0), (1.0, 9.0), (2.0, 3.0)])
-    assert lines.between(4.0, 6.0)[0].tolist()[:2] == [0, 1]
-    lines.drop(first)
-    assert 0 not in lines.between(4.0, 6.0)[0]
-    assert 0 not in lines.between(1.0, 2.0)[0]
-
-
-def test_ways_are_found_anew_when_all_are_known() -> None:
-    # the first way, the shortest, is found before the one that it had better not cross
-    centres = [(0.0, 0.0), (0.6, 6.0), (-4.0, -1.0), (4.0, 12.0), (0.2, 3.0)]
-    edges = {0: LayoutEdge("short", 0, 1, 1), 1: LayoutEdge("long", 2, 3, 1)}
-    along, across = channels(edges, centres, [], {})
-    assert not across
-    ends = [
-        [centres[edge.source], *((way.x, way.y) for way in along[i]), centres[edge.target]] for i, edge in edges.items()
-    ]
-    lines = CutLines()
-    lines.add(ends[0])
-    steps = [(a, b) for a, b in pairwise(ends[1])]
-    total = sum(
-        float(crossed(np.array([a[0]]), np.array([b[0]]), lines.between(a[1], b[1])).sum())
-        for a, b in steps
-        if a[1] < b[1]
-    )
-    assert total <= 1
-
-
 @pytest.mark.parametrize(("sources", "targets"), [(4, 8), (3, 5), (5, 5), (8, 4)])
 def test_full_layers_beside_a_frame_run_as_if_there_were_none(sources: int, targets: int) -> None:
     network = nv.compile_text(

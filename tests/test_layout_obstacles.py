@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from neurovis_layouts.routing.bows import BowSought, clear_bow, clear_bows
+from neurovis_layouts.routing.bows import BowSought, clear_bows
 from neurovis_layouts.routing.obstacles import REACH, Obstacles
 
 from neurovis_spec.layout.geometry import straight
@@ -38,6 +38,13 @@ def test_a_line_is_crowded_by_a_disc_beside_it_but_not_by_its_own_ends(middle: P
     assert obstacles.crowded([line], [(0, 2)], REACH - 0.1) == [True]
 
 
+def test_a_disc_between_two_points_of_a_line_is_not_overlooked() -> None:
+    """However far apart the points are that are looked up."""
+    for shift in range(20):
+        obstacles = Obstacles([(0.0, 0.0), (10.0, 0.0), (5.0 + shift / 50, 0.2995)])
+        assert obstacles.clearance(straight((0.0, 0.0), (10.0, 0.0)), (0, 1)) == pytest.approx(0.2995)
+
+
 def test_nothing_crowds_where_there_is_nothing() -> None:
     assert Obstacles(()).crowded([straight((0.0, 0.0), (1.0, 0.0))], [(0, 1)], 0.3) == [False]
     assert Obstacles([(0.0, 0.0)]).crowded([], [], 0.3) == []
@@ -55,7 +62,7 @@ def test_bows_found_together_are_those_found_one_by_one(centres: list[Point], da
         )
     ]
     together = clear_bows(wishes, obstacles)
-    assert together == [clear_bow(wish, obstacles) for wish in wishes]
+    assert together == [clear_bows([wish], obstacles)[0] for wish in wishes]
     for wish, (route, clearance, height) in zip(wishes, together, strict=True):
         assert (route[0], route[-1]) == (wish.start, wish.end)
         assert clearance == obstacles.clearance(route, wish.own)

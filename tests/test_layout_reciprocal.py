@@ -10,8 +10,8 @@ import layout_conformance as suite
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from neurovis_layouts.routing.route_cost import Judge
-from neurovis_layouts.routing.simplify_routes import told_apart
+from neurovis_layouts.routing.improve import improved
+from neurovis_layouts.routing.route_cost import Drawn
 from test_layout_compound import attempt, walkers
 
 import neurovis_spec as nv
@@ -145,7 +145,7 @@ def test_long_ways_there_and_back_do_not_share_a_stretch() -> None:
     assert 0.1 < together(back, there, 0.08) < 0.2
     edges = [LayoutEdge("A -> B", 0, 1, 0), LayoutEdge("B -> A", 1, 0, 0)]
     routes = {0: there, 1: back}
-    routes.update(told_apart(Judge(edges, [there[0], there[-1]], routes), {0, 1}))
+    routes.update(improved(Drawn(edges, [there[0], there[-1]], routes), {0, 1}))
     assert together(routes[1], routes[0], 0.08) == 0.0
 
 

@@ -14,7 +14,7 @@ from neurovis_layouts.routing import route_all
 from neurovis_layouts.routing.corners import rounded
 from neurovis_layouts.routing.detours import Detours, detoured
 from neurovis_layouts.routing.obstacles import Obstacles
-from neurovis_layouts.routing.walls import Walls, meet, touch
+from neurovis_layouts.routing.walls import Walls, meet
 
 import neurovis_spec as nv
 from neurovis_spec.layout import Direction, Layout, LayoutEdge, LayoutProblem, LayoutRefusalError, Point
@@ -160,10 +160,8 @@ rects = st.tuples(*(st.integers(-6, 6) for _ in range(4))).map(
 spots = st.tuples(st.integers(-8, 8), st.integers(-8, 8)).map(lambda at: (float(at[0]), float(at[1])))
 
 
-@given(a=spots, b=spots, rect=rects, centre=spots)
-def test_segments_meet_rectangles_and_touch_discs_where_points_on_them_do(
-    a: Point, b: Point, rect: Rect, centre: Point
-) -> None:
+@given(a=spots, b=spots, rect=rects)
+def test_segments_meet_rectangles_where_points_on_them_do(a: Point, b: Point, rect: Rect) -> None:
     import numpy as np
 
     line = [(a[0] + (b[0] - a[0]) * i / 400, a[1] + (b[1] - a[1]) * i / 400) for i in range(401)]
@@ -173,10 +171,6 @@ def test_segments_meet_rectangles_and_touch_discs_where_points_on_them_do(
     found = bool(meet(one, other, np.array([rect]))[0, 0])
     assert found or not inside
     assert near or not found
-    closest = min(distance(point, centre) for point in line)
-    touched = bool(touch(one, other, np.array([centre]), 0.7)[0, 0])
-    assert touched or closest > 0.65
-    assert closest < 0.75 or not touched
 
 
 def test_rounded_lines_run_from_end_to_end_and_stay_within_their_corners() -> None:

@@ -12,18 +12,13 @@ from neurovis_layouts.layered.component_layout import ComponentLayout
 from neurovis_layouts.layered.pinning import Settled
 from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.routing import Waypoint, route_all
-from neurovis_layouts.routing.arcs import Arcs, even
 from neurovis_layouts.routing.channel_routing import channels
-from neurovis_layouts.routing.corners import reflected, rounded
+from neurovis_layouts.routing.corners import rounded
 from neurovis_layouts.routing.ends import Key
+from neurovis_layouts.routing.images import Images
 from neurovis_layouts.routing.obstacles import REACH
-from neurovis_layouts.routing.route_cost import Judge
-from neurovis_layouts.routing.simplify_routes import MOST_EASED, eased, told_apart
 from neurovis_spec.layout.geometry import Rect, bounds, distance, meet, snap
 from neurovis_spec.layout.model import GRID, LayoutEdge, LayoutProblem, Point, Route
-
-#: With more connections than this nobody can tell them apart.
-_MOST = 1000
 
 
 def linked(
@@ -43,7 +38,7 @@ def linked(
     the frame of its neuron; ``drawn`` are the routes within the frames."""
     edges = [problem.edges[i] for i in links]
     framed = [(frozenset(members), rect) for members, rect in (*frames, *boxes, *labels)]
-    # what has its waypoints from the plan crosses nothing, and what would be drawn anew beside it might
+    # what has its waypoints from the plan keeps them
     firm: dict[int, list[Waypoint]] = {}
     lateral: dict[int, list[Waypoint]] = {}
     planned = _passing(problem, plan, rests)
@@ -58,6 +53,8 @@ def linked(
     else:
         ways = planned
     bowed = _bowed(edges, units)
+    own = [keys[i] for i in links]
+    images = _images(own, rests, pair)
     routes = route_all(
         edges,
         rests.places,
@@ -67,54 +64,10 @@ def linked(
         frames=framed,
         drawn=drawn,
         begun=begun,
-        ease=not firm,
-        improve=not pair,
+        images=images,
+        planned=firm.keys(),
     )
-    found = {keys[i]: tuple(_snapped(route)) for i, route in zip(links, routes, strict=True)}
-    if not pair:
-        return found
-    found = _reflected(found, rests, pair)
-    if len(found) <= _MOST:
-        found.update(_improved(found, edges, [keys[i] for i in links], rests, pair, framed, drawn, not firm))
-    return found
-
-
-def _improved(
-    routes: Mapping[Key, Route],
-    edges: Sequence[LayoutEdge],
-    keys: Sequence[Key],
-    rests: Settled,
-    pair: Mapping[int, int],
-    frames: Sequence[tuple[frozenset[int], Rect]],
-    drawn: Sequence[Route],
-    ease: bool,
-) -> dict[Key, Route]:
-    """Routes that are drawn better: those there and back between mirror images clear of obstacles and of each other
-    (``Arcs``), others with fewer bends and apart from others, those of mirror images reflections of each other."""
-    number = {key: i for i, key in enumerate(keys)}
-    image: dict[int, int] = {}
-    free: set[int] = set()
-    for key, i in number.items():
-        source, target, _ = key
-        other = number.get(_image_of(key, rests, pair), -1)
-        if source == target or other == i or pair.get(source) == target:
-            continue
-        if other >= 0:
-            image[i] = other
-        if other < 0 or i < other:
-            free.add(i)
-    here = {i: routes[key] for key, i in number.items() if key[0] != key[1]}
-    loops = [routes[key] for key in keys if key[0] == key[1]]
-    judge = Judge(edges, rests.places, here, frames, [*drawn, *loops], image, 2 * rests.axis)
-    between: dict[tuple[int, ...], list[int]] = {}
-    for key, i in sorted(number.items()):
-        if pair.get(key[0]) == key[1] and (key[1], key[0], 0) in routes:
-            between.setdefault(tuple(sorted(key[:2])), []).append(i)
-    arcs = Arcs(judge, frames, pair) if between else None
-    mended = {i for own in between.values() if arcs is not None and arcs.mend(own) for i in own}
-    better = eased(judge, free) if ease and len(routes) <= MOST_EASED else {}
-    better.update(told_apart(judge, free))
-    return {keys[i]: tuple(_snapped(judge.routes[i])) for i in mended | better.keys()}
+    return {key: tuple(_snapped(route)) for key, route in zip(own, routes, strict=True)}
 
 
 def _cut(
@@ -183,29 +136,19 @@ def _passing(problem: LayoutProblem, plan: ComponentLayout, rests: Settled) -> d
     return ways
 
 
-def _reflected(routes: dict[Key, Route], rests: Settled, pair: Mapping[int, int]) -> dict[Key, Route]:
-    """For every two routes that are mirror images the second as the reflection of the first; of two neurons that are
-    images of each other and drive each other, both ways as their own reflections, else they would share a line. There
-    and back are taken from the same side: the sides that they bow to are exchanged on the other."""
-    twice = 2 * rests.axis
-    result: dict[Key, Route] = {}
-    for key, route in sorted(routes.items(), key=lambda item: (sorted(item[0][:2]), item[0])):
-        source, target, _ = key
-        image = _image_of(key, rests, pair)
-        if pair.get(source) == target and (target, source, 0) in routes:
-            result[key] = even(route, twice)
-        if key in result or image == key or image not in routes:
-            result.setdefault(key, route)
-            continue
-        result[key] = route
-        result[image] = reflected(route, twice, rests.places[image[0]], rests.places[image[1]])
-    return result
-
-
-def _image_of(key: Key, rests: Settled, pair: Mapping[int, int]) -> Key:
-    """The key that the mirror image of a connection has, if there is one."""
-    source, target, number = key
-    return _image(source, rests, pair), _image(target, rests, pair), number
+def _images(keys: Sequence[Key], rests: Settled, pair: Mapping[int, int]) -> Images:
+    """Which connections are mirror images of others. There and back are taken from the same side: the sides that they
+    bow to are exchanged on the other."""
+    number = {key: i for i, key in enumerate(keys)}
+    of: dict[int, int] = {}
+    for key in sorted(keys, key=lambda key: (sorted(key[:2]), key)):
+        source, target, times = key
+        image = number.get((_image(source, rests, pair), _image(target, rests, pair), times))
+        if source != target and pair.get(source) == target:
+            of[number[key]] = number[key]
+        elif image is not None and image != number[key] and image not in of:
+            of[number[key]] = image
+    return Images(of, 2 * rests.axis)
 
 
 def _image(neuron: int, rests: Settled, pair: Mapping[int, int]) -> int:

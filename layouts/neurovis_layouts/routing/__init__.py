@@ -2,8 +2,8 @@
 
 In: centres, edges, and what an engine knows about the way (waypoints). Out: a cubic spline for every edge. Routes are
 found, ``ports`` (who leaves and arrives where on a disc), ``curves`` (along the direction), ``bows`` (from anywhere to
-anywhere), ``detours`` (round frames and discs), ``arcs`` (between mirror images), ``loops`` (to itself), and then
-improved (``simplify_routes``) by what they cost among all that is drawn (``route_cost``).
+anywhere), ``detours`` (round frames and discs), improved (``improve``) by what they cost among all that is drawn
+(``route_cost``), and joined by ``loops`` (to itself).
 """
 
 from neurovis_layouts.routing.router import Waypoint, route_all

@@ -38,20 +38,13 @@ def bow(start: Point, end: Point, height: float, hold: float = 0.3) -> Route:
 @dataclass(frozen=True, slots=True)
 class BowSought:
     """A bow that is asked for: between which places and neurons, how high at least; ``sided`` keeps it on the side of
-    ``least`` (one of a reciprocal pair must not change over); ``wide`` is by how much less of the way its control
-    points stand from the ends."""
+    ``least`` (one of a reciprocal pair must not change over)."""
 
     start: Point
     end: Point
     own: tuple[int, int]
     least: float
     sided: bool
-    wide: float = 0.0
-
-
-def clear_bow(wish: BowSought, obstacles: Obstacles) -> tuple[Route, float, float]:
-    """The flattest bow clear of foreign discs, else the clearest; its clearance and height."""
-    return clear_bows([wish], obstacles)[0]
 
 
 def clear_bows(
@@ -66,7 +59,7 @@ def clear_bows(
     while waiting:
         # all of them at once, a few heights at a time, as most find their way soon
         chosen = [(i, height, hold) for i in waiting for height, hold in islice(ways[i], many)]
-        bows = [bow(wishes[i].start, wishes[i].end, height, hold - wishes[i].wide) for i, height, hold in chosen]
+        bows = [bow(wishes[i].start, wishes[i].end, height, hold) for i, height, hold in chosen]
         clearances = obstacles.clearances(bows, [wishes[i].own for i, _, _ in chosen])
         tried: set[int] = set()
         clear: set[int] = set()

@@ -44,7 +44,7 @@ def straight(a: Point, b: Point) -> float:
 
 
 def way(
-    rows: OccupiedRows, ends: tuple[int, int], crossing: float = _CROSSING, limit: float = math.inf
+    rows: OccupiedRows, ends: tuple[int, int], limit: float = math.inf, crossing: float = _CROSSING
 ) -> tuple[float, list[Point]]:
     """The cost of the best way, infinite where the ends are level or it costs more than the limit, and its points: both
     ends, one in each row. ``crossing`` is what it costs to cross a line."""
@@ -53,9 +53,9 @@ def way(
         return math.inf, []
     own = rows.own(*ends)
     if start[1] > end[1]:
-        cost, path = _down(rows, end, start, own, crossing, limit)
+        cost, path = _down(rows, end, start, own, limit, crossing)
         return cost, path[::-1]
-    return _down(rows, start, end, own, crossing, limit)
+    return _down(rows, start, end, own, limit, crossing)
 
 
 def through(rows: OccupiedRows, ends: tuple[int, int], gates: Sequence[Waypoint]) -> list[Point]:
@@ -79,8 +79,8 @@ def _down(
     start: Point,
     end: Point,
     own: Own,
-    crossing: float = _CROSSING,
     limit: float = math.inf,
+    crossing: float = _CROSSING,
 ) -> tuple[float, list[Point]]:
     """The cost of the best way down from one point to another, and its points: both ends, one in each row."""
     limit *= 1 + _ROUNDED
@@ -251,7 +251,7 @@ def knots(rows: OccupiedRows, path: Sequence[Point], ends: tuple[int, int], alon
         at = _reach(rows, line, limits, at)
     if not knots and not alone and len(path) > 3:
         knots = [Waypoint(*path[1]), Waypoint(*path[-2])]
-    return _spaced(knots)
+    return knots
 
 
 def _span(free: Sequence[Span], x: float) -> Span:
@@ -299,15 +299,3 @@ def _beside(used: Sequence[float], x: float, own: float) -> bool:
     """Whether another way runs beside a place."""
     beside = used[bisect_left(used, x - _BESIDE_WAY) : bisect_left(used, x + _BESIDE_WAY)]
     return any(other != own for other in beside)
-
-
-def _spaced(knots: list[Waypoint]) -> list[Waypoint]:
-    """Knots are straight as far as there is room to their neighbours."""
-    result = list(knots)
-    for i, (a, b) in enumerate(pairwise(knots)):
-        room = abs(b.y - a.y) / 2 - 0.05
-        if a.half > room:
-            result[i] = Waypoint(a.x, a.y, 0.0)
-        if b.half > room:
-            result[i + 1] = Waypoint(b.x, b.y, 0.0)
-    return result

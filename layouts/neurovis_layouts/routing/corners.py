@@ -39,11 +39,6 @@ def corners(route: Route) -> tuple[Point, ...]:
     return line
 
 
-def reflected(route: Route, twice: float, start: Point, end: Point) -> Route:
-    """The reflection of a route on the axis at half of ``twice``, from centre to centre exactly."""
-    return (start, *((twice - x, y) for x, y in route[1:-1]), end)
-
-
 def _simple(points: FloatArray, flat: float) -> tuple[Point, ...]:
     keep = {0, len(points) - 1}
     waiting = [(0, len(points) - 1)]

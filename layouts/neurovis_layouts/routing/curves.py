@@ -12,6 +12,7 @@ from itertools import pairwise
 
 from neurovis_spec.layout.model import Point, Route
 
+#: How far across a route runs in a gap, at most, for a unit along.
 _SLOPE = 1.0
 
 
@@ -30,20 +31,12 @@ def handle(across: float, along: float) -> float:
     return 0.5 + 0.4 * min(1.0, abs(across) / (6 * abs(along)))
 
 
-def curve(
-    start: Point,
-    end: Point,
-    ways: Sequence[Waypoint],
-    lean: tuple[float, float],
-    grip: float = 0.0,
-    slope: float = _SLOPE,
-) -> Route:
-    """The route. ``lean`` are the sideways shares at both ends; ``grip`` sets the handles, 0 chooses them; ``slope`` is
-    how far across it runs at most for a unit along, in the gaps."""
+def curve(start: Point, end: Point, ways: Sequence[Waypoint], lean: tuple[float, float]) -> Route:
+    """The route. ``lean`` are the sideways shares at both ends."""
     sign = 1.0 if end[1] > start[1] else -1.0
     knots = [start]
     slopes = [0.0]
-    for way, leaning in zip(ways, _slopes(start, end, ways, slope), strict=True):
+    for way, leaning in zip(ways, _slopes(start, end, ways), strict=True):
         if way.half > 0:
             knots += [(way.x, way.y - sign * way.half), (way.x, way.y + sign * way.half)]
             slopes += [0.0, 0.0]
@@ -56,7 +49,7 @@ def curve(
     for i in range(len(knots) - 1):
         (ax, ay), (bx, by) = knots[i], knots[i + 1]
         along = by - ay
-        share = grip or handle(bx - ax, along)
+        share = handle(bx - ax, along)
         first = _leaning(ax, ay, lean[0], sign, share * abs(along))
         if i > 0:
             reach = min(share, 0.5) * along
@@ -73,12 +66,12 @@ def _leaning(x: float, y: float, lean: float, sign: float, length: float) -> Poi
     return x + lean * length, y + sign * math.sqrt(1 - lean * lean) * length
 
 
-def _slopes(start: Point, end: Point, ways: Sequence[Waypoint], most: float) -> list[float]:
+def _slopes(start: Point, end: Point, ways: Sequence[Waypoint]) -> list[float]:
     """Slopes (across by along) at waypoints: monotone (Fritsch and Butland 1984), so that nothing overshoots."""
     line = [start, *((way.x, way.y) for way in ways), end]
     secants = [(b[0] - a[0]) / (b[1] - a[1]) if b[1] != a[1] else 0.0 for a, b in pairwise(line)]
     result: list[float] = []
     for before, after in pairwise(secants):
         slope = 2 * before * after / (before + after) if before * after > 0 else 0.0
-        result.append(max(-most, min(most, slope)))
+        result.append(max(-_SLOPE, min(_SLOPE, slope)))
     return result

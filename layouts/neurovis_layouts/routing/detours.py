@@ -146,22 +146,6 @@ class Detours:
         found = self.line(source, target, alone)
         return None if found is None else self.along(source, target, *found)
 
-    def folded(self, source: int, target: int, twice: float) -> Route | None:
-        """A way round from a neuron to its mirror image (the axis is at half of ``twice``, and what is in the way is
-        the same on both sides) that is its own reflection, None where there is none; each keeps off those before it."""
-        found = self.line(source, target, False)
-        if found is None:
-            return None
-        path, rects = found
-        side = path[0][0] < twice / 2
-        last = next(k for k, point in enumerate(path) if (point[0] < twice / 2) != side) - 1
-        (ax, ay), (bx, by) = path[last : last + 2]
-        half = path[: last + 1]
-        if blocked(np.array([[ax, ay]]), np.array([[twice - ax, ay]]), rects)[0]:
-            half = [*half, (twice / 2, ay + (by - ay) * (twice / 2 - ax) / (bx - ax))]
-        path = [*half, *((twice - x, y) for x, y in half[::-1] if 2 * x != twice)]
-        return self.along(source, target, path, rects)
-
     def along(self, source: int, target: int, path: Sequence[Point], rects: FloatArray) -> Route:
         """The route along a line, which others are to keep off."""
 

@@ -28,9 +28,8 @@ class CutLines:
         self._heights: FloatArray = np.zeros(_FEW)
         self._table: FloatArray = np.full((_FEW, _FEW), np.nan)
 
-    def add(self, line: Sequence[Point]) -> range:
-        """Add a line; the numbers of its runs: the line is cut wherever it turns back up or down."""
-        first = len(self._runs)
+    def add(self, line: Sequence[Point]) -> None:
+        """Add a line: it is cut wherever it turns back up or down."""
         run: list[Point] = list(line[:1])
         for (_, before), point in pairwise(line):
             if len(run) > 1 and (point[1] - before) * (run[-1][1] - run[0][1]) < 0:
@@ -38,13 +37,6 @@ class CutLines:
                 run = run[-1:]
             run.append(point)
         self._note(run)
-        return range(first, len(self._runs))
-
-    def drop(self, runs: Sequence[int]) -> None:
-        """Forget runs."""
-        for run in runs:
-            self._runs[run] = np.array([np.inf, -np.inf]), np.zeros(2)
-            self._table[:, run] = np.nan
 
     def _note(self, run: Sequence[Point]) -> None:
         found = np.array(run if run[0][1] <= run[-1][1] else run[::-1], dtype=np.float64)

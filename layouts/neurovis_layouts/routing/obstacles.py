@@ -10,7 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from neurovis_spec.layout.geometry import Cells, pieces_of, points_in_turn
+from neurovis_spec.layout import FloatArray
+from neurovis_spec.layout.geometry import Cells, pieces_of, points_in_turn, squared_distances
 from neurovis_spec.layout.model import Point, Route
 
 #: A route this far from a centre is clear of the disc and of its ring.
@@ -25,7 +26,9 @@ class Obstacles:
     """All centres, by cell."""
 
     def __init__(self, centres: Sequence[Point]) -> None:
-        self._centres = Cells(np.array(centres, dtype=np.float64).reshape(-1, 2), REACH)
+        self._places: FloatArray = np.array(centres, dtype=np.float64).reshape(-1, 2)
+        # where a line is closer than this to a centre, one of its points is closer than that
+        self._cells = Cells(self._places, REACH + _STEP / 4)
 
     def clearance(self, route: Route, own: tuple[int, int]) -> float:
         """The least distance of the route to a foreign centre, at most ``REACH``."""
@@ -37,11 +40,18 @@ class Obstacles:
 
     def clearances(self, routes: Sequence[Route], own: Sequence[tuple[int, int]]) -> list[float]:
         """For each route the least distance to a centre that is none of its two ``own`` neurons', at most ``REACH``."""
-        result = np.full(len(routes), REACH)
+        result = np.full(len(routes), REACH * REACH)
         ends = np.array(own, dtype=np.int64).reshape(-1, 2)
         for points, whose in points_in_turn(*pieces_of(routes), _STEP):
-            point, centre, squared = self._centres.near(points)
+            point, centre, _ = self._cells.near(points)
             route = whose[point]
             foreign = (centre != ends[route, 0]) & (centre != ends[route, 1])
-            np.minimum.at(result, route[foreign], np.sqrt(squared[foreign]))
-        return [float(value) for value in result]
+            point, centre, route = point[foreign], centre[foreign], route[foreign]
+            # the line is as close as the nearer of the two steps that lead to and from a point
+            for other in (np.maximum(point - 1, 0), np.minimum(point + 1, len(points) - 1)):
+                other = np.where(whose[other] == route, other, point)
+                squared = squared_distances(
+                    *(self._places[centre] - points[point]).T, *(points[other] - points[point]).T
+                )
+                np.minimum.at(result, route, squared)
+        return [float(value) for value in np.sqrt(result)]

@@ -1,4 +1,4 @@
-"""Judge: what a route costs: how hard it is to follow by eye among all that is drawn.
+"""The cost of routes: what a route costs: how hard it is to follow by eye among all that is drawn.
 
 In: all routes, the neurons, the frames. Out: one number for a route, higher for each disc or frame that it runs over,
 for crossings, for running along other lines, for length and bends, and for ends close to others at a disc.
@@ -7,11 +7,13 @@ for crossings, for running along other lines, for length and bends, and for ends
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_layouts.routing.corners import reflected
 from neurovis_layouts.routing.ends import by_ends
+from neurovis_layouts.routing.images import Images
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
 from neurovis_layouts.routing.polylines import END, STEP, Polylines, polylines
 from neurovis_layouts.routing.walls import Frame, Walls, meet
@@ -61,31 +63,48 @@ _BACK = 3.0
 #: To lead a unit beyond all that is drawn: two units are a crossing (without: 1 % more line, around everything).
 _OUTSIDE = 0.5
 
+#: To arrive where another leaves, or the other way round, so close that both are one line: more than a crossing, which
+#: can be followed (without: connections arrive where others leave, which tests hold that none does).
+_ARRIVING = 3.0
+#: To bow to the side of what leads back, of routes between mirror images: there and back are told apart by their sides.
+_ASTRAY = 5.0
+
+#: A route whose way and shape cost more than this winds: a bend of 70°.
+_WINDS = 0.6
+#: One for which what else runs or ends there costs more than this is to be told apart: a fifth of a unit on another
+#: (with 0.6 bows over a row lie on each other).
+_UNCLEAR = 0.3
 #: More connections between two neurons than this have no room to be told apart, nor have more ends at a disc.
 _MATES, _ENDS = 12, 12
-#: Where so much more of a route than may runs on another between the same ends, it is drawn anew.
-_RUN_ON = 0.1
-#: So does what runs on any others for this part of its way, and as far as this.
-_PART, _STRETCH = 0.4, 0.5
-#: Closer than this an arrival and a departure are one line, and two ends of a kind, where there are few at a disc.
-_CLOSE, _ONE, _FEW_ENDS = 0.13, 0.07, 8
+#: More of them than this are a fan, in which each has its place.
+_FAN = 3
+#: As far as this a line runs beside borders for nothing, as it passes some aslant.
+_PASSING = 2.0
+#: Closer than this an arrival and a departure are one line.
+_CLOSE = 0.13
 #: What is this close to a disc may be measured to run over it.
 _SLACK = 0.02
 #: How far off a foreign frame lines stay, at least: it may grow by what is drawn in it.
 OFF = 0.06
 #: How far beyond discs and frames a line may lead for nothing; how far back along the direction.
 _MARGIN, _ONWARD = 0.8, 0.05
-#: What runs so far along borders is drawn anew where it can be; to pass some aslant takes less.
-_RUN = 2.0
 #: So close to a border a line is one with it.
 _BESIDE_BORDER = 0.08
 #: How far from a centre ends are checked, how far apart they are to be.
 _AT, _APART = 0.45, 0.16
 
 
-class Judge:
-    """All that is drawn: ``routes`` by edge index, and others, which stay. ``image`` are mirror images of edges, of
-    which only one has to be drawn; the axis is at half of ``twice``."""
+@dataclass(frozen=True, slots=True)
+class Unclear:
+    """How hard a route is to follow, and whether that is by its own way and shape, not only by what else is there."""
+
+    cost: float
+    winds: bool
+
+
+class Drawn:
+    """All that is drawn: ``routes`` by edge index, and others, which stay. Of mirror
+    ``images`` only one has to be drawn."""
 
     def __init__(
         self,
@@ -94,12 +113,10 @@ class Judge:
         routes: Mapping[int, Route],
         frames: Sequence[Frame] = (),
         drawn: Sequence[Route] = (),
-        image: Mapping[int, int] | None = None,
-        twice: float = 0.0,
+        images: Images | None = None,
     ) -> None:
-        self.edges, self.centres, self.twice = edges, centres, twice
+        self.edges, self.centres, self.images = edges, centres, images or Images()
         self.routes: dict[int, Route] = dict(routes)
-        self._image = dict(image or {})
         wide = [(own, padded(rect, OFF)) for own, rect in frames]
         self.rects: FloatArray = np.array([rect for _, rect in frames], dtype=np.float64).reshape(-1, 4)
         self.obstacles, self.walls = Obstacles(centres), Walls(wide, len(centres))
@@ -126,92 +143,97 @@ class Judge:
         #: (2, n, 2) where each is seen to arrive at a disc (0), and to leave one (1)
         self._seen: FloatArray = np.stack([self._lines.arrive(_AT), self._lines.leave(_AT)])
         cells, owner = self._lines.cells()
-        borders = np.full(len(self._borders), -1, dtype=np.int64)
+        borders = np.full(len(self._borders), -2, dtype=np.int64)
         self._enter(np.concatenate([cells, self._borders]), np.concatenate([self._edge_of[owner], borders]))
 
-    def winding(self) -> dict[int, tuple[float, float]]:
-        """How much each route bends, and by which factor it is longer than the straight way."""
-        lengths, (bends, _) = self._lines.lengths().tolist(), self._lines.bends()
-        return {
-            i: (bend, length / max(distance(self.routes[i][0], self.routes[i][-1]), 1e-9))
-            for i, bend, length in zip(self._line, bends.tolist(), lengths, strict=False)
-        }
-
-    def through_loops(self) -> set[int]:
-        """The edges whose routes run through a connection of a neuron to itself."""
+    def unclear(self, free: AbstractSet[int]) -> dict[int, Unclear]:
+        """Which of these edges' routes are hard to follow, by all that they cost but crossings, of which most have to
+        be."""
+        count, own = len(self._line), [(self.edges[i].source, self.edges[i].target) for i in self._line]
+        routes = [self.routes[i] for i in self._line]
+        far = np.array([max(distance(route[0], route[-1]), 1e-9) for route in routes])
+        # a single curve winds only where it is much longer than the straight way
+        several = np.array([len(route) > 4 for route in routes], dtype=np.bool_)
+        shape = _RATIO * (self._lines.lengths()[:count] / far - 1) + BENDING * self._lines.bends()[0][:count] * several
+        shape += ENTERING * np.array(self.walls.entered(routes, own), dtype=np.float64)
+        shape += ENTERING * (np.array(self.obstacles.clearances(routes, own)) < TOUCH)
         first, last = self._ends_of[self._lines.owner].T
         loops = (first == last) & (first >= 0)
-        crossed = self._lines.crossed(self._lines.a[loops], self._lines.b[loops])
-        return {i for i, times in zip(self._line, crossed.tolist(), strict=False) if times}
-
-    def along_borders(self) -> set[int]:
-        """The edges whose routes run along the border of a frame, so that both are one line."""
-        if not len(self._borders):
-            return set()
+        shape += _CROSSING * self._lines.crossed(self._lines.a[loops], self._lines.b[loops])[:count]
         cells, owner = self._lines.cells()
-        along = self._borders[np.minimum(np.searchsorted(self._borders, cells), len(self._borders) - 1)] == cells
-        far = STEP * np.bincount(owner[along], minlength=len(self._lines))
-        return {i for i, by in zip(self._line, far.tolist(), strict=False) if by > _RUN}
+        border: IntArray = np.bincount(owner[np.isin(cells, self._borders)], minlength=len(self._lines))[:count]
+        shape += np.where(STEP * border > _PASSING, ALONG * STEP * border, 0.0)
+        # in a fan each has its place
+        shape *= [float(len(self._between[frozenset(ends)]) <= _FAN) for ends in own]
+        around = ALONG * STEP * self._shared() + self._meeting()[:count]
+        found = {i: (a, b) for i, a, b in zip(self._line, shape.tolist(), around.tolist(), strict=True)}
+        for mates in self._between.values():
+            for i in mates if 1 < len(mates) <= _MATES else ():
+                others, line = self.mates(i, self.both(i)), self._lines.some(np.array([self._line[i]]))
+                a, b = found[i]
+                same = _SAME * float(line.on(polylines(others))[0]) if others else 0.0
+                found[i] = a + float(self.astray(i, line)[0]), b + same
+        return {
+            i: Unclear(a + b, a > _WINDS) for i, (a, b) in found.items() if i in free and (a > _WINDS or b > _UNCLEAR)
+        }
 
-    def in_fans(self, most: int) -> set[int]:
-        """The edges of which more than so many share both ends, in either direction."""
-        return {i for fan in self._between.values() if len(fan) > most for i in fan}
-
-    def on_others(self) -> set[int]:
-        """The edges whose routes run on one between the same ends, or for a good part of their way on any."""
-        drawn = self.cell_edges >= 0
-        cells, many = self.cells[drawn], max(self.routes, default=0) + 1
-        number = np.cumsum(np.append(False, cells[1:] != cells[:-1]))[: len(cells)]
+    def _shared(self) -> FloatArray:
+        """(n,) through how many cells the route of each edge runs where others are; where its ends are too many to
+        be told apart, none."""
+        many = len(self.edges) + 1
         # each edge once in a cell
-        places = np.sort(number * many + self.cell_edges[drawn], kind="stable")
-        cell, edge = np.divmod(places[np.append(True, places[1:] != places[:-1])[: len(places)]], many)
-        shared = np.zeros(len(cell), dtype=np.bool_)
+        lines = self.cell_edges > -2
+        cell, edge = np.divmod(np.unique(self.cells[lines] * many + self.cell_edges[lines] + 1), many)
+        shared: BoolArray = np.zeros(len(cell), dtype=np.bool_)
         shared[1:] |= cell[1:] == cell[:-1]
         shared[:-1] |= cell[1:] == cell[:-1]
-        total, beside = np.bincount(edge), np.bincount(edge, shared)
-        along = np.flatnonzero((beside > _PART * total) & (beside * STEP > _STRETCH)).tolist()
         full = {neuron for neuron, ends in self._at.items() if len(ends) > _ENDS}
-        found = {i for i in along if full.isdisjoint((self.edges[i].source, self.edges[i].target))}
-        for mates in self._between.values():
-            for i in mates if len(mates) <= _MATES else ():
-                others = [self._line[k] for k in mates if k not in self.both(i)]
-                own = self._lines.some(np.array([self._line[i]]))
-                if others and own.on(self._lines.some(np.array(others)))[0] > _RUN_ON:
-                    found.add(i)
-        return found
+        free = [full.isdisjoint((self.edges[i].source, self.edges[i].target)) for i in self._line]
+        times: FloatArray = np.bincount(edge[shared], minlength=many)[1:].astype(np.float64)
+        times = np.where(np.array(free, dtype=np.bool_), times[list(self._line)], 0.0)
+        return times
 
-    def meeting(self) -> dict[int, set[bool]]:
-        """The edges whose routes arrive at a disc where another leaves it, or end where one does, each with which of
-        its ends does."""
-        found: dict[int, set[bool]] = {}
+    def _meeting(self) -> FloatArray:
+        """(n,) what it costs each line to end close to others at its discs, where these are few."""
+        cost = np.zeros(len(self._lines))
         for ends in self._at.values():
-            if len(ends) > _ENDS:
-                continue
-            lines, leaves = np.array(ends, dtype=np.int64).T
-            places, edges = self._seen[leaves, lines], self._edge_of[lines].tolist()
-            x, y = (places[:, None] - places).transpose(2, 0, 1)
-            least = np.where(leaves[:, None] != leaves, _CLOSE, _ONE if len(ends) <= _FEW_ENDS else 0.0)
-            for k, other in np.argwhere(x * x + y * y < least * least).tolist():
-                if edges[k] != edges[other]:
-                    found.setdefault(edges[k], set()).add(ends[k][1])
-        return found
+            if 1 < len(ends) <= _ENDS:
+                lines, leaves = np.array(ends, dtype=np.int64).T
+                places = self._seen[leaves, lines]
+                far = np.sqrt(((places[:, None] - places) ** 2).sum(axis=2))
+                one = _together(far, leaves[:, None] == leaves)
+                np.fill_diagonal(one, 0.0)
+                np.add.at(cost, lines, one.sum(axis=1))
+        return cost
+
+    def astray(self, i: int, lines: Polylines) -> FloatArray:
+        """(n,) what it costs lines of an edge between mirror images to bow to the side of those that lead back."""
+        if not self.even(i):
+            return np.zeros(len(lines))
+        (x0, y0), (x1, _) = self.routes[i][0], self.routes[i][-1]
+        middle = lines.points[(lines.starts[:-1] + lines.starts[1:]) // 2, 1]
+        cost: FloatArray = np.where(middle >= y0 if x0 < x1 else middle <= y0, _ASTRAY, 0.0)
+        return cost
 
     def mates(self, i: int, but: Sequence[int]) -> list[Route]:
         """The routes between the same ends as that of an edge, ``but`` for some."""
         own = self._between[frozenset((self.edges[i].source, self.edges[i].target))]
         return [self.routes[k] for k in own if k not in but] if len(own) <= _MATES else []
 
+    def even(self, i: int) -> bool:
+        """Whether the route of an edge is to be its own reflection."""
+        return self.images.of.get(i, -1) == i
+
     def both(self, i: int) -> tuple[int, ...]:
         """An edge and its mirror image, if it has one."""
-        other = self._image.get(i, i)
+        other = self.images.of.get(i, i)
         return (i,) if other == i else (i, other)
 
     def draw(self, i: int, route: Route) -> None:
         """Give an edge another route, and its mirror image the reflection of it."""
         self._draw(i, route)
         for other in self.both(i)[1:]:
-            ends = self.centres[self.edges[other].source], self.centres[self.edges[other].target]
-            self._draw(other, reflected(route, self.twice, *ends))
+            self._draw(other, self.images.reflected(route, self.edges[other], self.centres))
 
     def _draw(self, i: int, route: Route) -> None:
         self.routes[i], line = route, polylines([route])
@@ -248,48 +270,53 @@ class Judge:
         return self._seen[leaves, lines], leaves.astype(np.float64)
 
 
-class Pen:
-    """Judges routes for one edge."""
+class RouteCost:
+    """What routes cost that one edge may have."""
 
-    def __init__(self, judge: Judge, edge: int, but: Sequence[int] = (), arriving: float = 0.0) -> None:
-        """What is drawn of edges ``but`` for this one does not matter. ``arriving`` is what it costs to be one line
-        with what arrives where it leaves, or leaves where it arrives."""
-        self._arriving = arriving
-        self._judge, self.route = judge, judge.routes[edge]
-        self._own = judge.edges[edge].source, judge.edges[edge].target
+    def __init__(self, drawn: Drawn, edge: int) -> None:
+        self._drawn, self.edge, self.route = drawn, edge, drawn.routes[edge]
+        self._own = drawn.edges[edge].source, drawn.edges[edge].target
         self._far = max(distance(self.route[0], self.route[-1]), 1e-9)
         # what leads to its own level runs back whatever way it takes
         level = abs(self.route[0][1] - self.route[-1][1]) < _ONWARD
         self._onward = not level and float(polylines([self.route]).backward()[0]) < _ONWARD
-        self._reflect = len(judge.both(edge)) > 1
-        both = [*judge.both(edge), *but]
-        self._a, self._b, kin = judge.others(both, self._own)
+        self._reflect = len(drawn.both(edge)) > 1
+        #: which ends are on the axis, where the route and its image meet
+        self._on_axis = [self._reflect and 2 * drawn.centres[neuron][0] == drawn.images.twice for neuron in self._own]
+        both = drawn.both(edge)
+        self._a, self._b, kin = drawn.others(both, self._own)
         self._weight: FloatArray = np.where(kin, _CROSSING + _KIN, _CROSSING)
-        self._cells = judge.free_cells(both)
-        mates = judge.mates(edge, both)
+        self._cells = drawn.free_cells(both)
+        mates = drawn.mates(edge, both)
         self._mates = polylines(mates) if mates else None
-        self._ends = [(leaves, *judge.ends(n, both)) for n, leaves in zip(self._own, (True, False), strict=True)]
-        walls = judge.walls
+        self._ends = [(leaves, *drawn.ends(n, both)) for n, leaves in zip(self._own, (True, False), strict=True)]
+        walls = drawn.walls
         foreign = walls.foreign(*self._own)
         self._margins: FloatArray = walls.rects[foreign]
-        self._foreign: FloatArray = judge.rects[foreign]
-        self._discs: FloatArray = np.delete(judge.discs, self._own, axis=0)
+        self._foreign: FloatArray = drawn.rects[foreign]
+        self._discs: FloatArray = np.delete(drawn.discs, self._own, axis=0)
 
-    def trespass(self, route: Route) -> tuple[int, float]:
-        """How many foreign frames a route enters, and by how much it is too close to a disc, both measured exactly."""
+    def trespass(self, route: Route) -> tuple[int, float, float]:
+        """How many foreign frames a route enters, by how much it is too close to a disc, both measured exactly, and how
+        often it crosses others; an arc between images goes to its side, whatever it crosses."""
         lines = polylines([route])
         entered = int(meet(lines.a, lines.b, self._foreign).any(axis=0).sum())
-        return entered, max(0.0, TOUCH + _SLACK - self._judge.obstacles.clearance(route, self._own))
+        close = max(0.0, TOUCH + _SLACK - self._drawn.obstacles.clearance(route, self._own))
+        even = self._drawn.even(self.edge)
+        return entered, close, 0.0 if even else float(lines.crossed(self._a, self._b)[0])
 
     def cost(self) -> float:
         """The cost of the edge's present route."""
         found = self.cheapest(polylines([self.route]), np.inf)
         return found[1] if found is not None else np.inf
 
-    def costs(self, routes: Sequence[Route]) -> FloatArray:
-        """(n,) the cost of each of these routes."""
-        lines = polylines(routes)
-        return self._by_itself(lines) + self._in_the_way(lines) + self._beside(lines) + self._across(lines)
+    def whole(self, route: Route) -> Route:
+        """A route as the edge may have it: its own reflection, where it is to be that."""
+        return self._drawn.images.even(route) if self._drawn.even(self.edge) else route
+
+    def line(self, line: tuple[Point, ...]) -> tuple[Point, ...]:
+        """A line as the edge may have it: its own reflection, where it is to be that."""
+        return self._drawn.images.even_line(line) if self._drawn.even(self.edge) else line
 
     def cheapest(self, lines: Polylines, limit: float, most: int | None = None) -> tuple[int, float] | None:
         """The cheapest of these lines and its cost, if that is below the limit; no more than so many are checked
@@ -313,7 +340,7 @@ class Pen:
     def _by_itself(self, lines: Polylines) -> FloatArray:
         """(n,) what they cost whatever there is around them."""
         (low, high), (bends, tight), lengths = lines.extents(), lines.bends(), lines.lengths()
-        outside = np.maximum(self._judge.low - low, 0.0) + np.maximum(high - self._judge.high, 0.0)
+        outside = np.maximum(self._drawn.low - low, 0.0) + np.maximum(high - self._drawn.high, 0.0)
         cost = _LONGER * lengths + _RATIO * (lengths / self._far - 1) + BENDING * bends + _TIGHT * tight
         cost += _OUTSIDE * (outside[:, 0] + outside[:, 1])
         if self._onward:
@@ -331,13 +358,16 @@ class Pen:
     def _beside(self, lines: Polylines) -> FloatArray:
         """(n,) what it costs to meet others at a disc and to run on them."""
         cost = np.zeros(len(lines))
-        for (leaves, places, kinds), here in zip(self._ends, (lines.leave(_AT), lines.arrive(_AT)), strict=True):
+        both = lines.leave(_AT), lines.arrive(_AT)
+        for (leaves, places, kinds), here, on_axis in zip(self._ends, both, self._on_axis, strict=True):
+            if on_axis:
+                cost += _together(
+                    np.abs(2 * here[:, 0] - self._drawn.images.twice), np.ones(len(lines), dtype=np.bool_)
+                )
             away = here[:, None, :] - places[None, :, :]
-            far, alike = np.sqrt((away * away).sum(axis=2)), kinds == leaves
-            cost += (np.maximum(1 - far / _APART, 0.0) * np.where(alike, _BESIDE, _MEETING)).sum(axis=1)
-            cost += self._arriving * ((far < _CLOSE) & ~alike).sum(axis=1)
+            cost += _together(np.sqrt((away * away).sum(axis=2)), kinds == leaves).sum(axis=1)
         if self._mates is not None:
-            cost += _SAME * lines.on(self._mates)
+            cost += _SAME * lines.on(self._mates) + self._drawn.astray(self.edge, lines)
         cells, owner = lines.cells()
         if len(self._cells):
             there = self._cells[np.minimum(np.searchsorted(self._cells, cells), len(self._cells) - 1)] == cells
@@ -348,13 +378,20 @@ class Pen:
         """(n,) what it costs to cross others."""
         cost = lines.crossed(self._a, self._b, self._weight)
         if self._reflect:
-            (low, high), axis = lines.extents(), self._judge.twice / 2
-            flip, shift = np.array([-1.0, 1.0]), np.array([self._judge.twice, 0.0])
+            (low, high), axis = lines.extents(), self._drawn.images.twice / 2
+            flip, shift = np.array([-1.0, 1.0]), np.array([self._drawn.images.twice, 0.0])
             # only what reaches over the axis meets its own image
             for k in np.flatnonzero((low[:, 0] <= axis) & (high[:, 0] >= axis)).tolist():
                 one = lines.some(np.array([k], dtype=np.int64))
                 cost[k] += _CROSSING * float(one.crossed(one.a * flip + shift, one.b * flip + shift)[0])
         return cost
+
+
+def _together(far: FloatArray, alike: BoolArray | np.bool_) -> FloatArray:
+    """What it costs two ends so far apart to be at one disc, whether both leave or arrive, or one does either."""
+    beside: FloatArray = np.maximum(1 - far / _APART, 0.0) * np.where(alike, _BESIDE, _MEETING)
+    cost: FloatArray = beside + _ARRIVING * ((far < _CLOSE) & ~alike)
+    return cost
 
 
 def _border_cells(rects: FloatArray) -> IntArray:

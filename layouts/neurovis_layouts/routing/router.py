@@ -11,15 +11,15 @@ from collections.abc import Set as AbstractSet
 
 import numpy as np
 
-from neurovis_layouts.routing.bows import FEW_TRIES, MANY_TRIES, BowSought, clear_bow, clear_bows
+from neurovis_layouts.routing.bows import FEW_TRIES, MANY_TRIES, BowSought, clear_bows
 from neurovis_layouts.routing.curves import Waypoint, curve
 from neurovis_layouts.routing.detours import detoured
-from neurovis_layouts.routing.ends import shared_ends
+from neurovis_layouts.routing.images import Images
+from neurovis_layouts.routing.improve import MOST_IMPROVED, improved
 from neurovis_layouts.routing.loops import Loops
-from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
+from neurovis_layouts.routing.obstacles import Obstacles
 from neurovis_layouts.routing.ports import Port, leanings
-from neurovis_layouts.routing.route_cost import Judge
-from neurovis_layouts.routing.simplify_routes import MOST_EASED, eased, told_apart
+from neurovis_layouts.routing.route_cost import Drawn
 from neurovis_layouts.routing.walls import Frame, Walls
 from neurovis_spec.layout.geometry import Cells, distance
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
@@ -34,11 +34,6 @@ _MOST_AT_LENGTH = 1000
 #: Nor where all of them together are longer than this by the heights tried.
 _MOST_LENGTH = 250_000.0
 _STEEP_ENOUGH = 0.75
-#: Bows of more than three equal connections are wider by this share of the way, each than the one in it, since their
-#: legs would be as steep.
-_WIDER = 0.12
-#: Handles, leanings and slopes for a curve that comes too close to a disc.
-_OTHERWISE = ((0.75, 1.0, 1.0), (0.95, 1.0, 1.0), (0.75, 0.4, 1.0), (0.95, 0.4, 1.0), (0.0, 1.0, 0.3), (0.5, 1.0, 0.0))
 
 
 def route_all(
@@ -51,8 +46,8 @@ def route_all(
     frames: Sequence[Frame] = (),
     drawn: Sequence[Route] = (),
     there: Mapping[int, Route] | None = None,
-    ease: bool = True,
-    improve: bool = True,
+    images: Images | None = None,
+    planned: AbstractSet[int] = frozenset(),
     highest: float = math.inf,
     begun: Mapping[int, Route] | None = None,
 ) -> list[Route]:
@@ -63,20 +58,21 @@ def route_all(
     and y exchanged. With more than ``careful`` edges, discs in the way are not gone round. No route enters one of the
     ``frames`` that holds neither of its ends, if there is a way round. ``drawn`` are other routes, which are
     there, as are those of these edges that are ``there``. A bow is at most ``highest`` times as high as its way is
-    long; what it cannot get over it goes round from disc to disc. ``begun`` are routes to begin with, not curves.
+    long; what it cannot get over it goes round from disc to disc. ``begun`` are routes to begin with, not curves; of
+    those with ``images`` one is the other's reflection. Where some are ``planned``, which cross nothing, what would be
+    drawn anew beside them might: only arcs between images are.
     """
     near = Obstacles(centres)
     obstacles = near if len(edges) <= careful else Obstacles(())
     routes: dict[int, Route] = dict(begun or {})
     if lateral:
         exchanged = [(y, x) for x, y in centres]
-        beside = Obstacles(exchanged if len(edges) <= careful else ())
-        across = _curves(edges, exchanged, sorted(lateral), lateral, beside)
+        across = _curves(edges, exchanged, sorted(lateral), lateral)
         routes.update({i: tuple((x, y) for y, x in route) for i, route in across.items()})
     if waypoints is not None:
         chosen = bowed | routes.keys()
         along = [i for i, edge in enumerate(edges) if i not in chosen and _runs_along(edge, centres)]
-        routes.update(_curves(edges, centres, along, waypoints, obstacles))
+        routes.update(_curves(edges, centres, along, waypoints))
     rest = [i for i, edge in enumerate(edges) if i not in routes and edge.source != edge.target]
     bowed_over = _bows(edges, centres, rest, obstacles, highest)
     routes.update(bowed_over)
@@ -85,16 +81,17 @@ def route_all(
     ways = {i: [(way.x, way.y) for way in line] for i, line in (waypoints or {}).items()}
     ways |= {i: [(way.y, way.x) for way in line] for i, line in (lateral or {}).items()}
     routes.update(detoured(edges, centres, routes, obstacles if few else Obstacles(()), walls, ways, drawn))
-    if few:
-        if there:
-            routes.update((i, route) for i, route in there.items() if i in routes)
-        free = routes.keys() - there.keys() if there else routes.keys()
-        if improve and free and len(edges) <= MOST_EASED:
-            judge = Judge(edges, centres, routes, frames, drawn)
-            if ease:
-                routes.update(eased(judge, free))
-            routes.update(told_apart(judge, free))
-    routes.update(_loops(edges, centres, routes, near, walls, there or {}))
+    images = images or Images()
+    routes.update(images.kept(routes, edges, centres))
+    routes.update((i, route) for i, route in (there or {}).items() if few and i in routes)
+    free = set(routes) - (there or {}).keys() - {image for i, image in images.of.items() if image != i}
+    if planned:
+        free = {i for i in free if images.of.get(i) == i}
+    if free and len(edges) <= MOST_IMPROVED:
+        routes.update(improved(Drawn(edges, centres, routes, frames, drawn, images), free))
+    loops = _loops(edges, centres, routes, near, walls, there or {})
+    routes.update(loops)
+    routes.update(images.kept(loops, edges, centres))
     return [routes[i] for i in range(len(edges))]
 
 
@@ -108,49 +105,17 @@ def _curves(
     centres: Sequence[Point],
     chosen: Sequence[int],
     waypoints: Mapping[int, Sequence[Waypoint]],
-    obstacles: Obstacles,
 ) -> dict[int, Route]:
     lean = _lean(edges, centres, chosen, waypoints)
-    shared = shared_ends(edges)
-    heights: dict[tuple[int, int], float] = {}
-    routes: dict[int, Route] = {}
-    owns = [(edges[i].source, edges[i].target) for i in chosen]
-    plain = [
-        curve(centres[own[0]], centres[own[1]], waypoints.get(i, ()), (lean[i, True], lean[i, False]))
-        for i, own in zip(chosen, owns, strict=True)
-    ]
-    for i, route in zip(chosen, plain, strict=True):
-        routes[i] = route
-    tight = [k for k, found in enumerate(obstacles.crowded(plain, owns, REACH - 0.1)) if found]
-    # those too close to a disc, each with all its alternatives
-    others = [
-        curve(
-            centres[owns[k][0]],
-            centres[owns[k][1]],
-            waypoints.get(chosen[k], ()),
-            (lean[chosen[k], True] * share, lean[chosen[k], False] * share),
-            grip,
-            slope,
+    return {
+        i: curve(
+            centres[edges[i].source],
+            centres[edges[i].target],
+            waypoints.get(i, ()),
+            (lean[i, True], lean[i, False]),
         )
-        for k in tight
-        for grip, share, slope in ((0.0, 1.0, 1.0), *_OTHERWISE)
-    ]
-    many = len(_OTHERWISE) + 1
-    clearances = obstacles.clearances(others, [owns[k] for k in tight for _ in range(many)])
-    for number, k in enumerate(tight):
-        start, end = centres[owns[k][0]], centres[owns[k][1]]
-        tried = range(number * many, (number + 1) * many)
-        best, clearance = others[tried[0]], clearances[tried[0]]
-        for other in tried[1:]:
-            if clearances[other] > clearance + 0.02:
-                best, clearance = others[other], clearances[other]
-        if clearance < TOUCH + 0.02 and not waypoints.get(chosen[k]):
-            least = heights.get(owns[k], 0.0) + 0.3
-            bowed, found, height = clear_bow(BowSought(start, end, owns[k], least, owns[k] in shared), obstacles)
-            if found > clearance + 0.02:
-                best, heights[owns[k]] = bowed, height
-        routes[chosen[k]] = best
-    return routes
+        for i in chosen
+    }
 
 
 def _lean(
@@ -202,7 +167,6 @@ def _bows(
                 centres[ends[1]],
                 ends,
                 *_least(place, len(equal), ends, between, reach, centres),
-                _WIDER * max(0, place - 2),
             )
             for ends, equal in between.items()
             if place < len(equal)

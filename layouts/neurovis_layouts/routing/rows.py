@@ -126,11 +126,6 @@ class OccupiedRows:
         for x, y in path:
             insort(self._used.setdefault(y, []), x)
 
-    def leave(self, path: Iterable[Point]) -> None:
-        """Forget where a way runs (the opposite of ``use``)."""
-        for x, y in path:
-            self._used[y].remove(x)
-
 
 def _height(stop: tuple[float, Own]) -> float:
     return stop[0]

@@ -12,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 
 from neurovis_spec.layout import BoolArray, FloatArray, IntArray
-from neurovis_spec.layout.geometry import Rect, pieces_of, points_in_turn, squared_distances
+from neurovis_spec.layout.geometry import Rect, pieces_of, points_in_turn
 from neurovis_spec.layout.model import Route
 
 #: The neurons in a frame, and its rectangle.
@@ -82,10 +82,3 @@ def meetings(a: FloatArray, b: FloatArray, rects: FloatArray) -> tuple[IntArray,
     x, y = mx[k] - middle[f, 0], my[k] - middle[f, 1]
     entered = np.abs(x * ey - y * ex) <= half[f, 0] * high + half[f, 1] * wide
     return k[entered], f[entered]
-
-
-def touch(a: FloatArray, b: FloatArray, centres: FloatArray, clear: float) -> BoolArray:
-    """(c, k) whether the segments from ``a`` (k, 2) to ``b`` (k, 2) come closer than ``clear`` to centres (c, 2)."""
-    x, y = centres[:, 0, None] - a[:, 0], centres[:, 1, None] - a[:, 1]
-    near: BoolArray = squared_distances(x, y, *(b - a).T) < clear * clear
-    return near

@@ -13,9 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from neurovis_layouts.routing import route_cost
 from neurovis_layouts.routing.corners import corners, smooth, smoothed
+from neurovis_layouts.routing.images import Images
+from neurovis_layouts.routing.improve import improved
 from neurovis_layouts.routing.polylines import Polylines, close_segments, polylines
-from neurovis_layouts.routing.route_cost import Judge, Pen
-from neurovis_layouts.routing.simplify_routes import eased
+from neurovis_layouts.routing.route_cost import Drawn, RouteCost
 from neurovis_layouts.routing.walls import Frame
 
 import neurovis_spec as nv
@@ -130,9 +131,9 @@ def test_a_loop_is_as_long_as_it_is_drawn_and_can_be_crossed() -> None:
     assert other.crossed(lines.a, lines.b).tolist() == [2]
 
 
-def test_where_nothing_is_drawn_nothing_is_eased() -> None:
+def test_where_nothing_is_drawn_nothing_is_improved() -> None:
     for frames in ([], [(frozenset({0}), (-1.0, -1.0, 1.0, 1.0))]):
-        assert eased(Judge([], [(0.0, 0.0)], {}, frames), set()) == {}
+        assert improved(Drawn([], [(0.0, 0.0)], {}, frames), set()) == {}
 
 
 def test_a_route_along_a_border_is_led_off_it() -> None:
@@ -141,11 +142,11 @@ def test_a_route_along_a_border_is_led_off_it() -> None:
     centres: list[Point] = [(0.0, 0.0), (6.0, 0.0), (3.0, 0.0)]
     along: Route = ((0.0, 0.0), (0.4, 0.6), (0.6, 0.8), (1.0, 0.8), *straight((1.0, 0.8), (5.0, 0.8))[1:])
     along = (*along, (5.4, 0.8), (5.6, 0.6), centres[1])
-    before = Judge([edge(0, 1)], centres, {0: along}, frames)
-    assert before.along_borders() == {0}
-    found = eased(before, {0})[0]
-    assert Judge([edge(0, 1)], centres, {0: found}, frames).along_borders() == set()
-    assert Judge([edge(0, 1)], centres, {0: found}, []).along_borders() == set()
+    before = Drawn([edge(0, 1)], centres, {0: along}, frames)
+    assert before.unclear({0})[0].winds
+    found = improved(before, {0})[0]
+    assert Drawn([edge(0, 1)], centres, {0: found}, frames).unclear({0}) == {}
+    assert Drawn([edge(0, 1)], centres, {0: found}, []).unclear({0}) == {}
 
 
 ALONG = """
@@ -183,9 +184,9 @@ def test_no_coupling_runs_along_the_border_of_a_frame(inner: str, couplings: str
 def test_a_route_through_a_loop_is_led_around_it() -> None:
     """Though it does not wind."""
     through, loop = straight((-3.0, 0.0), (0.0, 0.0)), ((0.0, 0.0), (-1.05, -0.62), (-1.05, 0.62), (0.0, 0.0))
-    before, drawn = Judge([edge(0, 1)], [(-3.0, 0.0), (0.0, 0.0)], {0: through}, drawn=[loop]), polylines([loop])
-    assert before.through_loops() == {0}
-    route = eased(before, {0})[0]
+    before, drawn = Drawn([edge(0, 1)], [(-3.0, 0.0), (0.0, 0.0)], {0: through}, drawn=[loop]), polylines([loop])
+    assert before.unclear({0})[0].winds
+    route = improved(before, {0})[0]
     assert polylines([route]).crossed(drawn.a, drawn.b).tolist() == [0]
 
 
@@ -265,27 +266,27 @@ def segments(route: Route) -> tuple[FloatArray, FloatArray]:
 HOOKED = kink((0, 0), (0, 3), (2, 3), (2, 1), (4, 1), (4, 6))
 
 
-def judge(frames: list[Frame], *more: tuple[Point, Point], first: Route = HOOKED) -> Judge:
+def fenced(frames: list[Frame], *more: tuple[Point, Point], first: Route = HOOKED) -> Drawn:
     """A winding route among others, all straight."""
     centres = [first[0], first[-1], *(p for ends in more for p in ends)]
     edges = [edge(k, k + 1) for k in range(0, len(centres), 2)]
-    return Judge(edges, centres, {0: first, **{k + 1: straight(*ends) for k, ends in enumerate(more)}}, frames)
+    return Drawn(edges, centres, {0: first, **{k + 1: straight(*ends) for k, ends in enumerate(more)}}, frames)
 
 
 def test_a_hook_becomes_a_straight_line() -> None:
-    found = eased(judge([]), {0})
+    found = improved(fenced([]), {0})
     assert found.keys() == {0}
     assert corners(found[0]) == ((0, 0), (4, 6))
 
 
 def test_what_is_not_free_stays_and_what_does_not_wind() -> None:
-    assert eased(judge([]), set()) == {}
-    assert eased(judge([], ((9, 0), (9, 6))), {1}) == {}
+    assert improved(fenced([]), set()) == {}
+    assert improved(fenced([], ((9, 0), (9, 6))), {1}) == {}
 
 
 def test_an_eased_route_keeps_off_frames_and_discs() -> None:
-    walled = judge([(frozenset({2, 3}), (1.0, 2.0, 3.0, 4.0))], ((1.5, 3.0), (2.5, 3.0)))
-    route = eased(walled, {0})[0]
+    walled = fenced([(frozenset({2, 3}), (1.0, 2.0, 3.0, 4.0))], ((1.5, 3.0), (2.5, 3.0)))
+    route = improved(walled, {0})[0]
     assert not walled.walls.entered([route], [(0, 1)])[0]
     assert walled.obstacles.clearance(route, (0, 1)) >= 0.4
     assert polylines([route]).lengths()[0] < 9
@@ -296,8 +297,8 @@ def test_a_route_that_only_grazes_a_frame_is_not_led_through_it() -> None:
     grazing = kink((0, 0), (0.98, 0), (0.98, 5), (5, 5), (5, 6.5), (2, 6.5), (2, 8))
     fence = [((-0.5 - 0.5 * k, 2.5), (0.99, 2.5 + 0.2 * k)) for k in range(4)]
     frames: list[Frame] = [(frozenset({2}), (1.0, 1.0, 4.0, 4.0)), (frozenset({4}), (-9.0, 1.0, -7.0, 4.0))]
-    walled = judge(frames, *fence, first=grazing)
-    route = eased(walled, {0}).get(0, grazing)
+    walled = fenced(frames, *fence, first=grazing)
+    route = improved(walled, {0}).get(0, grazing)
     lines = polylines([grazing, route])
     assert lines.enter(np.array([(1.0, 1.0, 4.0, 4.0)])).tolist() == [False, False]
 
@@ -305,15 +306,15 @@ def test_a_route_that_only_grazes_a_frame_is_not_led_through_it() -> None:
 def test_two_lines_from_one_neuron_do_not_cross_for_a_shorter_way() -> None:
     centres: list[Point] = [(0, 0), (4, 8), (0.5, 8)]
     known = {0: kink((0, 0), (-3, 2), (-3, 4), (4, 4), (4, 8)), 1: straight((0, 0), (0.5, 8))}
-    route = eased(Judge([edge(0, 1), edge(0, 2)], centres, known), {0})[0]
+    route = improved(Drawn([edge(0, 1), edge(0, 2)], centres, known), {0})[0]
     assert polylines([known[0], route]).crossed(*segments(known[1])).tolist() == [1, 0]
 
 
 def test_an_eased_route_crosses_less_even_if_it_is_longer() -> None:
     # a fence of lines, open at one end
     fence = [((1.5 + 0.5 * k, -1.0), (1.5 + 0.5 * k, 9.0)) for k in range(6)]
-    through = judge([], *fence, first=kink((0, 0), (0, 3), (-1, 3), (-1, 5), (6, 5), (6, 0)))
-    route = eased(through, {0})[0]
+    through = fenced([], *fence, first=kink((0, 0), (0, 3), (-1, 3), (-1, 5), (6, 5), (6, 0)))
+    route = improved(through, {0})[0]
     lines = polylines([straight(*ends) for ends in fence])
     assert polylines([route]).crossed(lines.a, lines.b).sum() == 0
 
@@ -321,11 +322,11 @@ def test_an_eased_route_crosses_less_even_if_it_is_longer() -> None:
 def test_a_line_that_runs_along_does_not_run_back_for_a_crossing() -> None:
     fence = [((1.6 + 0.3 * k, -0.8), (1.6 + 0.3 * k, 9.0)) for k in range(4)]
     winding = kink((0, 0), (3, 0.5), (0, 1), (3, 1.5), (4, 2))
-    route = eased(judge([], *fence, first=winding), {0})[0]
+    route = improved(fenced([], *fence, first=winding), {0})[0]
     assert polylines([route]).backward()[0] < 0.05
     # what runs to and fro already may go round the fence
     wandering = kink((0, 0), (3, 1.5), (0, 1), (3, 0.5), (4, 2))
-    route = eased(judge([], *fence, first=wandering), {0})[0]
+    route = improved(fenced([], *fence, first=wandering), {0})[0]
     assert polylines([route]).backward()[0] > 0.5
 
 
@@ -333,8 +334,8 @@ def test_the_image_of_an_eased_route_is_its_reflection() -> None:
     left: Route = tuple((x - 10, y) for x, y in HOOKED)
     right: Route = tuple((10 - x, y) for x, y in HOOKED)
     centres = [left[0], left[-1], right[0], right[-1]]
-    both = Judge([edge(0, 1), edge(2, 3)], centres, {0: left, 1: right}, image={0: 1, 1: 0}, twice=0.0)
-    found = eased(both, {0})
+    both = Drawn([edge(0, 1), edge(2, 3)], centres, {0: left, 1: right}, images=Images({0: 1}))
+    found = improved(both, {0})
     assert found.keys() == {0, 1}
     assert found[1] == tuple((0.0 - x, y) for x, y in found[0])
 
@@ -346,9 +347,9 @@ def test_a_route_that_meets_its_own_image_pays_for_it() -> None:
         image: Route = tuple((0.0 - x, y) for x, y in route)
         centres = [route[0], route[-1], image[0], image[-1]]
         known = {0: route, 1: image}
-        alone = Judge([edge(0, 1), edge(2, 3)], centres, {0: route, 1: straight((9, 9), (9, 12))})
-        paired = Judge([edge(0, 1), edge(2, 3)], centres, known, image={0: 1, 1: 0}, twice=0.0)
-        assert Pen(paired, 0).cost() - Pen(alone, 0).cost() == pytest.approx(1.2 * crossings, abs=1e-6)
+        alone = Drawn([edge(0, 1), edge(2, 3)], centres, {0: route, 1: straight((9, 9), (9, 12))})
+        paired = Drawn([edge(0, 1), edge(2, 3)], centres, known, images=Images({0: 1}))
+        assert RouteCost(paired, 0).cost() - RouteCost(alone, 0).cost() == pytest.approx(1.2 * crossings, abs=1e-6)
 
 
 #: the way of `r2.y -> l1.x` is only just clear of the frame of `l2`
@@ -430,9 +431,11 @@ def test_routes_between_pins_far_apart_are_looked_at_within_memory(engine: str) 
 def test_in_a_fan_of_many_each_stays_where_it_is() -> None:
     fan = [straight((0, 0), (0, 8)), *(kink((0, 0), (k, 1), (k, 7), (0, 8)) for k in (2, 4, -3))]
     edges = [LayoutEdge(f"fan ({k})", 0, 1, 1) for k in range(4)]
-    judge_of_all = Judge(edges, [(0, 0), (0, 8)], dict(enumerate(fan)))
-    assert eased(judge_of_all, {0, 1, 2, 3}) == {}
-    assert eased(Judge(edges[:2], [(0, 0), (0, 8)], dict(enumerate(fan[:2]))), {0, 1}).keys() == {1}
+    drawn_all = Drawn(edges, [(0, 0), (0, 8)], dict(enumerate(fan)))
+    assert not any(how.winds for how in drawn_all.unclear({0, 1, 2, 3}).values())
+    moved = improved(drawn_all, {0, 1, 2, 3})
+    assert all(max(map(distance, route, fan[k])) < 1 for k, route in moved.items())
+    assert improved(Drawn(edges[:2], [(0, 0), (0, 8)], dict(enumerate(fan[:2]))), {0, 1}).keys() == {1}
 
 
 @given(st.lists(routes(), min_size=2, max_size=5), st.data())
@@ -440,14 +443,16 @@ def test_in_a_fan_of_many_each_stays_where_it_is() -> None:
 def test_a_route_that_is_drawn_anew_is_known_as_if_it_had_been_there(drawn: list[Route], data: st.DataObject) -> None:
     ends = sorted({end for route in drawn for end in (route[0], route[-1])})
     edges = [edge(ends.index(route[0]), ends.index(route[-1])) for route in drawn]
-    judge = Judge(edges, ends, dict(enumerate(drawn[:-1])), drawn=drawn[-1:])
+    known = Drawn(edges, ends, dict(enumerate(drawn[:-1])), drawn=drawn[-1:])
     for k in range(len(drawn) - 1):
         middle = data.draw(st.lists(point, max_size=2, unique=True))
-        judge.draw(k, kink(drawn[k][0], *middle, drawn[k][-1]))
-    anew = Judge(edges, ends, judge.routes, drawn=drawn[-1:])
-    for k in judge.routes:
-        assert Pen(judge, k).cost() == pytest.approx(Pen(anew, k).cost(), abs=1e-9)
-    assert (judge.winding(), judge.on_others(), judge.meeting()) == (anew.winding(), anew.on_others(), anew.meeting())
+        known.draw(k, kink(drawn[k][0], *middle, drawn[k][-1]))
+    anew = Drawn(edges, ends, known.routes, drawn=drawn[-1:])
+    for k in known.routes:
+        assert RouteCost(known, k).cost() == pytest.approx(RouteCost(anew, k).cost(), abs=1e-9)
+    unclear, anew_unclear = known.unclear(known.routes.keys()), anew.unclear(known.routes.keys())
+    assert {k: how.winds for k, how in unclear.items()} == {k: how.winds for k, how in anew_unclear.items()}
+    assert [how.cost for how in unclear.values()] == pytest.approx([how.cost for how in anew_unclear.values()])
 
 
 def test_only_what_is_drawn_anew_is_measured_anew(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -460,10 +465,10 @@ def test_only_what_is_drawn_anew_is_measured_anew(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(route_cost, "polylines", counted)
     centres: list[Point] = [(float(x), 4.0 * y) for x in range(20) for y in range(2)]
     edges = [edge(2 * k, 2 * k + 1) for k in range(20)]
-    judge = Judge(edges, centres, {k: straight(centres[2 * k], centres[2 * k + 1]) for k in range(20)})
+    known = Drawn(edges, centres, {k: straight(centres[2 * k], centres[2 * k + 1]) for k in range(20)})
     measured.clear()
     for k in range(20):
-        judge.draw(k, kink(centres[2 * k], (k + 0.5, 2.0), centres[2 * k + 1]))
+        known.draw(k, kink(centres[2 * k], (k + 0.5, 2.0), centres[2 * k + 1]))
     assert sum(measured) == 20
 
 

@@ -1,0 +1,198 @@
+"""Improved routes: what is hard to follow is drawn anew, the worst first, by the one cost of routes.
+
+In: all that is drawn, the edges whose routes are free. Out: better routes for some of them. A route is shifted to a
+side, turned at an end, made straight, bowed, or led through other corners, and the best of all that is taken; of
+mirror images one is drawn and the other reflected, and what joins two images of each other is its own reflection.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
+from itertools import product
+
+from neurovis_layouts.routing.corners import corners, smooth, smoothed
+from neurovis_layouts.routing.polylines import along, polylines
+from neurovis_layouts.routing.route_cost import Drawn, RouteCost
+from neurovis_spec.layout.geometry import distance, turn
+from neurovis_spec.layout.model import RADIUS, Point, Route
+
+#: With more routes than this none is drawn anew: they cross too much to be followed.
+MOST_IMPROVED = 300
+#: How many routes are drawn anew, at most, by how many there are: in a crowd nobody follows one. How many in vain, and
+#: how often it is tried again beside what is better now.
+_LEAST, _WORK, _VAIN, _ROUNDS = 15, 3000, 12, 3
+#: How far routes are shifted, to what parts of a full turn their ends are turned, and which pieces are too short for
+#: that.
+_SHIFTS = (0.16, 0.22, 0.3, 0.42, 0.6, 0.9)
+_TURNS = tuple(turn(step / 48) for step in (1, -1, 2, -2, 3, -3, 5, -5))
+_SHORT = 1.0
+#: How much of a corner is cut off, at most.
+_CUTS = (4.0, 1.0)
+#: So many corners in a row are left out at once, at first and later on.
+_MOST_CORNERS, _FEW_CORNERS = 9, 2
+#: How far corners are moved, how often each, and how far off the straight way a lone one is tried.
+_MOVES, _PASSES = (1.0, 0.45, 0.2), 4
+_BOWS = (0.35, 0.7, 1.2, 2.0, 3.2, 5.0)
+#: A new line is better than the old route by this at least.
+_BETTER = 0.4
+#: What is worse than the old one by this, where the search begins, will not become better; each step of it is worth
+#: this at least.
+_HOPELESS, _GAIN = 0.7, 0.05
+#: Of all lines that are tried in a step so many are checked closely.
+_SOME = 24
+_DIAGONAL = 0.7071067811865476
+_AROUND = (
+    (1.0, 0.0), (_DIAGONAL, _DIAGONAL), (0.0, 1.0), (-_DIAGONAL, _DIAGONAL),
+    (-1.0, 0.0), (-_DIAGONAL, -_DIAGONAL), (0.0, -1.0), (_DIAGONAL, -_DIAGONAL),
+)  # fmt: skip
+
+#: A line by its corners, and how much is cut off these.
+_Line = tuple[tuple[Point, ...], float]
+
+
+def improved(drawn: Drawn, free: AbstractSet[int]) -> dict[int, Route]:
+    """Better routes by edge index, of the edges that are ``free``; mirror images with them."""
+    changed: set[int] = set()
+    left, most = set(free), max(_LEAST, _WORK // max(1, len(drawn.routes)))
+    for _ in range(_ROUNDS):
+        unclear = drawn.unclear(left)
+        vain, found = 0, False
+        for i in sorted(unclear, key=lambda i: (-unclear[i].cost, i))[:most]:
+            route = _better(RouteCost(drawn, i), unclear[i].winds)
+            if route is None:
+                left.discard(i)
+                vain += 1
+                if vain == _VAIN:
+                    break
+            else:
+                drawn.draw(i, route)
+                changed.add(i)
+                found, vain = True, 0
+        if not found:
+            break
+    return {i: drawn.routes[i] for k in sorted(changed) for i in drawn.both(k)}
+
+
+def _better(cost: RouteCost, winds: bool) -> Route | None:
+    """The best route that an edge may have, if it is better than the one that is there, no closer to a disc or a
+    frame, and crosses no more."""
+    if distance(cost.route[0], cost.route[-1]) < 2 * RADIUS:
+        return None  # between discs that overlap, as pins may have it
+    now = cost.cost()
+    best = _searched(cost, now) if winds else None
+    if best is None:
+        tries = [cost.whole(route) for route in (*_shifted(cost.route), *_turned(cost.route))]
+        found = cost.cheapest(polylines(tries), now)
+        best = None if found is None else tries[found[0]]
+    if best is None:
+        return None
+    new, old = cost.trespass(best), cost.trespass(cost.route)
+    return best if all(a <= b for a, b in zip(new, old, strict=True)) else None
+
+
+def _searched(cost: RouteCost, now: float) -> Route | None:
+    """The best line of few corners that is found, if it is clearly better than ``now``."""
+    line = corners(cost.route)
+    starts = [line, *_fewer(line), *_bowed(line[0], line[-1])]
+    best = _best(cost, product(starts, _CUTS), now + _HOPELESS)
+    if best is None:
+        return None
+    for far in _MOVES:
+        for _ in range(_PASSES):
+            line, cut = best.line
+            lines = *_moved(line, far), *_fewer(line, _FEW_CORNERS)
+            better = _best(cost, ((line, cut) for line in lines), best.cost - _GAIN, _SOME)
+            if better is None:
+                break
+            best = better
+    best = _best(cost, product([best.line[0]], _CUTS), best.cost - _GAIN) or best
+    return cost.whole(smooth(*best.line)) if best.cost <= now - _BETTER else None
+
+
+@dataclass(frozen=True, slots=True)
+class _Try:
+    """A line and what it costs."""
+
+    cost: float
+    line: _Line
+
+
+def _best(cost: RouteCost, tries: Iterable[_Line], limit: float, most: int | None = None) -> _Try | None:
+    """The best of these lines, None where all cost more than the limit; at most so many are checked closely."""
+    ways = [(cost.line(line), cut) for line, cut in tries]
+    if not ways:
+        return None
+    found = cost.cheapest(along(*smoothed(ways), len(ways)), limit, most)
+    return None if found is None else _Try(found[1], ways[found[0]])
+
+
+def _shifted(route: Route) -> Iterator[Route]:
+    """The route this far to either side, but for its ends."""
+    for by in _SHIFTS:
+        for side in (by, -by):
+            yield _beside(route, side)
+
+
+def _beside(route: Route, by: float) -> Route:
+    result = [route[0]]
+    for number in range(1, len(route) - 1):
+        # a knot and what is before and behind it move as one, so that the line stays smooth
+        knot = (number + 1) // 3 * 3
+        around = (max(knot - 1, 0), min(knot + 1, len(route) - 1)), (max(knot - 3, 0), min(knot + 3, len(route) - 1))
+        for before, behind in around:
+            dx, dy = route[behind][0] - route[before][0], route[behind][1] - route[before][1]
+            length = math.sqrt(dx * dx + dy * dy)
+            if length > 0:
+                break
+        x, y = route[number]
+        result.append((x + by * dy / length, y - by * dx / length) if length > 0 else (x, y))
+    return *result, route[-1]
+
+
+def _turned(route: Route) -> Iterator[Route]:
+    """The route turned about its first or its last point by some steps."""
+    for leaves in (False, True):
+        line = route if leaves else route[::-1]
+        while len(line) > 4 and distance(line[0], line[3]) < _SHORT:
+            line = line[0], *line[4:]  # a piece too short to be turned
+        (x, y), (px, py) = line[:2]
+        for cosine, sine in _TURNS:
+            dx, dy = px - x, py - y
+            turned = (line[0], (x + cosine * dx - sine * dy, y + sine * dx + cosine * dy), *line[2:])
+            yield turned if leaves else turned[::-1]
+
+
+def _fewer(line: tuple[Point, ...], most: int = _MOST_CORNERS) -> Iterator[tuple[Point, ...]]:
+    """The line without some corners in a row, up to so many."""
+    for first in range(1, len(line) - 1):
+        for last in range(first, min(first + most, len(line) - 1)):
+            yield line[:first] + line[last + 1 :]
+
+
+def _moved(line: tuple[Point, ...], far: float) -> Iterator[tuple[Point, ...]]:
+    """The line with a corner elsewhere."""
+    for k in range(1, len(line) - 1):
+        x, y = line[k]
+        for dx, dy in _AROUND:
+            yield (*line[:k], (x + far * dx, y + far * dy), *line[k + 1 :])
+
+
+def _bowed(start: Point, end: Point) -> Iterator[tuple[Point, ...]]:
+    """The straight way, and lines with a corner or two beside it."""
+    yield start, end
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    length = distance(start, end)
+    for high in _BOWS:
+        for side in (high, -high):
+            nx, ny = dy / length * side, -dx / length * side
+            for share in (0.25, 0.5, 0.75):
+                yield start, (start[0] + share * dx + nx, start[1] + share * dy + ny), end
+            yield (
+                start,
+                (start[0] + 0.2 * dx + nx, start[1] + 0.2 * dy + ny),
+                (start[0] + 0.8 * dx + nx, start[1] + 0.8 * dy + ny),
+                end,
+            )
