@@ -10,7 +10,7 @@ import layout_conformance as suite
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from neurovis_layouts.routing import route_all
+from neurovis_layouts.routing import Waypoint, route_all, router
 from neurovis_layouts.routing.corners import rounded
 from neurovis_layouts.routing.detours import Detours, detoured
 from neurovis_layouts.routing.obstacles import Obstacles
@@ -248,3 +248,11 @@ def test_a_detour_keeps_to_the_way_that_was_found_unless_another_crosses_less(li
     routes = {0: straight(*centres[:2])}
     found = detoured(edges, centres, routes, Obstacles(centres), walls, ways, drawn)[0]
     assert max(x for x, _ in sampled(found)) > 8 if not lines else min(x for x, _ in sampled(found)) < -2
+
+
+def test_a_curve_that_no_detour_leads_round_a_disc_bows_over_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    for later in ("detoured", "improved"):
+        monkeypatch.setattr(router, later, lambda *_: {})
+    edges, centres = [LayoutEdge("a", 0, 1, 1)], [(0.0, 0.0), (0.0, 10.0), (0.1, 5.0)]
+    route = route_all(edges, centres, {0: [Waypoint(0.0, 5.0, 0.2)]})[0]
+    assert min(distance(point, centres[2]) for point in sampled(route, 0.05)) > 0.3

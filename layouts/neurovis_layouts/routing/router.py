@@ -17,7 +17,7 @@ from neurovis_layouts.routing.detours import detoured
 from neurovis_layouts.routing.images import Images
 from neurovis_layouts.routing.improve import MOST_IMPROVED, improved
 from neurovis_layouts.routing.loops import Loops
-from neurovis_layouts.routing.obstacles import Obstacles
+from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
 from neurovis_layouts.routing.ports import Port, leanings
 from neurovis_layouts.routing.route_cost import Drawn
 from neurovis_layouts.routing.walls import Frame, Walls
@@ -74,13 +74,14 @@ def route_all(
         along = [i for i, edge in enumerate(edges) if i not in chosen and _runs_along(edge, centres)]
         routes.update(_curves(edges, centres, along, waypoints))
     rest = [i for i, edge in enumerate(edges) if i not in routes and edge.source != edge.target]
-    bowed_over = _bows(edges, centres, rest, obstacles, highest)
-    routes.update(bowed_over)
+    curved = frozenset(routes)
+    routes.update(_bows(edges, centres, rest, obstacles, highest))
     walls = Walls(frames, len(centres))
     few = len(edges) <= min(careful, _MOST_AT_LENGTH)
     ways = {i: [(way.x, way.y) for way in line] for i, line in (waypoints or {}).items()}
     ways |= {i: [(way.y, way.x) for way in line] for i, line in (lateral or {}).items()}
     routes.update(detoured(edges, centres, routes, obstacles if few else Obstacles(()), walls, ways, drawn))
+    routes.update(_clearer(edges, centres, {i: routes[i] for i in sorted(curved)}, obstacles, highest))
     images = images or Images()
     routes.update(images.kept(routes, edges, centres))
     routes.update((i, route) for i, route in (there or {}).items() if few and i in routes)
@@ -177,6 +178,21 @@ def _bows(
             routes[between[ends][place]] = route
             reach[ends] = min(reach[ends][0], height), max(reach[ends][1], height)
     return routes
+
+
+def _clearer(
+    edges: Sequence[LayoutEdge],
+    centres: Sequence[Point],
+    routes: Mapping[int, Route],
+    obstacles: Obstacles,
+    highest: float,
+) -> dict[int, Route]:
+    """Bows for those of the routes that run over a disc, where these keep farther off."""
+    clear = obstacles.clearances([*routes.values()], [(edges[i].source, edges[i].target) for i in routes])
+    over = {i: clearance for i, clearance in zip(routes, clear, strict=True) if clearance < TOUCH}
+    bows = _bows(edges, centres, [*over], obstacles, highest)
+    found = obstacles.clearances([*bows.values()], [(edges[i].source, edges[i].target) for i in bows])
+    return {i: bows[i] for i, clearance in zip(bows, found, strict=True) if clearance > over[i]}
 
 
 def _least(
