@@ -36,6 +36,17 @@ neurons:
 connections: {A -> B: 1}
 layout:
 """
+CELLS = """\
+neurovis: 1
+name: cells
+modules:
+  m:
+    neurons: {A: {bias: 1}, B: {}, C: {bias: 1}, D: {bias: 1}, E: {bias: 1}, F: {}}
+    connections: {B -> F: 1, D -> B: 1, D -> F: 1}
+    layout: {align: [[E, B]], plan: [[C, D], [F, A]]}
+instances: {one: {module: m}}
+"""
+PAIRED = GROUPS.replace("B: {}", "B: {count: 2}").replace("A -> B", "A1 -> B1")
 PINS = "{left1: [0, 0], left2: [0.2, 0], left1.K: [4, 4]}"
 
 REFUSED = [
@@ -56,6 +67,8 @@ REFUSED = [
     (LEGS.replace("{bias: 1}, K: {}}",
                   "{count: 3}, K: {}}\n    layout: {arrange: {S: row}, mirror: [[S1, K], [S2, S3]]}")
      + "  direction: down\n", "mirror-arrange", "S"),
+    (CELLS, "align-conflict", "[E, B]"),
+    (f"{PAIRED}  plan: [[A], [B]]\n  positions: {{A1: [0, 0], A4: [4, 3], B1: [-1, 0]}}\n", "pin-in-frame", "[0, 0]"),
 ]  # fmt: skip
 
 

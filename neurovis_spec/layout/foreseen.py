@@ -34,7 +34,7 @@ def foreseen(network: Network, problem: Callable[[], LayoutProblem], *, memory: 
     try:
         engine = engine_of(name)
         refuse(asked_of(network, memory), name, engine.capabilities)
-        if engine.capabilities.checks and (_crowded(network) or _mirrored(network)):
+        if engine.capabilities.checks and (_crowded(network) or _bound(network)):
             cast(CheckingEngine, engine).check(problem())
     except LayoutRefusalError as refusal:
         return refusal
@@ -43,9 +43,9 @@ def foreseen(network: Network, problem: Callable[[], LayoutProblem], *, memory: 
     return None
 
 
-def _mirrored(network: Network) -> bool:
-    """Whether there are mirror images, which frames and arrangements may not allow."""
-    return bool(network.layout.mirrors) and not _too_large(network)
+def _bound(network: Network) -> bool:
+    """Whether there are mirror images or lines, which frames, cells and arrangements may not allow."""
+    return bool(network.layout.mirrors or network.layout.align) and not _too_large(network)
 
 
 def _too_large(network: Network) -> bool:
@@ -53,14 +53,14 @@ def _too_large(network: Network) -> bool:
 
 
 def _crowded(network: Network) -> bool:
-    """Whether pins may leave no room for something: a frame, a mirror image, what is on a line."""
+    """Whether pins may leave no room for something: a frame, a cell, a mirror image, what is on a line."""
     if _too_large(network):
         return False
     settings = network.layout
     if not (settings.positions or settings.origins or settings.relative):
         return False
     boxed = any(group.box is not None for group in network.neurons.groups)
-    return boxed or bool(network.instances or settings.boxes or settings.mirrors or settings.align)
+    return boxed or bool(network.instances or settings.boxes or settings.mirrors or settings.align or settings.plan)
 
 
 def foresee_frames(engine: Located[str], network: Network, findings: Findings) -> None:

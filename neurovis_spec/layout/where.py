@@ -30,7 +30,7 @@ _PARTS: Final[Mapping[str, Sequence[str]]] = {
     "mirror-pins": ("positions", "mirror"),
     "mirror-frames": ("mirror",),
     "mirror-arrange": ("arrange", "mirror"),
-    "pin-in-frame": ("positions", "mirror", "align"),
+    "pin-in-frame": ("positions", "mirror", "align", "plan"),
     "frames-overlap": ("positions", "file", "boxes", "instances", "neurons"),
     "pins-too-close": ("positions",),
     "pin-not-finite": ("positions",),

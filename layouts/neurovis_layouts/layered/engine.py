@@ -38,13 +38,13 @@ def drawn(problem: LayoutProblem, engine: str) -> Layout:
 
 
 def checked(problem: LayoutProblem) -> None:
-    """Raises the LayoutRefusalError that ``drawn`` would. Only pins need places for it, and for these no connection
-    between frames has to be routed."""
+    """Raises the LayoutRefusalError that ``drawn`` would. Only pins and lines need places for it, and for these no
+    connection between frames has to be routed."""
     if not problem.neurons:
         return
     composer = Composer(_framed(problem))
     composer.check_mirrors()
-    if problem.pins or any(module.pins or module.origin is not None for module in problem.modules):
+    if problem.pins or problem.align or any(module.pins or module.origin is not None for module in problem.modules):
         composer.whole(routed=False)
 
 

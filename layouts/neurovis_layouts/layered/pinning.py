@@ -340,9 +340,10 @@ def _refusal(problem: LayoutProblem, one: Wish, other: Wish) -> LayoutRefusalErr
             break
     name = problem.neurons[(inside or inner.bodies[0].members)[0]]
     mate = problem.neurons[outer.bodies[0].members[0]]
+    place = "cell" if problem.plan else "frame"
     return LayoutRefusalError(
         "pin-in-frame",
-        f"pins put '{name}' into the frame that '{mate}' is in; nothing foreign may stand there",
+        f"pins put '{name}' into the {place} that '{mate}' is in; nothing foreign may stand there",
         "move one of the pins",
         (name, mate),
     )
