@@ -247,7 +247,9 @@ def test_titles_stand_in_one_place_of_narrow_frames_within_frames_and_lines_keep
         frame = frames[path]
         assert isinstance(title, Text)
         assert isinstance(frame, Rectangle)
-        places.add((title.size, *(round(a - b, 6) for a, b in zip(title.point, frame.corner, strict=True))))
+        x0, y0 = frame.corner
+        x = x0 + {"start": 0.0, "middle": 0.5, "end": 1.0}[title.anchor] * frame.width
+        places.add((title.size, title.anchor, round(title.point[0] - x, 6), round(title.point[1] - y0, 6)))
     assert len(places) == 1
     lines = np.concatenate([sample(s.points, 200) for s in scene.shapes() if isinstance(s, Spline)])
     for number, title in enumerate(titles):

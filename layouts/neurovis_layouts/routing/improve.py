@@ -26,7 +26,7 @@ MOST_IMPROVED = 300
 _LEAST, _WORK, _VAIN, _ROUNDS = 15, 3000, 12, 3
 #: How far routes are shifted, to what parts of a full turn their ends are turned, and which pieces are too short for
 #: that.
-_SHIFTS = (0.16, 0.22, 0.3, 0.42, 0.6, 0.9)
+_SHIFTS = (0.1, 0.16, 0.22, 0.3, 0.42, 0.6, 0.9)
 _TURNS = tuple(turn(step / 48) for step in (1, -1, 2, -2, 3, -3, 5, -5))
 _SHORT = 1.0
 #: How much of a corner is cut off, at most.
