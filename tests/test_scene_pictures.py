@@ -243,14 +243,16 @@ def test_titles_stand_in_one_place_of_narrow_frames_within_frames_and_lines_keep
     titles = [title for title in found.values() if isinstance(title, Text)]
     assert {title.text for title in titles} == {"z1", "z2", "i1", "i2"}
     places = set()
+    sides: list[tuple[float, float]] = []
     for path, title in found.items():
         frame = frames[path]
         assert isinstance(title, Text)
         assert isinstance(frame, Rectangle)
-        x0, y0 = frame.corner
-        x = x0 + {"start": 0.0, "middle": 0.5, "end": 1.0}[title.anchor] * frame.width
-        places.add((title.size, title.anchor, round(title.point[0] - x, 6), round(title.point[1] - y0, 6)))
+        x0, _, x1, _ = text_rect(title)
+        sides.append((x0 - frame.corner[0], frame.corner[0] + frame.width - x1))
+        places.add((title.size, round(title.point[1] - frame.corner[1], 6)))
     assert len(places) == 1
+    assert any(max(gaps) - min(gaps) < 0.01 for gaps in zip(*sides, strict=True)), "as far from one side in all"
     lines = np.concatenate([sample(s.points, 200) for s in scene.shapes() if isinstance(s, Spline)])
     for number, title in enumerate(titles):
         x0, y0, x1, y1 = text_rect(title)
