@@ -253,6 +253,7 @@ def test_a_recording_shows_itself_with_play_and_scrubber_and_its_traces_beside()
     assert isinstance(recording, PlayedRecording)
     widget = recording._widget
     assert widget is not None
+    assert not widget._session.shown.status.playing, "nor before anybody looks on"
     it = Notebook(widget)
     it.say("a", open=True)
     until(lambda: SCENE in it.kinds("a"))

@@ -90,8 +90,8 @@ def _nothing() -> None:
 
 
 class Run:
-    """A live run; it plays from the start on. ``wanted`` says whether anybody looks on: else nothing is shown.
-    ``failed`` is called where it cannot go on; ``failure`` says why."""
+    """A live run; it plays from the start on, or stands still where it is not ``playing``. ``wanted`` says whether
+    anybody looks on: else nothing is shown. ``failed`` is called where it cannot go on; ``failure`` says why."""
 
     def __init__(
         self,
@@ -100,10 +100,11 @@ class Run:
         show: Show,
         wanted: Callable[[], bool] = lambda: True,
         failed: Callable[[], object] = lambda: None,
+        playing: bool = True,
     ) -> None:
         self._source, self._view, self._show, self._wanted, self._failed = source, view, show, wanted, failed
         self._asked: SimpleQueue[tuple[Command | Change | _Drawn | _Inquiry | None, Refuse, Done]] = SimpleQueue()
-        self._playing, self._ended = True, False
+        self._playing, self._ended = playing, False
         #: how the picture is wanted, and whether it is being drawn so
         self.appearance, self._drawing = view.appearance, False
         #: the step to go to, which is further than has been reached

@@ -40,12 +40,11 @@ class Session:
         self._loop = asyncio.new_event_loop()
         self._thread = Thread(target=self._serve, name="notebook", daemon=True)
         self._hub = Hub(self._loop)
-        self._run = Run(*stage, self._show, failed=self._fail)
+        self._run = Run(*stage, self._show, failed=self._fail, playing=False)
         self._reception = Reception(self._hub, self._run)
         self._frames: dict[str, tuple[Client, asyncio.Task[None]]] = {}
         self._ended = False
         self.shown = self._run.shown()
-        self._run.ask(Pause())
 
     def begin(self) -> None:
         """Begin, standing still."""
