@@ -22,7 +22,7 @@ import neurovis_spec as nv
 from neurovis_spec.live.protocol import FRAME, SCENE
 from neurovis_spec.notebook import session
 from neurovis_spec.notebook.recording import PlayedRecording
-from neurovis_spec.notebook.session import MOST
+from neurovis_spec.notebook.session import MOST, Session
 from neurovis_spec.notebook.widget import LiveWidget
 from neurovis_spec.runtime.recording import Recording, RecordingError
 
@@ -253,12 +253,23 @@ def test_a_recording_shows_itself_with_play_and_scrubber_and_its_traces_beside()
     assert isinstance(recording, PlayedRecording)
     widget = recording._widget
     assert widget is not None
-    assert not widget._session.shown.status.playing, "nor before anybody looks on"
     it = Notebook(widget)
     it.say("a", open=True)
     until(lambda: SCENE in it.kinds("a"))
     assert not widget.playing
     widget.close()
+
+
+def test_a_view_stands_still_before_it_begins(monkeypatch: pytest.MonkeyPatch) -> None:
+    begin, playing = Session.begin, list[bool]()
+
+    def begun(session: Session) -> None:
+        playing.append(session.shown.status.playing)
+        begin(session)
+
+    monkeypatch.setattr(Session, "begin", begun)
+    with notebook():
+        assert playing == [False]
 
 
 def test_a_live_view_has_a_picture_for_those_who_read_the_notebook() -> None:
