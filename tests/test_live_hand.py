@@ -133,6 +133,18 @@ async def holds(opened: Page, at: tuple[float, float], name: str) -> None:
     raise AssertionError(f"{found} is there, not {name}")
 
 
+async def settled(opened: Page) -> bytes:
+    """The picture, once the lines of what is dragged have followed."""
+    last = b""
+    for _ in range(50):
+        await asyncio.sleep(0.25)
+        now = await opened.shot()
+        if now == last:
+            return now
+        last = now
+    raise AssertionError("it does not come to rest")
+
+
 def test_a_neuron_is_dragged_and_put_back(tmp_path: Path) -> None:
     async def main() -> None:
         async with at_hand(tmp_path) as (opened, desk, _):
@@ -141,9 +153,8 @@ def test_a_neuron_is_dragged_and_put_back(tmp_path: Path) -> None:
             end = (x + 99, y - 24.75)  # whole steps of what is put by hand
             before = await opened.shot()
             await drag(opened, (x, y), end, release_it=False)
-            await asyncio.sleep(0.2)
             await holds(opened, end, "O")
-            (tmp_path / "dragging.png").write_bytes(dragging := await opened.shot())
+            (tmp_path / "dragging.png").write_bytes(dragging := await settled(opened))
             assert desk.placed.moved == (), "it is not put before it is let go"
             await release(opened, end)
             await opened.until(f"{PUT} == 'O'")
@@ -173,8 +184,7 @@ def test_near_by_a_neuron_and_its_lines_follow_the_pointer_as_they_are_drawn_the
             await holds(opened, at, "O")
             before = await opened.shot()
             await drag(opened, at, end, release_it=False)
-            await asyncio.sleep(0.2)
-            dragging = await opened.shot()
+            dragging = await settled(opened)
             await release(opened, end)
             await opened.until(f"{PUT} == 'O'")
             await holds(opened, end, "O")
