@@ -206,6 +206,26 @@ def test_an_earlier_recording_stays_where_none_can_be_begun(
     assert {one: one.read_bytes() for one in tmp_path.rglob("*") if one.is_file()} == before
 
 
+def test_an_earlier_recording_of_which_one_file_cannot_be_moved_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made(tmp_path / "x.mcap", 2, 3000, Rotation(size=150_000))
+    before = {one: one.read_bytes() for one in tmp_path.iterdir()}
+    assert len(before) > 1
+    forced, rename = files(tmp_path / "x.mcap", 2, force=True), Path.rename
+
+    def stuck(path: Path, target: Path) -> Path:
+        if path.name == "x-1.mcap":
+            raise PermissionError(errno.EACCES, "Permission denied")
+        return rename(path, target)
+
+    monkeypatch.setattr(Path, "rename", stuck)
+    message = Stored(topic_of(TOPIC, ARRAY, text_of_type(ARRAY, 2), 2), 0, START, START, sent(2, range(1))[0])
+    with pytest.raises(PermissionError):
+        forced.write([message])
+    assert {one: one.read_bytes() for one in tmp_path.iterdir()} == before
+
+
 @KINDS
 def test_a_folder_that_is_not_there_is_an_error_at_once(name: str, ros: Ros, tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):

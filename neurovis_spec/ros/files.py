@@ -22,6 +22,7 @@ import yaml
 from neurovis_spec.ros.definitions import written
 from neurovis_spec.ros.logs import BagLog, Log, McapLog, Stored, Topic
 from neurovis_spec.ros.middleware import Ros
+from neurovis_spec.runtime.parts import short
 from neurovis_spec.runtime.rotated import place
 
 _FORMATS: Final[Mapping[str, tuple[type[McapLog | BagLog], Ros | None]]] = {
@@ -93,15 +94,17 @@ def in_the_way(path: Path, force: bool) -> list[Path]:
 @contextmanager
 def _out_of_the_way(paths: Iterable[Path]) -> Iterator[None]:
     """The files have other names meanwhile. They are removed then, or are back where there was an error."""
-    moved = [(path, path.rename(path.with_name(f".{path.name}.old"))) for path in paths if path.exists()]
+    moved: list[tuple[Path, Path]] = []
     try:
+        for path in (path for path in paths if path.exists()):
+            moved.append((path, path.rename(path.with_name(f".{short(path.name)}.old"))))
         yield
     except BaseException:
         for path, aside in moved:
             aside.replace(path)
         raise
     for _, aside in moved:
-        aside.unlink()
+        aside.unlink(missing_ok=True)
 
 
 @dataclass(eq=False)

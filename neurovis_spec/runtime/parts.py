@@ -47,7 +47,7 @@ def open_beside(target: Path, kind: Kind) -> tuple[Path, FileIO]:
 
 def beside(target: Path, kind: Kind) -> list[Path]:
     """The files of this kind beside ``target``, the one written last first."""
-    pattern = re.compile(re.escape(f".{_short(target.name)}") + rf"(?:\.[0-9]+)?\.{kind}")
+    pattern = re.compile(re.escape(f".{short(target.name)}") + rf"(?:\.[0-9]+)?\.{kind}")
     found: list[tuple[int, Path]] = []
     with suppress(OSError):
         for name in os.listdir(target.parent):  # noqa: PTH208
@@ -98,11 +98,11 @@ def shown(part: Path, path: Path) -> Path:
 
 
 def _beside(target: Path, kind: Kind, number: int) -> Path:
-    return target.with_name(f".{_short(target.name)}{f'.{number}' if number > 1 else ''}.{kind}")
+    return target.with_name(f".{short(target.name)}{f'.{number}' if number > 1 else ''}.{kind}")
 
 
-def _short(name: str) -> str:
-    """The name, or one in its place where that with a little more would be too long for a file system."""
+def short(name: str) -> str:
+    """The name of a file, or one in its place where that with a little more would be too long for a file system."""
     if len(os.fsencode(name)) <= _LONGEST:
         return name
     return f"{name[:40]}~{sha256(os.fsencode(name)).hexdigest()[:16]}{Path(name).suffix[:8]}"
