@@ -53,14 +53,14 @@ def _too_large(network: Network) -> bool:
 
 
 def _crowded(network: Network) -> bool:
-    """Whether pins may leave no room for something: a frame, a cell, a mirror image, what is on a line."""
+    """Whether pins may leave no room for something: a frame or a cell."""
     if _too_large(network):
         return False
     settings = network.layout
     if not (settings.positions or settings.origins or settings.relative):
         return False
     boxed = any(group.box is not None for group in network.neurons.groups)
-    return boxed or bool(network.instances or settings.boxes or settings.mirrors or settings.align or settings.plan)
+    return boxed or bool(network.instances or settings.boxes or settings.plan)
 
 
 def foresee_frames(engine: Located[str], network: Network, findings: Findings) -> None:

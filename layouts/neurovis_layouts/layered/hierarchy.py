@@ -59,9 +59,9 @@ class Composer:
         return self.compose(problem, routed)
 
     def _in_shape(self, problem: LayoutProblem, shape: Shape) -> Drawing:
-        """The drawing of the whole in a shape, without routes between its outermost frames."""
+        """The drawing of the whole in a shape."""
         self._shape = shape
-        return self.compose(problem, False)
+        return self.compose(problem)
 
     def check_mirrors(self) -> None:
         """Raises LayoutRefusalError where an arrangement cannot be symmetric, in the problem or in a kind of instance,
