@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -119,6 +120,11 @@ def straight(a: Point, b: Point) -> Route:
     """A straight route, its control points on the line."""
     third = ((2 * a[0] + b[0]) / 3, (2 * a[1] + b[1]) / 3)
     return (a, third, ((a[0] + 2 * b[0]) / 3, (a[1] + 2 * b[1]) / 3), b)
+
+
+def angular(points: Sequence[Point]) -> Route:
+    """A route straight from point to point, its corners as they are."""
+    return (points[0], *(point for a, b in pairwise(points) for point in (a, b, b)))
 
 
 class Cells:

@@ -17,7 +17,7 @@ from neurovis_layouts.routing.corners import rounded
 from neurovis_layouts.routing.ends import Key
 from neurovis_layouts.routing.images import Images
 from neurovis_layouts.routing.obstacles import REACH
-from neurovis_spec.layout.geometry import Rect, bounds, distance, meet, snap
+from neurovis_spec.layout.geometry import Rect, angular, bounds, distance, meet, snap
 from neurovis_spec.layout.model import GRID, LayoutEdge, LayoutProblem, Point, Route
 
 
@@ -108,8 +108,7 @@ def _aslant(line: Sequence[Point]) -> Point:
 
 def _through(places: Sequence[Point], edge: LayoutEdge, line: Sequence[Waypoint]) -> Route:
     """A route straight from waypoint to waypoint."""
-    stops = [places[edge.source], *((way.x, way.y) for way in line), places[edge.target]]
-    return (stops[0], *(point for a, b in pairwise(stops) for point in (a, b, b)))
+    return angular([places[edge.source], *((way.x, way.y) for way in line), places[edge.target]])
 
 
 def _snapped(route: Route) -> list[Point]:

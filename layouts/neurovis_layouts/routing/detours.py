@@ -23,7 +23,7 @@ from neurovis_layouts.routing.polylines import polylines
 from neurovis_layouts.routing.route_cost import ALONG, BENDING, ENTERING
 from neurovis_layouts.routing.walls import Walls, blocked, meet
 from neurovis_spec.layout import BoolArray, FloatArray, IntArray
-from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.geometry import angular, distance
 from neurovis_spec.layout.model import RADIUS, LayoutEdge, Point, Route
 
 #: How far off a frame's border lanes run.
@@ -77,7 +77,7 @@ def detoured(
         line = detours.line(*ends, ends not in shared)
         if line is not None and (way := detours.line(*ends, True, ways[i]) if ways.get(i) else None):
             others = lines.owner != number[i]
-            both = polylines([_sharp(path) for path, _ in (way, line)])
+            both = polylines([angular(path) for path, _ in (way, line)])
             crossed = both.crossed(lines.a[others], lines.b[others])
             line = way if crossed[0] <= crossed[1] else line
         route = None if line is None else detours.along(*ends, *line)
@@ -85,11 +85,6 @@ def detoured(
             found[i] = route
             lines = lines.replaced(number[i], polylines([route]))
     return found
-
-
-def _sharp(path: Sequence[Point]) -> Route:
-    """The route along a line, its corners as they are."""
-    return (path[0], *(point for a, b in pairwise(path) for point in (a, b, b)))
 
 
 @dataclass(frozen=True, slots=True)
