@@ -219,17 +219,19 @@ class Insertion:
         sides = [self._lines(ups, last, True), self._lines(downs, first, False)]
         length = sum(first - self.rank[self.links[c].upper] for c in ups)
         length += sum(self.rank[self.links[c].lower] - last for c in downs)
-        best, at, chosen = -1, first, self._shut_to(first, node)
+        options: list[tuple[int, int, Counts]] = []
         for r in range(first, last + 1):
             costs = sum((np.add.reduce(lines[r][1], 0) for lines in sides if lines), self._shut_to(r, node))
-            cost = int(costs[costs.argmin()]) * CROSSING + length + len(ups) * (r - first) + len(downs) * (last - r)
-            if best < 0 or cost < best or (cost == best and roll & 1):
-                best, at, chosen = cost, r, costs
-            roll >>= 1
+            least = int(costs[costs.argmin()])
+            options.append((least * CROSSING + length + len(ups) * (r - first) + len(downs) * (last - r), r, costs))
             self.work += 1
+        best = min(cost for cost, *_ in options)
         if best > most:
             return best
-        ties = np.flatnonzero(chosen == chosen.min())
+        options = [option for option in options if option[0] == best]
+        roll, choice = divmod(roll, len(options))
+        _, at, costs = options[choice]
+        ties = np.flatnonzero(costs == costs.min())
         slot = int(ties[roll % len(ties)])
         self.rank[node] = at
         self._out.discard(node)

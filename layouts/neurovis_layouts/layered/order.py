@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from itertools import pairwise
+from operator import itemgetter
 
 import numpy as np
 
@@ -33,12 +34,11 @@ def ordered(
 ) -> tuple[Levels, Order]:
     """The ranks in order; ``free`` nodes may have moved to others. A ``draft`` is as wide, about, as what is drawn in
     full. Deterministic: every tie falls to the order before, in the end to that of the names."""
-    natural = [_grouped_start(levels, rank) for rank in levels.ranks]
-    if not any(levels.segments):
-        return levels, natural
     segments = Segments(levels)
     strict = any(node.kin >= 0 for node in levels.nodes)
-    crossings, order = _swept(levels, segments, _by_descent(levels, natural), strict)
+    # large levels end far from each other: neither start is better in all of them
+    starts = levels.ranks, _by_descent(levels)
+    crossings, order = min((_swept(levels, segments, start, strict) for start in starts), key=itemgetter(0))
     if strict and crossings:
         fewer, other = _swept(levels, segments, order, False)
         if fewer < _CLEARLY * crossings:
@@ -50,7 +50,7 @@ def ordered(
 
 def crossings(levels: Levels, order: Order) -> int:
     """How many segments cross in this order."""
-    return Segments(levels).count(places(len(levels.nodes), [np.array(rank, dtype=np.int64) for rank in order]))
+    return Segments(levels).count(places(len(levels.nodes), order))
 
 
 def places(count: int, order: Sequence[Sequence[int] | Ints]) -> Ints:
@@ -108,26 +108,17 @@ def _kin(levels: Levels, rank: Sequence[int]) -> list[Ints]:
     return [np.array(mates, dtype=np.int64) for mates in kin.values() if len(mates) > 1]
 
 
-def _grouped_start(levels: Levels, rank: Sequence[int]) -> list[int]:
-    """Natural order with the members of each box together, where its first one stands."""
-    first: dict[int, int] = {}
-    for place, node in enumerate(rank):
-        first.setdefault(levels.nodes[node].box, place)
-    key = {node: first[levels.nodes[node].box] if levels.nodes[node].box >= 0 else i for i, node in enumerate(rank)}
-    return sorted(rank, key=lambda node: key[node])
-
-
-def _by_descent(levels: Levels, natural: Order) -> Order:
+def _by_descent(levels: Levels) -> Order:
     """Nodes in the order in which a walk down from the first rank meets them: keeps what hangs together together."""
     below: list[list[int]] = [[] for _ in levels.nodes]
     for segment in (segment for gap in levels.segments for segment in gap):
         below[segment.upper].append(segment.lower)
     met: dict[int, int] = {}
-    for root in (node for rank in natural for node in rank):
+    for root in (node for rank in levels.ranks for node in rank):
         stack = [root]
         while stack:
             node = stack.pop()
             if node not in met:
                 met[node] = len(met)
                 stack.extend(other for other in sorted(below[node], reverse=True) if other not in met)
-    return [_grouped_start(levels, sorted(rank, key=lambda node: met[node])) for rank in natural]
+    return [sorted(rank, key=lambda node: met[node]) for rank in levels.ranks]
