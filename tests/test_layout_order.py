@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise, permutations, product
 from random import Random
 
@@ -13,7 +14,7 @@ from neurovis_layouts.layered import exchange
 from neurovis_layouts.layered.crossings import Ints, Segments, inversions
 from neurovis_layouts.layered.exchange import Exchange
 from neurovis_layouts.layered.levels import Levels, Node, Segment
-from neurovis_layouts.layered.order import Order, crossings, ordered
+from neurovis_layouts.layered.order import Order, crossings, ordered, places
 
 
 def levels_by_hand(nodes: list[list[Node]], segments: list[list[tuple[int, float, int, float]]]) -> Levels:
@@ -80,6 +81,16 @@ def test_inversions_are_pairs_out_of_order(values: list[int]) -> None:
 def test_the_fast_count_is_the_plain_one(levels: Levels, random: Random) -> None:
     order = [random.sample(rank, len(rank)) for rank in levels.ranks]
     assert crossings(levels, order) == by_pairs(levels, order)
+
+
+@given(some_levels(), st.randoms(use_true_random=False))
+@settings(deadline=None)
+def test_what_is_turned_has_its_ports_the_other_way_round(levels: Levels, random: Random) -> None:
+    turned = np.array([random.random() < 0.5 for _ in levels.nodes])
+    side = np.where(turned, -1.0, 1.0)
+    gaps = [[replace(s, a=s.a * side[s.upper], b=s.b * side[s.lower]) for s in gap] for gap in levels.segments]
+    place = places(len(levels.nodes), levels.ranks)
+    assert Segments(levels).count(place, turned) == by_pairs(replace(levels, segments=gaps), levels.ranks)
 
 
 @given(some_levels(most=4, ranks=3))
