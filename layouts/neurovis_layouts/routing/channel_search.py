@@ -255,7 +255,10 @@ def knots(rows: OccupiedRows, path: Sequence[Point], ends: tuple[int, int], alon
     if not knots and not alone and len(path) > 3:
         knots = [Waypoint(*path[1]), Waypoint(*path[-2])]
     stops = [path[0][1], *(knot.y for knot in knots), path[-1][1]]
-    room = [_SHARE * min(abs(y - before), abs(after - y)) for before, y, after in zip(stops, stops[1:], stops[2:], strict=False)]
+    room = [
+        _SHARE * min(abs(y - before), abs(after - y))
+        for before, y, after in zip(stops, stops[1:], stops[2:], strict=False)
+    ]
     return [Waypoint(knot.x, knot.y, min(knot.half, most)) for knot, most in zip(knots, room, strict=True)]
 
 
