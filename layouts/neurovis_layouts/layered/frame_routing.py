@@ -12,13 +12,15 @@ from neurovis_layouts.layered.component_layout import ComponentLayout
 from neurovis_layouts.layered.pinning import Settled
 from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.routing import Waypoint, route_all
-from neurovis_layouts.routing.channel_routing import channels
-from neurovis_layouts.routing.corners import rounded
+from neurovis_layouts.routing.corners import smooth
 from neurovis_layouts.routing.ends import Key
 from neurovis_layouts.routing.images import Images
 from neurovis_layouts.routing.obstacles import REACH
-from neurovis_spec.layout.geometry import Rect, angular, bounds, distance, meet, snap
+from neurovis_spec.layout.geometry import Rect, bounds, distance, meet, snap
 from neurovis_spec.layout.model import GRID, LayoutEdge, LayoutProblem, Point, Route
+
+#: How much of the corners of a line from band to band is cut off.
+_CUT = 3.0
 
 
 def linked(
@@ -38,34 +40,17 @@ def linked(
     the frame of its neuron; ``drawn`` are the routes within the frames."""
     edges = [problem.edges[i] for i in links]
     framed = [(frozenset(members), rect) for members, rect in (*frames, *boxes, *labels)]
-    # what has its waypoints from the plan keeps them
-    firm: dict[int, list[Waypoint]] = {}
-    lateral: dict[int, list[Waypoint]] = {}
     planned = _passing(problem, plan, rests)
-    begun = _cut(problem, links, plan, rests, [rect for _, rect in labels])
-    if frames:
-        gates = {k: planned[i] for k, i in enumerate(links) if i in planned}
-        firm = {k: gates[k] for k, i in enumerate(links) if k in gates and i in plan.firm and not rests.moved}
-        lines = [*drawn, *(_through(rests.places, edges[k], line) for k, line in firm.items()), *begun.values()]
-        free = {k: edge for k, edge in enumerate(edges) if k not in firm and k not in begun}
-        ways, lateral = channels(free, rests.places, framed, gates, lines)
-        ways.update(firm)
-    else:
-        ways = planned
-    bowed = _bowed(edges, units)
     own = [keys[i] for i in links]
-    images = _images(own, rests, pair)
     routes = route_all(
         edges,
         rests.places,
-        ways,
-        bowed,
-        lateral,
+        {k: planned[i] for k, i in enumerate(links) if i in planned},
+        _bowed(edges, units),
         frames=framed,
         drawn=drawn,
-        begun=begun,
-        images=images,
-        planned=firm.keys(),
+        begun=_cut(problem, links, plan, rests, [rect for _, rect in labels]),
+        images=_images(own, rests, pair),
     )
     return {key: tuple(_snapped(route)) for key, route in zip(own, routes, strict=True)}
 
@@ -89,7 +74,7 @@ def _cut(
                 line = [line[0], aslant, *line[3:]]
             line.reverse()
         apart = [a for a, b in pairwise(line) if distance(a, b) > GRID]
-        found[k] = rounded([*apart, line[-1]], lambda _: True)
+        found[k] = smooth([*apart, line[-1]], _CUT)
     return found
 
 
@@ -104,11 +89,6 @@ def _aslant(line: Sequence[Point]) -> Point:
     (x, y), turn, end = line[0], line[2], line[3]
     far = min(abs(turn[0] - x), abs(end[1] - y) / 2)
     return turn[0], y + (far if end[1] > y else -far)
-
-
-def _through(places: Sequence[Point], edge: LayoutEdge, line: Sequence[Waypoint]) -> Route:
-    """A route straight from waypoint to waypoint."""
-    return angular([places[edge.source], *((way.x, way.y) for way in line), places[edge.target]])
 
 
 def _snapped(route: Route) -> list[Point]:

@@ -19,11 +19,10 @@ import numpy as np
 from neurovis_layouts.routing.corners import rounded
 from neurovis_layouts.routing.ends import shared_ends
 from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
-from neurovis_layouts.routing.polylines import polylines
 from neurovis_layouts.routing.route_cost import ALONG, BENDING, ENTERING
 from neurovis_layouts.routing.walls import Walls, blocked, meet
 from neurovis_spec.layout import BoolArray, FloatArray, IntArray
-from neurovis_spec.layout.geometry import angular, distance
+from neurovis_spec.layout.geometry import distance
 from neurovis_spec.layout.model import RADIUS, LayoutEdge, Point, Route
 
 #: How far off a frame's border lanes run.
@@ -41,7 +40,7 @@ _CORNERS = ((0, 1), (0, 3), (2, 1), (2, 3))
 #: What comes this close to a disc may be measured to run over it.
 _BARELY = 0.01
 #: Where more run over discs than this, detours would only move the crowd.
-_MOST = 60
+_MOST = 300
 
 
 def detoured(
@@ -51,12 +50,10 @@ def detoured(
     obstacles: Obstacles,
     walls: Walls,
     ways: Mapping[int, Sequence[Point]],
-    drawn: Sequence[Route] = (),
 ) -> dict[int, Route]:
     """Detours by edge index for the routes that enter foreign frames or run over discs, where there are some: first
     those between the farthest neurons, which so take the inner lanes round what they share with others. What has a way
-    already, from point to point, goes round what is in the way between two of these alone, unless the shortest detour
-    crosses fewer lines, of the routes and of others that are ``drawn``."""
+    already, from point to point, goes round what is in the way between two of these alone, where that can be: a point may be in a frame."""
     chosen = sorted(routes)
     own = [(edges[i].source, edges[i].target) for i in chosen]
     entered = walls.entered([routes[i] for i in chosen], own)
@@ -70,20 +67,13 @@ def detoured(
     if not wrong:
         return {}
     shared, detours, found = shared_ends(edges), Detours(walls, centres), dict[int, Route]()
-    number = {i: k for k, i in enumerate(chosen)}
-    lines = polylines([*(routes[i] for i in chosen), *drawn])
     for _, i, enters, clearance in sorted(wrong):
         ends = edges[i].source, edges[i].target
-        line = detours.line(*ends, ends not in shared)
-        if line is not None and (way := detours.line(*ends, True, ways[i]) if ways.get(i) else None):
-            others = lines.owner != number[i]
-            both = polylines([angular(path) for path, _ in (way, line)])
-            crossed = both.crossed(lines.a[others], lines.b[others])
-            line = way if crossed[0] <= crossed[1] else line
+        by = ways.get(i)
+        line = (detours.line(*ends, True, by) if by else None) or detours.line(*ends, ends not in shared)
         route = None if line is None else detours.along(*ends, *line)
         if route is not None and (enters or obstacles.clearance(route, ends) > clearance):
             found[i] = route
-            lines = lines.replaced(number[i], polylines([route]))
     return found
 
 
@@ -143,14 +133,9 @@ class Detours:
 
     def along(self, source: int, target: int, path: Sequence[Point], rects: FloatArray) -> Route:
         """The route along a line, which others are to keep off."""
-
-        def free(route: Route) -> bool:
-            line = polylines([route])
-            return not _blocked(line.a, line.b, rects).any()
-
         self._taken.add(path)
         self._between.setdefault((min(source, target), max(source, target)), []).extend(path[1:-1])
-        return rounded(path, free)
+        return rounded(path, rects)
 
     def line(
         self, source: int, target: int, alone: bool, by: Sequence[Point] = ()
@@ -268,16 +253,8 @@ class _Corners:
         # the second end may be far away, the corners are not
         for chosen in (seen & (to == 1), seen & (to != 1)):
             line = there[chosen]
-            seen[chosen] = ~_blocked(np.repeat(here[None, :], len(line), axis=0), line, rects)
+            seen[chosen] = ~blocked(np.repeat(here[None, :], len(line), axis=0), line, rects)
         return seen
-
-
-def _blocked(a: FloatArray, b: FloatArray, rects: FloatArray) -> BoolArray:
-    """What ``blocked`` gives, for segments that are close to each other: compared with what is near these alone."""
-    if not len(a):
-        return np.zeros(0, dtype=np.bool_)
-    low, high = np.minimum(a, b).min(axis=0), np.maximum(a, b).max(axis=0)
-    return blocked(a, b, rects[((rects[:, :2] < high) & (rects[:, 2:] > low)).all(axis=1)])
 
 
 def _taut(way: FloatArray, sides: FloatArray) -> BoolArray:

@@ -17,7 +17,7 @@ from neurovis_layouts.routing.detours import detoured
 from neurovis_layouts.routing.images import Images
 from neurovis_layouts.routing.improve import MOST_IMPROVED, improved
 from neurovis_layouts.routing.loops import Loops
-from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
+from neurovis_layouts.routing.obstacles import Obstacles
 from neurovis_layouts.routing.ports import Port, leanings
 from neurovis_layouts.routing.route_cost import Drawn
 from neurovis_layouts.routing.walls import Frame, Walls
@@ -41,13 +41,11 @@ def route_all(
     centres: Sequence[Point],
     waypoints: Mapping[int, Sequence[Waypoint]] | None = None,
     bowed: AbstractSet[int] = frozenset(),
-    lateral: Mapping[int, Sequence[Waypoint]] | None = None,
     careful: int = _MOST_CAREFULLY,
     frames: Sequence[Frame] = (),
     drawn: Sequence[Route] = (),
     there: Mapping[int, Route] | None = None,
     images: Images | None = None,
-    planned: AbstractSet[int] = frozenset(),
     highest: float = math.inf,
     begun: Mapping[int, Route] | None = None,
 ) -> list[Route]:
@@ -65,29 +63,20 @@ def route_all(
     near = Obstacles(centres)
     obstacles = near if len(edges) <= careful else Obstacles(())
     routes: dict[int, Route] = dict(begun or {})
-    if lateral:
-        exchanged = [(y, x) for x, y in centres]
-        across = _curves(edges, exchanged, sorted(lateral), lateral)
-        routes.update({i: tuple((x, y) for y, x in route) for i, route in across.items()})
     if waypoints is not None:
         chosen = bowed | routes.keys()
         along = [i for i, edge in enumerate(edges) if i not in chosen and _runs_along(edge, centres)]
         routes.update(_curves(edges, centres, along, waypoints))
     rest = [i for i, edge in enumerate(edges) if i not in routes and edge.source != edge.target]
-    curved = frozenset(routes)
     routes.update(_bows(edges, centres, rest, obstacles, highest))
     walls = Walls(frames, len(centres))
     few = len(edges) <= min(careful, _MOST_AT_LENGTH)
     ways = {i: [(way.x, way.y) for way in line] for i, line in (waypoints or {}).items()}
-    ways |= {i: [(way.y, way.x) for way in line] for i, line in (lateral or {}).items()}
-    routes.update(detoured(edges, centres, routes, obstacles if few else Obstacles(()), walls, ways, drawn))
-    routes.update(_clearer(edges, centres, {i: routes[i] for i in sorted(curved)}, obstacles, highest))
+    routes.update(detoured(edges, centres, routes, obstacles, walls, ways))
     images = images or Images()
     routes.update(images.kept(routes, edges, centres))
     routes.update((i, route) for i, route in (there or {}).items() if few and i in routes)
     free = set(routes) - (there or {}).keys() - {image for i, image in images.of.items() if image != i}
-    if planned:
-        free = {i for i in free if images.of.get(i) == i}
     if free and len(edges) <= MOST_IMPROVED:
         routes.update(improved(Drawn(edges, centres, routes, frames, drawn, images), free))
     loops = _loops(edges, centres, routes, near, walls, there or {})
@@ -178,21 +167,6 @@ def _bows(
             routes[between[ends][place]] = route
             reach[ends] = min(reach[ends][0], height), max(reach[ends][1], height)
     return routes
-
-
-def _clearer(
-    edges: Sequence[LayoutEdge],
-    centres: Sequence[Point],
-    routes: Mapping[int, Route],
-    obstacles: Obstacles,
-    highest: float,
-) -> dict[int, Route]:
-    """Bows for those of the routes that run over a disc, where these keep farther off."""
-    clear = obstacles.clearances([*routes.values()], [(edges[i].source, edges[i].target) for i in routes])
-    over = {i: clearance for i, clearance in zip(routes, clear, strict=True) if clearance < TOUCH}
-    bows = _bows(edges, centres, [*over], obstacles, highest)
-    found = obstacles.clearances([*bows.values()], [(edges[i].source, edges[i].target) for i in bows])
-    return {i: bows[i] for i, clearance in zip(bows, found, strict=True) if clearance > over[i]}
 
 
 def _least(
