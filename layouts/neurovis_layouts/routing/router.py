@@ -72,7 +72,7 @@ def route_all(
     walls = Walls(frames, len(centres))
     few = len(edges) <= min(careful, _MOST_AT_LENGTH)
     ways = {i: [(way.x, way.y) for way in line] for i, line in (waypoints or {}).items()}
-    routes.update(detoured(edges, centres, routes, obstacles, walls, ways))
+    routes.update(detoured(edges, centres, routes, obstacles, walls, ways, drawn))
     images = images or Images()
     routes.update(images.kept(routes, edges, centres))
     routes.update((i, route) for i, route in (there or {}).items() if few and i in routes)
