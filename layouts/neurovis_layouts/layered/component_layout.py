@@ -22,7 +22,7 @@ from neurovis_layouts.layered.fold_ports import with_exits
 from neurovis_layouts.layered.folds import folded, interleaved, stacked
 from neurovis_layouts.layered.levels import Levels, levels_of
 from neurovis_layouts.layered.mirror import mirrored, symmetric
-from neurovis_layouts.layered.order import ordered
+from neurovis_layouts.layered.order import crossings, ordered
 from neurovis_layouts.layered.place import placed, reaches
 from neurovis_layouts.layered.ranks import INSTANT, ranks_of
 from neurovis_layouts.layered.staggered import staggered
@@ -42,6 +42,8 @@ class ComponentLayout:
 
     places: dict[int, Point] = field(default_factory=dict)
     ways: dict[int, list[Waypoint]] = field(default_factory=dict)
+    #: edges whose waypoints are all that they need
+    firm: set[int] = field(default_factory=set)
     reflected: set[int] = field(default_factory=set)
     #: on which sides labels stand that do not stand on the usual one
     sides: dict[int, Side] = field(default_factory=dict)
@@ -66,6 +68,7 @@ class ComponentLayout:
         self.corners += [(x + dx, y + dy) for x, y in other.corners]
         self.reflected |= other.reflected
         self.sides.update(other.sides)
+        self.firm |= other.firm
         self.cuts = max(self.cuts, other.cuts)
         self.cut.update({i: [(x + dx, y + dy) for x, y in line] for i, line in other.cut.items()})
         for i, ways in other.ways.items():
@@ -193,7 +196,9 @@ def _component(
     spans = list(zip(*reaches(levels, order), strict=True))
     for i, passages in levels.passages.items():
         plan.ways[i] = [_passage(places[n], *spans[levels.nodes[n].rank]) for n in passages]
-    plan.ways = with_exits(problem, edges, levels, places, spans, folds, uneven, plan.ways)
+    plan.ways, whole = with_exits(problem, edges, levels, places, spans, folds, uneven, plan.ways)
+    if whole and not crossings(levels, order):
+        plan.firm |= whole
     if not pair:
         plan.cuts, found = banded(problem, levels, places, folds.ranks, wanted)
         if wanted.bands > 1:
@@ -221,6 +226,7 @@ def _in_bands(problem: LayoutProblem, plan: ComponentLayout, levels: Levels, ban
     rank = {m: node.rank for node in levels.nodes for m, _, _ in node.members}
     for i, line in bands.ways.items():
         plan.cut[i] = line if rank[problem.edges[i].source] < rank[problem.edges[i].target] else line[::-1]
+    plan.firm -= plan.cut.keys()
     plan.ways = {
         i: [Waypoint(way.x + dx, way.y + dy, way.half) for way in ways]
         for i, ways in plan.ways.items()

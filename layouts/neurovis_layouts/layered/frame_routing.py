@@ -14,7 +14,7 @@ from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.routing import Waypoint, route_all
 from neurovis_layouts.routing.corners import smooth
 from neurovis_layouts.routing.ends import Key
-from neurovis_layouts.routing.images import Images
+from neurovis_layouts.routing.images import images_of
 from neurovis_layouts.routing.obstacles import REACH
 from neurovis_spec.layout.geometry import Rect, bounds, distance, meet, snap
 from neurovis_spec.layout.model import GRID, LayoutEdge, LayoutProblem, Point, Route
@@ -41,6 +41,8 @@ def linked(
     edges = [problem.edges[i] for i in links]
     framed = [(frozenset(members), rect) for members, rect in (*frames, *boxes, *labels)]
     planned = _passing(problem, plan, rests)
+    # what has all waypoints that it needs from the plan keeps them
+    firm = {k for k, i in enumerate(links) if i in plan.firm} if frames and not rests.moved else set()
     own = [keys[i] for i in links]
     routes = route_all(
         edges,
@@ -50,7 +52,8 @@ def linked(
         frames=framed,
         drawn=drawn,
         begun=_cut(problem, links, plan, rests, [rect for _, rect in labels]),
-        images=_images(own, rests, pair),
+        images=images_of(own, rests.places, pair, rests.axis),
+        planned=firm,
     )
     return {key: tuple(_snapped(route)) for key, route in zip(own, routes, strict=True)}
 
@@ -113,23 +116,3 @@ def _passing(problem: LayoutProblem, plan: ComponentLayout, rests: Settled) -> d
             passing = [Waypoint(way.x + dx, way.y + dy, way.half) for way in line]
             ways[i] = passing if plan.places[edge.source][1] < plan.places[edge.target][1] else passing[::-1]
     return ways
-
-
-def _images(keys: Sequence[Key], rests: Settled, pair: Mapping[int, int]) -> Images:
-    """Which connections are mirror images of others. There and back are taken from the same side: the sides that they
-    bow to are exchanged on the other."""
-    number = {key: i for i, key in enumerate(keys)}
-    of: dict[int, int] = {}
-    for key in sorted(keys, key=lambda key: (sorted(key[:2]), key)):
-        source, target, times = key
-        image = number.get((_image(source, rests, pair), _image(target, rests, pair), times))
-        if source != target and pair.get(source) == target:
-            of[number[key]] = number[key]
-        elif image is not None and image != number[key] and image not in of:
-            of[number[key]] = image
-    return Images(of, 2 * rests.axis)
-
-
-def _image(neuron: int, rests: Settled, pair: Mapping[int, int]) -> int:
-    """The mirror image of a neuron: itself on the axis, −1 where it has none."""
-    return pair.get(neuron, neuron if rests.places[neuron][0] == rests.axis else -1)

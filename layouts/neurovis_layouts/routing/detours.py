@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 
 from neurovis_layouts.routing.corners import rounded
-from neurovis_layouts.routing.ends import shared_ends
+from neurovis_layouts.routing.ends import by_ends
 from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
 from neurovis_layouts.routing.polylines import crossings, polylines
 from neurovis_layouts.routing.route_cost import ALONG, BENDING, ENTERING
@@ -73,14 +73,12 @@ def detoured(
     ]
     if not wrong:
         return {}
-    shared, found = shared_ends(edges), dict[int, Route]()
+    between, found = by_ends(enumerate(edges)), dict[int, Route]()
     right = [routes[i] for i in sorted(routes.keys() - {i for _, i, _, _ in wrong})]
     detours = Detours(walls, centres, [*right, *drawn] if len(routes) + len(drawn) <= _MOST_CROSSED else None)
     for _, i, enters, clearance in sorted(wrong):
         ends = edges[i].source, edges[i].target
-        by = ways.get(i)
-        line = (detours.line(*ends, True, by) if by else None) or detours.line(*ends, ends not in shared)
-        route = None if line is None else detours.along(*ends, *line)
+        route = detours.route(*ends, len(between[frozenset(ends)]) == 1, ways.get(i, ()))
         if route is not None and (enters or obstacles.clearance(route, ends) > clearance):
             found[i] = route
     return found
@@ -136,14 +134,13 @@ class Detours:
         self._taken = _Taken()
         self._between: dict[tuple[int, int], list[Point]] = {}
 
-    def route(self, source: int, target: int, alone: bool) -> Route | None:
-        """A way round, None where there is none; one that is not ``alone`` between its ends keeps off the straight
-        line and off those before it."""
-        found = self.line(source, target, alone)
-        return None if found is None else self.along(source, target, *found)
-
-    def along(self, source: int, target: int, path: Sequence[Point], rects: FloatArray) -> Route:
-        """The route along a line, which others are to keep off."""
+    def route(self, source: int, target: int, alone: bool, by: Sequence[Point] = ()) -> Route | None:
+        """A way round, ``by`` these points if there is one, None where there is none at all; one that is not ``alone``
+        between its ends and has no such points keeps off the straight line and off those before it."""
+        found = (self._line(source, target, True, by) if by else None) or self._line(source, target, alone)
+        if found is None:
+            return None
+        path, rects = found
         self._taken.add(path)
         self._between.setdefault((min(source, target), max(source, target)), []).extend(path[1:-1])
         route = rounded(path, rects)
@@ -151,7 +148,7 @@ class Detours:
             self._lines = self._lines.and_then(polylines([route]))
         return route
 
-    def line(
+    def _line(
         self, source: int, target: int, alone: bool, by: Sequence[Point] = ()
     ) -> tuple[list[Point], FloatArray] | None:
         """The line that a detour follows, ``by`` these points, and what it keeps off."""

@@ -48,15 +48,15 @@ def route_all(
     images: Images | None = None,
     highest: float = math.inf,
     begun: Mapping[int, Route] | None = None,
+    planned: AbstractSet[int] = frozenset(),
 ) -> list[Route]:
     """Routes by edge index.
 
     Without ``waypoints`` every edge runs from anywhere to anywhere; with them, edges not in ``bowed`` run along the
-    direction (through their waypoints, if they have any). Those in ``lateral`` run across it, through waypoints with x
-    and y exchanged. With more than ``careful`` edges, discs in the way are not gone round. No route enters one of the
-    ``frames`` that holds neither of its ends, if there is a way round. ``drawn`` are other routes, which are
-    there, as are those of these edges that are ``there``. A bow is at most ``highest`` times as high as its way is
-    long; what it cannot get over it goes round from disc to disc. ``begun`` are routes to begin with, not curves; of
+    direction (through their waypoints, if they have any). With more than ``careful`` edges, discs in the way are not
+    gone round. No route enters one of the ``frames`` that holds neither of its ends, if there is a way round. ``drawn``
+    are other routes, which are there, as are those of these edges that are ``there``. A bow is at most ``highest``
+    times as high as its way is long; what it cannot get over it goes round from disc to disc. ``begun`` are routes to begin with, not curves; of
     those with ``images`` one is the other's reflection. Where some are ``planned``, which cross nothing, what would be
     drawn anew beside them might: only arcs between images are.
     """
@@ -77,6 +77,8 @@ def route_all(
     routes.update(images.kept(routes, edges, centres))
     routes.update((i, route) for i, route in (there or {}).items() if few and i in routes)
     free = set(routes) - (there or {}).keys() - {image for i, image in images.of.items() if image != i}
+    if planned:
+        free = {i for i in free if images.of.get(i) == i}
     if free and len(edges) <= MOST_IMPROVED:
         routes.update(improved(Drawn(edges, centres, routes, frames, drawn, images), free))
     loops = _loops(edges, centres, routes, near, walls, there or {})
