@@ -56,9 +56,9 @@ def route_all(
     direction (through their waypoints, if they have any). With more than ``careful`` edges, discs in the way are not
     gone round. No route enters one of the ``frames`` that holds neither of its ends, if there is a way round. ``drawn``
     are other routes, which are there, as are those of these edges that are ``there``. A bow is at most ``highest``
-    times as high as its way is long; what it cannot get over it goes round from disc to disc. ``begun`` are routes to begin with, not curves; of
-    those with ``images`` one is the other's reflection. Where some are ``planned``, which cross nothing, what would be
-    drawn anew beside them might: only arcs between images are.
+    times as high as its way is long; what it cannot get over it goes round from disc to disc. ``begun`` are routes to
+    begin with, not curves; of those with ``images`` one is the other's reflection. Where some are ``planned``, which
+    cross nothing, what would be drawn anew beside them might: only arcs between images are.
     """
     near = Obstacles(centres)
     obstacles = near if len(edges) <= careful else Obstacles(())
