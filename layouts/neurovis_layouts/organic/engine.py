@@ -15,7 +15,6 @@ from functools import partial
 import numpy as np
 
 from neurovis_layouts.apart import apart
-from neurovis_layouts.boxed import ROOM
 from neurovis_layouts.finish import drawn, drawn_apart, nearest
 from neurovis_layouts.organic.field import GridField
 from neurovis_layouts.organic.flow import in_flow
@@ -35,6 +34,8 @@ _MOST = 0.75
 #: How far an arc leads down at least, and how much too high its target may be to be put there: others would move many
 #: neurons far, and make crossings.
 _STEP, _NEARLY = 0.1, 3.0
+#: A neuron's share of a picture, in square spacings, at most: discs have to stay in sight.
+_ROOM = 7.0
 _PINNED_STEPS = 60
 #: Steps of trees, and gaps between parts, are not shorter than this, for links to pass between discs.
 _LEAST = 0.85
@@ -192,7 +193,7 @@ def _scales(wiring: Wiring, places: FloatArray, part: IntArray, spacing: float) 
     by_room = _NEXT * spacing / np.maximum(_quantile(part[: wiring.neurons], next_one, count), 1e-3)
     by_link = _LINK * spacing / np.maximum(_mean(part[wiring.a[links]], length, count, 1.0), 1e-3)
     width, height = (_extent(places, part) + 0.1).T
-    by_area = spacing * np.sqrt(ROOM * np.bincount(part) / (width * height))
+    by_area = spacing * np.sqrt(_ROOM * np.bincount(part) / (width * height))
     scales: FloatArray = np.maximum(np.minimum(by_room, by_area), by_link)[part]
     return scales
 
