@@ -5,12 +5,8 @@ from itertools import combinations
 from random import Random
 
 import layout_conformance as suite
-import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from neurovis_layouts.organic.paths import distances
 
 from neurovis_spec.layout import Direction, LayoutProblem, LayoutRefusalError
 from neurovis_spec.layout.arrange import lay_out_problem
@@ -18,18 +14,6 @@ from neurovis_spec.layout.frames import Frames
 from neurovis_spec.layout.geometry import distance, meet
 from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.problem import canonical
-
-
-@given(st.integers(1, 12), st.lists(st.tuples(st.integers(0, 11), st.integers(0, 11)), max_size=20))
-def test_ways_are_the_shortest(count: int, pairs: list[tuple[int, int]]) -> None:
-    links = [(a % count, b % count) for a, b in pairs]
-    ends = np.array(links, dtype=np.int64).reshape(-1, 2)
-    graph: nx.Graph[int] = nx.Graph(links)
-    graph.add_nodes_from(range(count))
-    known = dict(nx.all_pairs_shortest_path_length(graph))
-    most = max(far for row in known.values() for far in row.values())
-    wanted = [[known[i].get(j, most + 1) for j in range(count)] for i in range(count)]
-    assert distances(count, ends[:, 0], ends[:, 1]).tolist() == wanted
 
 
 def test_a_ring_becomes_a_ring() -> None:

@@ -1,9 +1,8 @@
 """Boxed: every box drawn together, and nothing foreign in its frame.
 
 In: where an engine that places neurons anywhere has put them. Out: places at which the frame of each box holds its
-neurons alone, as far as pins allow: what takes more room than its neurons need is drawn in, boxes are moved off each
-other as wholes, and who stands in a foreign frame leaves it. So it is for boxes within boxes; boxes that share some of
-their neurons move as one.
+neurons alone, as far as pins allow: boxes are moved off each other as wholes, and who stands in a foreign frame leaves
+it. So it is for boxes within boxes; boxes that share some of their neurons move as one.
 """
 
 from __future__ import annotations
@@ -24,18 +23,13 @@ from neurovis_spec.layout.model import RADIUS, LayoutProblem
 
 #: Half of what is free between two frames: one line of a title fits.
 _GAP = TITLE / 2
-#: Of a box with so many neurons, those farther out than this share of them, and so much more, are drawn in.
-_MANY, _MOST, _MORE = 8, 0.8, 1.25
-#: A neuron's share of a picture or a box, in square spacings, at most: discs have to stay in sight. And how long a box
-#: is for each of its neurons, in spacings, at most.
-ROOM, _LONG = 7.0, 1.5
 #: More boxes than this nobody could tell apart.
 _MOST_BOXES = 1000
 #: Steps in which frames push each other off; after so many of them the whole grows a little with each.
 _ROUNDS, _PATIENCE, _GROWTH = 400, 60, 1.02
-#: So often at most neurons leave foreign frames and are then kept off each other, which may push some of them back;
-#: after so many times the whole grows a little with each; who moves less than this has settled.
-_TURNS, _TRIES, _SETTLED = 40, 4, 0.01
+#: So often at most neurons leave foreign frames and are then kept off each other, which may push some of them back; who
+#: moves less than this has settled.
+_TURNS, _SETTLED = 40, 0.01
 #: From centres to the line of a box, and of an instance with its title.
 _LINE: Rect = (-BOX_ACROSS, -BOX_DOWN, BOX_ACROSS, BOX_DOWN)
 _INSTANCE: Rect = (-PAD, -PAD - TITLE, PAD, PAD)
@@ -65,11 +59,9 @@ class _Box:
 
 @dataclass(frozen=True, slots=True)
 class _Sizes:
-    """How far discs are kept apart, and neurons are from each other on the whole; what ``labels`` cover around their
-    centres (n, 4), NaN where there is none."""
+    """How far discs are kept apart, and what ``labels`` cover around their centres (n, 4), NaN where there is none."""
 
     apart: float
-    spacing: float
     labels: FloatArray
 
 
@@ -92,7 +84,7 @@ def boxes_apart(
     pinned[list(problem.pins)] = True
     symmetry = symmetry or Symmetry(np.arange(count))
     pinned |= pinned[symmetry.image]
-    sizes = _Sizes(spacing, problem.neuron_spacing, np.full((count, 4), np.nan) if labels is None else labels)
+    sizes = _Sizes(spacing, np.full((count, 4), np.nan) if labels is None else labels)
     _divided(places, _Box(np.arange(count), boxes, np.zeros(4), np.zeros(2)), pinned, sizes, symmetry)
     return places
 
@@ -149,10 +141,6 @@ def _within(wholes: Sequence[_Box]) -> list[_Box]:
 
 def _divided(places: FloatArray, box: _Box, pinned: BoolArray, sizes: _Sizes, symmetry: Symmetry) -> None:
     """Move the neurons of a box: its boxes off each other, who is in none of them out of them."""
-    for inner in box.within:
-        own = inner.members
-        places[own] = _drawn_in(places[own], pinned[own], sizes.spacing)
-    places[:] = symmetry.kept(places)
     for number, inner in enumerate(box.within):
         own = inner.members
         if -1 < _image(box.within, inner, symmetry) < number and symmetry.paired[own].all():
@@ -162,7 +150,9 @@ def _divided(places: FloatArray, box: _Box, pinned: BoolArray, sizes: _Sizes, sy
     own, still = box.members, pinned.copy()
     frames = _Frames(places, box, pinned, symmetry, sizes.labels)
     if box.within:
-        _carry(places, box, frames.pushed(), symmetry)
+        for inner, way in zip(box.within, frames.pushed(), strict=True):
+            places[inner.members] += way
+        places[:] = symmetry.kept(places)
         still[np.concatenate([inner.members for inner in box.within])] = True
     free = own[~still[own]]
     inside = symmetry.within(own)
@@ -175,20 +165,10 @@ def _divided(places: FloatArray, box: _Box, pinned: BoolArray, sizes: _Sizes, sy
             places[:] = symmetry.kept(places)
         if turn and np.abs(places[free] - before).max() < _SETTLED:
             break
-        if box.within and turn >= _TRIES:
-            places[free], ways = frames.grown(places[free])
-            _carry(places, box, ways, symmetry)
         places[own] = apart(
             places[own], sizes.apart, np.flatnonzero(still[own]), kept=inside.kept, labels=sizes.labels[own]
         )
         places[:] = symmetry.kept(places)
-
-
-def _carry(places: FloatArray, box: _Box, ways: FloatArray, symmetry: Symmetry) -> None:
-    """Move the neurons of the boxes within a box these ways (k, 2)."""
-    for inner, way in zip(box.within, ways, strict=True):
-        places[inner.members] += way
-    places[:] = symmetry.kept(places)
 
 
 class _Frames:
@@ -249,17 +229,6 @@ class _Frames:
             np.add.at(centres, (other[close], axis), (1 - share[close]) * step)
             np.add.at(centres, (one[close], axis), -share[close] * step)
             centres = self._kept(centres)
-        return self._moved(centres)
-
-    def grown(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Points, and how far the frames have moved, farther apart, each frame as a whole."""
-        middle = self._all.mean(axis=0)
-        if (self._image >= 0).any():
-            middle[0] = self._axis
-        centres = np.where(self._held[:, None], self._all, middle + _GROWTH * (self._all - middle))
-        return middle + _GROWTH * (points - middle), self._moved(centres)
-
-    def _moved(self, centres: FloatArray) -> FloatArray:
         moved: FloatArray = (centres - self._all)[: self._count]
         self._all = centres
         return moved
@@ -276,25 +245,6 @@ def _image(boxes: Sequence[_Box], box: _Box, symmetry: Symmetry) -> int:
     paired = box.members[symmetry.image[box.members] != box.members]
     images = set(symmetry.image[paired].tolist())
     return next((i for i, other in enumerate(boxes) if images and images <= set(other.members.tolist())), -1)
-
-
-def _drawn_in(places: FloatArray, pinned: BoolArray, unit: float) -> FloatArray:
-    """Places of which none is much farther out than most are, and which take no more room than their number needs;
-    where some are pinned, the others stand around these."""
-    if pinned.all():
-        return places
-    middle = np.median(places[~pinned], axis=0)
-    free = places[~pinned] - middle
-    if len(free) >= _MANY:
-        far = np.hypot(free[:, 0], free[:, 1])
-        limit = _MORE * float(np.quantile(far, _MOST))
-        free *= np.minimum(1.0, limit / np.maximum(far, 1e-9))[:, None]
-    wide, high = np.maximum(np.ptp(free, axis=0) / unit, 1.0).tolist()
-    room, long = ROOM * len(free) / (wide * high), _LONG * len(places) / max(wide, high)
-    drawn = places.copy()
-    about = places[pinned].mean(axis=0) if pinned.any() else middle
-    drawn[~pinned] = about + free * min(1.0, float(np.sqrt(room)), long)
-    return drawn
 
 
 def _outside(points: FloatArray, centres: FloatArray, half: FloatArray, bodies: FloatArray) -> FloatArray:

@@ -1,11 +1,14 @@
-"""Engines whose neurons stand in a fixed formation, circular and grid: what they share.
+"""The engines whose neurons stand in a fixed formation, in natural order: circular, a ring wide enough that neighbours
+keep their spacing, clockwise from where the direction begins; and grid, rows, nearly square.
 
-In: a problem and a formation. Out: a Layout: instances as frames, pins kept, direction turned, edges routed.
+In: a problem. Out: a Layout: members of a box side by side, instances as frames with a formation of their own, pins
+kept, direction turned; edges go round the discs between their ends where they can.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from neurovis_layouts.blocks import Blocks, routed
 from neurovis_layouts.formations import offsets
@@ -18,15 +21,41 @@ from neurovis_layouts.pins import fit, with_origins
 from neurovis_layouts.routing.ends import keys_of
 from neurovis_spec.layout.frames import BOX_ACROSS, PAD_LABEL
 from neurovis_spec.layout.geometry import shifted, snap
-from neurovis_spec.layout.model import RADIUS, Arrangement, Layout, LayoutProblem, Point, Side
+from neurovis_spec.layout.model import RADIUS, Arrangement, Capabilities, Layout, LayoutProblem, Point, Side
 
 #: So many neurons are arranged around pins frame by frame.
 _MOST_AROUND_PINS = 5000
 #: From labels to other discs: lines of boxes run between them.
 _AIR = BOX_ACROSS - RADIUS + PAD_LABEL
+#: Neighbours are no closer than this.
+_LEAST = 0.65
 
 
-def boxes_together(problem: LayoutProblem) -> list[int]:
+class GridEngine:
+    """Neurons in rows and columns."""
+
+    name = "grid"
+    capabilities = Capabilities(
+        pins=True, arrange=False, boxes=True, direction=True, modules=True, memory=True, neurons=100_000
+    )
+
+    def lay_out(self, problem: LayoutProblem) -> Layout:
+        """Place the neurons row by row and route the edges."""
+        return _placed(problem, self.name, "grid", max(1.5 * problem.neuron_spacing, _LEAST))
+
+
+class CircularEngine:
+    """Neurons on a ring."""
+
+    name = "circular"
+    capabilities = replace(GridEngine.capabilities, suits="tangle")
+
+    def lay_out(self, problem: LayoutProblem) -> Layout:
+        """Place the neurons round a circle and route the edges."""
+        return _placed(problem, self.name, "ring", max(1.2 * problem.neuron_spacing, _LEAST))
+
+
+def _boxes_together(problem: LayoutProblem) -> list[int]:
     """Neurons in natural order, but the members of a box follow its first member."""
     box_of: dict[int, int] = {}
     for number, (_, members) in enumerate(problem.boxes):
@@ -45,9 +74,9 @@ def boxes_together(problem: LayoutProblem) -> list[int]:
     return order
 
 
-def place(problem: LayoutProblem, engine: str, how: Arrangement, spacing: float) -> Layout:
+def _placed(problem: LayoutProblem, engine: str, how: Arrangement, spacing: float) -> Layout:
     """The layout in which all neurons stand in one formation, those of an instance in one of their own."""
-    order = {neuron: i for i, neuron in enumerate(boxes_together(problem))}
+    order = {neuron: i for i, neuron in enumerate(_boxes_together(problem))}
 
     def formation(neurons: Sequence[int]) -> tuple[list[Point], list[Side | None]]:
         """Places for these, members of a box one after the other; labels outside of a ring, else to the right."""

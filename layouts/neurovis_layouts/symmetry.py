@@ -45,33 +45,10 @@ class Symmetry:
         symmetric: FloatArray = np.where(paired[:, None], (places + theirs) / 2, places)
         return symmetric
 
-    def folding(self, sign: float) -> FloatArray:
-        """(n, m): what gives all coordinates from those of one of each pair, whose images have them times ``sign``."""
-        chosen = np.flatnonzero(self.image >= np.arange(len(self.image)))
-        fold = np.zeros((len(self.image), len(chosen)))
-        column = np.arange(len(chosen))
-        other = self.image[chosen] != chosen
-        fold[self.image[chosen[other]], column[other]] = sign
-        fold[chosen, column] = 1.0
-        return fold
-
     def within(self, chosen: IntArray) -> Symmetry:
         """That of the chosen points alone, which are in order; who has the image elsewhere has none here."""
         image = np.where(np.isin(self.image[chosen], chosen), self.image[chosen], chosen)
         return Symmetry(np.searchsorted(chosen, image), self.axis)
-
-    def turned(self, places: FloatArray, first: IntArray) -> FloatArray:
-        """Places (n, 2) turned and moved so that the images of the ``first`` stand opposite them, across the axis, and
-        made symmetric."""
-        second = self.image[first]
-        x, y = (places[second] - places[first]).mean(axis=0).tolist()
-        length = float(np.hypot(x, y)) or 1.0
-        cosine, sine = (x / length, y / length) if x or y else (1.0, 0.0)
-        places = np.stack(
-            [cosine * places[:, 0] + sine * places[:, 1], cosine * places[:, 1] - sine * places[:, 0]], axis=1
-        )
-        places[:, 0] += self.axis - (places[first, 0] + places[second, 0]).mean() / 2
-        return self.kept(places)
 
     def reflected(self, point: Point) -> Point:
         """A point on the other side of the axis."""

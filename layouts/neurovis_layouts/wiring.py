@@ -1,8 +1,9 @@
 """Wiring: a network as arrays, for engines that move many neurons at once.
 
 In: a problem. Out: links without direction (parallel and reciprocal edges are one link of their number, self-loops are
-none), arcs (what tells above from below: edges between different loops), hubs (a weightless point for every module and
-box, linked with what belongs to it, which keeps that together) and the parts that hang together.
+none), arcs (what tells above from below: from loop to loop), hubs (a weightless point for every module and
+box, linked with what belongs to it, which keeps that together) and the parts that hang together. Of mirror images one
+is wired as the other is.
 """
 
 from __future__ import annotations
@@ -15,14 +16,16 @@ from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.model import LayoutProblem
 
 #: How heavy a hub is, and its links.
-_HUB, _SPOKE = 0.2, 1.0
+_HUB, _SPOKE = 0.2, 4.0
+#: The most arcs from all of a loop to all of another.
+_MOST_ARCS = 50_000
 
 
 @dataclass(frozen=True, slots=True)
 class Wiring:
     """``count`` points, of which the first ``neurons`` are neurons and the rest hubs; ``mass`` (count,), 1 in the mean;
     links from ``a`` to ``b`` of weight ``weight`` (k,), ``a < b``; arcs from ``above`` to ``below`` of weight ``pull``
-    (m,)."""
+    (m,); ``image`` (count,) says whose mirror image each point is, itself where it has none."""
 
     neurons: int
     mass: FloatArray
@@ -32,6 +35,7 @@ class Wiring:
     above: IntArray
     below: IntArray
     pull: FloatArray
+    image: IntArray
 
     @property
     def count(self) -> int:
@@ -39,26 +43,45 @@ class Wiring:
         return len(self.mass)
 
 
-def wiring_of(problem: LayoutProblem, hubs: bool = True) -> Wiring:
-    """The wiring of a problem."""
+def wiring_of(problem: LayoutProblem, image: IntArray) -> Wiring:
+    """The wiring of a problem whose neurons have these images (n,)."""
     neurons = len(problem.neurons)
     ends = np.array([(edge.source, edge.target) for edge in problem.edges], dtype=np.int64).reshape(-1, 2)
-    spokes = _spokes(problem) if hubs else np.zeros((0, 2), dtype=np.int64)
+    arcs, pull = _arcs(_loops(neurons, ends), ends)
+    links, spokes = ends, _spokes(problem)
+    paired = np.flatnonzero(image != np.arange(neurons))
+    if len(paired):
+        links = np.concatenate([ends, image[ends]])
+        arcs, pull = np.concatenate([arcs, image[arcs]]), np.concatenate([pull, pull]) / 2
+        # images are about one axis: parts of them that nothing connects are one all the same
+        part = parts_of(neurons, *links.T)[paired]
+        one, *others = paired[np.unique(part, return_index=True)[1]].tolist()
+        ties = np.array([(one, other) for other in others], dtype=np.int64).reshape(-1, 2)
+        spokes = np.concatenate([spokes, ties, image[ties]])
     count = max(neurons, int(spokes.max(initial=-1)) + 1)
-    a, b, weight = linked(
-        count,
-        np.concatenate([ends[:, 0], spokes[:, 0]]),
-        np.concatenate([ends[:, 1], spokes[:, 1]]),
-        np.concatenate([np.ones(len(ends)), np.full(len(spokes), _SPOKE)]),
-    )
+    weight = np.concatenate([np.full(len(links), len(ends) / max(len(links), 1)), np.full(len(spokes), _SPOKE)])
+    one, other = np.concatenate([links, spokes]).T
+    a, b, weight = linked(count, one, other, weight)
     # what has many links needs room around it, what has one is to stay near (Jacomy et al. 2014: ForceAtlas2)
     mass = np.ones(count) + np.bincount(a, weight, count) + np.bincount(b, weight, count)
     mass[:neurons] /= mass[:neurons].mean() if neurons else 1.0
     mass[neurons:] = _HUB
-    loops = loops_of(problem)
+    above, below, pull = summed(count, arcs[:, 0], arcs[:, 1], pull)
+    return Wiring(neurons, mass, a, b, weight, above, below, pull, np.concatenate([image, np.arange(neurons, count)]))
+
+
+def _arcs(loops: IntArray, ends: IntArray) -> tuple[IntArray, FloatArray]:
+    """Arcs (k, 2) from all of a loop to all of the next, as what drives a loop stands above the whole of it, and their
+    weights. As they are where that would be too many."""
     between = ends[loops[ends[:, 0]] != loops[ends[:, 1]]]
-    above, below, pull = summed(count, between[:, 0], between[:, 1], np.ones(len(between)))
-    return Wiring(neurons, mass, a, b, weight, above, below, pull)
+    pairs, times = np.unique(loops[between], axis=0, return_counts=True)
+    sizes = np.bincount(loops)
+    many = sizes[pairs].prod(axis=1)
+    if many.sum() > _MOST_ARCS:
+        return between, np.ones(len(between))
+    of = np.split(np.argsort(loops, kind="stable"), np.cumsum(sizes)[:-1])
+    arcs = [np.stack([np.repeat(of[a], len(of[b])), np.tile(of[b], len(of[a]))], axis=1) for a, b in pairs.tolist()]
+    return np.concatenate([between[:0], *arcs]), np.repeat(times / many, many)
 
 
 def linked(count: int, a: IntArray, b: IntArray, weight: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
@@ -107,14 +130,13 @@ def _spokes(problem: LayoutProblem) -> IntArray:
     return np.array(spokes, dtype=np.int64).reshape(-1, 2)
 
 
-def loops_of(problem: LayoutProblem) -> IntArray:
+def _loops(neurons: int, ends: IntArray) -> IntArray:
     """(neurons,) which loop (strongly connected component) each neuron is part of."""
-    neurons = len(problem.neurons)
     import networkx as nx  # only here
 
     graph: nx.DiGraph[int] = nx.DiGraph()
     graph.add_nodes_from(range(neurons))
-    graph.add_edges_from((edge.source, edge.target) for edge in problem.edges)
+    graph.add_edges_from(ends.tolist())
     loops = np.zeros(neurons, dtype=np.int64)
     for number, part in enumerate(nx.strongly_connected_components(graph)):
         loops[list(part)] = number

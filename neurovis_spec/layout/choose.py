@@ -18,8 +18,6 @@ _LARGE, _DENSE = 40, 2.5
 #: A tangle goes on a ring if it has this share of all connections that there can be, and no more neurons than these: on
 #: a larger ring discs get too small.
 _COMPLETE, _MOST_IN_RING = 0.25, 120
-#: So many neurons are laid out by their distances in the network.
-_MOST_BY_DISTANCE = 500
 #: With more connections nobody can follow one.
 _MOST_IN_RANKS = 1000
 #: Layers of neurons, frames of instances, and chains and trees, show something nevertheless, up to so many.
@@ -74,8 +72,8 @@ def _most_suitable(problem: LayoutProblem) -> tuple[Suits, str]:
     if problem.plan:
         return "flow", "it puts what the spec says into rows and columns of the page"
     arranged = problem.arrange or problem.align or problem.pins or problem.modules
-    if problem.mirrors and not arranged and len(problem.neurons) <= _MOST_BY_DISTANCE and _tangled(problem):
-        return "nearness", _TANGLED
+    if problem.mirrors and not arranged and _tangled(problem):
+        return "clusters", _TANGLED
     if problem.arrange or problem.mirrors or problem.align:
         return "flow", "it can arrange, mirror and align as the spec says"
     if problem.neurons and len(problem.pins) == len(problem.neurons):
@@ -91,16 +89,12 @@ def _most_suitable(problem: LayoutProblem) -> tuple[Suits, str]:
             and edges > _COMPLETE * len(problem.neurons) ** 2
         ):
             return "tangle", _TANGLED
-        if len(problem.neurons) <= _MOST_BY_DISTANCE:
-            return "nearness", _TANGLED
         return "clusters", _TANGLED
     if not (problem.pins or problem.boxes or problem.modules) and _as_trees(problem):
         return "clusters", f"its {edges} connections form trees, which it draws without a crossing"
     if edges > _MOST_IN_RANKS and _in_branches(problem):
         return "flow", f"its {edges} connections form chains or trees, whose flow ranks keep"
     if edges > _MOST_IN_RANKS and not _in_layers(problem):
-        if problem.boxes and not (problem.pins or problem.modules) and len(problem.neurons) <= _MOST_BY_DISTANCE:
-            return "nearness", f"its {edges} connections are too many to follow each: boxes that stand apart say more"
         shown = ", and instances show as such, not as frames drawn alike" if problem.modules else ""
         return "clusters", f"its {edges} connections are too many to follow each: clusters say more{shown}"
     return "flow", "the default for networks whose positions are not all given"

@@ -24,8 +24,8 @@ _PER_UNIT = round(1 / GRID)
 _PI = 3.141592653589793
 #: How many points there are on a piece, and how many are made at once: so many stay in the processor's cache.
 _FEWEST, _MOST, _AT_ONCE = 4, 400, 1 << 14
-#: How far the numbers of cells beside each other are apart: no column has so many.
-_COLUMN = 1 << 31
+#: With at most so many cells for each place all of them are counted; more would fill the memory.
+_MOST_CELLS = 64
 
 
 def snap(value: float) -> float:
@@ -64,9 +64,12 @@ def _series(angle: float) -> Point:
 
 def cubic(pieces: FloatArray, t: FloatArray) -> FloatArray:
     """The points (…, 2) of cubic pieces (…, 4, 2) at ``t`` (…) in [0, 1] (Bernstein's weights)."""
-    t = t[..., None]
-    s, (a, b, c, d) = 1 - t, np.moveaxis(pieces, -2, 0)
-    points: FloatArray = s * s * s * a + 3 * s * s * t * b + 3 * s * t * t * c + t * t * t * d
+    s = 1 - t
+    weights = (s * s * s, 3 * s * s * t, 3 * s * t * t, t * t * t)
+    points = np.empty((*np.broadcast_shapes(pieces.shape[:-2], t.shape), 2))
+    for k in (0, 1):
+        a, b, c, d = (weight * pieces[..., i, k] for i, weight in enumerate(weights))
+        points[..., k] = a + b + c + d
     return points
 
 
@@ -132,24 +135,40 @@ class Cells:
 
     def __init__(self, places: FloatArray, reach: float) -> None:
         self._reach = reach
+        cells = self._cells(places)
+        self._low = cells.min(axis=0, initial=2**40)
+        columns, self._rows = (np.maximum(cells.max(axis=0, initial=-(2**40)) - self._low, 0) + 3).tolist()
         keys = self._keys(places)
         self._order = np.argsort(keys, kind="stable")
         self._sorted, self._places = keys[self._order], places[self._order]
+        #: how many places are in cells before each, where there are not too many cells
+        self._before: IntArray | None = None
+        if columns * self._rows <= _MOST_CELLS * len(places):
+            self._before = np.cumsum(np.bincount(keys + 1, minlength=columns * self._rows))
+
+    def _cells(self, points: FloatArray) -> IntArray:
+        cells: IntArray = np.floor(points / self._reach).astype(np.int64)
+        return cells
 
     def _keys(self, points: FloatArray) -> IntArray:
-        """(k,) the cell that each point is in: those of a column follow each other."""
-        cells = np.floor(points / self._reach).astype(np.int64)
-        keys: IntArray = cells[:, 0] * _COLUMN + cells[:, 1]
+        """(k,) the cell that each point is in: those of a column follow each other, with an empty one on either end."""
+        column, row = (self._cells(points) - self._low).T
+        keys: IntArray = (column + 1) * self._rows + np.clip(row + 1, 0, self._rows - 1)
         return keys
+
+    def _begin(self, keys: IntArray) -> IntArray:
+        """(k,) where what is in this cell, or behind it, begins."""
+        if self._before is None:
+            return np.searchsorted(self._sorted, keys)
+        return self._before[np.clip(keys, 0, len(self._before) - 1)]
 
     def near(self, points: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
         """All pairs of points (k, 2) and places closer than the reach: both numbers, how far, squared."""
         keys = self._keys(points)
         found: list[tuple[IntArray, IntArray, FloatArray]] = []
-        for column in (-_COLUMN, 0, _COLUMN):
-            begin = np.searchsorted(self._sorted, keys + (column - 1))
-            point, place = _ranges(begin, np.searchsorted(self._sorted, keys + (column + 1), side="right"))
-            x, y = (self._places[place] - points[point]).T
+        for column in (-self._rows, 0, self._rows):
+            point, place = _ranges(self._begin(keys + (column - 1)), self._begin(keys + (column + 2)))
+            x, y = self._places[place, 0] - points[point, 0], self._places[place, 1] - points[point, 1]
             squared = x * x + y * y
             near = squared < self._reach * self._reach
             found.append((point[near], self._order[place[near]], squared[near]))
@@ -160,9 +179,9 @@ class Cells:
         """All pairs of places closer than the reach: both numbers, from the first to the second (k, 2), how far."""
         keys, ones, others = self._sorted, list[IntArray](), list[IntArray]()
         # each cell with half of those around it, and what is in it with what follows
-        for step in (0, 1, _COLUMN - 1, _COLUMN, _COLUMN + 1):
-            begin = np.searchsorted(keys, keys + step) if step else np.arange(len(keys), dtype=np.int64) + 1
-            one, other = _ranges(begin, np.searchsorted(keys, keys + step, side="right"))
+        for step in (0, 1, self._rows - 1, self._rows, self._rows + 1):
+            begin = self._begin(keys + step) if step else np.arange(len(keys), dtype=np.int64) + 1
+            one, other = _ranges(begin, self._begin(keys + (step + 1)))
             ones.append(one)
             others.append(other)
         one, other = np.concatenate(ones), np.concatenate(others)

@@ -31,7 +31,7 @@ Effort = Literal["quick", "normal", "best"]
 EFFORTS: tuple[Effort, ...] = get_args(Effort)
 #: What a drawing may show best: how signals flow, what is near what in the network, clusters of very many neurons, some
 #: neurons that nearly all drive each other, pins of all neurons, where neurons are as data.
-Suits = Literal["flow", "nearness", "clusters", "tangle", "pins", "positions"]
+Suits = Literal["flow", "clusters", "tangle", "pins", "positions"]
 
 #: Radius of a neuron's disc.
 RADIUS = 0.3

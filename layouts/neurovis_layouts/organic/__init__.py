@@ -1,9 +1,10 @@
-"""The organic engine: distances on paper like those in the network, for a few hundred neurons.
+"""The organic engine: forces over levels of detail, for networks whose ranks say little, small or large.
 
-The modules: ``paths`` (how far neurons are from each other in the network), ``stress`` (places whose distances differ
-least from these, with what runs one way running down), ``engine``.
+The modules: ``levels`` (coarser and coarser networks), ``field`` (how all push each other off), ``settle`` (forces,
+step by step, at one level), ``spread`` (the levels from coarse to fine), ``flow`` (what runs along the direction),
+``trees`` (parts that can be drawn without a crossing), ``engine``.
 """
 
-from neurovis_layouts.organic.engine import OrganicEngine
+from neurovis_layouts.organic.engine import LargeEngine, OrganicEngine
 
-__all__ = ["OrganicEngine"]
+__all__ = ["LargeEngine", "OrganicEngine"]

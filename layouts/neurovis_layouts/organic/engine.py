@@ -1,40 +1,48 @@
 """The organic engine: from a problem to a layout.
 
-In: a problem of a few hundred neurons whose ranks say little. Out: a layout whose distances are those in the network,
-as far as a plane allows: what is wired closely stands close. What runs from one loop to another runs down; modules and
-boxes are drawn together; mirror images are such from the start, and pins part of the whole.
+In: a problem of any size. Out: a layout in which modules and whatever else hangs together show as clusters, and most
+connections run along the direction. The parts of the network are laid out (``spread``), scaled so that neighbours are a
+spacing apart, their discs pushed off each other, packed; then pins are put where they belong and pull the rest along.
+Mirror images are such from the start.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from neurovis_layouts.apart import LEAST, apart, jitter
-from neurovis_layouts.finish import drawn_apart, nearest
-from neurovis_layouts.organic.paths import distances
-from neurovis_layouts.organic.stress import Arcs, least_stress
+from neurovis_layouts.apart import apart
+from neurovis_layouts.finish import drawn, drawn_apart, nearest
+from neurovis_layouts.organic.field import GridField
+from neurovis_layouts.organic.flow import in_flow
+from neurovis_layouts.organic.levels import COARSEST
+from neurovis_layouts.organic.settle import Cooling, settle
+from neurovis_layouts.organic.spread import SPARSE, spread, spread_small
+from neurovis_layouts.organic.trees import trees_of
 from neurovis_layouts.packing import packed
 from neurovis_layouts.symmetry import Symmetry, about_pins, first_of_pairs, symmetry_of
-from neurovis_layouts.wiring import Wiring, loops_of, parts_of, wiring_of
-from neurovis_spec.layout import FloatArray, IntArray
-from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem
+from neurovis_layouts.wiring import Wiring, parts_of, wiring_of
+from neurovis_spec.layout import BoolArray, Capabilities, FloatArray, IntArray, Layout, LayoutProblem, Progress
 
-#: In spacings: how far linked neurons are apart, discs of any two, three quarters of the discs from their next at
-#: least, and parts.
-_LINK, _APART, _NEXT, _GAP = 1.6, 0.8, 1.05, 1.5
+#: In spacings: how far three quarters are from their next at most, how long links are in the mean at least, how far
+#: discs are kept apart, and parts.
+_NEXT, _LINK, _APART, _GAP = 1.0, 0.9, 0.75, 1.5
 _MOST = 0.75
-#: What is in one module, or box, is as close as if it were so many links, or so much of what it is.
-_MATES, _CLOSER = 0.6, 0.3
-#: How strongly an arc presses its target below its source, and how far, in links.
-_PRESS, _BELOW = 4.0, 0.8
-#: The most arcs between loops.
-_MOST_ARCS = 50_000
+#: How far an arc leads down at least, and how much too high its target may be to be put there: others would move many
+#: neurons far, and make crossings.
+_STEP, _NEARLY = 0.1, 3.0
+#: A neuron's share of a picture, in square spacings, at most: discs have to stay in sight.
+_ROOM = 7.0
+_PINNED_STEPS = 60
+#: Steps of trees, and gaps between parts, are not shorter than this, for links to pass between discs.
+_LEAST = 0.85
 
 
 class OrganicEngine:
-    """Stress majorisation with a direction."""
+    """Forces over levels of detail."""
 
     name = "organic"
     capabilities = Capabilities(
@@ -44,30 +52,24 @@ class OrganicEngine:
         mirrors=True,
         memory=True,
         checks=True,
-        neurons=1000,
-        edges=20_000,
-        suits="nearness",
+        progress=True,
+        neurons=200_000,
+        edges=2_000_000,
+        suits="clusters",
     )
 
-    def lay_out(self, problem: LayoutProblem) -> Layout:
-        """Place the neurons by their distances in the network, route the edges round what is in the way."""
-        wiring = _stacked(wiring_of(problem, hubs=False), loops_of(problem))
+    def lay_out(self, problem: LayoutProblem, progress: Progress | None = None) -> Layout:
+        """Place the neurons by forces, route the edges straight or round what is in the way."""
         symmetry = symmetry_of(problem)
-        part = _parts(problem, wiring)
-        places = np.zeros((wiring.count, 2))
-        # what has pins is one part: it has its place, and the others stand beside it; so is what has mirror images
-        whole = np.union1d(np.array(sorted(problem.pins), dtype=np.int64), np.flatnonzero(symmetry.paired))
-        part[np.isin(part, part[whole])] = -1
-        numbers = np.unique(part).tolist()
-        sizes: list[tuple[float, float]] = []
-        for number in numbers:
-            chosen = np.flatnonzero(part == number)
-            places[chosen] = _placed(problem, wiring, chosen, symmetry)
-            if number < 0:
-                symmetry, places = _at_pins(problem, wiring, chosen, symmetry, places)
-            sizes.append(tuple((places[chosen].max(axis=0) - places[chosen].min(axis=0)).tolist()))
-        _pack(places, part, numbers, sizes, max(_GAP * problem.neuron_spacing, LEAST))
-        return drawn_apart(problem, self.name, places, _APART * problem.neuron_spacing, symmetry)
+        wiring = wiring_of(problem, symmetry.image)
+        places, planar = _free(problem, wiring, progress)
+        if problem.pins:
+            symmetry, places = _around_pins(problem, wiring, symmetry, places)
+        if problem.pins or problem.boxes or symmetry.paired.any() or any(wide for wide, _ in problem.labels):
+            real = places[: len(problem.neurons)]
+            return drawn_apart(problem, self.name, real, _APART * problem.neuron_spacing, symmetry)
+        clear = [i for i, edge in enumerate(problem.edges) if planar[edge.source] and edge.source != edge.target]
+        return drawn(problem, self.name, places, clear=_once(problem, clear))
 
     def check(self, problem: LayoutProblem) -> None:
         """Raises LayoutRefusalError for mirror images that it cannot draw."""
@@ -76,118 +78,165 @@ class OrganicEngine:
             about_pins(problem, symmetry, np.zeros((len(problem.neurons), 2)))
 
 
-def _stacked(wiring: Wiring, loops: IntArray) -> Wiring:
-    """The wiring with an arc from all of a loop to all of the next: what drives a loop stands above the whole of it.
-    Arcs stay as they are where that would be too many."""
-    order = np.argsort(loops, kind="stable")
-    sizes = np.bincount(loops)
-    begin = np.cumsum(sizes) - sizes
-    pairs = np.unique(np.stack([loops[wiring.above], loops[wiring.below]], axis=1), axis=0).tolist()
-    if sum(int(sizes[a] * sizes[b]) for a, b in pairs) > _MOST_ARCS:
-        return wiring
-    of = [order[start : start + size] for start, size in zip(begin.tolist(), sizes.tolist(), strict=True)]
-    above = [np.repeat(of[a], len(of[b])) for a, b in pairs]
-    below = [np.tile(of[b], len(of[a])) for a, b in pairs]
-    none = np.zeros(0, dtype=np.int64)
-    return replace(
-        wiring,
-        above=np.concatenate([none, *above]),
-        below=np.concatenate([none, *below]),
-        pull=np.ones(sum(map(len, above))),
-    )
+class LargeEngine(OrganicEngine):
+    """The same by the name that it had where networks were large."""
+
+    name = "large"
+    capabilities = replace(OrganicEngine.capabilities, suits=None)
 
 
-def _parts(problem: LayoutProblem, wiring: Wiring) -> IntArray:
-    """(count,) parts that hang together, be it by a module or a box."""
-    together = [(members[0], mate) for members in _together(problem) for mate in members[1:]]
-    pairs = np.array(together, dtype=np.int64).reshape(-1, 2)
-    return parts_of(wiring.count, np.concatenate([wiring.a, pairs[:, 0]]), np.concatenate([wiring.b, pairs[:, 1]]))
+def _once(problem: LayoutProblem, chosen: list[int]) -> list[int]:
+    """Of these edges those that are alone between their ends."""
+    ends = [frozenset((problem.edges[i].source, problem.edges[i].target)) for i in chosen]
+    times = Counter(ends)
+    return [i for i, pair in zip(chosen, ends, strict=True) if times[pair] == 1]
 
 
-def _together(problem: LayoutProblem) -> list[tuple[int, ...]]:
-    """Modules and boxes, those within others after these."""
-    return [module.members for module in problem.modules] + [members for _, members in problem.boxes]
+def _free(problem: LayoutProblem, wiring: Wiring, progress: Progress | None) -> tuple[FloatArray, BoolArray]:
+    """Places (count, 2) without pins: every part laid out, then all packed; and who is in a tree drawn as such. The
+    axis of mirror images is at x = 0, with those on its left that were written first."""
+    part, spacing = parts_of(wiring.count, wiring.a, wiring.b), problem.neuron_spacing
+    sizes = np.bincount(part)
+    places = np.zeros((wiring.count, 2))
+    planar = np.zeros(wiring.count, dtype=np.bool_)
+    for chosen, drawing in trees_of(wiring, part):
+        places[chosen] = drawing * max(spacing, _LEAST)
+        planar[chosen] = True
+    small = np.flatnonzero((sizes[part] <= COARSEST) & ~planar)
+    if len(small):
+        within = np.unique(part[small], return_inverse=True)[1]
+        places[small] = spread_small(_only(wiring, small), within)
+    done = len(small) + int(planar.sum())
+    for number in np.unique(part[(sizes[part] > COARSEST) & ~planar]).tolist():
+        chosen = np.flatnonzero(part == number)
+        reported = partial(_report, progress, done, len(chosen), wiring.count)
+        places[chosen] = spread(_only(wiring, chosen), reported)
+        done += len(chosen)
+    first = first_of_pairs(problem)
+    if places[first, 0].sum() > 0:
+        places *= (-1.0, 1.0)
+    return _packed(wiring, places, part, planar, spacing), planar
 
 
-def _placed(problem: LayoutProblem, wiring: Wiring, chosen: IntArray, symmetry: Symmetry) -> FloatArray:
-    """Places (k, 2) of the ``chosen`` neurons: of least stress, then scaled and kept apart."""
-    ways, press = _wishes(problem, wiring, chosen)
-    link, own = _LINK * problem.neuron_spacing, symmetry.within(chosen)
-    above, below = press.above, press.below
-    first = jitter(len(chosen)) * link * np.sqrt(len(chosen))
-    nobody = np.zeros(0, dtype=np.int64)
-    # the direction comes in once the rest has found its shape: springs would lock what begins the wrong way round
-    loose = least_stress(ways, first, Arcs(nobody, nobody, 0.0, 0.0), nobody, 60)
-    pairs = np.searchsorted(chosen, np.intersect1d(first_of_pairs(problem), chosen))
-    if len(pairs):
-        loose = own.turned(loose, pairs)
-        if len(above) and (loose[below, 1] - loose[above, 1]).sum() < 0:
-            loose = loose * (1.0, -1.0)
-    else:
-        loose = _upright(loose, above, below)
-    places = least_stress(ways, loose, press, nobody, symmetry=own)
-    places *= max(1.0, _NEXT * problem.neuron_spacing / max(_most(nearest(places, link)), 1e-3))
-    return apart(places, _APART * problem.neuron_spacing, None, (above, below), kept=own.kept)
+def _report(progress: Progress | None, before: int, size: int, count: int, share: float) -> None:
+    """Say how many of ``count`` points are done: those ``before`` and a ``share`` of the ``size`` at work."""
+    if progress is not None:
+        progress(before + int(share * size), count)
 
 
-def _at_pins(
-    problem: LayoutProblem, wiring: Wiring, chosen: IntArray, symmetry: Symmetry, places: FloatArray
-) -> tuple[Symmetry, FloatArray]:
-    """The places with the ``chosen`` neurons moved to their pins and the rest of them pulled along; and the symmetry
-    with its axis where it stands then."""
-    symmetry, fixed, there = about_pins(problem, symmetry, places)
-    if not len(fixed):
-        return symmetry, places
-    ways, press = _wishes(problem, wiring, chosen)
-    held, own = np.searchsorted(chosen, fixed), symmetry.within(chosen)
-    moved = places[chosen] + (symmetry.axis, 0.0)
-    shift = (there - moved[held]).mean(axis=0)
-    moved += (0.0, shift[1]) if symmetry.paired.any() else shift
-    moved[held] = there
-    moved = least_stress(ways, moved, press, held, symmetry=own)
-    places = places.copy()
-    places[chosen] = apart(moved, _APART * problem.neuron_spacing, held, (press.above, press.below), kept=own.kept)
-    return symmetry, places
-
-
-def _wishes(problem: LayoutProblem, wiring: Wiring, chosen: IntArray) -> tuple[FloatArray, Arcs]:
-    """How far any two of the ``chosen`` are to be from each other (k, k), and which of them is to be below another."""
+def _only(wiring: Wiring, chosen: IntArray) -> Wiring:
+    """The wiring of these points alone, which nothing connects to others."""
     number = np.full(wiring.count, -1, dtype=np.int64)
     number[chosen] = np.arange(len(chosen))
     links, arcs = number[wiring.a] >= 0, number[wiring.above] >= 0
-    link = _LINK * problem.neuron_spacing
-    ways = distances(len(chosen), number[wiring.a[links]], number[wiring.b[links]])
-    for members in _together(problem):
-        mates = number[list(members)]
-        mates = mates[mates >= 0]
-        block = np.ix_(mates, mates)
-        ways[block] = np.minimum(ways[block], np.maximum(_MATES, _CLOSER * ways[block]))
-    np.fill_diagonal(ways, 0.0)
-    return link * ways, Arcs(number[wiring.above[arcs]], number[wiring.below[arcs]], _BELOW * link, _PRESS / link**2)
+    return Wiring(
+        int(np.searchsorted(chosen, wiring.neurons)),
+        wiring.mass[chosen],
+        number[wiring.a[links]],
+        number[wiring.b[links]],
+        wiring.weight[links],
+        number[wiring.above[arcs]],
+        number[wiring.below[arcs]],
+        wiring.pull[arcs],
+        number[wiring.image[chosen]],
+    )
 
 
-def _most(values: FloatArray) -> float:
-    return float(np.quantile(values, _MOST)) if len(values) else 1.0
-
-
-def _upright(places: FloatArray, above: IntArray, below: IntArray) -> FloatArray:
-    """Places turned about their middle so that arcs run down on the whole."""
-    if not len(above):
+def _packed(wiring: Wiring, places: FloatArray, part: IntArray, ready: BoolArray, spacing: float) -> FloatArray:
+    """Every part scaled, its discs kept apart, but for those that are ready, and all packed; what holds no neuron goes
+    nowhere."""
+    count = int(part.max(initial=-1)) + 1
+    real, image = slice(0, wiring.neurons), wiring.image[: wiring.neurons]
+    if not wiring.neurons:
         return places
-    x, y = (places[below] - places[above]).mean(axis=0).tolist()
-    length = float(np.sqrt(x * x + y * y))
-    if length == 0:
-        return places
-    sine, cosine = x / length, y / length
-    return np.stack([cosine * places[:, 0] - sine * places[:, 1], sine * places[:, 0] + cosine * places[:, 1]], axis=1)
+    # far from each other, so that all parts can be worked on at once
+    places = places * np.where(ready, 1.0, _scales(wiring, _aside(places, part), part, spacing))[:, None]
+    aside = _aside(places, part)
+    paired = np.flatnonzero(image != np.arange(wiring.neurons))
+    axis = float((aside - places)[paired[:1], 0].sum())  # the part that mirror images are in begins about 0
+    aside[:, 1] = _in_flow(wiring, aside[:, 1], part, spacing)
+    kept, arcs = Symmetry(image, axis).kept, (wiring.above, wiring.below)
+    moved = apart(aside[real], _APART * spacing, np.flatnonzero(ready[real]), arcs, part[real], kept)
+    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    np.minimum.at(low, part[real], moved)
+    np.maximum.at(high, part[real], moved)
+    filled = np.flatnonzero(np.isfinite(low[:, 0]))
+    sizes = [(float(w), float(h)) for w, h in (high - low)[filled].tolist()]
+    shift = np.zeros((count, 2))
+    shift[filled] = packed(sizes, max(_GAP * spacing, _LEAST)) - low[filled]
+    shift[:, 0] -= axis + shift[part[paired[:1]], 0].sum()
+    places[real] = moved + shift[part[real]]
+    return places
 
 
-def _pack(places: FloatArray, part: IntArray, numbers: list[int], sizes: list[tuple[float, float]], gap: float) -> None:
-    """Move the parts side by side; the one with pins (−1) stays, and the others go below it."""
-    free = [i for i, number in enumerate(numbers) if number >= 0]
-    corners = packed([sizes[i] for i in free], gap)
-    pinned = places[part < 0]
-    left, top = (0.0, 0.0) if not len(pinned) else (float(pinned[:, 0].min()), float(pinned[:, 1].max()) + gap)
-    for i, corner in zip(free, corners, strict=True):
-        chosen = part == numbers[i]
-        places[chosen] += np.array((corner[0] + left, corner[1] + top)) - places[chosen].min(axis=0)
+def _aside(places: FloatArray, part: IntArray) -> FloatArray:
+    """The parts far from each other, side by side."""
+    reach = float(np.abs(places).max()) + 10.0
+    return places + np.stack([8 * reach * part, np.zeros(len(part))], axis=1)
+
+
+def _in_flow(wiring: Wiring, high: FloatArray, part: IntArray, spacing: float) -> FloatArray:
+    """Heights (count,) at which arcs run down: all of a sparse part, of others those that do so nearly."""
+    count = int(part.max()) + 1
+    sparse = np.bincount(part[wiring.a], minlength=count) <= SPARSE * np.bincount(part)
+    chosen = sparse[part[wiring.above]] | (high[wiring.above] - high[wiring.below] <= _NEARLY * spacing)
+    return in_flow(high, wiring.above[chosen], wiring.below[chosen], _STEP * spacing)
+
+
+def _scales(wiring: Wiring, places: FloatArray, part: IntArray, spacing: float) -> FloatArray:
+    """(count,) what to multiply each part by, so that those next to each other have room."""
+    count = int(part.max()) + 1
+    next_one = nearest(places[: wiring.neurons], 1.0)
+    links = (wiring.a < wiring.neurons) & (wiring.b < wiring.neurons)
+    way = places[wiring.b[links]] - places[wiring.a[links]]
+    length = np.sqrt((way**2).sum(axis=1))
+    by_room = _NEXT * spacing / np.maximum(_quantile(part[: wiring.neurons], next_one, count), 1e-3)
+    by_link = _LINK * spacing / np.maximum(_mean(part[wiring.a[links]], length, count, 1.0), 1e-3)
+    width, height = (_extent(places, part) + 0.1).T
+    by_area = spacing * np.sqrt(_ROOM * np.bincount(part) / (width * height))
+    scales: FloatArray = np.maximum(np.minimum(by_room, by_area), by_link)[part]
+    return scales
+
+
+def _extent(places: FloatArray, part: IntArray) -> FloatArray:
+    """(count, 2) how wide and how high each part is."""
+    count = int(part.max()) + 1
+    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    np.minimum.at(low, part, places)
+    np.maximum.at(high, part, places)
+    extent: FloatArray = high - low
+    return extent
+
+
+def _quantile(part: IntArray, values: FloatArray, count: int) -> FloatArray:
+    """(count,) what most of the values of each part do not exceed; 1 for none."""
+    times = np.bincount(part, minlength=count)
+    order = np.lexsort((values, part))
+    place = np.cumsum(times) - times + (_MOST * np.maximum(times - 1, 0)).astype(np.int64)
+    return np.where(times > 0, values[order][np.minimum(place, max(len(values) - 1, 0))], 1.0)
+
+
+def _mean(part: IntArray, values: FloatArray, count: int, otherwise: float) -> FloatArray:
+    """(count,) the mean of the values of each part."""
+    times = np.bincount(part, minlength=count)
+    total = np.bincount(part, values, count)
+    return np.where(times > 0, total / np.maximum(times, 1), otherwise)
+
+
+def _around_pins(
+    problem: LayoutProblem, wiring: Wiring, symmetry: Symmetry, places: FloatArray
+) -> tuple[Symmetry, FloatArray]:
+    """The whole moved to the pins, these put where they belong, their images, too, and the rest pulled along; and the
+    symmetry with its axis where it stands then."""
+    symmetry, fixed, there = about_pins(problem, symmetry, places)
+    places = places + ((symmetry.axis, 0.0) if symmetry.paired.any() else (0.0, 0.0))
+    shift = (there - places[fixed]).mean(axis=0)
+    places += (0.0, shift[1]) if symmetry.paired.any() else shift
+    places[fixed] = there
+    scale = 2.0 * problem.neuron_spacing
+    cooling, field = Cooling(_PINNED_STEPS, 0.5, 0.02), GridField(wiring.mass)
+    pulled = settle(wiring, places / scale, field, cooling, fixed, axis=symmetry.axis / scale) * scale
+    pulled[fixed] = there
+    real, arcs = slice(0, wiring.neurons), (wiring.above, wiring.below)
+    pulled[real] = apart(pulled[real], _APART * problem.neuron_spacing, fixed, arcs, None, symmetry.kept)
+    return symmetry, pulled

@@ -2,7 +2,7 @@
 
 In: a wiring and where its points are. Out: where they come to rest. All points push each other off (``field``); links
 pull with a force that grows slower than their length, so that clusters stand apart (Noack 2007: forces between linear
-and logarithmic); arcs press their target below their source.
+and logarithmic); arcs press their target below their source. Mirror images are such at each step.
 """
 
 from __future__ import annotations
@@ -12,14 +12,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_layouts.large.field import Field
+from neurovis_layouts.organic.field import Field
+from neurovis_layouts.symmetry import Symmetry
 from neurovis_layouts.wiring import Wiring
 from neurovis_spec.layout import FloatArray, IntArray
 
 #: How strongly points push each other off, and the power of length with which links pull.
 _PUSH, _POWER = 0.2, 0.7
 #: How strongly an arc presses as long as its target is too little below its source.
-_PRESS = 5.0
+_PRESS = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,10 +40,12 @@ def settle(
     fixed: IntArray | None = None,
     tick: Callable[[int], None] | None = None,
     drop: FloatArray | float = 1.0,
+    axis: float = 0.0,
 ) -> FloatArray:
-    """Places (count, 2) at rest; ``fixed`` ones stay; ``tick`` is called after every step with their number. An arc
-    presses as long as its target is less than ``drop`` below its source, one for all or (m,)."""
-    count = wiring.count
+    """Places (count, 2) at rest, mirror images about x = ``axis``; ``fixed`` ones stay; ``tick`` is called after every
+    step with their number. An arc presses as long as its target is less than ``drop`` below its source, one for all or
+    (m,)."""
+    count, symmetry = wiring.count, Symmetry(wiring.image, axis)
     for step in range(cooling.steps):
         force = _PUSH * field(places)
         way = places[wiring.b] - places[wiring.a]
@@ -63,7 +66,7 @@ def settle(
         move *= (np.minimum(far, longest) / far)[:, None]
         if fixed is not None:
             move[fixed] = 0.0
-        places = places + move
+        places = symmetry.kept(places + move)
         if tick is not None:
             tick(count)
     return places

@@ -2,7 +2,7 @@
 
 In: a Wiring. Out: the wirings from fine to coarse, each with who became part of whom. Neighbours are joined in pairs,
 the heaviest links first, all at once by sorting (Karypis and Kumar 1998: heavy-edge matching); whoever finds all
-neighbours taken joins the nearest pair, so that stars shrink, too.
+neighbours taken joins the nearest pair, so that stars shrink, too. The images of two are joined as these are.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ import numpy as np
 from neurovis_layouts.wiring import Wiring, linked, summed
 from neurovis_spec.layout import FloatArray, IntArray
 
-_COARSEST = 30
+#: Parts of so few points are not made smaller.
+COARSEST = 30
 #: A level that saves less than this is not worth it.
 _WORTH = 0.95
 _TRIES = 6
@@ -31,7 +32,7 @@ class Level:
 def levels_of(wiring: Wiring) -> tuple[list[Level], Wiring]:
     """The levels from the finest on, and the coarsest wiring."""
     levels: list[Level] = []
-    while wiring.count > _COARSEST:
+    while wiring.count > COARSEST:
         part_of = _joined(wiring)
         count = int(part_of.max()) + 1
         if count > _WORTH * wiring.count:
@@ -45,29 +46,37 @@ def _coarser(wiring: Wiring, part_of: IntArray, count: int) -> Wiring:
     a, b, weight = linked(count, part_of[wiring.a], part_of[wiring.b], wiring.weight)
     above, below, pull = summed(count, part_of[wiring.above], part_of[wiring.below], wiring.pull)
     mass: FloatArray = np.bincount(part_of, wiring.mass, count).astype(np.float64)
-    return Wiring(count, mass, a, b, weight, above, below, pull)
+    image = np.arange(count)
+    image[part_of] = part_of[wiring.image]
+    return Wiring(count, mass, a, b, weight, above, below, pull, image)
 
 
 def _joined(wiring: Wiring) -> IntArray:
     """(count,) numbers of the pairs (and of those that joined one)."""
-    count, a, b = wiring.count, wiring.a, wiring.b
-    score = wiring.weight / np.sqrt(wiring.mass[a] * wiring.mass[b])
-    # equal links must not all wait for their neighbour: a little noise, the same every time
-    score = score * (1 + (a * 7919 + b * 104729) % 10007 / 1e10)
+    count, image = wiring.count, wiring.image
+    paired = image != np.arange(count)
+    distinct = image[wiring.a] != wiring.b  # an image is never joined with its own
+    a, b = wiring.a[distinct], wiring.b[distinct]
+    score = wiring.weight[distinct] / np.sqrt(wiring.mass[a] * wiring.mass[b])
+    # equal links must not all wait for their neighbour: a little noise, the same every time, and for images
+    ends = ((a, b), (image[a], image[b]))
+    keys = [7919 * np.minimum(one, other) + 104729 * np.maximum(one, other) for one, other in ends]
+    score = score * (1 + np.minimum(*keys) % 10007 / 1e10)
     head = np.arange(count, dtype=np.int64)
     free = np.ones(count, dtype=np.bool_)
     for _ in range(_TRIES):
-        open_ones = free[a] & free[b]
+        open_ones = free[a] & free[b] & (paired[a] == paired[b])
         if not open_ones.any():
             break
         pick = _best(count, a[open_ones], b[open_ones], score[open_ones])
         has = np.flatnonzero(pick >= 0)
-        lead = has[(pick[pick[has]] == has) & (has < pick[has])]
+        lead = has[(pick[pick[has]] == has) & (has < pick[has]) & (pick[image[has]] == image[pick[has]])]
         head[pick[lead]] = lead
         free[lead] = free[pick[lead]] = False
     pick = _best(count, a, b, score)
     late = np.flatnonzero(free & (pick >= 0))
-    late = late[~free[pick[late]]]
+    late = late[~free[pick[late]] | (paired[late] & ~paired[pick[late]])]
+    late = late[pick[image[late]] == image[pick[late]]]
     head[late] = head[pick[late]]
     return np.unique(head, return_inverse=True)[1].astype(np.int64)
 

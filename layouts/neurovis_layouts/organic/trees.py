@@ -34,12 +34,13 @@ Neighbours = Sequence[Sequence[tuple[int, int]]]
 
 
 def trees_of(wiring: Wiring, part: IntArray) -> Iterator[tuple[IntArray, FloatArray]]:
-    """The parts of a wiring that are trees, hubs aside, each with its places (n, 2), in steps: not those that are far
-    longer than deep, chains above all, which fill a plane better otherwise."""
+    """The parts of a wiring that are trees, hubs and mirror images aside, each with its places (n, 2), in steps: not
+    those that are far longer than deep, chains above all, which fill a plane better otherwise."""
     count = int(part.max(initial=-1)) + 1
     sizes = np.bincount(part, minlength=count)
     is_tree = (sizes > 1) & (np.bincount(part[wiring.a], minlength=count) == sizes - 1)
     is_tree[part[wiring.neurons :]] = False
+    is_tree[part[wiring.image != np.arange(wiring.count)]] = False
     order = np.argsort(part, kind="stable")
     place = np.zeros(wiring.count, dtype=np.int64)
     place[order] = np.arange(wiring.count) - np.searchsorted(part[order], part[order])

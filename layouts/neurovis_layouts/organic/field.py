@@ -1,14 +1,16 @@
 """The field: how all points push each other off, by the inverse of their distance.
 
-In: places and masses. Out: the push on each. Few points are taken pair by pair; many give their mass to a grid, whose
-field is one convolution, by Fourier transform (Hockney and Eastwood 1988: particle-mesh). Closer than a cell that push
-fades, which is as well, as discs are kept apart afterwards; but of a network that reaches far out on one side cells are
-so large that whole clusters would fall into one: there what the grid cannot tell apart is added pair by pair.
+In: places and masses. Out: the push on each. Points of many small parts are taken pair by pair; those of a large one
+give their mass to a grid, whose field is one convolution, by Fourier transform (Hockney and Eastwood 1988:
+particle-mesh). Closer than a cell that push fades, which is as well, as discs are kept apart afterwards; but of a
+network that reaches far out on one side cells are so large that whole clusters would fall into one: there what the grid
+cannot tell apart is added pair by pair.
 """
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 
@@ -19,30 +21,28 @@ from neurovis_spec.layout.geometry import near_pairs
 #: same, pairs are added then.
 _WIDEST, _REACH = 2.0, 3.0
 _FEWEST_CELLS, _MOST_CELLS = 16, 1024
+#: Nearer than this (squared) the push of a pair grows no more.
+_SOFT = 0.01
+
+#: Whatever gives the push (n, 2) on places (n, 2).
+Field: TypeAlias = Callable[[FloatArray], FloatArray]
 
 
-class Field(Protocol):
-    """Whatever gives the push (n, 2) on places (n, 2)."""
-
-    def __call__(self, places: FloatArray, /) -> FloatArray: ...  # noqa: D102
-
-
-class PairField:
+def pair_field(mass: FloatArray, one: IntArray, other: IntArray) -> Field:
     """Pair by pair: ``one`` and ``other`` (k,) are the pairs."""
+    both = mass[one] * mass[other]
 
-    def __init__(self, mass: FloatArray, one: IntArray, other: IntArray) -> None:
-        self._count, self._one, self._other = len(mass), one, other
-        self._mass = mass[one] * mass[other]
+    def field(places: FloatArray) -> FloatArray:
+        way = places[other] - places[one]
+        return _pushed(len(mass), one, other, way * (both / ((way**2).sum(axis=1) + _SOFT))[:, None])
 
-    def __call__(self, places: FloatArray, /) -> FloatArray:
-        """The push on each place."""
-        way = places[self._other] - places[self._one]
-        push = way * (self._mass / ((way**2).sum(axis=1) + 0.01))[:, None]
-        sums = [
-            np.bincount(self._other, push[:, k], self._count) - np.bincount(self._one, push[:, k], self._count)
-            for k in (0, 1)
-        ]
-        return np.stack(sums, axis=1)
+    return field
+
+
+def _pushed(count: int, one: IntArray, other: IntArray, push: FloatArray) -> FloatArray:
+    """(count, 2) what pairs that push each other off add up to at each point."""
+    sums = [np.bincount(other, push[:, k], count) - np.bincount(one, push[:, k], count) for k in (0, 1)]
+    return np.stack(sums, axis=1)
 
 
 class GridField:
@@ -87,11 +87,9 @@ class GridField:
     def _within(self, places: FloatArray, cell: float) -> FloatArray:
         """What the field of clouds one cell wide lacks between points close by."""
         one, other, way, far = near_pairs(places, min(2 * cell, _REACH * self._unit))
-        lacking = np.exp(-((far / cell) ** 2)) / (far**2 + 0.01)
+        lacking = np.exp(-((far / cell) ** 2)) / (far**2 + _SOFT)
         push = way * (lacking * self._mass[one] * self._mass[other])[:, None]
-        count = len(places)
-        sums = [np.bincount(other, push[:, k], count) - np.bincount(one, push[:, k], count) for k in (0, 1)]
-        return np.stack(sums, axis=1)
+        return _pushed(len(places), one, other, push)
 
 
 def _smooth(least: int) -> int:

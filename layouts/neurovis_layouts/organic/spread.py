@@ -11,19 +11,15 @@ from collections.abc import Callable
 import numpy as np
 
 from neurovis_layouts.apart import jitter
-from neurovis_layouts.large.field import Field, GridField, PairField
-from neurovis_layouts.large.flow import heights
-from neurovis_layouts.large.levels import Level, levels_of
-from neurovis_layouts.large.settle import Cooling, settle
+from neurovis_layouts.organic.field import GridField, pair_field
+from neurovis_layouts.organic.flow import in_flow
+from neurovis_layouts.organic.levels import Level, levels_of
+from neurovis_layouts.organic.settle import Cooling, settle
 from neurovis_layouts.wiring import Wiring
 from neurovis_spec.layout import FloatArray, IntArray
 
-#: Parts of at most so many points are laid out together, pair by pair.
-SMALL = 64
 #: With at most so many links for each point a network is sparse: one can follow its chains.
 SPARSE = 1.6
-#: Up to so many points, forces are taken pair by pair.
-_BY_PAIRS = 250
 #: Steps at the finest level, where points are few and where they are many.
 _STEPS, _FEWER_STEPS, _MANY = 200, 160, 3000
 #: How far crowded stretches are evened out, and how many stretches there are by the root of the points.
@@ -40,23 +36,25 @@ def spread(wiring: Wiring, report: Report | None = None) -> FloatArray:
     steps = [_STEPS if level.wiring.count <= _MANY else _FEWER_STEPS for level in levels]
     tick = _tick(sum(n * level.wiring.count for n, level in zip(steps, levels, strict=True)), report)
     drops = _drops(wiring, levels, coarsest)
-    unit = np.sqrt(whole / coarsest.count)
-    places = jitter(coarsest.count) * np.sqrt(whole)
-    cooling = Cooling(2 * _STEPS, np.sqrt(whole) / 4, 0.02 * unit)
-    places = settle(coarsest, places, _field(coarsest), cooling, drop=drops.pop())
+    places = spread_small(coarsest, np.zeros(coarsest.count, dtype=np.int64), whole, drops.pop())
     for level, n in zip(reversed(levels), reversed(steps), strict=True):
         unit = np.sqrt(whole / level.wiring.count)
         places = places[level.part_of] + 0.3 * unit * jitter(level.wiring.count)
-        cooling = Cooling(n, unit, 0.02 * unit)
-        places = settle(level.wiring, places, _field(level.wiring), cooling, None, tick, drops.pop())
-    return np.stack([_evened(places[:, 0]), _evened(places[:, 1])], axis=1)
+        cooling, field = Cooling(n, unit, 0.02 * unit), GridField(level.wiring.mass)
+        places = settle(level.wiring, places, field, cooling, None, tick, drops.pop())
+    x, y = places.T
+    if (wiring.image != np.arange(wiring.count)).any():
+        x = np.concatenate([x, -x])
+    return np.stack([_evened(x)[: wiring.count], _evened(y)], axis=1)
 
 
 def _drops(wiring: Wiring, levels: list[Level], coarsest: Wiring) -> list[FloatArray]:
     """How far the target of each arc is to be below its source, level by level: as far as points of this level are from
     each other, and in sparse networks as far as the arcs that the points stand for take, or a chain would have to be
     folded that is longer than the network is wide."""
-    high = heights(wiring) if len(wiring.a) <= SPARSE * wiring.count else np.zeros(wiring.count)
+    high = np.zeros(wiring.count)
+    if len(wiring.a) <= SPARSE * wiring.count:
+        high = in_flow(high, wiring.above, wiring.below, 1.0)
     drops: list[FloatArray] = []
     for level in [*levels, Level(coarsest, np.arange(coarsest.count))]:
         at = level.wiring
@@ -89,25 +87,21 @@ def _evened(line: FloatArray) -> FloatArray:
     return evened
 
 
-def spread_small(wiring: Wiring, part: IntArray) -> FloatArray:
-    """Places (count, 2) for a wiring of many small parts, each around its own origin: those of different parts do not
-    feel each other. ``part`` (count,) says which one a point belongs to."""
+def spread_small(wiring: Wiring, part: IntArray, whole: float = 0.0, drop: FloatArray | float = 1.0) -> FloatArray:
+    """Places (count, 2) for a wiring of small parts, each around its own origin: those of different parts do not
+    feel each other. ``part`` (count,) says which one a point belongs to. They stand for ``whole`` points, if for more
+    than themselves, whose arcs take ``drop``."""
     order = np.argsort(part, kind="stable")
     begin = np.searchsorted(part[order], part[order], side="right")
     at = np.arange(len(order), dtype=np.int64)
     counts = begin - at - 1
     one = np.repeat(at, counts)
     other = one + 1 + np.arange(len(one), dtype=np.int64) - np.repeat(np.cumsum(counts) - counts, counts)
-    field = PairField(wiring.mass, order[one], order[other])
-    size = np.sqrt(np.bincount(part)[part])[:, None]
+    field = pair_field(wiring.mass, order[one], order[other])
+    sizes = np.bincount(part)[part]
+    size = np.sqrt(np.maximum(sizes, whole))
+    unit = float(np.sqrt(whole / wiring.count)) if whole else 1.0
     rank = np.zeros(wiring.count, dtype=np.int64)
     rank[order] = at - np.searchsorted(part[order], part[order])
-    places = jitter(int(rank.max(initial=0)) + 1)[rank] * size
-    return settle(wiring, places, field, Cooling(2 * _STEPS, 1.0, 0.01))
-
-
-def _field(wiring: Wiring) -> Field:
-    if wiring.count > _BY_PAIRS:
-        return GridField(wiring.mass)
-    one, other = np.triu_indices(wiring.count, 1)
-    return PairField(wiring.mass, one.astype(np.int64), other.astype(np.int64))
+    places = jitter(int(rank.max(initial=0)) + 1)[rank] * size[:, None]
+    return settle(wiring, places, field, Cooling(2 * _STEPS, size.max(initial=4.0) / 4, 0.02 * unit), None, None, drop)
