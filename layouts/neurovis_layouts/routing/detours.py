@@ -67,7 +67,7 @@ def detoured(
     own = [(edges[i].source, edges[i].target) for i in chosen]
     entered = walls.entered([routes[i] for i in chosen], own)
     clear = obstacles.clearances([routes[i] for i in chosen], own)
-    crowd = sum(clearance < TOUCH + _BARELY for clearance in clear) > _MOST
+    crowd = sum(near < TOUCH + _BARELY and not enters for near, enters in zip(clear, entered, strict=True)) > _MOST
     wrong = [
         (-distance(*(centres[end] for end in ends)), i, enters, clearance)
         for i, ends, enters, clearance in zip(chosen, own, entered, clear, strict=True)
