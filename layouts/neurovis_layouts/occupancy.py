@@ -164,9 +164,18 @@ class Occupancy:
             self.enter(bodies, anchor)
         return anchor is not None
 
-    def fits(self, bodies: Sequence[Body], anchor: Point) -> bool:
-        """Whether bodies can stand here, however near to others."""
-        return self._free(bodies, anchor, _TIGHT)
+    def fits(self, bodies: Sequence[Body], anchor: Point, near: bool = False) -> bool:
+        """Whether bodies can stand here, however near to others, or only ``near``, so that lines pass between."""
+        return self._free(bodies, anchor, _NEAR if near else _TIGHT)
+
+    @property
+    def rects(self) -> Sequence[Rect | None]:
+        """The frames as they are now, by number."""
+        return self._rects
+
+    def rect(self, number: int) -> Rect | None:
+        """A frame as it is now; None for −1."""
+        return self._rects[number] if number >= 0 else None
 
     def enter(self, bodies: Sequence[Body], anchor: Point) -> None:
         """Bodies have their place, whatever else is there."""
