@@ -143,15 +143,6 @@ class Alike:
                         reach(mate, found[one].then(move), module.template)
         return list(found.items())
 
-    def image(self, module: LayoutModule) -> tuple[tuple[int, ...], Move] | None:
-        """The mirror images of an instance's neurons, if all of them have one, and the move to them."""
-        images = [self._images.get(neuron) for neuron in module.members]
-        known = [image for image in images if image is not None]
-        if not known or len(known) < len(images) or any(move != known[0][1] for _, move in known):
-            return None
-        mates = tuple(mate for mate, _ in known)
-        return None if set(mates) & set(module.members) else (mates, known[0][1])
-
     def _move(self, one: LayoutModule, other: LayoutModule) -> Move | None:
         """What takes one instance to the other, where neurons of both are placed; None where they are not drawn
         alike."""

@@ -38,8 +38,9 @@ def kept(problem: LayoutProblem, fresh: Layout, pins: Mapping[int, Point] | None
     belong there; without, and without an earlier layout, what is pinned is off other discs alone.
     """
     drawn = [fresh.positions[name] for name in problem.neurons]
-    problem = replace(problem, pins=_held(problem, drawn, pins))
-    if problem.memory is None and not problem.pins:
+    own = [module.members for module in problem.modules if module.origin is not None]
+    now = {m: drawn[m] for members in own for m in members} if pins is None else pins
+    if problem.memory is None and not (problem.pins or now):
         return fresh
     if problem.memory is None and not (around and problem.modules and len(drawn) <= _MOST_AROUND_PINS):
         problem = replace(problem, modules=(), boxes=())
@@ -52,6 +53,14 @@ def kept(problem: LayoutProblem, fresh: Layout, pins: Mapping[int, Point] | None
         for number, module in enumerate(problem.modules)
         if module.members
     ]
+    # instances whose origin is pinned are drawn as they were, with what their module has new as in their copies
+    known = {i: memory.positions[name] for i, name in enumerate(problem.neurons) if name in memory.positions}
+    free = [members for members in own if problem.pins.keys().isdisjoint(members)]
+    if any(0 < len(known.keys() & members) < len(members) for members in free):
+        known = dict(enumerate(settled(problem, frames, drawn, wholes).at))
+    held = {**now, **with_origins(problem, {m: known[m] for members in free for m in members if m in known})}
+    lost = overlapping({m: held[m] for m in held.keys() - problem.pins.keys()}, problem.pins)
+    problem = replace(problem, pins={m: held[m] for m in sorted(held.keys() - lost)})
     centres = settled(problem, frames, drawn, wholes).at
     sides = {**fresh.labels, **memory.labels}
     ways = _Ways(problem, centres, sides)
@@ -82,18 +91,6 @@ def kept(problem: LayoutProblem, fresh: Layout, pins: Mapping[int, Point] | None
         {edge.name: routes[i] for i, edge in enumerate(problem.edges)},
         sides,
     )
-
-
-def _held(problem: LayoutProblem, drawn: Sequence[Point], pins: Mapping[int, Point] | None) -> dict[int, Point]:
-    """The pins, and where instances stand whose origin is pinned: as they were drawn before, else as they are now."""
-    own = [module.members for module in problem.modules if module.origin is not None]
-    now = {m: drawn[m] for members in own for m in members} if pins is None else pins
-    bent = {m for members in own if not problem.pins.keys().isdisjoint(members) for m in members}
-    before = problem.memory.positions if problem.memory else {}
-    known = {m: before[name] for m in now.keys() - bent if (name := problem.neurons[m]) in before}
-    held = {**now, **with_origins(problem, known)}
-    lost = overlapping({m: held[m] for m in held.keys() - problem.pins.keys()}, problem.pins)
-    return {m: held[m] for m in sorted(held.keys() - lost)}
 
 
 class _Ways:

@@ -188,7 +188,7 @@ class _Settling:
         for flip in (STAY, Move(reflection(self._across, 0.0).flip)):
             offsets = {m: flip.point(offset) for m, offset in shape.offsets}
             shifts = [(placed[m][0] - x, placed[m][1] - y) for m, (x, y) in offsets.items() if m in placed]
-            if not all(same(shift, shifts[0]) for shift in shifts):
+            if len(shifts) in (0, len(offsets)) or not all(same(shift, shifts[0]) for shift in shifts):
                 continue
             anchor = flip.point(shifts[0])
             free = tuple((m, offset) for m, offset in shape.offsets if m not in placed)
@@ -199,9 +199,7 @@ class _Settling:
                 bodies.append(Body(mates, self._numbers.get(frozenset(images), -1), shape.rect, flip.then(mirror)))
             elif images:
                 spots = {m: flip.point((anchor[0] + x, anchor[1] + y)) for m, (x, y) in shape.offsets}
-                if not all(
-                    same(mirror.point(spots[m]), spots[mate]) for m, mate in zip(whole.members, images, strict=True)
-                ):
+                if not all(same(mirror.point(at), spots.get(self._pair[m], _HERE)) for m, at in spots.items()):
                     continue
             yield bodies, anchor
 
@@ -213,13 +211,17 @@ class _Settling:
     def _shape(
         self, whole: Whole, placed: Mapping[int, Point], rects: Sequence[Rect | None], held: Mapping[int, Point]
     ) -> _Shape:
-        """How a whole is drawn: as it is placed, else as another of its make, else as in the fresh drawing."""
+        """How a whole is drawn: as it is placed, else as another of its make, as far as that is, else as in the fresh
+        drawing. What is held may be bent by its pins."""
+        if not self._memory.known:
+            return _Shape.of({m: self._fresh[m] for m in whole.members}, whole.rect)
         like = [whole, *sorted(self._makes[whole.make], key=lambda one: not held.keys().isdisjoint(one.members))]
-        for one in like if self._memory.known else ():
-            rect = rects[one.frame] if one.frame >= 0 else None
-            if rect is not None and placed.keys() >= set(one.members):
-                return _Shape.of(whole.members, [placed[m] for m in one.members], rect)
-        return _Shape.of(whole.members, [self._fresh[m] for m in whole.members], whole.rect)
+        most = max(like, key=lambda one: sum(m in placed for m in one.members))
+        rect = rects[most.frame] if most.frame >= 0 else None
+        at = {m: placed[mate] for m, mate in zip(whole.members, most.members, strict=True) if mate in placed}
+        if rect is None or not at:
+            return _Shape.of({m: self._fresh[m] for m in whole.members}, whole.rect)
+        return _Shape.of(at, rect)
 
     def _recalled(self, before: Earlier, there: Occupancy, held: Mapping[int, Point]) -> Earlier:
         """The earlier places with what stands ``there`` anew; what overlaps a disc or a frame of that is lost."""
@@ -303,9 +305,9 @@ class _Settling:
                     shape = self._shape(one, before.where, self._frames.rects(before.where, {}), held)
                 elif lead is not None:
                     anchor, back = placed[lead[0][0]], lead[1].inverse()
-                    at, number = [placed[m] for m in lead[0]], self._numbers.get(frozenset(lead[0]), -1)
-                    rect = there.rect(number)
-                    shape = _Shape.of(one.members, at, bounds(at) if rect is None else rect)
+                    at = {m: placed[mate] for m, mate in zip(one.members, lead[0], strict=True)}
+                    rect = there.rect(self._numbers.get(frozenset(lead[0]), -1))
+                    shape = _Shape.of(at, rect or bounds(at.values()))
                 else:
                     anchor, shape = None, self._shape(one, placed, there.rects, held)
                 copies = [Body(shape.offsets, one.frame, shape.rect, back)]
@@ -351,11 +353,10 @@ class _Shape:
     rect: Rect
 
     @classmethod
-    def of(cls, members: Sequence[int], at: Sequence[Point], rect: Rect) -> _Shape:
+    def of(cls, at: Mapping[int, Point], rect: Rect) -> _Shape:
         """The shape of these neurons as they stand here."""
-        x0, y0 = at[0]
-        offsets = tuple((m, (x - x0, y - y0)) for m, (x, y) in zip(members, at, strict=True))
-        return cls(offsets, shifted(rect, (-x0, -y0)))
+        x0, y0 = next(iter(at.values()))
+        return cls(tuple((m, (x - x0, y - y0)) for m, (x, y) in at.items()), shifted(rect, (-x0, -y0)))
 
 
 class _Wishes:
