@@ -58,6 +58,8 @@ def kept(problem: LayoutProblem, fresh: Layout, pins: Mapping[int, Point] | None
     free = [members for members in own if problem.pins.keys().isdisjoint(members)]
     if any(0 < len(known.keys() & members) < len(members) for members in free):
         known = dict(enumerate(settled(problem, frames, drawn, wholes).at))
+        grown = {name: known[i] for i, name in enumerate(problem.neurons)}
+        problem = replace(problem, memory=replace(memory, positions=grown))
     held = {**now, **with_origins(problem, {m: known[m] for members in free for m in members if m in known})}
     lost = overlapping({m: held[m] for m in held.keys() - problem.pins.keys()}, problem.pins)
     problem = replace(problem, pins={m: held[m] for m in sorted(held.keys() - lost)})

@@ -67,8 +67,12 @@ class _Settling:
         self._lines = {member: line for line in problem.align for member in line}
         self._numbers = {frozenset(whole.members): whole.frame for whole in wholes}
         self._makes: dict[str, list[Whole]] = {}
-        for whole in wholes:
+        #: by neuron, what it is in, the outermost first
+        self._around: dict[int, list[Whole]] = {}
+        for whole in sorted(wholes, key=lambda whole: -len(whole.members)):
             self._makes.setdefault(whole.make, []).append(whole)
+            for m in whole.members:
+                self._around.setdefault(m, []).append(whole)
 
     def places(self) -> Places:
         """Where everything stands."""
@@ -93,7 +97,7 @@ class _Settling:
         for piece, anchor in self._pieces(there, before, held, axis):
             row = wishes.row(piece[0], there.placed) if anchor is None else None
             wish = self._on_lines(piece, anchor or row or wishes.wish(piece[0], there.placed), there.placed, axis)
-            if not known and self._alone(piece[0].members, there.placed):
+            if not known and self._alone(piece[0].members[0], there.placed):
                 later.append(wish)
             elif not there.put(wish, stay=anchor is not None, in_row=row is not None):
                 there.put(replace(wish, along=(True, True)))
@@ -109,7 +113,7 @@ class _Settling:
         problem, twice, pins = self._problem, self._memory.twice, self._problem.pins
         if not pins and not self._memory.known:
             return
-        start = self._drawn_shift(pins or self._memory.known)[self._across] + self._twice.get(-1, 0.0) / 2
+        start = shift_of(self._fresh, pins or self._memory.known)[self._across] + self._twice.get(-1, 0.0) / 2
         start = twice[-1] / 2 if -1 in twice else start
         if not pins:
             yield start, {}
@@ -123,13 +127,9 @@ class _Settling:
         """Twice where each axis stands that is known."""
         return {**self._memory.twice, -1: 2 * axis} if self._pair else self._memory.twice
 
-    def _drawn_shift(self, held: Mapping[int, Point]) -> Point:
-        """How what is held is moved from where it is drawn, in the mean."""
-        return shift_of(self._fresh, held)
-
     def _shift(self, held: Mapping[int, Point], axis: float) -> Point:
         """How the drawing is moved to what is held."""
-        shift = list(self._drawn_shift(held)) if held else [0.0, 0.0]
+        shift = list(shift_of(self._fresh, held)) if held else [0.0, 0.0]
         if self._pair:
             shift[self._across] = axis - self._twice[-1] / 2
         return shift[0], shift[1]
@@ -245,12 +245,9 @@ class _Settling:
         lost = before.lost | together(problem, (i for body in off for i in body.members))
         return Earlier(where, newly, frozenset((lost & where.keys()) - stay))
 
-    def _alone(self, neurons: Sequence[int], placed: Mapping[int, Point]) -> bool:
-        """Whether nothing that these neurons are drawn with has its place."""
-        own = set(neurons)
-        return not any(
-            own <= set(whole.members) and not placed.keys().isdisjoint(whole.members) for whole in self._wholes
-        )
+    def _alone(self, neuron: int, placed: Mapping[int, Point]) -> bool:
+        """Whether nothing that a neuron is drawn with has its place."""
+        return all(placed.keys().isdisjoint(whole.members) for whole in self._around.get(neuron, ()))
 
     def _on_lines(self, piece: Sequence[Body], anchor: Point, placed: Mapping[int, Point], axis: float) -> Wish:
         """The wish of what is on a line, or on the axis, along that alone."""
@@ -288,13 +285,10 @@ class _Settling:
             return singles, before.where[neuron] if neuron in lost else lead
 
         for again in (True, False):
-            partly = [one for one in self._wholes if not again and not done.isdisjoint(one.members)]
-            for neuron in sorted(
-                {i for one in partly for i in self._own(one)} - done, key=lambda i: (i not in firm, i)
-            ):
-                if neuron not in done:
+            for neuron in () if again else sorted(self._around, key=lambda i: (i not in firm, i)):
+                if neuron not in done and not done.isdisjoint(self._around[neuron][-1].members):
                     yield single(neuron)
-            for one in sorted(self._wholes, key=lambda one: self._alone(one.members, placed)):
+            for one in sorted(self._wholes, key=lambda one: self._alone(one.members[0], placed)):
                 if not done.isdisjoint(one.members) or (again and not lost.issuperset(one.members)):
                     continue
                 counterparts = list(self._copies(alike, one, axis))
@@ -322,20 +316,13 @@ class _Settling:
                 if neuron not in done and (neuron in lost or not again):
                     yield single(neuron)
 
-    def _own(self, whole: Whole) -> set[int]:
-        """The neurons of a whole that are in none within it."""
-        own = set(whole.members)
-        return own - {m for one in self._wholes for m in one.members if own > set(one.members)}
-
     def _copies(self, alike: Alike, whole: Whole, axis: float) -> Iterator[tuple[tuple[int, ...], Move]]:
         """The counterparts of a whole within other instances of the make around it, or its mirror image; not all of its
         own make."""
         images = self._image(whole)
         if images and set(images).isdisjoint(whole.members):
             yield images, reflection(self._across, 2 * axis)
-        if all(
-            set(whole.members) >= set(one.members) or set(whole.members).isdisjoint(one.members) for one in self._wholes
-        ):
+        if self._around[whole.members[0]][0] is whole:
             return
         others = [dict(alike.of(neuron)) for neuron in whole.members]
         moves = [list(other.items()) for other in others]
