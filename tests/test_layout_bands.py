@@ -11,7 +11,8 @@ from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.model import LayoutProblem
 from neurovis_spec.layout.problem import problem_of
 
-LINE = "neurovis: 1\nname: line\nneurons: {a: {count: 30}}\nconnections:\n  a -> a: {pattern: chain}\n"
+CHAIN = "neurovis: 1\nname: line\nneurons: {a: {count: 30}}\nconnections:\n  a -> a: {pattern: chain}\n"
+LINE = f"{CHAIN}render: {{size: [800, 600]}}\n"
 #: Six legs, each of which drives the next on its side.
 LEGS = (
     "neurovis: 1\nname: legs\nmodules:\n  leg: {neurons: {a: {count: 15}}, connections: {a -> a: {pattern: chain}}}\n"
@@ -81,10 +82,16 @@ def test_what_is_near_to_a_page_runs_one_way() -> None:
 
 
 def test_the_size_of_the_picture_is_that_of_the_page() -> None:
-    _, wide = drawn(f"{LINE}render: {{size: [1200, 400]}}\n")
-    _, high = drawn(f"{LINE}render: {{size: [400, 1200]}}\n")
+    _, wide = drawn(f"{CHAIN}render: {{size: [1200, 400]}}\n")
+    _, high = drawn(f"{CHAIN}render: {{size: [400, 1200]}}\n")
     assert stretched(wide, 3) < 2
     assert stretched(high, 1 / 3) < 2
+
+
+def test_neurons_in_no_instance_run_one_way_unless_a_page_is_asked_for() -> None:
+    problem, layout = drawn(CHAIN)
+    assert metrics(layout, problem)["flow"] == 1
+    assert len({x for x, _ in layout.positions.values()}) == 1
 
 
 def test_pins_keep_ranks_uncut() -> None:

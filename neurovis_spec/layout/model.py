@@ -115,8 +115,8 @@ class LayoutProblem:
     boxes: tuple[tuple[str, tuple[int, ...]], ...] = ()
     neuron_spacing: float = 1.0
     rank_spacing: float = 2.0
-    #: width by height that the drawing comes near to
-    aspect: float = PAGE
+    #: width by height that the drawing is to come near to; None where the author has not said
+    aspect: float | None = None
     #: where signals enter and leave the network: a hint on what comes first in a loop
     entries: tuple[int, ...] = ()
     exits: tuple[int, ...] = ()
@@ -137,6 +137,11 @@ class LayoutProblem:
     #: an earlier layout of the same network: memory, not pins
     memory: Layout | None = None
     effort: Effort = "normal"
+
+    @property
+    def page(self) -> float:
+        """Width by height of the page."""
+        return PAGE if self.aspect is None else self.aspect
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,6 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.labels import label_room
 from neurovis_spec.layout.makes import modules_of
 from neurovis_spec.layout.model import (
-    PAGE,
     Arrangement,
     Direction,
     Layout,
@@ -55,7 +54,7 @@ def canonical(
     places: Mapping[str, Point] | None = None,
     labels: Mapping[str, Point] | None = None,
     memory: Layout | None = None,
-    aspect: float = PAGE,
+    aspect: float | None = None,
 ) -> LayoutProblem:
     """The problem made of these parts, in canonical order.
 
@@ -66,7 +65,7 @@ def canonical(
     these, ``mirrors`` the scope's path, the
     pairs of neurons and the pairs of instances; ``plan`` the path of the instance that is divided, what
     stands in which row and column of it, and how many of them that spans; ``places`` where neurons are as data;
-    ``labels`` how wide and high are those that discs cannot hold; ``aspect`` the width of the page by its height.
+    ``labels`` how wide and high are those that discs cannot hold; ``aspect`` the width of the page by its height, where one is asked for.
     """
     names = tuple(sorted(neurons, key=natural_key))
     index = {name: i for i, name in enumerate(names)}
@@ -179,7 +178,7 @@ def problem_of(network: Network, memory: Layout | None = None) -> LayoutProblem:
         _places(network),
         dict(zip(names, label_room(network), strict=False)),
         memory,
-        aspect=PAGE if network.render.size is None else network.render.size[0] / network.render.size[1],
+        aspect=None if network.render.size is None else network.render.size[0] / network.render.size[1],
     )
 
 

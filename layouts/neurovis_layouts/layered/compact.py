@@ -68,9 +68,11 @@ Drawn: TypeAlias = Callable[[LayoutProblem, Shape], Drawing]
 
 
 def may_be_folded(problem: LayoutProblem) -> bool:
-    """Whether nothing says where on the page something stands, and it is not too large to try."""
+    """Whether nothing says where on the page something stands, there are instances, which are folded, or a page is asked
+    for, as signals run one way otherwise, and it is not too large to try."""
     fixed = problem.plan or problem.pins or any(module.pins for module in problem.modules)
-    return not fixed and len(problem.neurons) + len(problem.edges) <= _MOST
+    asked = problem.modules or problem.aspect is not None
+    return bool(asked) and not fixed and len(problem.neurons) + len(problem.edges) <= _MOST
 
 
 def compact(problem: LayoutProblem, drawn: Drawn, most: Mapping[Fold, int]) -> Shape:
@@ -117,14 +119,14 @@ def _size(drawing: Drawing, direction: Direction) -> tuple[float, float]:
 def _stretched(problem: LayoutProblem, drawing: Drawing) -> float:
     """How much wider or higher than a page a drawing is."""
     wide, high = _size(drawing, problem.direction)
-    return max(wide / (problem.aspect * high), problem.aspect * high / wide)
+    return max(wide / (problem.page * high), problem.page * high / wide)
 
 
 def _cost(problem: LayoutProblem, drawing: Drawing) -> float:
     """How large a page is that holds a drawing, times how long straight lines between the ends of its connections
     are, times what those cost that run back."""
     wide, high = _size(drawing, problem.direction)
-    page = max(wide, problem.aspect * high) ** 2
+    page = max(wide, problem.page * high) ** 2
     lengths = [distance(drawing.places[edge.source], drawing.places[edge.target]) for edge in problem.edges]
     back = sum(drawing.places[edge.source][1] > drawing.places[edge.target][1] for edge in problem.edges)
     return page * math.fsum(lengths) * (1 + _BACK * back / max(1, len(problem.edges)))

@@ -160,7 +160,7 @@ def facing(
         high = max(r[3] for r in rects) - min(r[1] for r in rects)
         if problem.direction in ("right", "left"):
             wide, high = high, wide
-        stretched = max(wide / (problem.aspect * high), problem.aspect * high / wide) if whole else 1.0
+        stretched = max(wide / (problem.page * high), problem.page * high / wide) if whole else 1.0
         lines = np.array([(at[a], at[b]) for a, b in between], dtype=np.float64).reshape(-1, 2, 2)
         length = float(np.sqrt(((lines[:, 1] - lines[:, 0]) ** 2).sum(axis=1)).sum())
         return (wide + high + length + _CROSSING * _crossings(lines, *apart)) * stretched

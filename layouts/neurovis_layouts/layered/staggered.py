@@ -25,7 +25,7 @@ def staggered(
     """The levels with the widest ranks staggered; None where they are not much wider than a page."""
     xs, ys = zip(*places, strict=True)
     wide, high = max(xs) - min(xs) + 1, max(ys) - min(ys) + 1
-    page = problem.aspect if problem.direction in ("down", "up") else 1 / problem.aspect
+    page = problem.page if problem.direction in ("down", "up") else 1 / problem.page
     if wide < _WIDE * page * high:
         return None
     lined = {m for line in problem.align for m in line}
