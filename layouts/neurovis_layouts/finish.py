@@ -47,6 +47,8 @@ def drawn(
     high as they are long. With a ``symmetry`` images, and routes between them, are exact reflections. On these
     ``sides`` labels have room."""
     flat: list[Point] = [(snap(x), snap(y)) for x, y in places[: len(problem.neurons)].tolist()]
+    for i, point in problem.pins.items():
+        flat[i] = from_picture(point, problem.direction)
     pins = with_origins(problem, {i: to_picture(point, problem.direction) for i, point in enumerate(flat)})
     mirrored = symmetry is not None and symmetry.paired.any()
     centres = exact(problem, symmetry, flat) if symmetry is not None and mirrored else flat
