@@ -19,6 +19,7 @@ from neurovis_layouts.occupancy import overlapping
 from neurovis_spec.layout.geometry import distance, snap
 from neurovis_spec.layout.model import RADIUS, Layout, LayoutModule, LayoutProblem, Point, Route
 
+#: Discs that touch do not overlap, whatever rounding says.
 _SLACK = 1e-6
 
 

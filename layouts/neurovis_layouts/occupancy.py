@@ -18,7 +18,7 @@ from types import MappingProxyType
 from neurovis_layouts.alike import STAY, Move
 from neurovis_spec.layout.frames import Frames, titled, untitled
 from neurovis_spec.layout.geometry import Rect, bounds, distance, meet, padded, sampled, snap, united
-from neurovis_spec.layout.model import RADIUS, LayoutProblem, Point, Route
+from neurovis_spec.layout.model import RADIUS, Point, Route
 
 #: Steps of the search and how many of them it goes: near first, then far, then beyond everything.
 _REACHES = ((0.25, 4), (0.25, 16), (0.5, 32), (1.0, 64))
@@ -387,12 +387,6 @@ def overlapping(where: Mapping[int, Point], pins: Mapping[int, Point]) -> set[in
         else:
             found.add(i)
     return found
-
-
-def instance_of(problem: LayoutProblem, members: Iterable[int]) -> int:
-    """The instance that these are the neurons of, −1 where there is none."""
-    own = set(members)
-    return next((k for k, module in enumerate(problem.modules) if own == set(module.members)), -1)
 
 
 class _CentreCells:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 from neurovis_layouts.alike import Move, same, shifted_by
-from neurovis_layouts.frame import across_of, from_picture, to_picture
+from neurovis_layouts.frame import across_of, from_picture, in_picture, to_picture
 from neurovis_layouts.layered.component_layout import ComponentLayout
 from neurovis_layouts.layered.drawing import Piece
 from neurovis_layouts.settling import Whole, settled
@@ -54,7 +54,7 @@ def pinned(
     frames = Frames(replace(turned, boxes=tuple(problem.boxes[box] for box in boxes)))
     numbers = {own: number for number, own in reversed(list(enumerate(frames.members)))}
     wholes = [
-        Whole(members, numbers.get(frozenset(members), -1), _turned_rect(rect, problem))
+        Whole(members, numbers.get(frozenset(members), -1), in_picture(rect, problem.direction))
         for piece, move in pieces
         for members, rect in _frames_of(piece, move)
     ]
@@ -94,10 +94,6 @@ def _frames_of(piece: Piece, move: Move) -> Iterator[tuple[tuple[int, ...], Rect
     yield piece.part.members, move.rect(piece.rect)
     for own, rect in piece.drawing.frames:
         yield tuple(piece.part.members[place] for place in own), move.rect(rect)
-
-
-def _turned_rect(rect: Rect, problem: LayoutProblem) -> Rect:
-    return bounds([to_picture(rect[:2], problem.direction), to_picture(rect[2:], problem.direction)])
 
 
 def _fitting(piece: Piece, move: Move, at: Sequence[Point]) -> Move | None:
