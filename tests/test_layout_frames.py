@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import layout_conformance as suite
 import numpy as np
 import pytest
 from neurovis_layouts.frame import to_picture
@@ -57,3 +60,17 @@ def test_frames_are_drawn_where_engines_and_memory_keep_room_for_them(direction:
         assert room[1] <= rect[1] + 0.03, path
         assert room[2] >= rect[2] - 0.03, path
         assert room[3] >= rect[3] - 0.03, path
+
+
+def test_a_box_that_is_not_drawn_sends_no_connection_through_a_frame() -> None:
+    network = nv.compile_text(
+        "neurovis: 1\nname: x\nneurons: {G: {count: 3, bias: 1}}\n"
+        "modules: {m: {neurons: {A: {}, B: {}, C: {}}, connections: {A -> B: 1, A -> C: 1}}}\n"
+        "instances: {left: {module: m, count: 2}, right: {module: m, count: 2}}\n"
+        "connections: {right2.A -> right1.C: 1, left1.C -> left2.C: 1, G3 -> right2.A: 1, right1.B -> right2.B: 1, "
+        "right2.A -> left1.B: 1, right2.A -> left1.A: 1, G3 -> G2: 1, right1.B -> left2.B: 1}\n"
+        "layout: {mirror: [[left, right]], boxes: {b: [left2, G, right1]}}\n"
+    )
+    layout = network.layout("layered").value
+    instances = replace(network.problem, boxes=())
+    assert suite.through_frames(layout, instances) == []

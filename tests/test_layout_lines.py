@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from neurovis_layouts.routing.channel_routing import channels
 from neurovis_layouts.routing.channel_search import way
+from neurovis_layouts.routing.curves import Waypoint
 from neurovis_layouts.routing.lines import CutLines, crossed
 from neurovis_layouts.routing.rows import OccupiedRows
 
@@ -56,6 +57,15 @@ def test_a_way_takes_the_longer_side_of_a_disc_rather_than_cross_a_line() -> Non
     assert all(way.x < 0.2 for way in plain)
     assert wary
     assert all(way.x > 0.2 for way in wary)
+
+
+def test_a_way_is_not_straight_before_and_behind_a_bend_for_longer_than_to_the_next() -> None:
+    centres = [(0.0, 0.0), (0.0, 4.0), (-1.0, 1.4), (1.0, 1.2), (0.0, 1.0), (1.0, 1.0)]
+    ways = channels({0: LayoutEdge("a", 0, 1, 1)}, centres, [], {})[0][0]
+    assert len(ways) == 2
+    assert all(way.half > 0 for way in ways)
+    stops = [Waypoint(*centres[0]), *ways, Waypoint(*centres[1])]
+    assert all(before.y + before.half < after.y - after.half for before, after in pairwise(stops))
 
 
 @pytest.mark.parametrize(("sources", "targets"), [(4, 8), (3, 5), (5, 5), (8, 4)])

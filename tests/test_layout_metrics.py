@@ -9,6 +9,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import neurovis_spec as nv
 from neurovis_spec.layout import Direction, Layout, LayoutProblem, Point, Route
 from neurovis_spec.layout import metrics as measures
 from neurovis_spec.layout.geometry import cubic, distance, pieces_of, snap, straight, turn
@@ -150,3 +151,13 @@ def test_of_too_many_pairs_a_sample_of_the_routes_is_compared_which_is_said() ->
         part = metrics(layout, problem)
     assert part["sampled"] < len(pairs) / 2
     assert abs(part["crossings"] / whole["crossings"] - 1) < 0.1
+
+
+def test_images_in_an_instance_that_a_plan_turns_are_images() -> None:
+    layout = nv.compile_text(
+        "neurovis: 1\nname: x\nneurons: {A: {count: 2}}\nmodules: {m: {neurons: {L: {bias: 1}, R: {bias: 1}, O: {}}, "
+        "connections: {L -> O: 1, R -> O: 1}, layout: {mirror: [[L, R]]}}}\ninstances: {x: {module: m}}\n"
+        "connections: {x.O -> A1: 1, x.O -> A2: 1}\nlayout: {plan: [[A], [x]]}\n"
+    ).layout()
+    assert layout.positions["x.L"][0] == layout.positions["x.R"][0]
+    assert layout.metrics()["symmetry"] == 1

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from itertools import product
+from random import Random
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from layout_conformance import members, named
 from neurovis_layouts.layered.ranks import ranks_of
 from neurovis_layouts.layered.simplex import shortened
 
 import neurovis_spec as nv
+from neurovis_spec.layout.arrange import lay_out_problem
+from neurovis_spec.layout.metrics import metrics
+from neurovis_spec.layout.problem import canonical
 
 Arcs = dict[tuple[int, int], float]
 
@@ -67,6 +72,33 @@ def test_a_tie_stands_early() -> None:
 def test_what_runs_within_a_step_is_never_turned() -> None:
     arcs: Arcs = {(0, 1): 1000.0, (1, 2): 1000.0, (2, 0): 1.0}
     assert ranks_of(3, arcs, set(), set()) == [0, 1, 2]
+
+
+def test_what_is_in_no_loop_of_neurons_is_not_turned_for_one_of_units() -> None:
+    arcs: Arcs = {(0, 1): 3.0, (1, 2): 3.0, (2, 0): 1.0}
+    assert ranks_of(3, arcs, set(), set()) == [0, 1, 2]
+    assert ranks_of(3, arcs, set(), set(), {(2, 0)}) == [1, 2, 0]
+
+
+def test_a_group_shares_no_rank_where_a_connection_would_run_back_for_it() -> None:
+    network = nv.compile_text(
+        "neurovis: 1\nname: x\nneurons: {A: {count: 2, bias: 1}, D: {}, O: {}}\n"
+        "connections: {A1 -> D: 1, D -> A2: 1, A1 -> O: 1, O -> A1: 1}\n"
+    )
+    assert network.layout("layered").metrics()["flow"] == 1
+
+
+@given(st.randoms(use_true_random=False))
+@settings(deadline=None, max_examples=20)
+def test_all_that_is_in_no_loop_runs_along_whatever_groups_there_are(random: Random) -> None:
+    groups = [(name, members(name, random.randint(2, 4))) for name in "ABCD"]
+    names = [name for _, own in groups for name in own]
+    random.shuffle(names)
+    ends = [sorted(random.sample(range(len(names)), 2)) for _ in range(16)]
+    ends += [[b, a] for a, b in ends[:2]]
+    edges = named(sorted({(names[a], names[b]) for a, b in ends}))
+    problem = canonical("x", names, groups, edges)
+    assert metrics(lay_out_problem(problem, "layered"), problem)["flow"] == 1
 
 
 @given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=1, max_size=14))

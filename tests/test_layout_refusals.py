@@ -68,6 +68,7 @@ REFUSED = [
                   "{count: 3}, K: {}}\n    layout: {arrange: {S: row}, mirror: [[S1, K], [S2, S3]]}")
      + "  direction: down\n", "mirror-arrange", "S"),
     (CELLS, "align-conflict", "[E, B]"),
+    (f"{LEGS}  mirror: [[left, right]]\n  align: [[left1.S, right1.K]]\n", "align-conflict", "[left1.S, right1.K]"),
     (f"{PAIRED}  plan: [[A], [B]]\n  positions: {{A1: [0, 0], A4: [4, 3], B1: [2, 1]}}\n", "pin-in-frame", "[2, 1]"),
 ]  # fmt: skip
 

@@ -151,3 +151,39 @@ def test_a_name_that_is_too_long_for_its_disc_stands_beside_it_at_every_size() -
             f"render: {{size: [{side}, {side}], legend: false}}\n"
         )
         assert found["sensor"].text == "sensor"
+
+
+def texts_outside(spec: str) -> tuple[list[str], list[str]]:
+    """The texts of a picture, and those of them that leave it to the left or to the right."""
+    network = nv.compile_text("neurovis: 1\nname: labels\n" + spec)
+    snapshot, layout = network.run(3).snapshot(2), network.layout().value
+    scene = pipeline.picture(network.network, layout, snapshot, network.gains, network.network.render)
+    texts = [shape for shape in scene.shapes() if isinstance(shape, Text)]
+    found = []
+    for text in texts:
+        wide = width(text.text, text.size, text.weight, text.subscript)
+        left = text.point[0] - {"start": 0.0, "middle": wide / 2, "end": wide}[text.anchor]
+        if left < 0 or left + wide > scene.width:
+            found.append(text.text)
+    return [text.text for text in texts], found
+
+
+def test_names_of_numbered_neurons_at_the_rim_stay_in_the_picture() -> None:
+    name = "Along_name_of_group"
+    texts, found = texts_outside(
+        f"neurons: {{{name}: {{count: 8, bias: 1}}}}\n"
+        f"connections: {{{name}1 -> {name}8: 1, {name}5 -> {name}6: 1, {name}3 -> {name}6: 1}}\n"
+        f"layout: {{mirror: [[{name}1, {name}7]]}}\n"
+    )
+    assert {f"{name}1", f"{name}7"} <= set(texts)
+    assert found == []
+
+
+def test_the_label_of_a_connection_at_the_rim_stays_in_the_picture() -> None:
+    texts, found = texts_outside(
+        "neurons: {A: {bias: 1}, B: {}, C: {bias: 1}, D: {}}\n"
+        "connections: {A -> B: {weight: 1, label: inhibitory interneuron of the leg}, C -> D: 1, A -> D: 1}\n"
+        "render: {size: [200, 600]}\n"
+    )
+    assert any(text.startswith("inhibitory") for text in texts)
+    assert found == []

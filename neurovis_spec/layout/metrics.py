@@ -194,7 +194,7 @@ def _flow(layout: Layout, problem: LayoutProblem) -> float:
 
 def _symmetry(centres: FloatArray, problem: LayoutProblem) -> float:
     """Share of the mirrored pairs that are mirror images on the axis of their scope (the median of the middles between
-    pairs), to a billionth; 1 for none."""
+    pairs), to a billionth; 1 for none. A plan may turn an instance by a quarter, and the axis in it."""
     if not problem.mirrors:
         return 1.0
     across = 0 if problem.direction in ("down", "up") else 1
@@ -202,13 +202,19 @@ def _symmetry(centres: FloatArray, problem: LayoutProblem) -> float:
     for mirror in problem.mirrors:
         scopes.setdefault(mirror.scope, []).extend(mirror.pairs)
     kept = 0
-    for pairs in scopes.values():
+    for scope, pairs in scopes.items():
         first, second = centres[[a for a, _ in pairs]], centres[[b for _, b in pairs]]
-        middle = (first[:, across] + second[:, across]) / 2
-        axis = np.sort(middle)[len(middle) // 2]
-        level = np.abs(first[:, 1 - across] - second[:, 1 - across]) <= _SLACK
-        kept += int((level & (np.abs(middle - axis) <= _SLACK)).sum())
+        turns = (across, 1 - across) if scope >= 0 and problem.plan else (across,)
+        kept += max(_mirrored(first, second, turn) for turn in turns)
     return kept / sum(len(pairs) for pairs in scopes.values())
+
+
+def _mirrored(first: FloatArray, second: FloatArray, across: int) -> int:
+    """How many of these are images on one axis; ``across``: which coordinate that changes."""
+    middle = (first[:, across] + second[:, across]) / 2
+    axis = np.sort(middle)[len(middle) // 2]
+    level = np.abs(first[:, 1 - across] - second[:, 1 - across]) <= _SLACK
+    return int((level & (np.abs(middle - axis) <= _SLACK)).sum())
 
 
 def _area(centres: FloatArray) -> float:

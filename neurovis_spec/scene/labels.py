@@ -241,7 +241,7 @@ def margin_beside(network: Network, radius: float, rooms: Collection[int] = ()) 
     ):
         return 0.0
     said = [cut.shorten(label, 1.0, WIDEST) for label, _ in named]
-    return max((texts.width(text, _BESIDE_SMALLEST, WEIGHT) for text in said), default=0.0) + ASIDE + 3
+    return max((texts.width(text, size_beside(radius), WEIGHT) for text in said), default=0.0) + ASIDE + 3
 
 
 def room_beside(network: Network, radius: float) -> list[tuple[int, Point]]:

@@ -27,8 +27,11 @@ _PLACES, _MOST = (1 / 2, 0.4, 0.6, 0.3, 0.7), 12
 _TOO_MUCH = 10_000
 
 
-def line_labels(network: Network, lines: Mapping[int, Line], obstacles: Obstacles, theme: Theme) -> dict[str, Text]:
-    """The texts by the names of their entries; the room that each takes is added to ``obstacles``."""
+def line_labels(
+    network: Network, lines: Mapping[int, Line], obstacles: Obstacles, theme: Theme, picture: Rect
+) -> dict[str, Text]:
+    """The texts by the names of their entries, none of which leaves the ``picture`` to a side; the room that each takes
+    is added to ``obstacles``."""
     connections = network.connections
     wanted: dict[int, list[int]] = {}
     if any(connections.labels):
@@ -38,7 +41,7 @@ def line_labels(network: Network, lines: Mapping[int, Line], obstacles: Obstacle
     for entry, label in enumerate(connections.labels):
         if label and entry in wanted:
             text = texts.shorten(label, _SIZE, _WIDEST, _WEIGHT)
-            place = _best([lines[index] for index in _some(wanted[entry])], text, obstacles)
+            place = _best([lines[index] for index in _some(wanted[entry])], text, obstacles, picture)
             if place is not None:
                 obstacles.add_text(_rect(place, text))
                 result[connections.entries[entry]] = Text(
@@ -58,9 +61,12 @@ def _some(members: Sequence[int]) -> Sequence[int]:
     return members[:: -(-len(members) // _MOST)]
 
 
-def _best(lines: Sequence[Line], text: str, obstacles: Obstacles) -> Point | None:
+def _best(lines: Sequence[Line], text: str, obstacles: Obstacles, picture: Rect) -> Point | None:
     """Where the text covers least; None where it would cover a disc or another text everywhere."""
-    places = [point_at(line.points, share * (len(line.points) - 1) / 3) for line in lines for share in _PLACES]
+    half = _half(text)
+    low, high = picture[0] + half, picture[2] - half
+    on_lines = [point_at(line.points, share * (len(line.points) - 1) / 3) for line in lines for share in _PLACES]
+    places = [(max(low, min(high, x)), y) for x, y in on_lines]
     hits = [obstacles.hits(_rect(place, text)) for place in places]
     least = min(hits)
     return places[hits.index(least)] if least < _TOO_MUCH else None
@@ -68,5 +74,10 @@ def _best(lines: Sequence[Line], text: str, obstacles: Obstacles) -> Point | Non
 
 def _rect(centre: Point, text: str) -> Rect:
     """What a text takes up, with a little air."""
-    half = texts.width(text, _SIZE, _WEIGHT) / 2 + 2
+    half = _half(text)
     return centre[0] - half, centre[1] - 0.6 * _SIZE, centre[0] + half, centre[1] + 0.6 * _SIZE
+
+
+def _half(text: str) -> float:
+    """Half the width of a text, with a little air."""
+    return texts.width(text, _SIZE, _WEIGHT) / 2 + 2

@@ -172,7 +172,7 @@ def plan(
         )
         sides = {index: layout.labels[network.neurons.names[index]] for index in rooms}
         labels = labels_of(network, ground, obstacles, (~seen.focus).tolist(), sizes, sides)
-    named = line_labels(network, lines, obstacles, theme) if settings.labels else {}
+    named = line_labels(network, lines, obstacles, theme, picture) if settings.labels else {}
     left = [index for index in range(len(boxes)) if index not in titles]
     others = elsewhere([titled[index] for index in left], obstacles, theme)
     titles |= {index: text for index, text in zip(left, others, strict=True) if text is not None}

@@ -12,6 +12,8 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
+import networkx as nx
+
 from neurovis_layouts.formations import columns, grid
 from neurovis_layouts.label_room import at_ends, covered, excess, sides_of
 from neurovis_layouts.layered.bands import UNCUT, Bands, Wanted, banded
@@ -249,16 +251,21 @@ def _ranks(
 ) -> list[int]:
     numbers = {bond: number for number, bond in enumerate(dict.fromkeys(bonds))}
     owner = {m: numbers[bond] for unit, bond in zip(units, bonds, strict=True) for m in unit.members}
+    wired: nx.DiGraph[int] = nx.DiGraph((problem.edges[i].source, problem.edges[i].target) for i in edges)
+    loop_of = {neuron: k for k, loop in enumerate(nx.strongly_connected_components(wired)) for neuron in loop}
     arcs: dict[tuple[int, int], float] = {}
+    along: set[tuple[int, int]] = set()
     for i in edges:
         edge = problem.edges[i]
         ends = owner[edge.source], owner[edge.target]
+        if loop_of[edge.source] != loop_of[edge.target]:
+            along.add(ends)
         if ends[0] != ends[1]:
             arcs[ends] = arcs.get(ends, 0.0) + (INSTANT if edge.delay == 0 else 1.0)
     arcs.update({(owner[a], owner[b]): _ROW for a, b in behind if a in owner and b in owner and owner[a] != owner[b]})
     first = {owner[m] for m in problem.entries if m in owner}
     last = {owner[m] for m in problem.exits if m in owner}
-    ranks = ranks_of(len(numbers), arcs, first, last)
+    ranks = ranks_of(len(numbers), arcs, first, last, along)
     return [ranks[numbers[bond]] for bond in bonds]
 
 

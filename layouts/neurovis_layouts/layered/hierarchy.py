@@ -12,6 +12,8 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
+import numpy as np
+
 from neurovis_layouts.alike import Move, shifted_by
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.label_room import covered, flipped, roomy, sides_of
@@ -30,7 +32,7 @@ from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.pins import with_origins
 from neurovis_layouts.routing.ends import Key, keys_of
 from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
-from neurovis_spec.layout.frames import BOX_DOWN, PAD_LABEL, SLACK
+from neurovis_spec.layout.frames import BOX_DOWN, PAD_LABEL, SLACK, entered
 from neurovis_spec.layout.geometry import Rect, bounds, meet, padded, snap, united
 from neurovis_spec.layout.labels import BOX_WEIGHT, title_room
 from neurovis_spec.layout.model import RADIUS, Direction, LayoutMirror, LayoutProblem, Point, Route, Side
@@ -332,7 +334,12 @@ class _Standing:
         frames += [(problem.boxes[i][1], lined[i]) for i in sorted(columns)]
         boxes = [(own, move.rect(rect)) for own, move, rect in _boxes_within(rests)]
         done = {frozenset(own) for own, _ in (*frames, *boxes)}
-        boxes += [(own, lined[i]) for i, (_, own) in enumerate(problem.boxes) if frozenset(own) not in done]
+        centres = np.array(places, dtype=np.float64).reshape(-1, 2)
+        boxes += [
+            (own, lined[i])
+            for i, (_, own) in enumerate(problem.boxes)
+            if frozenset(own) not in done and not entered(centres, lined[i], own)  # none is drawn round a stranger
+        ]
         return cls(
             plan,
             rests,

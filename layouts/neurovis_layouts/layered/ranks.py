@@ -18,21 +18,31 @@ from neurovis_layouts.layered.simplex import shortened
 
 #: The weight of a connection without delay: it is reversed only where a loop of such connections leaves no choice.
 INSTANT = 1000.0
+#: How much more an arc weighs that is in a loop only because units are.
+_ALONG = 100.0
 #: Loops of more units are cut greedily only.
 _SIFTED = 1500
 Arcs = Mapping[tuple[int, int], float]
 
 
-def ranks_of(count: int, arcs: Arcs, first: AbstractSet[int], last: AbstractSet[int]) -> list[int]:
+def ranks_of(
+    count: int,
+    arcs: Arcs,
+    first: AbstractSet[int],
+    last: AbstractSet[int],
+    along: AbstractSet[tuple[int, int]] = frozenset(),
+) -> list[int]:
     """A rank for each of ``count`` units; ``arcs`` are (from, to): weight. ``first`` and ``last`` are where signals
-    enter and leave: they decide where a loop is cut."""
+    enter and leave: they decide where a loop is cut, if it can be at none of the arcs that are to run ``along``, as
+    their neurons are in no loop."""
     graph: nx.DiGraph[int] = nx.DiGraph()
     graph.add_nodes_from(range(count))
     graph.add_edges_from(arcs)
     place = [0] * count
+    kept = {arc: weight * (_ALONG if arc in along else 1.0) for arc, weight in arcs.items()}
     for loop in nx.strongly_connected_components(graph):
         if len(loop) > 1:
-            for position, unit in enumerate(_sifted(_cut(sorted(loop), arcs, graph, first, last), arcs)):
+            for position, unit in enumerate(_sifted(_cut(sorted(loop), kept, graph, first, last), kept)):
                 place[unit] = position
     component = _component_order(graph)
     forward: dict[tuple[int, int], float] = {}

@@ -60,6 +60,8 @@ def bonded(
         for member, (_, along) in zip(unit.members, unit.places or (), strict=False):
             depth[member] = along
     lines = _Lines(len(units))
+    for a, b in sorted(pair.items()):
+        lines.join(owner[a], owner[b], 0.0)
     for line in problem.align:
         for member in line[1:]:
             if not lines.join(owner[line[0]], owner[member], depth[line[0]] - depth[member]):
@@ -70,8 +72,6 @@ def bonded(
                     "them apart",
                     about=(names[line[0]], names[member]),
                 )
-    for a, b in sorted(pair.items()):
-        lines.join(owner[a], owner[b], 0.0)
     flow = _flow(problem, units, owner) if families else nx.DiGraph()
     for family in families:
         mates = [owner[m] for m in family]

@@ -229,8 +229,16 @@ def _off_lines(problem: LayoutProblem, found: Sequence[Unit], lines: Mapping[int
 
 
 def _without_needless_loops(problem: LayoutProblem, found: list[Unit], lines: Mapping[int, int]) -> list[Unit]:
-    """Split groups that would make a loop of ranks only because their neurons share one."""
+    """Split groups that would make a loop of ranks only because their neurons share one: a loop that what runs along
+    makes, which is all that is in no loop of neurons and of rigid units."""
     owner = {member: i for i, unit in enumerate(found) for member in unit.members}
+    # a rigid unit is drawn as one piece, as if it were a neuron
+    rigid = {member: -1 - i for i, unit in enumerate(found) if unit.places is not None for member in unit.members}
+    wired = [(e.source, e.target) for e in problem.edges if e.source in owner and e.target in owner]
+    pieces: nx.DiGraph[int] = nx.DiGraph()
+    pieces.add_nodes_from(rigid.get(member, member) for member in owner)
+    pieces.add_edges_from((rigid.get(a, a), rigid.get(b, b)) for a, b in wired)
+    loop_of = {piece: k for k, loop in enumerate(nx.strongly_connected_components(pieces)) for piece in loop}
     # units on one line are one, too
     tied: nx.Graph[int] = nx.Graph()
     tied.add_nodes_from(range(len(found)))
@@ -238,23 +246,14 @@ def _without_needless_loops(problem: LayoutProblem, found: list[Unit], lines: Ma
     row = {i: min(part) for part in nx.connected_components(tied) for i in part}
     quotient: nx.DiGraph[int] = nx.DiGraph()
     quotient.add_nodes_from(row.values())
-    for edge in problem.edges:
-        if edge.source in owner and edge.target in owner:
-            source, target = row[owner[edge.source]], row[owner[edge.target]]
-            if source != target:
-                quotient.add_edge(source, target)
-    in_row: dict[int, list[int]] = {}
-    for i, first in row.items():
-        in_row.setdefault(first, []).append(i)
-    split: set[int] = set()
-    for loop in nx.strongly_connected_components(quotient):
-        units = sorted(i for first in loop for i in in_row[first])
-        loose = [i for i in units if found[i].places is None and len(found[i].members) > 1]
-        if len(loop) > 1 and loose:
-            members = [member for i in units for member in found[i].members]
-            if nx.is_directed_acyclic_graph(_graph(problem, members)):
-                split.update(loose)
+    quotient.add_edges_from(
+        (row[owner[a]], row[owner[b]])
+        for a, b in wired
+        if loop_of[rigid.get(a, a)] != loop_of[rigid.get(b, b)] and row[owner[a]] != row[owner[b]]
+    )
+    looping = {row for loop in nx.strongly_connected_components(quotient) if len(loop) > 1 for row in loop}
     result: list[Unit] = []
     for i, unit in enumerate(found):
-        result += [Unit((member,)) for member in unit.members] if i in split else [unit]
+        whole = unit.places is not None or row[i] not in looping
+        result += [unit] if whole else [Unit((member,)) for member in unit.members]
     return result

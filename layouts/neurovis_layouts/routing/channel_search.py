@@ -36,6 +36,9 @@ WALLED = _WALL
 _CHOICES, _NEAR, _MOST_NEAR, _KEPT = 16, 2.0, 8, 2
 #: Where a way is pulled straight: over how many rows, how far aside, and how close to another.
 _FARTHEST, _ASIDE, _BESIDE_WAY = 12, 0.6, 0.12
+#: How far before and behind a bend in a narrow gap a way is straight, and at most of the way to the next bend: two that
+#: are straight leave room for a curve between them.
+_STRAIGHT, _SHARE = 0.2, 0.45
 
 
 def straight(a: Point, b: Point) -> float:
@@ -247,11 +250,16 @@ def knots(rows: OccupiedRows, path: Sequence[Point], ends: tuple[int, int], alon
     at = _reach(rows, line, limits, 0)
     while at < len(path) - 1:
         low, high = spans[at]
-        knots.append(Waypoint(*path[at], 0.2 if 0 <= high - low < 1.2 else 0.0))
+        knots.append(Waypoint(*path[at], _STRAIGHT if 0 <= high - low < 1.2 else 0.0))
         at = _reach(rows, line, limits, at)
     if not knots and not alone and len(path) > 3:
         knots = [Waypoint(*path[1]), Waypoint(*path[-2])]
-    return knots
+    stops = [path[0][1], *(knot.y for knot in knots), path[-1][1]]
+    room = [
+        _SHARE * min(abs(y - before), abs(after - y))
+        for before, y, after in zip(stops, stops[1:], stops[2:], strict=False)
+    ]
+    return [Waypoint(knot.x, knot.y, min(knot.half, most)) for knot, most in zip(knots, room, strict=True)]
 
 
 def _span(free: Sequence[Span], x: float) -> Span:

@@ -100,6 +100,9 @@ def check_plan(
     skip = len(scope) + 1 if scope else 0
     names = tuple(name[skip:] for name in names)
     where = {m: cell for cell in cells for m in cell.members}
+    image = {
+        b: a for mirror in mirrors if mirror.scope == scope for pair in mirror.pairs for a, b in (pair, pair[::-1])
+    }
     told: set[tuple[Seat, Seat]] = set()
     for mirror in mirrors:
         for a, b in mirror.pairs if mirror.scope == scope else ():
@@ -107,9 +110,13 @@ def check_plan(
             if one is None and other is None:
                 continue
             if one is not None and other is not None:
-                if (one.seat, other.seat) in told or one.seat.image(direction) == other.seat:
+                if (one.seat, other.seat) in told:
                     continue
                 told.add((one.seat, other.seat))
+                if one.seat.image(direction) == other.seat:
+                    if one is not other:
+                        _check_images(rows, one, other, image, names, findings)
+                    continue
             known = one or other
             assert known is not None
             message = f"'{names[a]}' and '{names[b]}' are mirror images and do not stand in mirrored cells"
@@ -128,6 +135,25 @@ def check_plan(
             findings.error(
                 "plan-align", _span(rows, cell).span, message, "the plan says where cells are; align within one"
             )
+
+
+def _check_images(
+    rows: tuple[PlanRow, ...],
+    one: Cell,
+    other: Cell,
+    image: Mapping[int, int],
+    names: tuple[str, ...],
+    findings: Findings,
+) -> None:
+    """Two cells are mirror images as wholes: a neuron in one of them whose image is not in the other is a finding."""
+    for cell, mate in ((one, other), (other, one)):
+        odd = next((m for m in cell.members if image.get(m) not in mate.members), None)
+        if odd is not None:
+            message = f"'{names[odd]}' has no mirror image in the cell that is the image of its own"
+            findings.error(
+                "plan-mirror", _span(rows, cell).span, message, "mirror all that these cells hold, or nothing of it"
+            )
+            return
 
 
 def _span(rows: tuple[PlanRow, ...], cell: Cell) -> Located[str]:
