@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise, permutations, product
 from random import Random
 
@@ -13,8 +14,7 @@ from neurovis_layouts.layered import exchange
 from neurovis_layouts.layered.crossings import Ints, Segments, inversions
 from neurovis_layouts.layered.exchange import Exchange
 from neurovis_layouts.layered.levels import Levels, Node, Segment
-from neurovis_layouts.layered.order import Order, crossings, ordered
-from neurovis_layouts.layered.sifting import HELD, sifted, sifted_in_boxes
+from neurovis_layouts.layered.order import Order, crossings, ordered, places
 
 
 def levels_by_hand(nodes: list[list[Node]], segments: list[list[tuple[int, float, int, float]]]) -> Levels:
@@ -83,6 +83,16 @@ def test_the_fast_count_is_the_plain_one(levels: Levels, random: Random) -> None
     assert crossings(levels, order) == by_pairs(levels, order)
 
 
+@given(some_levels(), st.randoms(use_true_random=False))
+@settings(deadline=None)
+def test_what_is_turned_has_its_ports_the_other_way_round(levels: Levels, random: Random) -> None:
+    turned = np.array([random.random() < 0.5 for _ in levels.nodes])
+    side = np.where(turned, -1.0, 1.0)
+    gaps = [[replace(s, a=s.a * side[s.upper], b=s.b * side[s.lower]) for s in gap] for gap in levels.segments]
+    place = places(len(levels.nodes), levels.ranks)
+    assert Segments(levels).count(place, turned) == by_pairs(replace(levels, segments=gaps), levels.ranks)
+
+
 @given(some_levels(most=4, ranks=3))
 @settings(deadline=None, max_examples=40, derandomize=True)
 def test_tiny_graphs_are_ordered_as_well_as_can_be(levels: Levels) -> None:
@@ -127,33 +137,6 @@ def test_the_order_of_segments_does_not_show(levels: Levels) -> None:
     turned = Levels(levels.nodes, levels.ranks, [gap[::-1] for gap in levels.segments])
     assert [*map(set, ordered(turned)[1])] == [*map(set, levels.ranks)]
     assert by_pairs(turned, ordered(turned)[1]) == by_pairs(levels, ordered(levels)[1])
-
-
-@given(some_levels(boxes=True))
-@settings(deadline=None)
-def test_differences_are_what_sifting_saves(levels: Levels) -> None:
-    segments = Segments(levels)
-    place = np.zeros(len(levels.nodes), dtype=np.int64)
-    for rank in levels.ranks:
-        place[rank] = np.arange(len(rank))
-    for r, rank in enumerate(levels.ranks):
-        sides = segments.above[r], segments.below[r]
-        costs = sum((segments.differences(len(rank), side, place) for side in sides), np.zeros((1, 1), np.int64))
-        boxes: Ints = np.array([levels.nodes[node].box for node in rank], dtype=np.int64)
-        start = np.lexsort((np.arange(len(rank)), boxes))
-        first = [[*other] for other in levels.ranks]
-        first[r] = [rank[i] for i in start]
-        for found, saved in (sifted(costs, start), sifted_in_boxes(costs, start, boxes)):
-            order = [[*other] for other in first]
-            order[r] = [rank[i] for i in found]
-            assert by_pairs(levels, order) == by_pairs(levels, first) - saved
-
-
-def test_what_is_held_is_never_passed() -> None:
-    costs = np.array([[0, 5], [-5, 0]], dtype=np.int64)
-    assert sifted(costs, np.array([0, 1]))[0].tolist() == [1, 0]
-    costs[0, 1], costs[1, 0] = -HELD, HELD
-    assert sifted(costs, np.array([0, 1]))[0].tolist() == [0, 1]
 
 
 @given(some_levels(boxes=True, kin=True))

@@ -19,6 +19,7 @@ from neurovis_layouts.label_room import rect_of
 from neurovis_layouts.label_sides import best_sides, sided
 from neurovis_layouts.pins import with_origins
 from neurovis_layouts.routing import route_all
+from neurovis_layouts.routing.images import Images
 from neurovis_layouts.symmetry import Symmetry, exact, routed_alike
 from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.geometry import near_pairs, snap, straight
@@ -50,12 +51,14 @@ def drawn(
     for i, point in problem.pins.items():
         flat[i] = from_picture(point, problem.direction)
     pins = with_origins(problem, {i: to_picture(point, problem.direction) for i, point in enumerate(flat)})
-    mirrored = symmetry is not None and symmetry.paired.any()
-    centres = exact(problem, symmetry, flat) if symmetry is not None and mirrored else flat
+    centres, images, ghosts = flat, Images(), list[Point]()
+    if symmetry is not None and symmetry.paired.any():
+        centres = exact(problem, symmetry, centres)
+        images, ghosts = routed_alike(problem, symmetry, centres)
     there = {i: straight(centres[problem.edges[i].source], centres[problem.edges[i].target]) for i in clear}
-    routes = route_all(problem.edges, centres, careful=_CAREFUL, there=there, highest=highest)
-    if symmetry is not None and mirrored:
-        routes = routed_alike(problem, symmetry, centres, routes)
+    routes = route_all(
+        problem.edges, [*centres, *ghosts], careful=_CAREFUL, there=there, highest=highest, images=images
+    )
     turned = problem.direction
     fresh = Layout(
         problem.network,

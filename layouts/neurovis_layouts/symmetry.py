@@ -1,7 +1,7 @@
 """Symmetry: places and routes of neurons some of which are mirror images of others, about one axis.
 
 In: a problem, or places near those wanted. Out: whose image each neuron is; the places, symmetric; where the axis
-stands among pins; routes that are their image's reflections. Who has no image stands anywhere.
+stands among pins; which routes are their image's reflections. Who has no image stands anywhere.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ import numpy as np
 from neurovis_layouts.axes import axes, shift_of
 from neurovis_layouts.frame import from_picture
 from neurovis_layouts.routing.ends import keys_of
-from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
+from neurovis_layouts.routing.images import Images, images_of
 from neurovis_spec.layout import BoolArray, FloatArray, IntArray
-from neurovis_spec.layout.geometry import snap
-from neurovis_spec.layout.model import LayoutProblem, LayoutRefusalError, Point, Route
+from neurovis_spec.layout.geometry import Cells, snap
+from neurovis_spec.layout.model import RADIUS, LayoutProblem, LayoutRefusalError, Point
 
 #: How far from a pin the axis may stand, in neuron spacings, when it has to leave all pins on one side.
 _WIDE = 4.0
@@ -129,40 +129,12 @@ def exact(problem: LayoutProblem, symmetry: Symmetry, centres: Sequence[Point]) 
     return found
 
 
-def routed_alike(
-    problem: LayoutProblem, symmetry: Symmetry, centres: Sequence[Point], routes: Sequence[Route]
-) -> list[Route]:
-    """The routes, all between two neurons drawn as reflections of those between their images: whichever of both have
-    a clear way on the other side. What runs to its own image and back is its own reflection."""
-    index = {key: i for i, key in enumerate(keys_of(problem.edges))}
-    on_axis = np.array([x == symmetry.axis for x, _ in centres], dtype=np.bool_)
-    mirrored = (symmetry.paired | on_axis).tolist()
-    image = symmetry.image.tolist()
-    between: dict[tuple[int, int], list[int]] = {}
-    other: dict[int, int] = {}
-    for (source, target, number), i in index.items():
-        if mirrored[source] and mirrored[target]:
-            between.setdefault((min(source, target), max(source, target)), []).append(i)
-            other[i] = index.get((image[source], image[target], number), i)
-    found, obstacles = list(routes), Obstacles(centres)
-    for ends, here in between.items():
-        images = min(image[ends[0]], image[ends[1]]), max(image[ends[0]], image[ends[1]])
-        if images == ends:
-            for i in here if ends[0] != ends[1] else ():
-                back = [symmetry.reflected(point) for point in reversed(found[i])]
-                found[i] = tuple(((a + c) / 2, (b + d) / 2) for (a, b), (c, d) in zip(found[i], back, strict=True))
-        elif ends < images:
-            pairs = [(i, other[i]) for i in here if other[i] != i]
-            over = _reflected(symmetry, [(found[i], k) for i, k in pairs])
-            under = _reflected(symmetry, [(found[k], i) for i, k in pairs])
-            clear = not any(obstacles.crowded(list(over.values()), [images] * len(over), TOUCH))
-            if clear or any(obstacles.crowded(list(under.values()), [ends] * len(under), TOUCH)):
-                under = over
-            for i, route in under.items():
-                found[i] = route
-    return found
-
-
-def _reflected(symmetry: Symmetry, routes: Sequence[tuple[Route, int]]) -> dict[int, Route]:
-    """By edge, the reflection of the route that it is given with."""
-    return {i: tuple(map(symmetry.reflected, route)) for route, i in routes}
+def routed_alike(problem: LayoutProblem, symmetry: Symmetry, centres: Sequence[Point]) -> tuple[Images, list[Point]]:
+    """Which routes are reflections of others, and what these keep off besides the discs: where these would be on the
+    other side of the axis, but for what stands there."""
+    pair = {i: int(symmetry.image[i]) for i in np.flatnonzero(symmetry.paired).tolist()}
+    there = np.array(centres, dtype=np.float64)
+    ghosts = np.array([symmetry.reflected(point) for i, point in enumerate(centres) if i not in pair]).reshape(-1, 2)
+    taken = Cells(there, 2 * RADIUS).near(ghosts)[0]
+    free: list[Point] = [(x, y) for x, y in np.delete(ghosts, taken, axis=0).tolist()]
+    return images_of(keys_of(problem.edges), centres, pair, symmetry.axis), free

@@ -18,7 +18,7 @@ from neurovis_layouts.formations import columns, grid
 from neurovis_layouts.label_room import at_ends, covered, excess, sides_of
 from neurovis_layouts.layered.bands import UNCUT, Bands, Wanted, banded
 from neurovis_layouts.layered.box_columns import straightened, tied, with_spines
-from neurovis_layouts.layered.components import components_of, packed
+from neurovis_layouts.layered.components import components_of
 from neurovis_layouts.layered.flips import reflected
 from neurovis_layouts.layered.fold_ports import with_exits
 from neurovis_layouts.layered.folds import folded, interleaved, stacked
@@ -29,10 +29,13 @@ from neurovis_layouts.layered.place import placed, reaches
 from neurovis_layouts.layered.ranks import INSTANT, ranks_of
 from neurovis_layouts.layered.staggered import staggered
 from neurovis_layouts.layered.units import Unit
+from neurovis_layouts.packing import packed
 from neurovis_layouts.routing import Waypoint
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import LayoutProblem, Point, Side
 
+#: Between components that nothing connects.
+_APART = 1.5
 #: That a row stands behind another outweighs any connection.
 _ROW = 1000 * INSTANT
 
@@ -121,8 +124,10 @@ def planned(
     if alone and not (few and connected):
         parts.append(_unconnected(problem, [units[u] for u in alone]))
     plan = ComponentLayout()
-    for part_plan, shift in zip(parts, packed([part.extent() for part in parts]), strict=True):
-        plan.add(part_plan, shift)
+    extents = [part_plan.extent() for part_plan in parts]
+    corners = packed([(high[0] - low[0], high[1] - low[1]) for low, high in extents], _APART)
+    for part_plan, (x, y), (low, _) in zip(parts, corners, extents, strict=True):
+        plan.add(part_plan, (x - low[0], y - low[1]))
     return plan
 
 

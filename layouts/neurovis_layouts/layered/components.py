@@ -1,20 +1,17 @@
-"""Components: what is not connected is laid out on its own, and stands side by side.
+"""Components: what is not connected is laid out on its own.
 
-In: a problem and its units. Out: components as lists of units, and, for finished ones, where each goes.
+In: a problem and its units. Out: components as lists of units.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from itertools import pairwise
 
 import networkx as nx
 
 from neurovis_layouts.layered.units import Unit
-from neurovis_spec.layout.model import LayoutProblem, Point
-
-_APART = 1.5
+from neurovis_spec.layout.model import LayoutProblem
 
 
 def components_of(
@@ -44,18 +41,3 @@ def components_of(
         else:
             connected.append(component)
     return connected, alone
-
-
-def packed(extents: Sequence[tuple[Point, Point]]) -> list[Point]:
-    """Shifts that put boxes (low corner, high corner) side by side, in rows about as wide as the whole is high."""
-    sizes = [(high[0] - low[0] + _APART, high[1] - low[1] + _APART) for low, high in extents]
-    area = math.fsum((w + 0.6) * (h + 0.6) for w, h in sizes)
-    limit = max([16.0, 1.3 * math.sqrt(area), *(w for w, _ in sizes)])
-    shifts: list[Point] = []
-    x = y = row = 0.0
-    for (low, _), (width, height) in zip(extents, sizes, strict=True):
-        if x > 0 and x + width > limit + _APART:
-            x, y, row = 0.0, y + row, 0.0
-        shifts.append((x - low[0], y - low[1]))
-        x, row = x + width, max(row, height)
-    return shifts

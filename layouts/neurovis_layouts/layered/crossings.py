@@ -1,4 +1,4 @@
-"""Crossings: how many segments cross in an order, and what the nodes of a rank have with one another.
+"""Crossings: how many segments cross in an order, and where those of a node lead in the mean.
 
 In: Levels. Out: counts. The ends of segments are compared as integers: the place of the node in its rank, then which of
 its ports it is (the offsets of a block, in their order). So every count is exact, and the same on every machine.
@@ -7,7 +7,6 @@ its ports it is (the offsets of a block, in their order). So every count is exac
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -16,21 +15,6 @@ from neurovis_layouts.layered.levels import Levels
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class Side:
-    """What leads from a rank to one beside it: for each segment its other node and the port there, sorted by the node
-    in the rank; ``starts`` is where the segments of each node begin that has any, ``who`` its place in ``ranks[r]``."""
-
-    other: Ints
-    port: Ints
-    starts: Ints
-    who: Ints
-
-    def sizes(self) -> Ints:
-        """How many segments each node of ``who`` has."""
-        return np.diff(np.append(self.starts, len(self.other)))
 
 
 class Segments:
@@ -45,57 +29,31 @@ class Segments:
         self.lower_port = _ports(self.lower, [segment.b for segment in every])
         self.ports = 1 + int(max(self.upper_port.max(initial=0), self.lower_port.max(initial=0)))
         self.gap: Ints = np.repeat(np.arange(len(gaps), dtype=np.int64), gaps)
-        #: by rank: to the rank above, to the rank below
-        self.above: list[Side] = []
-        self.below: list[Side] = []
-        self.local: Ints = np.zeros(len(levels.nodes), dtype=np.int64)
-        for rank in levels.ranks:
-            self.local[rank] = np.arange(len(rank), dtype=np.int64)
-        bounds = np.cumsum([0, 0, *gaps, 0]).tolist()  # the first rank has nothing above, the last nothing below
-        for r in range(len(levels.ranks)):
-            above, below = slice(bounds[r], bounds[r + 1]), slice(bounds[r + 1], bounds[r + 2])
-            self.above.append(self._side(self.lower[above], self.upper[above], self.upper_port[above]))
-            self.below.append(self._side(self.upper[below], self.lower[below], self.lower_port[below]))
+        #: where the segments of each gap begin and end
+        self._bounds = np.cumsum([0, *gaps]).tolist()
 
-    def _side(self, own: Ints, other: Ints, port: Ints) -> Side:
-        local = self.local[own]
-        order = np.argsort(local, kind="stable")
-        local = local[order]
-        first = np.ones(len(local), dtype=np.bool_)
-        first[1:] = local[1:] != local[:-1]
-        return Side(other[order], port[order], np.flatnonzero(first), local[first])
-
-    def count(self, place: Ints) -> int:
-        """Crossings of all segments whose nodes have these places in their ranks; those from one point have none."""
+    def count(self, place: Ints, turned: npt.NDArray[np.bool_] | None = None) -> int:
+        """Crossings of all segments whose nodes have these places in their ranks; those from one point have none. The
+        ports of nodes that are ``turned`` stand the other way round."""
+        upper, lower = self.upper_port, self.lower_port
+        if turned is not None:
+            upper = np.where(turned[self.upper], self.ports - 1 - upper, upper)
+            lower = np.where(turned[self.lower], self.ports - 1 - lower, lower)
         wide = (int(place.max(initial=0)) + 1) * self.ports
-        start = (self.gap * wide + place[self.upper]) * self.ports + self.upper_port
-        end = self.gap * wide + place[self.lower] * self.ports + self.lower_port
+        start = (self.gap * wide + place[self.upper]) * self.ports + upper
+        end = self.gap * wide + place[self.lower] * self.ports + lower
         return inversions(end[np.argsort(start * (int(end.max(initial=0)) + 1) + end)])
 
-    def differences(self, size: int, side: Side, place: Ints) -> Ints:
-        """For the nodes of a rank, by their places in ``ranks[r]``: (i, j) is how many more crossings they have with
-        each other on this side if i stands before j than if j stands before i."""
-        result = np.zeros((size, size), dtype=np.int64)
-        count = len(side.other)
-        if not count:
-            return result
-        key = place[side.other] * self.ports + side.port
-        along = np.argsort(key, kind="stable")
-        # (k, j): how many of the first k segments, in the order of their other ends, are of the j-th node
-        before = np.zeros((count + 1, len(side.starts)), dtype=np.int64)
-        before[np.arange(1, count + 1), np.repeat(np.arange(len(side.starts)), side.sizes())[along]] = 1
-        np.cumsum(before, axis=0, out=before)
-        pairs = np.add.reduceat(before[np.searchsorted(key[along], key)], side.starts, axis=0)
-        result[side.who[:, None], side.who] = pairs - pairs.T
-        return result
-
-    def means(self, size: int, side: Side, place: Ints) -> Floats:
-        """The mean place of what each node of a rank is connected to on a side; NaN for those without."""
-        result = np.full(size, np.nan)
-        if len(side.other):
-            key = place[side.other] * self.ports + side.port
-            result[side.who] = np.add.reduceat(key, side.starts) / side.sizes()
-        return result
+    def means(self, r: int, down: bool, place: Ints, size: int) -> Floats:
+        """The mean place of what each of the nodes of a rank, so many, in their order, is connected to in the rank
+        above, else below; NaN for those without."""
+        gap = slice(*self._bounds[r - 1 : r + 1]) if down else slice(*self._bounds[r : r + 2])
+        here, there = (self.lower, self.upper) if down else (self.upper, self.lower)
+        port = (self.upper_port if down else self.lower_port)[gap]
+        own = place[here[gap]]
+        count = np.bincount(own, minlength=size)
+        sums = np.bincount(own, place[there[gap]] * self.ports + port, size)
+        return np.where(count > 0, sums / np.maximum(count, 1), np.nan)
 
 
 def _ports(nodes: Ints, offsets: Sequence[float]) -> Ints:

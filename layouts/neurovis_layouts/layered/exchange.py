@@ -27,11 +27,11 @@ class Exchange:
 
     def __init__(self, segments: Segments, classes: tuple[Ints, Ints]) -> None:
         self.ports = segments.ports
-        self.sides = [
-            _Ends(len(segments.local), segments.lower, segments.upper, segments.upper_port),
-            _Ends(len(segments.local), segments.upper, segments.lower, segments.lower_port),
-        ]
         self.box, self.kin = classes
+        self.sides = [
+            _Ends(len(self.box), segments.lower, segments.upper, segments.upper_port),
+            _Ends(len(self.box), segments.upper, segments.lower, segments.lower_port),
+        ]
 
     def improved(self, crossings: int, order: Sequence[Ints]) -> tuple[int, list[Ints]]:
         """The order after exchanges, and its crossings."""

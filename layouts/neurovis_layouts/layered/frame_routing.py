@@ -12,13 +12,15 @@ from neurovis_layouts.layered.component_layout import ComponentLayout
 from neurovis_layouts.layered.pinning import Settled
 from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.routing import Waypoint, route_all
-from neurovis_layouts.routing.channel_routing import channels
-from neurovis_layouts.routing.corners import rounded
+from neurovis_layouts.routing.corners import smooth
 from neurovis_layouts.routing.ends import Key
-from neurovis_layouts.routing.images import Images
+from neurovis_layouts.routing.images import images_of
 from neurovis_layouts.routing.obstacles import REACH
-from neurovis_spec.layout.geometry import Rect, angular, bounds, distance, meet, snap
+from neurovis_spec.layout.geometry import Rect, bounds, distance, meet, snap
 from neurovis_spec.layout.model import GRID, LayoutEdge, LayoutProblem, Point, Route
+
+#: How much of the corners of a line from band to band is cut off.
+_CUT = 3.0
 
 
 def linked(
@@ -38,34 +40,20 @@ def linked(
     the frame of its neuron; ``drawn`` are the routes within the frames."""
     edges = [problem.edges[i] for i in links]
     framed = [(frozenset(members), rect) for members, rect in (*frames, *boxes, *labels)]
-    # what has its waypoints from the plan keeps them
-    firm: dict[int, list[Waypoint]] = {}
-    lateral: dict[int, list[Waypoint]] = {}
     planned = _passing(problem, plan, rests)
-    begun = _cut(problem, links, plan, rests, [rect for _, rect in labels])
-    if frames:
-        gates = {k: planned[i] for k, i in enumerate(links) if i in planned}
-        firm = {k: gates[k] for k, i in enumerate(links) if k in gates and i in plan.firm and not rests.moved}
-        lines = [*drawn, *(_through(rests.places, edges[k], line) for k, line in firm.items()), *begun.values()]
-        free = {k: edge for k, edge in enumerate(edges) if k not in firm and k not in begun}
-        ways, lateral = channels(free, rests.places, framed, gates, lines)
-        ways.update(firm)
-    else:
-        ways = planned
-    bowed = _bowed(edges, units)
+    # what has all waypoints that it needs from the plan keeps them
+    firm = {k for k, i in enumerate(links) if i in plan.firm} if frames and not rests.moved else set()
     own = [keys[i] for i in links]
-    images = _images(own, rests, pair)
     routes = route_all(
         edges,
         rests.places,
-        ways,
-        bowed,
-        lateral,
+        {k: planned[i] for k, i in enumerate(links) if i in planned},
+        _bowed(edges, units),
         frames=framed,
         drawn=drawn,
-        begun=begun,
-        images=images,
-        planned=firm.keys(),
+        begun=_cut(problem, links, plan, rests, [rect for _, rect in labels]),
+        images=images_of(own, rests.places, pair, rests.axis),
+        planned=firm,
     )
     return {key: tuple(_snapped(route)) for key, route in zip(own, routes, strict=True)}
 
@@ -89,7 +77,7 @@ def _cut(
                 line = [line[0], aslant, *line[3:]]
             line.reverse()
         apart = [a for a, b in pairwise(line) if distance(a, b) > GRID]
-        found[k] = rounded([*apart, line[-1]], lambda _: True)
+        found[k] = smooth([*apart, line[-1]], _CUT)
     return found
 
 
@@ -104,11 +92,6 @@ def _aslant(line: Sequence[Point]) -> Point:
     (x, y), turn, end = line[0], line[2], line[3]
     far = min(abs(turn[0] - x), abs(end[1] - y) / 2)
     return turn[0], y + (far if end[1] > y else -far)
-
-
-def _through(places: Sequence[Point], edge: LayoutEdge, line: Sequence[Waypoint]) -> Route:
-    """A route straight from waypoint to waypoint."""
-    return angular([places[edge.source], *((way.x, way.y) for way in line), places[edge.target]])
 
 
 def _snapped(route: Route) -> list[Point]:
@@ -133,23 +116,3 @@ def _passing(problem: LayoutProblem, plan: ComponentLayout, rests: Settled) -> d
             passing = [Waypoint(way.x + dx, way.y + dy, way.half) for way in line]
             ways[i] = passing if plan.places[edge.source][1] < plan.places[edge.target][1] else passing[::-1]
     return ways
-
-
-def _images(keys: Sequence[Key], rests: Settled, pair: Mapping[int, int]) -> Images:
-    """Which connections are mirror images of others. There and back are taken from the same side: the sides that they
-    bow to are exchanged on the other."""
-    number = {key: i for i, key in enumerate(keys)}
-    of: dict[int, int] = {}
-    for key in sorted(keys, key=lambda key: (sorted(key[:2]), key)):
-        source, target, times = key
-        image = number.get((_image(source, rests, pair), _image(target, rests, pair), times))
-        if source != target and pair.get(source) == target:
-            of[number[key]] = number[key]
-        elif image is not None and image != number[key] and image not in of:
-            of[number[key]] = image
-    return Images(of, 2 * rests.axis)
-
-
-def _image(neuron: int, rests: Settled, pair: Mapping[int, int]) -> int:
-    """The mirror image of a neuron: itself on the axis, −1 where it has none."""
-    return pair.get(neuron, neuron if rests.places[neuron][0] == rests.axis else -1)

@@ -20,6 +20,10 @@ import numpy.typing as npt
 from neurovis_layouts.layered.levels import Levels
 
 Counts = npt.NDArray[np.int32]
+#: by rank: connections, and how many segments each has crossed at each slot
+Lines = dict[int, tuple[list[int], Counts]]
+#: by rank: slots, what decides who comes first in a slot, entries
+Added = dict[int, list[tuple[int, tuple[float, ...], int]]]
 
 #: What a crossing costs; a connection costs 1 for each rank that it is long. So a crossing is saved at the price of
 #: this many ranks; where it were less, connections would cross that need not; more changes nothing.
@@ -48,8 +52,7 @@ class Kept:
     """An order to which one can return."""
 
     order: tuple[list[int], ...]
-    before: tuple[Counts, ...]
-    costs: tuple[Counts | None, ...]
+    costs: tuple[Counts, ...]
     rank: tuple[int, ...]
     cells: tuple[tuple[int, ...] | None, ...]
 
@@ -90,20 +93,18 @@ class Insertion:
             for n, cell in zip(link.passages, cells or (), strict=True)
         }
         self.order = [[e for n in rank for e in ([cell_of[n]] if n in cell_of else self._points[n])] for rank in order]
-        #: (i, j): how many segments leave a rank before its i-th entry and arrive before the j-th of the next
-        self._before: list[Counts] = [
+        #: by rank (p, q): how many segments a line from slot p to slot q of the next rank crosses
+        self._costs: list[Counts] = [
             np.zeros((len(a) + 1, len(b) + 1), dtype=np.int32) for a, b in pairwise(self.order)
         ]
-        for r, i, j in self._segments():
-            self._before[r][i + 1, j + 1] += 1
-        self._before = [counts.cumsum(axis=0, dtype=np.int32).cumsum(axis=1, dtype=np.int32) for counts in self._before]
-        self._costs: list[Counts | None] = [None] * len(self._before)
+        self.work = 0
+        #: that of the whole at first: its crossings and lengths
+        self.cost = sum(self._threaded(c, 1) for c in range(len(self.links)))
         self._tight = [
             any(self._points[n] and (self._box[n] >= 0 or self._kin[n] >= 0 or len(self._points[n]) > 1) for n in rank)
             for rank in order
         ]
         self._out: set[int] = set()
-        self.work = 0
 
     def _find_links(self, levels: Levels) -> None:
         """Points, links, and the links of each node on both sides."""
@@ -145,80 +146,165 @@ class Insertion:
             return self._owner[entry], -1
         return -1, (entry - len(self._owner)) // self._height
 
-    def cost(self) -> int:
-        """That of the whole: its crossings and lengths."""
-        segments = list(self._segments())
-        crossed = sum(_between(self._before[r], i, j) for r, i, j in segments) // 2
-        return crossed * CROSSING + len(segments)
-
-    def _segments(self) -> Iterator[tuple[int, int, int]]:
-        """Every piece of a connection: its upper rank, which entry it leaves there, at which of the next it arrives."""
-        place = [{entry: i for i, entry in enumerate(rank)} for rank in self.order]
-        for link, cells in zip(self.links, self.cells, strict=True):
-            line = [link.top, *(cells or ()), link.bottom]
-            for r, (a, b) in enumerate(pairwise(line), self.rank[link.upper]):
-                yield r, place[r][a], place[r + 1][b]
+    def _threaded(self, c: int, sign: int) -> int:
+        """Count the segments of a connection with all others (``sign`` 1), or no more (-1); what they cost."""
+        link, cost = self.links[c], 0
+        r = self.rank[link.upper]
+        i = self.order[r].index(link.top)
+        for entry in (*(self.cells[c] or ()), link.bottom):
+            j, costs = self.order[r + 1].index(entry), self._costs[r]
+            for crossing in (costs[: i + 1, j + 1 :], costs[i + 1 :, : j + 1]):
+                crossing += sign
+            # the lines beside it cross what it crosses and what begins or ends where it does
+            beside = costs.item(i, j + 1) + costs.item(i + 1, j)
+            alike = costs.item(i + 1, 0) - costs.item(i, 0) + costs.item(0, j + 1) - costs.item(0, j)
+            cost += (beside - alike) // 2 * CROSSING + 1
+            i, r = j, r + 1
+        self.work += len(self.cells[c] or ()) + 1
+        return cost
 
     def keep(self) -> Kept:
         """The order as it is now."""
-        return Kept(tuple(self.order), tuple(self._before), tuple(self._costs), tuple(self.rank), tuple(self.cells))
+        return Kept(tuple(self.order), tuple(self._costs), tuple(self.rank), tuple(self.cells))
 
     def restore(self, kept: Kept) -> None:
         """Return to an order in which nothing was taken out."""
-        self.order, self._before, self._costs = list(kept.order), list(kept.before), list(kept.costs)
+        self.order, self._costs = list(kept.order), list(kept.costs)
         self.rank, self.cells = list(kept.rank), list(kept.cells)
         self._out.clear()
 
-    def take(self, node: int) -> int:
-        """Take a node out with its connections; what they cost."""
-        saved = sum(self._unroute(c) for c in (*self.ups[node], *self.downs[node]) if self.cells[c] is not None)
-        r, more = self.rank[node], len(self._points[node])
-        p = self.order[r].index(self._points[node][0])
-        self.order[r] = self.order[r][:p] + self.order[r][p + more :]
-        if r > 0:
-            old = self._before[r - 1]
-            self._set(r - 1, np.concatenate((old[:, : p + 1], old[:, p + 1 + more :]), axis=1))
-        if r < len(self._before):
-            old = self._before[r]
-            self._set(r, np.concatenate((old[: p + 1], old[p + 1 + more :])))
-        self._out.add(node)
-        return saved
+    def take(self, nodes: Sequence[int]) -> int:
+        """Take nodes out with their connections; what these cost."""
+        every = dict.fromkeys(c for n in nodes for c in (*self.ups[n], *self.downs[n]) if self.cells[c] is not None)
+        gone: dict[int, set[int]] = {}
+        copied: set[int] = set()
+        cost = 0
+        for c in every:
+            top = self.rank[self.links[c].upper]
+            for r in range(top, self.rank[self.links[c].lower]):
+                if r not in copied:
+                    copied.add(r)
+                    self._costs[r] = self._costs[r].copy()
+            cost += self._threaded(c, -1)
+            for r, cell in enumerate(self.cells[c] or (), top + 1):
+                gone.setdefault(r, set()).add(cell)
+            self.cells[c] = None
+        for n in nodes:
+            gone.setdefault(self.rank[n], set()).update(self._points[n])
+        left: dict[int, list[int]] = {}
+        for r, entries in gone.items():
+            left[r] = [0, *(i for i, entry in enumerate(self.order[r], 1) if entry not in entries)]
+            self.order[r] = [entry for entry in self.order[r] if entry not in entries]
+        self._select(left)
+        self._out.update(nodes)
+        return cost
 
-    def put(self, node: int, roll: int) -> int:
-        """Put a node back where its connections, to what is not taken out, cost least; what they cost. ``roll`` is a
-        random number that chooses between slots that cost the same."""
-        links = self.links
+    def _select(self, slots: Mapping[int, Sequence[int]]) -> None:
+        """Some ranks are others now: for each of their slots which one it was."""
+        for gap in sorted({r - 1 for r in slots if r} | {r for r in slots if r < len(self._costs)}):
+            costs = self._costs[gap]
+            if gap in slots:
+                costs = costs.take(slots[gap], 0)
+            if gap + 1 in slots:
+                costs = costs.take(slots[gap + 1], 1)
+            self._costs[gap] = costs
+            self.work += 1 + costs.size // _NUMBERS
+
+    def put(self, node: int, roll: int, most: int) -> int:
+        """Put a node back where its connections, to what is not taken out, cost least; what they cost. Where that is
+        more than ``most`` it stays out. ``roll`` is a random number that chooses between slots that cost the same."""
         first, last = self._first(node), self._last(node)
-        ups = [c for c in self.ups[node] if links[c].upper not in self._out]
-        downs = [c for c in self.downs[node] if links[c].lower not in self._out]
-        from_above = self._reach([(self.rank[links[c].upper], links[c].top) for c in ups], first, last, True)
-        from_below = self._reach([(self.rank[links[c].lower], links[c].bottom) for c in downs], first, last, False)
-        best = slot = -1
+        ups = [c for c in self.ups[node] if self.links[c].upper not in self._out]
+        downs = [c for c in self.downs[node] if self.links[c].lower not in self._out]
+        sides = [self._lines(ups, last, True), self._lines(downs, first, False)]
+        length = sum(first - self.rank[self.links[c].upper] for c in ups)
+        length += sum(self.rank[self.links[c].lower] - last for c in downs)
+        options: list[tuple[int, int, Counts]] = []
         for r in range(first, last + 1):
-            sums = [side[r] for side in (from_above, from_below) if side]
-            costs = (
-                sums[0] + sums[1] if len(sums) > 1 else sums[0] if sums else np.zeros(len(self.order[r]) + 1, np.int32)
-            )
-            if self._tight[r]:
-                costs = costs + self._shut_to(r, node)
-            least = int(costs.min())
-            cost = least * CROSSING + len(ups) * (r - first) + len(downs) * (last - r)
-            if slot < 0 or cost < best or (cost == best and roll & 1):
-                ties = np.flatnonzero(costs == least)
-                best, slot, self.rank[node] = cost, int(ties[roll % len(ties)]), r
-            roll >>= 1
-        r, more = self.rank[node], len(self._points[node])
-        self.order[r] = self.order[r][:slot] + self._points[node] + self.order[r][slot:]
-        if r > 0:
-            old = self._before[r - 1]
-            self._set(
-                r - 1, np.concatenate((old[:, :slot], *[old[:, slot : slot + 1]] * (more + 1), old[:, slot + 1 :]), 1)
-            )
-        if r < len(self._before):
-            old = self._before[r]
-            self._set(r, np.concatenate((old[:slot], *[old[slot : slot + 1]] * (more + 1), old[slot + 1 :])))
+            costs = sum((np.add.reduce(lines[r][1], 0) for lines in sides if lines), self._shut_to(r, node))
+            least = int(costs[costs.argmin()])
+            options.append((least * CROSSING + length + len(ups) * (r - first) + len(downs) * (last - r), r, costs))
+            self.work += 1
+        best = min(cost for cost, *_ in options)
+        if best > most:
+            return best
+        options = [option for option in options if option[0] == best]
+        roll, choice = divmod(roll, len(options))
+        _, at, costs = options[choice]
+        ties = np.flatnonzero(costs == costs.min())
+        slot = int(ties[roll % len(ties)])
+        self.rank[node] = at
         self._out.discard(node)
-        return sum(self._route(c) for c in (*ups, *downs))
+        added: Added = {at: [(slot, (number,), point) for number, point in enumerate(self._points[node])]}
+        for lines, step in zip(sides, (-1, 1), strict=True):
+            for k, c in enumerate(lines[at][0] if lines else ()):
+                self._lead(c, [slot, *self._way(lines, k, at, slot, step)], at, step, added)
+        return self._insert(added, (*ups, *downs))
+
+    def _lines(self, links: Sequence[int], end: int, down: bool) -> Lines:
+        """For each rank on the way from the far ends of these connections, above or below, to the ``end``: those that
+        have begun, and for each slot how many segments each of them crosses to get there."""
+        lines: Lines = {}
+        if not links:
+            return lines
+        step = 1 if down else -1
+        ends: dict[int, list[int]] = {}
+        for c in links:
+            ends.setdefault(self.rank[self.links[c].upper if down else self.links[c].lower], []).append(c)
+        begun: list[int] = []
+        for r in range((min if down else max)(ends), end, step):
+            costs = self._costs[r] if down else self._costs[r - 1].T
+            found: list[Counts] = []
+            if begun:
+                here = lines[r][1]
+                if self._tight[r]:
+                    here = here + np.array([self._shut(r, self.links[c].box) for c in begun])
+                self.work += 2 + len(begun) * costs.size // _NUMBERS
+                found.append(np.minimum.reduce(here[:, :, None] + costs, axis=1))
+            if r in ends:
+                at = [self.order[r].index(self.links[c].top if down else self.links[c].bottom) for c in ends[r]]
+                before, after = costs[at], costs[[i + 1 for i in at]]
+                # both cross what a line from between them crosses, and one or the other what begins there, too
+                found.append((before + after - (after[:, :1] - before[:, :1])) // 2)
+                begun = begun + ends[r]
+            lines[r + step] = begun, found[0] if len(found) == 1 else np.concatenate(found)
+        return lines
+
+    def _way(self, lines: Lines, k: int, r: int, slot: int, step: int) -> Iterator[int]:
+        """The slots through which the k-th of some lines comes to a slot of a rank, from the last one back."""
+        while (r := r + step) in lines and k < len(lines[r][0]):
+            reached = lines[r][1][k]
+            if self._tight[r]:
+                reached = reached + self._shut(r, self.links[lines[r][0][k]].box)
+            costs = self._costs[r - 1].T if step > 0 else self._costs[r]
+            slot = int((reached + costs[:, slot]).argmin())
+            yield slot
+
+    def _lead(self, c: int, way: Sequence[int], r: int, step: int, added: Added) -> None:
+        """A connection from a slot of a rank through others: of several in one slot that stands first which comes from
+        farther to the front."""
+        link = self.links[c]
+        end = link.top if step < 0 else link.bottom
+        line = [*way, self.order[r + step * len(way)].index(end) + 0.5]
+        for i, slot in enumerate(way[1:], 1):
+            added.setdefault(r + step * i, []).append((slot, tuple(line[i + 1 :]), self._cell(c, r + step * i)))
+
+    def _insert(self, added: Added, links: Sequence[int]) -> int:
+        """Put entries into slots, and connections through them; what these cost."""
+        slots: dict[int, list[int]] = {}
+        for r, entries in added.items():
+            rank = list(self.order[r])
+            slots[r] = sorted([*range(len(rank) + 1), *(slot for slot, *_ in entries)])
+            for slot, _, entry in sorted(entries, reverse=True):
+                rank.insert(slot, entry)
+            self.order[r] = rank
+        self._select(slots)
+        cost = 0
+        for c in links:
+            link = self.links[c]
+            self.cells[c] = tuple(self._cell(c, r) for r in range(self.rank[link.upper] + 1, self.rank[link.lower]))
+            cost += self._threaded(c, 1)
+        return cost
 
     def _first(self, node: int) -> int:
         """The first rank in which a node may stand, with a rank left for each node before it that is taken out."""
@@ -232,123 +318,6 @@ class Insertion:
             return self.rank[node]
         below = {self.links[c].lower for c in self.downs[node]}
         return min((self._last(n) if n in self._out else self.rank[n] for n in below), default=self._height) - 1
-
-    def _reach(self, starts: Sequence[tuple[int, int]], first: int, last: int, down: bool) -> dict[int, Counts]:
-        """By rank from ``first`` to ``last``, for each slot: how many segments lines from all of these entries above,
-        else below, cross on their way to it."""
-        found: dict[int, Counts] = {}
-        waiting = _by_rank(starts)
-        lines: Counts | None = None
-        step, end = (1, last) if down else (-1, first)
-        begin = (min if down else max)(waiting, default=end + step)
-        for r in range(begin, end + step, step):
-            if lines is not None and first <= r <= last:
-                found[r] = lines.sum(axis=0, dtype=np.int32)
-            if r == end:
-                break
-            gap = r if down else r - 1
-            if lines is not None:
-                if self._tight[r]:
-                    lines = lines + self._shut(r, -1)
-                costs = self._cost_of(gap)
-                lines = self._through(lines, costs if down else costs.T)
-            if r in waiting:
-                at = [self.order[r].index(entry) for entry in waiting[r]]
-                whole = self._before[gap] if down else self._before[gap].T
-                before, after = whole[at], whole[[i + 1 for i in at]]
-                # what leaves before it and arrives behind, and what leaves behind it and arrives before
-                more = before[:, -1:] - before + whole[-1] - after
-                lines = more if lines is None else np.concatenate((lines, more))
-        return found
-
-    def _through(self, lines: Counts, costs: Counts) -> Counts:
-        """The lines led on by one rank."""
-        self.work += 2 + lines.shape[0] * costs.size // _NUMBERS
-        found: Counts = (lines[:, :, None] + costs).min(axis=1)
-        return found
-
-    def _cost_of(self, r: int) -> Counts:
-        """(p, q): how many segments a line from slot p of a rank to slot q of the next crosses."""
-        found = self._costs[r]
-        if found is None:
-            before = self._before[r]
-            found = before[:, -1:] + before[-1] - 2 * before
-            self._costs[r] = found
-        return found
-
-    def _set(self, r: int, before: Counts) -> None:
-        self._before[r], self._costs[r] = before, None
-
-    def _unroute(self, c: int) -> int:
-        """Take a connection out; what it costs."""
-        link = self.links[c]
-        line = [link.top, *(self.cells[c] or ()), link.bottom]
-        first, last = self.rank[link.upper], len(line) - 2
-        at = [self.order[first + k].index(entry) for k, entry in enumerate(line)]
-        crossed = 0
-        for k in range(last + 1):
-            old = self._before[first + k]
-            a, b, da, db = at[k] + 1, at[k + 1] + 1, k > 0, k < last
-            crossed += _between(old, a - 1, b - 1)
-            new = np.empty((old.shape[0] - da, old.shape[1] - db), dtype=np.int32)
-            new[:a, :b] = old[:a, :b]
-            new[:a, b:] = old[:a, b + db :]
-            new[a:, :b] = old[a + da :, :b]
-            np.subtract(old[a + da :, b + db :], 1, out=new[a:, b:])
-            self._set(first + k, new)
-            self.work += 1 + old.size // _NUMBERS
-        for k in range(1, last + 1):
-            rank = self.order[first + k]
-            self.order[first + k] = rank[: at[k]] + rank[at[k] + 1 :]
-        self.cells[c] = None
-        return crossed * CROSSING + last + 1
-
-    def _route(self, c: int) -> int:
-        """Put a connection back where it crosses least; what it costs."""
-        link = self.links[c]
-        first, last = self.rank[link.upper], self.rank[link.lower]
-        a, b = self.order[first].index(link.top), self.order[last].index(link.bottom)
-        if last == first + 1:
-            crossed, at = _between(self._before[first], a, b), [a, b]
-        else:
-            crossed, at = self._way(link, a, b)
-        for k in range(last - first):
-            old = self._before[first + k]
-            i, j, di, dj = at[k] + 1, at[k + 1] + 1, k > 0, first + k + 1 < last
-            new = np.empty((old.shape[0] + di, old.shape[1] + dj), dtype=np.int32)
-            new[:i, :j] = old[:i, :j]
-            new[:i, j:] = old[:i, j - dj :]
-            new[i:, :j] = old[i - di :, :j]
-            np.add(old[i - di :, j - dj :], 1, out=new[i:, j:])
-            self._set(first + k, new)
-            self.work += 1 + old.size // _NUMBERS
-        cells = tuple(self._cell(c, r) for r in range(first + 1, last))
-        for r, slot, cell in zip(range(first + 1, last), at[1:-1], cells, strict=True):
-            self.order[r] = [*self.order[r][:slot], cell, *self.order[r][slot:]]
-        self.cells[c] = cells
-        return crossed * CROSSING + last - first
-
-    def _way(self, link: Link, a: int, b: int) -> tuple[int, list[int]]:
-        """The least crossings on the way from the a-th to the b-th entry of two ranks; these and the slots between."""
-        first, last = self.rank[link.upper] + 1, self.rank[link.lower] - 1
-        before = self._before[first - 1]
-        line = before[a, -1] - before[a] + before[-1] - before[a + 1]
-        come: list[npt.NDArray[np.int64]] = []
-        for r in range(first, last + 1):
-            if self._tight[r]:
-                line = line + self._shut(r, link.box)
-            if r < last:
-                through = line[:, None] + self._cost_of(r)
-                come.append(through.argmin(axis=0))
-                line = through.min(axis=0)
-                self.work += 2 + through.size // _NUMBERS
-        before = self._before[last]
-        line = line + before[:, -1] - before[:, b + 1] + before[-1, b] - before[:, b]
-        slots = [int(line.argmin())]
-        crossed = int(line[slots[0]])
-        for back in reversed(come):
-            slots.append(int(back[slots[-1]]))
-        return crossed, [a, *slots[::-1], b]
 
     def _shut(self, r: int, box: int) -> Counts:
         """For each slot of a rank ``_SHUT`` where it lies within a block or another box, or outside of ``box`` though
@@ -366,6 +335,8 @@ class Insertion:
 
     def _shut_to(self, r: int, node: int) -> Counts:
         """``_shut`` for a node, which also has to keep its place in the order of its group."""
+        if not self._tight[r]:
+            return np.zeros(len(self.order[r]) + 1, dtype=np.int32)
         found = self._shut(r, int(self._box[node]))
         if self._kin[node] >= 0:
             other, boxes = self._owners(r)
@@ -383,15 +354,3 @@ class Insertion:
         node = np.where(point, self._node_of[np.minimum(entries, count - 1)], -1)
         link = np.where(point, -1, (entries - count) // self._height)
         return node, np.where(point, self._box[node], self._box_of[link])
-
-
-def _between(before: Counts, i: int, j: int) -> int:
-    """How many segments a line between the i-th entry of a rank and the j-th of the next crosses."""
-    return int(before[i, -1] - before[i, j + 1] + before[-1, j] - before[i + 1, j])
-
-
-def _by_rank(starts: Sequence[tuple[int, int]]) -> Mapping[int, list[int]]:
-    found: dict[int, list[int]] = {}
-    for rank, entry in starts:
-        found.setdefault(rank, []).append(entry)
-    return found

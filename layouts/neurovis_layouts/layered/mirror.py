@@ -2,8 +2,8 @@
 
 In: Levels of a problem, and whose mirror image each neuron is. Out: the order of every rank, which turned round is that
 of the mirror images, and for each node its image; what is in no pair stands on the axis or about it. It is found by
-folding the levels along the axis, ordering the half, and then swapping where the whole crosses less. Passages without
-an image get one that nothing passes, so that the room they take is the same on both sides.
+folding the levels along the axis and ordering the half. Passages without an image get one that nothing passes, so that
+the room they take is the same on both sides.
 """
 
 from __future__ import annotations
@@ -11,17 +11,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 
-import numpy as np
-
-from neurovis_layouts.layered.crossings import Segments
 from neurovis_layouts.layered.levels import Levels, Node, Segment
-from neurovis_layouts.layered.order import ordered, places
+from neurovis_layouts.layered.order import ordered
 from neurovis_layouts.routing.ends import keys_of
 from neurovis_spec.layout.model import LayoutProblem
-
-_ROUNDS = 6
-#: Beyond this no swaps are tried after the half has been ordered.
-_MOST_SEGMENTS = 3000
 
 
 def mirrored(
@@ -40,8 +33,6 @@ def mirrored(
     _match_passages(problem, levels, pair, where, image, side)
     half = _folded(levels, image, side)
     order = _unfolded(levels, ordered(half[0], effort=problem.effort, draft=draft)[1], half[1], image, side)
-    if not draft and sum(len(gap) for gap in levels.segments) <= _MOST_SEGMENTS:
-        order = _improved(levels, order, side)
     for rank in order:
         _about(levels, rank, side, pair)
     result: list[int] = [0] * len(levels.nodes)
@@ -156,32 +147,4 @@ def _unfolded(
         nodes = [chosen[n] for n in rank]
         left = [n for n in nodes if side[n] < 0]
         order.append([*left, *(n for n in nodes if side[n] == 0), *(image[n] for n in reversed(left))])
-    return order
-
-
-def _improved(levels: Levels, order: list[list[int]], side: Mapping[int, int]) -> list[list[int]]:
-    """Swap neighbours, and their images, where that saves crossings of the whole."""
-    segments = Segments(levels)
-    place = places(len(levels.nodes), [np.array(rank, dtype=np.int64) for rank in order])
-    least = segments.count(place)
-    for _ in range(_ROUNDS):
-        before = least
-        for rank in order:
-            half = sum(side[n] < 0 for n in rank)
-            last = half + sum(side[n] == 0 for n in rank) - 1
-            for i in [*range(half - 1), *range(half, last)]:
-                a, b = levels.nodes[rank[i]], levels.nodes[rank[i + 1]]
-                if a.box != b.box or (a.kin >= 0 and a.kin == b.kin):
-                    continue
-                j = len(rank) - 2 - i if i + 1 < half else i
-                swapped = place.copy()
-                for k in {i, j}:
-                    swapped[rank[k]], swapped[rank[k + 1]] = k + 1, k
-                count = segments.count(swapped)
-                if count < least:
-                    least, place = count, swapped
-                    for k in {i, j}:
-                        rank[k], rank[k + 1] = rank[k + 1], rank[k]
-        if least == before:
-            break
     return order

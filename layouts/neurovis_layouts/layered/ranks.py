@@ -13,7 +13,6 @@ from collections.abc import Set as AbstractSet
 import networkx as nx
 import numpy as np
 
-from neurovis_layouts.layered.sifting import sifted
 from neurovis_layouts.layered.simplex import shortened
 
 #: The weight of a connection without delay: it is reversed only where a loop of such connections leaves no choice.
@@ -132,4 +131,17 @@ def _sifted(order: list[int], arcs: Arcs) -> list[int]:
         if a in number and b in number:
             costs[number[a], number[b]] -= int(weight)
             costs[number[b], number[a]] += int(weight)
-    return [order[i] for i in sifted(costs, np.arange(len(order), dtype=np.int64))[0].tolist()]
+    line = list(range(len(order)))
+    gained = True
+    while gained:
+        gained = False
+        for unit in range(len(order)):
+            at = line.index(unit)
+            others = line[:at] + line[at + 1 :]
+            # what it costs to stand behind so many of the others
+            behind = np.concatenate(([0], np.cumsum(costs[others, unit])))
+            best = int(behind.argmin())
+            if behind[best] < behind[at]:
+                line = [*others[:best], unit, *others[best:]]
+                gained = True
+    return [order[i] for i in line]

@@ -5,10 +5,12 @@ In: a route, or the points of a line. Out: the other of the two.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
+from neurovis_layouts.routing.polylines import along
+from neurovis_layouts.routing.walls import blocked
 from neurovis_spec.layout import BoolArray, FloatArray, IntArray
 from neurovis_spec.layout.geometry import cubic, pieces_of, squared_distances
 from neurovis_spec.layout.model import GRID, Point, Route
@@ -57,15 +59,22 @@ def smooth(line: Sequence[Point], cut: float) -> Route:
     """The route along a line of at least two points, its control points on the grid; of a leg at each of its ends no
     more than ``cut`` and no more than half is cut off, but nearly all where it leads to an end of the line."""
     pieces, _ = smoothed([(line, cut)])
+    return _route(pieces)
+
+
+def rounded(line: Sequence[Point], rects: FloatArray) -> Route:
+    """The route along a line of at least two points with the roundest corners with which it enters none of the
+    rectangles (f, 4); with sharp ones where it always does."""
+    pieces, owner = smoothed([(line, cut) for cut in _CUTS])
+    lines = along(pieces, owner, len(_CUTS))
+    inside = blocked(lines.a, lines.b, rects)
+    chosen = int(np.argmin(np.append(np.bincount(lines.owner, inside, len(_CUTS))[:-1], 0)))
+    return _route(pieces[owner == chosen])
+
+
+def _route(pieces: FloatArray) -> Route:
     first, *rest = ((x, y) for x, y in np.concatenate([pieces[0, :1], *pieces[:, 1:]]).tolist())
     return first, *rest
-
-
-def rounded(line: Sequence[Point], free: Callable[[Route], bool]) -> Route:
-    """The route along a line of at least two points with the roundest corners with which it is ``free``; with sharp
-    ones where it never is."""
-    routes = (smooth(line, cut) for cut in _CUTS)
-    return next(filter(free, routes), smooth(line, _CUTS[-1]))
 
 
 def smoothed(ways: Sequence[tuple[Sequence[Point], float]]) -> tuple[FloatArray, IntArray]:

@@ -1,11 +1,11 @@
 """Ends: connections that share both of theirs.
 
-In: edges. Out: a key for each; by ends, in either direction, which they are; the ends that several share.
+In: edges. Out: a key for each; by ends, in either direction, which they are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import TypeAlias
 
 from neurovis_spec.layout.model import LayoutEdge
@@ -31,12 +31,3 @@ def by_ends(edges: Iterable[tuple[int, LayoutEdge]]) -> dict[frozenset[int], lis
     for number, edge in edges:
         found.setdefault(frozenset((edge.source, edge.target)), []).append(number)
     return found
-
-
-def shared_ends(edges: Sequence[LayoutEdge]) -> frozenset[tuple[int, int]]:
-    """Ends that several edges share, in either direction: these must not leave their side."""
-    times: dict[tuple[int, int], int] = {}
-    for edge in edges:
-        for ends in ((edge.source, edge.target), (edge.target, edge.source)):
-            times[ends] = times.get(ends, 0) + 1
-    return frozenset(ends for ends, count in times.items() if count > 1)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from neurovis_layouts.routing.ends import Key
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
@@ -51,3 +52,22 @@ class Images:
         half = line[: len(line) // 2]
         middle = [(self.twice / 2, line[len(half)][1])] if len(line) % 2 else []
         return *half, *middle, *((self.twice - x, y) for x, y in half[::-1])
+
+
+def images_of(keys: Sequence[Key], centres: Sequence[Point], pair: Mapping[int, int], axis: float) -> Images:
+    """Which connections are mirror images of others, by who is whose ``pair``; who stands on the axis is their own.
+    There and back are taken from the same side: the sides that they bow to are exchanged on the other."""
+
+    def image(neuron: int) -> int:
+        return pair.get(neuron, neuron if centres[neuron][0] == axis else -1)
+
+    number = {key: i for i, key in enumerate(keys)}
+    of: dict[int, int] = {}
+    for key in sorted(keys, key=lambda key: (sorted(key[:2]), key)):
+        source, target, times = key
+        other = number.get((image(source), image(target), times))
+        if source != target and pair.get(source) == target:
+            of[number[key]] = number[key]
+        elif other is not None and other != number[key] and other not in of:
+            of[number[key]] = other
+    return Images(of, 2 * axis)

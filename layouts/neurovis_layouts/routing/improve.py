@@ -22,8 +22,8 @@ from neurovis_spec.layout.model import RADIUS, Point, Route
 #: With more routes than this none is drawn anew: they cross too much to be followed.
 MOST_IMPROVED = 300
 #: How many routes are drawn anew, at most, by how many there are: in a crowd nobody follows one. How many in vain, and
-#: how often it is tried again beside what is better now.
-_LEAST, _WORK, _VAIN, _ROUNDS = 15, 3000, 12, 3
+#: how often each is tried, a last time where they are few (of many it takes a fifth of the time: 2 % less turning).
+_LEAST, _WORK, _VAIN, _ROUNDS, _FEW = 15, 3000, 12, 3, 30
 #: How far routes are shifted, to what parts of a full turn their ends are turned, and which pieces are too short for
 #: that.
 _SHIFTS = (0.1, 0.16, 0.22, 0.3, 0.42, 0.6, 0.9)
@@ -57,7 +57,7 @@ def improved(drawn: Drawn, free: AbstractSet[int]) -> dict[int, Route]:
     """Better routes by edge index, of the edges that are ``free``; mirror images with them."""
     changed: set[int] = set()
     left, most = set(free), max(_LEAST, _WORK // max(1, len(drawn.routes)))
-    for _ in range(_ROUNDS):
+    for _ in range(_ROUNDS if len(drawn.routes) <= _FEW else _ROUNDS - 1):
         unclear = drawn.unclear(left)
         vain, found = 0, False
         for i in sorted(unclear, key=lambda i: (-unclear[i].cost, i))[:most]:

@@ -65,6 +65,11 @@ class Polylines:
             np.concatenate([np.zeros(1, dtype=np.int64), ends]),
         )
 
+    def and_then(self, others: Polylines) -> Polylines:
+        """These and others behind them."""
+        starts = np.concatenate([self.starts[:-1], self.starts[-1] + others.starts])
+        return Polylines(np.concatenate([self.points, others.points]), starts)
+
     def replaced(self, number: int, line: Polylines) -> Polylines:
         """The same with another line in place of one."""
         first, last = self.starts[number : number + 2].tolist()
@@ -176,7 +181,7 @@ class Polylines:
         (cx, cy), (dx, dy) = c.T, d.T
         near = (np.maximum(cx, dx) >= x0) & (np.minimum(cx, dx) <= x1)
         near &= (np.maximum(cy, dy) >= y0) & (np.minimum(cy, dy) <= y1)
-        i, j, share = _meetings(self.a, self.b, c[near], d[near])
+        i, j, share = crossings(self.a, self.b, c[near], d[near])
         where, line = self.a[i] + share[:, None] * self._way[i], self.owner[i]
         seen = np.ones(len(i), dtype=np.bool_)
         for end in (self.points[self.starts[:-1]], self.points[self.starts[1:] - 1]):
@@ -229,7 +234,7 @@ def _left(points: FloatArray, starts: IntArray, lines: IntArray, ring: float) ->
     return left
 
 
-def _meetings(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
+def crossings(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
     """Which segments from ``a`` to ``b`` cross which from ``c`` to ``d``, and at what share of their way."""
     i, j = close_segments(a, b, c, d, 0.0)
     share, hit = crossing(*a[i].T, *(b - a)[i].T, *c[j].T, *(d - c)[j].T)

@@ -17,7 +17,7 @@ from neurovis_layouts.routing.detours import detoured
 from neurovis_layouts.routing.images import Images
 from neurovis_layouts.routing.improve import MOST_IMPROVED, improved
 from neurovis_layouts.routing.loops import Loops
-from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
+from neurovis_layouts.routing.obstacles import Obstacles
 from neurovis_layouts.routing.ports import Port, leanings
 from neurovis_layouts.routing.route_cost import Drawn
 from neurovis_layouts.routing.walls import Frame, Walls
@@ -41,47 +41,38 @@ def route_all(
     centres: Sequence[Point],
     waypoints: Mapping[int, Sequence[Waypoint]] | None = None,
     bowed: AbstractSet[int] = frozenset(),
-    lateral: Mapping[int, Sequence[Waypoint]] | None = None,
     careful: int = _MOST_CAREFULLY,
     frames: Sequence[Frame] = (),
     drawn: Sequence[Route] = (),
     there: Mapping[int, Route] | None = None,
     images: Images | None = None,
-    planned: AbstractSet[int] = frozenset(),
     highest: float = math.inf,
     begun: Mapping[int, Route] | None = None,
+    planned: AbstractSet[int] = frozenset(),
 ) -> list[Route]:
     """Routes by edge index.
 
     Without ``waypoints`` every edge runs from anywhere to anywhere; with them, edges not in ``bowed`` run along the
-    direction (through their waypoints, if they have any). Those in ``lateral`` run across it, through waypoints with x
-    and y exchanged. With more than ``careful`` edges, discs in the way are not gone round. No route enters one of the
-    ``frames`` that holds neither of its ends, if there is a way round. ``drawn`` are other routes, which are
-    there, as are those of these edges that are ``there``. A bow is at most ``highest`` times as high as its way is
-    long; what it cannot get over it goes round from disc to disc. ``begun`` are routes to begin with, not curves; of
-    those with ``images`` one is the other's reflection. Where some are ``planned``, which cross nothing, what would be
-    drawn anew beside them might: only arcs between images are.
+    direction (through their waypoints, if they have any). With more than ``careful`` edges, discs in the way are not
+    gone round. No route enters one of the ``frames`` that holds neither of its ends, if there is a way round. ``drawn``
+    are other routes, which are there, as are those of these edges that are ``there``. A bow is at most ``highest``
+    times as high as its way is long; what it cannot get over it goes round from disc to disc. ``begun`` are routes to
+    begin with, not curves; of those with ``images`` one is the other's reflection. Where some are ``planned``, which
+    cross nothing, what would be drawn anew beside them might: only arcs between images are.
     """
     near = Obstacles(centres)
     obstacles = near if len(edges) <= careful else Obstacles(())
     routes: dict[int, Route] = dict(begun or {})
-    if lateral:
-        exchanged = [(y, x) for x, y in centres]
-        across = _curves(edges, exchanged, sorted(lateral), lateral)
-        routes.update({i: tuple((x, y) for y, x in route) for i, route in across.items()})
     if waypoints is not None:
         chosen = bowed | routes.keys()
         along = [i for i, edge in enumerate(edges) if i not in chosen and _runs_along(edge, centres)]
         routes.update(_curves(edges, centres, along, waypoints))
     rest = [i for i, edge in enumerate(edges) if i not in routes and edge.source != edge.target]
-    curved = frozenset(routes)
     routes.update(_bows(edges, centres, rest, obstacles, highest))
     walls = Walls(frames, len(centres))
     few = len(edges) <= min(careful, _MOST_AT_LENGTH)
     ways = {i: [(way.x, way.y) for way in line] for i, line in (waypoints or {}).items()}
-    ways |= {i: [(way.y, way.x) for way in line] for i, line in (lateral or {}).items()}
-    routes.update(detoured(edges, centres, routes, obstacles if few else Obstacles(()), walls, ways, drawn))
-    routes.update(_clearer(edges, centres, {i: routes[i] for i in sorted(curved)}, obstacles, highest))
+    routes.update(detoured(edges, centres, routes, obstacles, walls, ways, drawn))
     images = images or Images()
     routes.update(images.kept(routes, edges, centres))
     routes.update((i, route) for i, route in (there or {}).items() if few and i in routes)
@@ -178,21 +169,6 @@ def _bows(
             routes[between[ends][place]] = route
             reach[ends] = min(reach[ends][0], height), max(reach[ends][1], height)
     return routes
-
-
-def _clearer(
-    edges: Sequence[LayoutEdge],
-    centres: Sequence[Point],
-    routes: Mapping[int, Route],
-    obstacles: Obstacles,
-    highest: float,
-) -> dict[int, Route]:
-    """Bows for those of the routes that run over a disc, where these keep farther off."""
-    clear = obstacles.clearances([*routes.values()], [(edges[i].source, edges[i].target) for i in routes])
-    over = {i: clearance for i, clearance in zip(routes, clear, strict=True) if clearance < TOUCH}
-    bows = _bows(edges, centres, [*over], obstacles, highest)
-    found = obstacles.clearances([*bows.values()], [(edges[i].source, edges[i].target) for i in bows])
-    return {i: bows[i] for i, clearance in zip(bows, found, strict=True) if clearance > over[i]}
 
 
 def _least(

@@ -64,7 +64,11 @@ def meet(a: FloatArray, b: FloatArray, rects: FloatArray) -> BoolArray:
 def blocked(a: FloatArray, b: FloatArray, rects: FloatArray) -> BoolArray:
     """(k,) whether the segments from ``a`` (k, 2) to ``b`` (k, 2) enter any of the rectangles (f, 4)."""
     entered: BoolArray = np.zeros(len(a), dtype=np.bool_)
-    entered[meetings(a, b, rects)[0]] = True
+    if len(a):
+        # segments that are close to each other are compared with what is near these alone
+        low, high = np.minimum(a, b).min(axis=0), np.maximum(a, b).max(axis=0)
+        close = ((rects[:, :2] < high) & (rects[:, 2:] > low)).all(axis=1)
+        entered[meetings(a, b, rects[close])[0]] = True
     return entered
 
 
