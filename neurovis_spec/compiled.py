@@ -263,9 +263,7 @@ class CompiledNetwork(Drawable):
     def refusal(self) -> Diagnostic | None:
         """What ``layout`` and all that draws would refuse, as far as that is known before an engine begins; None where
         there is nothing of the kind."""
-        return pipeline.refusal(
-            self.spec, self.request, self.network, lambda: self.problem, memory=self.memory is not None
-        )
+        return pipeline.refusal(self.spec, self.request, self.network, lambda: self.problem)
 
     def layout(
         self,

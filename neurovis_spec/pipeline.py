@@ -151,16 +151,14 @@ def foresee(spec: Spec, network: Network, findings: Findings) -> None:
     foresee_frames(spec.layout.engine, network, findings)
 
 
-def refusal(
-    spec: Spec, request: Request, network: Network, problem: Callable[[], LayoutProblem], *, memory: bool = False
-) -> Diagnostic | None:
+def refusal(spec: Spec, request: Request, network: Network, problem: Callable[[], LayoutProblem]) -> Diagnostic | None:
     """What laying it out would refuse before the engine begins, and where the spec asks for it. The ``problem`` is
-    asked for where the engine depends on it; ``memory``: there is an earlier layout."""
+    asked for where the spec says anything of its layout."""
     if network.layout == LayoutSettings():
         return None
     from neurovis_spec.layout.foreseen import foreseen
 
-    found = foreseen(network, problem, memory=memory)
+    found = foreseen(network, problem)
     if found is None:
         return None
     span = locate(found, spec, request, network) or Span(*spec.name.span)

@@ -57,12 +57,14 @@ def test_the_help_of_a_command_imports_nothing_heavy(name: str) -> None:
 
 
 def test_validating_imports_nothing_that_runs_lays_out_or_draws() -> None:
-    """The engine that the spec names is asked what it can do, for which nothing is loaded that lays out."""
+    """The engine that the spec names is asked what it can do, by the problem, for which nothing is loaded that lays
+    out."""
     modules = loaded(command("validate", "specs/cpg_rbf.yaml"))
     assert not modules & {"networkx", "scipy", "PIL", "rich", "neurovis_renderers"}
     assert {name for name in modules if name.startswith("neurovis_layouts.")} == {"neurovis_layouts.layered"}
     later = ("runtime.", "layout.", "scene.", "describe", "snapshots")
-    asking = {f"layout.{name}" for name in ("engines", "foreseen", "geometry", "model", "naming", "refusals")}
+    parts = ("engines", "foreseen", "geometry", "labels", "makes", "model", "naming", "problem", "refusals")
+    asking = {f"layout.{name}" for name in parts}
     found = {name.removeprefix("neurovis_spec.") for name in modules}
     assert not {name for name in found if name.startswith(later)} - {"runtime.files", "runtime.parts"} - asking
 

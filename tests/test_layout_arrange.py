@@ -14,7 +14,7 @@ from neurovis_spec.layout.engines import engine_of
 from neurovis_spec.layout.geometry import straight
 from neurovis_spec.layout.model import LayoutMirror, LayoutModule
 from neurovis_spec.layout.problem import canonical
-from neurovis_spec.layout.refusals import asked_by, refuse
+from neurovis_spec.layout.refusals import refuse
 
 PAIR = canonical("pair", ["A", "B"], [("A", ["A"]), ("B", ["B"])], suite.named([("A", "B")]))
 
@@ -58,7 +58,7 @@ def test_auto_never_chooses_an_engine_that_takes_fewer_connections(boxed: bool) 
     engine, why = choose_engine(problem)
     assert engine == "organic"
     assert "densely" in why
-    refuse(asked_by(problem), engine, engine_of(engine).capabilities)
+    refuse(problem, engine, engine_of(engine).capabilities)
 
 
 def test_auto_takes_the_engine_for_many_neurons_also_where_nothing_connects_them() -> None:
@@ -180,7 +180,7 @@ def test_pins_just_a_disc_apart_are_fine() -> None:
 )
 def test_what_an_engine_cannot_do_is_refused(problem: LayoutProblem, code: str) -> None:
     with pytest.raises(LayoutRefusalError) as caught:
-        refuse(asked_by(problem), "poor", Capabilities(neurons=2))
+        refuse(problem, "poor", Capabilities(neurons=2))
     assert caught.value.code == code
 
 

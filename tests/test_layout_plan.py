@@ -204,3 +204,17 @@ def test_whichever_the_spacing_few_routes_of_the_hexapod_cross(spacing: tuple[fl
     layout = lay_out_problem(problem, "layered")
     assert metrics(layout, problem)["crossings"] <= 24
     assert suite.through_frames(layout, problem) == []
+
+
+def test_routes_of_a_cell_go_round_what_a_pin_puts_on_them() -> None:
+    links = "A4 -> A2: 1, A1 -> A1: 1, B1 -> A2: 1, B3 -> A4: 1, B1 -> B1: 1, B2 -> B4: 1, B2 -> A3: 1, A3 -> B4: 1"
+    network = nv.compile_text(f"""
+neurovis: 1
+name: cells
+neurons: {{A: {{count: 4, bias: 1}}, B: {{count: 4}}}}
+connections: {{{links}}}
+layout: {{plan: [[A], [B]], positions: {{A2: [0, 0], B4: [-2, 0]}}}}
+""")
+    layout = network.layout()
+    assert (layout.positions["A2"], layout.positions["B4"]) == ((0, 0), (-2, 0))
+    assert layout.metrics()["edges_over_neurons"] == 0

@@ -69,7 +69,7 @@ REFUSED = [
      + "  direction: down\n", "mirror-arrange", "S"),
     (CELLS, "align-conflict", "[E, B]"),
     (f"{LEGS}  mirror: [[left, right]]\n  align: [[left1.S, right1.K]]\n", "align-conflict", "[left1.S, right1.K]"),
-    (f"{PAIRED}  plan: [[A], [B]]\n  positions: {{A1: [0, 0], A4: [4, 3], B1: [-1, 0]}}\n", "pin-in-frame", "[0, 0]"),
+    (f"{PAIRED}  plan: [[A], [B]]\n  positions: {{A1: [0, 0], A4: [4, 3], B1: [2, 1]}}\n", "pin-in-frame", "[2, 1]"),
 ]  # fmt: skip
 
 

@@ -9,9 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from neurovis_layouts.frame import across_of
-from neurovis_spec.layout.model import LayoutModule, LayoutProblem, Point
+from neurovis_spec.layout.geometry import Rect, bounds
+from neurovis_spec.layout.model import LayoutModule, LayoutProblem, Point, Route
+
+#: Differences up to this are rounding, such as that of pins that are not on the grid.
+_SLACK = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +29,19 @@ class Move:
     def point(self, point: Point) -> Point:
         """A point moved."""
         return self.shift[0] + self.flip[0] * point[0], self.shift[1] + self.flip[1] * point[1]
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether it reflects across an upright axis."""
+        return self.flip[0] < 0
+
+    def route(self, route: Route) -> Route:
+        """A route moved."""
+        return tuple(map(self.point, route))
+
+    def rect(self, rect: Rect) -> Rect:
+        """A rectangle moved."""
+        return bounds([self.point(rect[:2]), self.point(rect[2:])])
 
     def inverse(self) -> Move:
         """The move back."""
@@ -39,15 +57,48 @@ class Move:
 STAY = Move()
 
 
+def shifted_by(shift: Point, flip: bool = False) -> Move:
+    """The move by a shift, reflected across the upright axis at 0 before that if ``flip``."""
+    return Move((-1.0 if flip else 1.0, 1.0), shift)
+
+
 def reflection(across: int, twice: float) -> Move:
     """The reflection on an axis, ``twice`` where it stands."""
     return Move((-1.0, 1.0), (twice, 0.0)) if across == 0 else Move((1.0, -1.0), (0.0, twice))
 
 
+def move_of(pairs: Sequence[tuple[Point, Point]]) -> Move | None:
+    """The move that takes the first of each pair to the second; None where there is none.
+
+    >>> move_of([((0.0, 0.0), (5.0, 1.0)), ((1.0, 2.0), (4.0, 3.0))])
+    Move(flip=(-1.0, 1.0), shift=(5.0, 1.0))
+    """
+    if not pairs:
+        return None
+    (a, b), flips = pairs[0], [1.0, 1.0]
+    for axis in (0, 1):
+        steps = ((p[axis] - a[axis], q[axis] - b[axis]) for p, q in pairs if abs(p[axis] - a[axis]) > _SLACK)
+        apart = next(steps, (0.0, 1.0))
+        flips[axis] = -1.0 if abs(apart[0] + apart[1]) <= _SLACK else 1.0
+    move = Move((flips[0], flips[1]), (b[0] - flips[0] * a[0], b[1] - flips[1] * a[1]))
+    return move if all(same(move.point(p), q) for p, q in pairs) else None
+
+
+def same(one: Point, other: Point) -> bool:
+    """Whether two points differ by rounding alone."""
+    return abs(one[0] - other[0]) <= _SLACK and abs(one[1] - other[1]) <= _SLACK
+
+
 class Alike:
     """Looks up the counterparts of a neuron: those whose places follow from its place."""
 
-    def __init__(self, problem: LayoutProblem, placed: Mapping[int, Point]) -> None:
+    def __init__(
+        self,
+        problem: LayoutProblem,
+        placed: Mapping[int, Point],
+        twice: Mapping[int, float] = MappingProxyType({}),
+    ) -> None:
+        """``twice`` where the axis of a scope stands, else it is where it is among what is placed."""
         self._placed = placed
         self._makes: dict[str, list[LayoutModule]] = {}
         self._around: dict[int, list[tuple[LayoutModule, int]]] = {}
@@ -57,10 +108,10 @@ class Alike:
                 self._around.setdefault(neuron, []).append((module, place))
         self._images: dict[int, tuple[int, Move]] = {}
         across = across_of(problem.direction)
-        for pairs in pairs_by_axis(problem):
+        for scope, pairs in pairs_by_axis(problem).items():
             there = [(a, b) for a, b in pairs if a in placed and b in placed]
-            move = reflection(across, twice_axis(there, placed, across))
-            for a, b in pairs if there else ():
+            move = reflection(across, twice.get(scope, twice_axis(there, placed, across)))
+            for a, b in pairs if there or scope in twice else ():
                 self._images[a] = b, move
                 self._images[b] = a, move
 
@@ -92,41 +143,24 @@ class Alike:
                         reach(mate, found[one].then(move), module.template)
         return list(found.items())
 
-    def image(self, module: LayoutModule) -> tuple[tuple[int, ...], Move] | None:
-        """The mirror images of an instance's neurons, if all of them have one, and the move to them."""
-        images = [self._images.get(neuron) for neuron in module.members]
-        known = [image for image in images if image is not None]
-        if not known or len(known) < len(images) or any(move != known[0][1] for _, move in known):
-            return None
-        mates = tuple(mate for mate, _ in known)
-        return None if set(mates) & set(module.members) else (mates, known[0][1])
-
     def _move(self, one: LayoutModule, other: LayoutModule) -> Move | None:
         """What takes one instance to the other, where neurons of both are placed; None where they are not drawn
         alike."""
-        pairs = [
-            (self._placed[a], self._placed[b])
-            for a, b in zip(one.members, other.members, strict=True)
-            if a in self._placed and b in self._placed
-        ]
-        if not pairs:
-            return None
-        flips: list[float] = []
-        for axis in (0, 1):
-            first, image = pairs[0][0][axis], pairs[0][1][axis]
-            apart = next(((a[axis] - first, b[axis] - image) for a, b in pairs if a[axis] != first), None)
-            flips.append(-1.0 if apart is not None and apart[0] == -apart[1] else 1.0)
-        (ax, ay), (bx, by) = pairs[0]
-        move = Move((flips[0], flips[1]), (bx - flips[0] * ax, by - flips[1] * ay))
-        return move if all(move.point(a) == b for a, b in pairs) else None
+        return move_of(
+            [
+                (self._placed[a], self._placed[b])
+                for a, b in zip(one.members, other.members, strict=True)
+                if a in self._placed and b in self._placed
+            ]
+        )
 
 
-def pairs_by_axis(problem: LayoutProblem) -> list[list[tuple[int, int]]]:
-    """The pairs of mirror images, those about one axis together."""
+def pairs_by_axis(problem: LayoutProblem) -> dict[int, list[tuple[int, int]]]:
+    """The pairs of mirror images, those about one axis together, by its scope."""
     found: dict[int, list[tuple[int, int]]] = {}
     for mirror in problem.mirrors:
         found.setdefault(mirror.scope, []).extend(mirror.pairs)
-    return list(found.values())
+    return found
 
 
 def twice_axis(pairs: Sequence[tuple[int, int]], where: Mapping[int, Point] | Sequence[Point], across: int) -> float:

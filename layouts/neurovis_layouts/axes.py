@@ -26,16 +26,16 @@ def shift_of(free: Sequence[Point], pins: Mapping[int, Point]) -> Point:
 
 
 def axes(
-    problem: LayoutProblem, free: Sequence[Point], pair: Mapping[int, int], wide: float
+    problem: LayoutProblem, start: float, pair: Mapping[int, int], wide: float
 ) -> Iterator[tuple[float, dict[int, Point]]]:
-    """Where the axis may be, the best place first, each with the pins and their images: one place where both of a pair
+    """Where the axis may be, the ``start`` first, each with the pins and their images: one place where both of a pair
     are pinned, else also so far off that nothing ``wide`` around a pin reaches it.
 
     Raises LayoutRefusalError where such pairs disagree, and where an image stands on a pin wherever the axis is.
     """
     refusal: LayoutRefusalError | None = None
     found = False
-    for axis in _places(problem, free, pair, wide):
+    for axis in _places(problem, start, pair, wide):
         try:
             pins = _imaged(problem, pair, axis)
         except LayoutRefusalError as error:
@@ -47,7 +47,7 @@ def axes(
         raise refusal
 
 
-def _places(problem: LayoutProblem, free: Sequence[Point], pair: Mapping[int, int], wide: float) -> Iterator[float]:
+def _places(problem: LayoutProblem, start: float, pair: Mapping[int, int], wide: float) -> Iterator[float]:
     """Where the axis may be. Raises LayoutRefusalError where pinned pairs disagree."""
     pins = problem.pins
     both = sorted((a, b) for a, b in pair.items() if a < b and a in pins and b in pins)
@@ -61,7 +61,6 @@ def _places(problem: LayoutProblem, free: Sequence[Point], pair: Mapping[int, in
     if both or not pair:
         yield (pins[both[0][0]][0] + pins[both[0][1]][0]) / 2 if both else 0.0
         return
-    start = shift_of(free, pins)[0]
     yield start
     reach = 0.0
     for step, count in _STEPS:

@@ -1,68 +1,115 @@
-"""Conflicts: what of an earlier layout, which somebody may have edited by hand, can stay.
+"""Conflicts: what of an earlier layout, which somebody may have edited by hand, is wanted where.
 
-In: a problem with an earlier layout, and a fresh one. Out: a place for each neuron that the earlier one knew or that is
-pinned, and who has to leave it. What was moved by hand differs from where the file's routes begin or end; it
-stays, and what it lies on then gives way. Where the earlier places break a symmetry of the spec, the symmetry wins:
-neurons of an instance follow the first instance of the same make; of a mirrored pair the one that was not moved by hand
-follows the other (else the second follows the first). Where the fresh layout is not symmetric either, nothing moves.
+In: a problem with an earlier layout, a drawing of it as if there were none, and where pins hold what. Out: a place for
+each neuron that the earlier one knew, and who of these is there for the first time. What was moved by hand differs from
+where the file's routes begin or end; it stays, and what it lies on then gives way. Where the earlier places break a
+symmetry of the spec, the symmetry wins: neurons of an instance follow the first instance of the same make; of a
+mirrored pair the one that was not moved by hand follows the other (else the second follows the first).
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from neurovis_layouts.alike import pairs_by_axis, reflection, twice_axis
+from neurovis_layouts.alike import Move, move_of, pairs_by_axis, reflection, same, twice_axis
 from neurovis_layouts.frame import across_of
-from neurovis_layouts.occupancy import Body, Occupancy, lone, overlapping
-from neurovis_spec.layout.frames import Frames
-from neurovis_spec.layout.geometry import distance
-from neurovis_spec.layout.model import Layout, LayoutModule, LayoutProblem, Point, Route
+from neurovis_layouts.occupancy import overlapping
+from neurovis_spec.layout.geometry import distance, snap
+from neurovis_spec.layout.model import RADIUS, Layout, LayoutModule, LayoutProblem, Point, Route
 
-#: Differences up to this are rounding.
+#: Discs that touch do not overlap, whatever rounding says.
 _SLACK = 1e-6
-#: What bodies are anchored at that stand where they are.
-_HERE = (0.0, 0.0)
-_SAME = (1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Earlier:
-    """Where neurons were, or are to be: those that ``stay`` there, and others that are ``wanted`` there if there is
-    room; and the routes, by edge, that can be used between these places."""
+    """Where neurons are wanted. Those that are put there ``newly``, by hand or by a pin, stand there whatever it was
+    that stood there; those that are ``lost`` only if there is room; all others where they were."""
 
     where: Mapping[int, Point]
-    stay: frozenset[int]
-    wanted: frozenset[int]
-    routes: Mapping[int, Route]
-
-    def has(self, neurons: Iterable[int]) -> bool:
-        """Whether all of these have a place."""
-        return all(neuron in self.where for neuron in neurons)
+    newly: frozenset[int]
+    lost: frozenset[int] = frozenset()
 
 
-def earlier(problem: LayoutProblem, fresh: Sequence[Point]) -> Earlier:
-    """What the earlier layout of a problem says, and its pins, which go before that."""
-    assert problem.memory is not None
-    there, pins = problem.memory.positions, problem.pins
-    known = {i: there[name] for i, name in enumerate(problem.neurons) if name in there}
-    where, hand = {**known, **pins}, _by_hand(problem, known)
-    wanted: set[int] = set()
-    _follow_makes(problem, fresh, where, wanted, known)
-    put = set(hand) - wanted
-    _follow_mirrors(problem, fresh, where, wanted, hand, put)
-    both = whole(problem, overlapping({i: where[i] for i in put}, pins)) & put
-    put -= both
-    wanted = (wanted | both) - put - pins.keys()
-    where.update(pins)
-    routes = carried(problem, problem.memory, where)
-    newly = put | {i for i, point in pins.items() if known.get(i) != point}
-    off = _giving_way(problem, where, newly, routes)
-    # in a file edited by hand neurons may overlap others without a word of that in its routes
-    off |= overlapping({i: where[i] for i in where.keys() - wanted - off - pins.keys()}, pins)
-    wanted |= (whole(problem, off) & where.keys()) - pins.keys() - (put - off)
-    return Earlier(where, frozenset(where.keys() - wanted), frozenset(wanted), routes)
+class Memory:
+    """What an earlier layout says of a problem's neurons; nothing where there is none."""
+
+    def __init__(self, problem: LayoutProblem, fresh: Sequence[Point]) -> None:
+        there = problem.memory.positions if problem.memory else {}
+        self.known = {i: there[name] for i, name in enumerate(problem.neurons) if name in there}
+        self._problem, self._fresh = problem, fresh
+        self._hand = _by_hand(problem, self.known)
+        #: twice where the axis of a scope stands, if a pair of it is known
+        self.twice: dict[int, float] = {}
+        across = across_of(problem.direction)
+        for scope, pairs in pairs_by_axis(problem).items():
+            both = [(a, b) for a, b in pairs if a in self.known and b in self.known]
+            # what was moved by hand does not take the axis along, unless all was
+            firm = [(a, b) for a, b in both if a not in self._hand or b not in self._hand]
+            if both:
+                where = {**self.known, **self._hand} if firm else self.known
+                self.twice[scope] = twice_axis(firm or both, where, across)
+
+    def earlier(self, held: Mapping[int, Point], twice: Mapping[int, float]) -> Earlier:
+        """Where neurons are wanted, with some ``held`` by pins, and axes at ``twice``, by their scopes."""
+        problem, where = self._problem, {**self.known, **held}
+        changed = {i for i, point in held.items() if i not in self.known or not same(self.known[i], point)}
+        for own in outermost(problem).values():  # it is drawn around its pins anew
+            if not changed.isdisjoint(own):
+                where = {i: point for i, point in where.items() if i in held or i not in own}
+        lost = self._follow_makes(where, held)
+        put = self._hand.keys() & where.keys() - held.keys() - lost
+        lost |= self._follow_mirrors(where, put, held, twice)
+        both = together(problem, overlapping({i: where[i] for i in put}, held)) & put
+        put -= both
+        lost = (lost | both) - put
+        on_top = overlapping({i: where[i] for i in where.keys() - held.keys() - lost}, held)
+        lost |= together(problem, on_top) - (put - on_top)
+        return Earlier(where, frozenset(put | changed), frozenset(lost & where.keys() - held.keys()))
+
+    def _follow_makes(self, where: dict[int, Point], held: Mapping[int, Point]) -> set[int]:
+        """Instances that are drawn alike made alike; those that have to move. What is held may be bent by its pins."""
+        makes: dict[str, list[LayoutModule]] = {}
+        for module in self._problem.modules:
+            if held.keys().isdisjoint(module.members) and not where.keys().isdisjoint(module.members):
+                makes.setdefault(module.template, []).append(module)
+        flips = (1.0, 1.0), reflection(across_of(self._problem.direction), 0.0).flip
+        lost: set[int] = set()
+        for first, *others in makes.values():
+            for other in others:
+                pairs = [(a, b) for a, b in zip(first.members, other.members, strict=True) if a in where and b in where]
+                drawn, now = (move_of([(at[a], at[b]) for a, b in pairs]) for at in (self._fresh, where))
+                if drawn is not None and now is None:
+                    move = _nearest([(where[a], where[b]) for a, b in pairs], flips)
+                    where.update({b: move.point(where[a]) for a, b in pairs})
+                    lost |= together(self._problem, [b for _, b in pairs])
+        return lost
+
+    def _follow_mirrors(
+        self, where: dict[int, Point], put: set[int], held: Mapping[int, Point], twice: Mapping[int, float]
+    ) -> set[int]:
+        """Mirror images made so; those that have to move. The image of what was ``put`` by hand is so, too."""
+        across, followed, on_axis = across_of(self._problem.direction), set[int](), set[int]()
+        bent = {i for own in outermost(self._problem).values() if not held.keys().isdisjoint(own) for i in own}
+        for scope, pairs in pairs_by_axis(self._problem).items():
+            mirror = reflection(across, twice.get(scope, 0.0))
+            for a, b in pairs if scope in twice else ():
+                if {a, b} & (bent | held.keys()):
+                    continue
+                if a in where and b in where and not same(mirror.point(where[a]), where[b]):
+                    first, second = (b, a) if b in self._hand and a not in self._hand else (a, b)
+                    where[second] = mirror.point(where[first])
+                    if first in put:
+                        put.add(second)
+                    else:
+                        followed |= {a, b}
+                there = {i for i in (a, b) if i in where}
+                on_axis |= {i for i in there if distance(where[i], mirror.point(where[i])) < 2 * RADIUS - _SLACK}
+        on_axis = together(self._problem, on_axis)  # their images would stand on them
+        put -= on_axis
+        return together(self._problem, followed) | on_axis
 
 
 def carried(problem: LayoutProblem, layout: Layout, placed: Mapping[int, Point]) -> dict[int, Route]:
@@ -73,10 +120,10 @@ def carried(problem: LayoutProblem, layout: Layout, placed: Mapping[int, Point])
         route = layout.routes.get(edge.name)
         if route is None or edge.source not in placed or edge.target not in placed:
             continue
-        (x, y), (a, b) = placed[edge.source], placed[edge.target]
-        dx, dy = x - route[0][0], y - route[0][1]
-        if _equal((a, b), (route[-1][0] + dx, route[-1][1] + dy)):
-            found[number] = tuple((p + dx, q + dy) for p, q in route) if dx or dy else route
+        (x, y), end = placed[edge.source], placed[edge.target]
+        move = Move(shift=(x - route[0][0], y - route[0][1]))
+        if same(end, move.point(route[-1])):
+            found[number] = move.route(route) if any(move.shift) else route
     return found
 
 
@@ -90,144 +137,41 @@ def _by_hand(problem: LayoutProblem, now: Mapping[int, Point]) -> dict[int, Poin
             before.setdefault(edge.source, route[0])
             before.setdefault(edge.target, route[-1])
     before = {i: point for i, point in before.items() if i in now}
-    moved = {i: point for i, point in before.items() if distance(point, now[i]) > _SLACK}
-    for own in _outermost(problem).values():
-        known = own & before.keys()
+    moved = {i: point for i, point in before.items() if not same(point, now[i])}
+    for own in outermost(problem).values():
+        known = sorted(own & before.keys())
         if moved.keys().isdisjoint(known):
             continue
-        shifts = [(now[i][0] - before[i][0], now[i][1] - before[i][1]) for i in known]
-        x, y = shifts[0]
-        rigid = all(_equal(shift, (x, y)) for shift in shifts)
         moved = {i: point for i, point in moved.items() if i not in own}
-        moved |= {i: (now[i][0] - x, now[i][1] - y) for i in own if rigid and i in now}
+        way = move_of([(now[i], before[i]) for i in known])
+        if way is not None and way.flip == (1.0, 1.0):
+            moved |= {i: way.point(now[i]) for i in own if i in now}
     return {i: moved[i] for i in sorted(moved.keys() - problem.pins.keys())}
 
 
-def _follow_makes(
-    problem: LayoutProblem,
-    fresh: Sequence[Point],
-    where: dict[int, Point],
-    moved: set[int],
-    known: Mapping[int, Point],
-) -> None:
-    across = across_of(problem.direction)
-    mirrored, upside_down = ((-1.0, 1.0), (1.0, -1.0))[:: 1 if across == 0 else -1]
-    makes: dict[str, list[LayoutModule]] = {}
-    for module in problem.modules:
-        makes.setdefault(module.template, []).append(module)
-    for make in makes.values():
-        # what is pinned may be bent by its pins
-        make.sort(key=lambda module: not problem.pins.keys().isdisjoint(module.members))
-        first = next((m for m in make if not where.keys().isdisjoint(m.members)), make[0])
-        for other in make:
-            pairs = [(a, b) for a, b in zip(first.members, other.members, strict=True) if a in where and b in where]
-            if other is first or not any(_alike(pairs, fresh, flip) for flip in (_SAME, mirrored)):
-                continue
-            if any(_alike(pairs, where, flip) for flip in (_SAME, mirrored, upside_down)):
-                continue
-            pinned = whole(problem, other.members) & problem.pins.keys()
-            if pinned and all(known.get(i) == problem.pins[i] for i in pinned):
-                continue  # it was drawn around its pins
-            flip, shift = _best_fit(pairs, where, (_SAME, mirrored), problem.pins)
-            for a, b in pairs:
-                where[b] = shift[0] + flip[0] * where[a][0], shift[1] + flip[1] * where[a][1]
-            moved.update(whole(problem, [b for _, b in pairs]) & where.keys())
-
-
-def _alike(pairs: Sequence[tuple[int, int]], where: Mapping[int, Point] | Sequence[Point], flip: Point) -> bool:
-    """Whether the second of the pairs stand as the first do, but for a flip and a shift."""
-    shifts = [_shift(where[a], where[b], flip) for a, b in pairs]
-    return bool(shifts) and all(_equal(shift, shifts[0]) for shift in shifts)
-
-
-def _shift(one: Point, other: Point, flip: Point) -> Point:
-    return other[0] - flip[0] * one[0], other[1] - flip[1] * one[1]
-
-
-def _best_fit(
-    pairs: Sequence[tuple[int, int]], where: Mapping[int, Point], flips: Sequence[Point], pins: Mapping[int, Point]
-) -> tuple[Point, Point]:
-    """The flip and the shift by which most stay where they are; those that are pinned count above all."""
-    best: list[tuple[int, Point, Point]] = []
+def _nearest(pairs: Sequence[tuple[Point, Point]], flips: Iterable[Point]) -> Move:
+    """The move, with one of these flips, by which most of the second of each pair stay where they are."""
+    best: list[tuple[int, Move]] = []
     for flip in flips:
-        votes: Counter[Point] = Counter()
-        for a, b in pairs:
-            votes[_shift(where[a], where[b], flip)] += len(pairs) + 1 if b in pins else 1
+        turned = Move(flip)
+        ends = ((turned.point(a), b) for a, b in pairs)
+        votes = Counter((snap(b[0] - x), snap(b[1] - y)) for (x, y), b in ends)
         shift, count = max(votes.items(), key=lambda vote: (vote[1], -abs(vote[0][0]), -abs(vote[0][1]), vote[0]))
-        best.append((count, flip, shift))
-    return max(best, key=lambda one: one[0])[1:]
+        best.append((count, Move(flip, shift)))
+    return max(best, key=lambda one: one[0])[1]
 
 
-def _follow_mirrors(
-    problem: LayoutProblem,
-    fresh: Sequence[Point],
-    where: dict[int, Point],
-    moved: set[int],
-    hand: Mapping[int, Point],
-    put: set[int],
-) -> None:
-    across = across_of(problem.direction)
-    for mirrored in pairs_by_axis(problem):
-        pairs = [(a, b) for a, b in mirrored if a in where and b in where]
-        mirror = reflection(across, twice_axis(pairs, fresh, across))
-        pairs = [(a, b) for a, b in pairs if _equal(mirror.point(fresh[a]), fresh[b])]
-        if not pairs:
-            continue
-        # what was moved by hand does not take the axis along, unless all was
-        firm = [(a, b) for a, b in pairs if a not in hand or b not in hand]
-        mirror = reflection(across, twice_axis(firm or pairs, {**where, **hand} if firm else where, across))
-        followed: list[int] = []
-        for a, b in pairs:
-            if _equal(mirror.point(where[a]), where[b]):
-                continue
-            leads = [(i in problem.pins, i in hand) for i in (a, b)]
-            first, second = (b, a) if leads[1] > leads[0] else (a, b)
-            where[second] = mirror.point(where[first])
-            if first in put and second not in problem.pins:
-                put.add(second)
-            else:
-                followed += (a, b)
-        moved.update(whole(problem, followed) & where.keys())
-
-
-def _equal(one: Point, other: Point) -> bool:
-    return abs(one[0] - other[0]) <= _SLACK and abs(one[1] - other[1]) <= _SLACK
-
-
-def whole(problem: LayoutProblem, neurons: Iterable[int]) -> set[int]:
+def together(problem: LayoutProblem, neurons: Iterable[int]) -> set[int]:
     """These neurons with all others in the outermost instances around them, and the mirror images of all of them."""
     found = set(neurons)
     images = {n: mate for mirror in problem.mirrors for a, b in mirror.pairs for n, mate in ((a, b), (b, a))}
     found |= {images[n] for n in found if n in images}
-    for own in _outermost(problem).values():
+    for own in outermost(problem).values():
         if not found.isdisjoint(own):
             found |= own
     return found | {images[n] for n in found if n in images}
 
 
-def _giving_way(
-    problem: LayoutProblem, placed: Mapping[int, Point], put: set[int], routes: Mapping[int, Route]
-) -> set[int]:
-    """The neurons (with all others of their instances) that overlap a disc or a frame that was ``put`` by hand."""
-    if not put:
-        return set()
-    frames = Frames(replace(problem, boxes=()))
-    rects, outer = frames.rects(placed, routes), _outermost(problem)
-    framed = {i for own in outer.values() for i in own}
-    bodies = [lone(i, point) for i, point in sorted(placed.items()) if i not in framed]
-    for number, own in outer.items():
-        if (rect := rects[number]) is not None:
-            bodies.append(Body(tuple((i, placed[i]) for i in sorted(own & placed.keys())), number, rect))
-    firm = Occupancy(frames)
-    for body in bodies:
-        if not put.isdisjoint(body.members):
-            firm.enter((body,), _HERE)
-    held = put | problem.pins.keys()
-    return {
-        i for body in bodies if held.isdisjoint(body.members) and not firm.fits((body,), _HERE) for i in body.members
-    }
-
-
-def _outermost(problem: LayoutProblem) -> dict[int, frozenset[int]]:
+def outermost(problem: LayoutProblem) -> dict[int, frozenset[int]]:
     """The neurons of each outermost instance, by its number."""
     return {k: frozenset(module.members) for k, module in enumerate(problem.modules) if module.parent < 0}

@@ -17,7 +17,7 @@ from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.incremental import kept
 from neurovis_layouts.label_room import rect_of
 from neurovis_layouts.label_sides import best_sides, sided
-from neurovis_layouts.pins import fit, with_origins
+from neurovis_layouts.pins import with_origins
 from neurovis_layouts.routing import route_all
 from neurovis_layouts.routing.images import Images
 from neurovis_layouts.symmetry import Symmetry, exact, routed_alike
@@ -28,9 +28,6 @@ from neurovis_spec.layout.model import Layout, LayoutProblem, Point, Side
 
 #: With more connections than this, routes do not go round discs: they would only run over others.
 _CAREFUL = 1000
-#: With at most so many neurons, instances without pins are moved off the frames of those with pins; with more, too
-#: many frames overlap for that to be quick.
-_MOST_AROUND_PINS = 300
 #: So often labels are given room at most, and how much more with each time.
 _TRIES, _GROWTH = 4, 1.1
 
@@ -51,9 +48,10 @@ def drawn(
     high as they are long. With a ``symmetry`` images, and routes between them, are exact reflections. On these
     ``sides`` labels have room."""
     flat: list[Point] = [(snap(x), snap(y)) for x, y in places[: len(problem.neurons)].tolist()]
-    pins = with_origins(problem, [to_picture(point, problem.direction) for point in flat])
-    centres, _, _ = fit(flat, {i: from_picture(point, problem.direction) for i, point in pins.items()})
-    images, ghosts = Images(), list[Point]()
+    for i, point in problem.pins.items():
+        flat[i] = from_picture(point, problem.direction)
+    pins = with_origins(problem, {i: to_picture(point, problem.direction) for i, point in enumerate(flat)})
+    centres, images, ghosts = flat, Images(), list[Point]()
     if symmetry is not None and symmetry.paired.any():
         centres = exact(problem, symmetry, centres)
         images, ghosts = routed_alike(problem, symmetry, centres)
@@ -72,7 +70,7 @@ def drawn(
         },
         sides,
     )
-    return sided(problem, kept(problem, fresh, pins, frames and len(problem.neurons) <= _MOST_AROUND_PINS))
+    return sided(problem, kept(problem, fresh, pins, frames))
 
 
 def drawn_apart(

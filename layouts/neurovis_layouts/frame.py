@@ -46,6 +46,11 @@ def turned(rect: Rect, direction: Direction) -> Rect:
     return bounds([from_picture(rect[:2], direction), from_picture(rect[2:], direction)])
 
 
+def in_picture(rect: Rect, direction: Direction) -> Rect:
+    """The inverse of ``turned``."""
+    return bounds([to_picture(rect[:2], direction), to_picture(rect[2:], direction)])
+
+
 def across_of(direction: Direction) -> int:
     """The coordinate of the picture that is across the direction."""
     return 0 if direction in ("down", "up") else 1

@@ -14,40 +14,56 @@ import numpy as np
 from neurovis_layouts.alike import Alike, Move
 from neurovis_layouts.conflicts import carried
 from neurovis_layouts.frame import from_picture, to_picture
-from neurovis_layouts.incremental_places import remembered
+from neurovis_layouts.occupancy import overlapping
+from neurovis_layouts.pins import with_origins
 from neurovis_layouts.routing import route_all
 from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
 from neurovis_layouts.routing.walls import Frame, Walls
+from neurovis_layouts.settling import Whole, settled
 from neurovis_spec.layout.frames import Frames
 from neurovis_spec.layout.geometry import bounds
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point, Route, Side
 
 #: With more new connections than this nobody can follow one: they do not go round frames.
 _CAREFULLY = 1000
+#: With more neurons than this what is pinned is off discs alone: to find room for many frames takes minutes.
+_MOST_AROUND_PINS = 2000
 
 
-def kept(
-    problem: LayoutProblem, fresh: Layout, pins: Mapping[int, Point] | None = None, around: bool = False
-) -> Layout:
-    """The fresh layout itself where there is no earlier one, else one that keeps the earlier one's places exactly.
+def kept(problem: LayoutProblem, fresh: Layout, pins: Mapping[int, Point] | None = None, around: bool = True) -> Layout:
+    """The fresh layout moved to pins and to where an earlier one has what it knows; itself where there is neither.
 
     ``pins`` are where what is pinned stands, instances included (as in the fresh layout, if they are not given). With
-    ``around``, pins of instances are an earlier layout to which all else is new: no frame lies on another then if that
-    can be, and nobody stands in a frame who does not belong there.
+    ``around`` no frame of an instance lies on another then if that can be, and nobody stands in a frame who does not
+    belong there; without, and without an earlier layout, what is pinned is off other discs alone.
     """
-    if pins is None:
-        placed = {m for module in problem.modules if module.origin is not None for m in module.members}
-        pins = {**{m: fresh.positions[problem.neurons[m]] for m in placed}, **problem.pins}
-    problem = replace(problem, pins=pins)
-    memory = problem.memory
-    if memory is None and around and pins and problem.modules:
-        pinned = {problem.neurons[i]: point for i, point in sorted(pins.items())}
-        memory = Layout(problem.network, fresh.engine, pinned, {})
-    if memory is None:
+    drawn = [fresh.positions[name] for name in problem.neurons]
+    own = [module.members for module in problem.modules if module.origin is not None]
+    now = {m: drawn[m] for members in own for m in members} if pins is None else pins
+    if problem.memory is None and not (problem.pins or now):
         return fresh
-    problem = replace(problem, memory=memory)
+    if problem.memory is None and not (around and problem.modules and len(drawn) <= _MOST_AROUND_PINS):
+        problem = replace(problem, modules=(), boxes=())
+    memory = problem.memory or Layout(problem.network, fresh.engine, {}, {})
     there = {i: fresh.routes[edge.name] for i, edge in enumerate(problem.edges)}
-    centres = remembered(problem, [fresh.positions[name] for name in problem.neurons], there)
+    frames = Frames(problem, memory.labels)
+    rects = frames.rects(dict(enumerate(drawn)), there)
+    wholes = [
+        Whole(module.members, number, rects[number] or bounds(drawn), module.template)
+        for number, module in enumerate(problem.modules)
+        if module.members
+    ]
+    # instances whose origin is pinned are drawn as they were, with what their module has new as in their copies
+    known = {i: memory.positions[name] for i, name in enumerate(problem.neurons) if name in memory.positions}
+    free = [members for members in own if problem.pins.keys().isdisjoint(members)]
+    if any(0 < len(known.keys() & members) < len(members) for members in free):
+        known = dict(enumerate(settled(problem, frames, drawn, wholes).at))
+        grown = {name: known[i] for i, name in enumerate(problem.neurons)}
+        problem = replace(problem, memory=replace(memory, positions=grown))
+    held = {**now, **with_origins(problem, {m: known[m] for members in free for m in members if m in known})}
+    lost = overlapping({m: held[m] for m in held.keys() - problem.pins.keys()}, problem.pins)
+    problem = replace(problem, pins={m: held[m] for m in sorted(held.keys() - lost)})
+    centres = settled(problem, frames, drawn, wholes).at
     sides = {**fresh.labels, **memory.labels}
     ways = _Ways(problem, centres, sides)
     routes = _old_routes(problem, memory, ways)

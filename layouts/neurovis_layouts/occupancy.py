@@ -18,7 +18,7 @@ from types import MappingProxyType
 from neurovis_layouts.alike import STAY, Move
 from neurovis_spec.layout.frames import Frames, titled, untitled
 from neurovis_spec.layout.geometry import Rect, bounds, distance, meet, padded, sampled, snap, united
-from neurovis_spec.layout.model import RADIUS, LayoutProblem, Point, Route
+from neurovis_spec.layout.model import RADIUS, Point, Route
 
 #: Steps of the search and how many of them it goes: near first, then far, then beyond everything.
 _REACHES = ((0.25, 4), (0.25, 16), (0.5, 32), (1.0, 64))
@@ -164,9 +164,18 @@ class Occupancy:
             self.enter(bodies, anchor)
         return anchor is not None
 
-    def fits(self, bodies: Sequence[Body], anchor: Point) -> bool:
-        """Whether bodies can stand here, however near to others."""
-        return self._free(bodies, anchor, _TIGHT)
+    def fits(self, bodies: Sequence[Body], anchor: Point, near: bool = False) -> bool:
+        """Whether bodies can stand here, however near to others, or only ``near``, so that lines pass between."""
+        return self._free(bodies, anchor, _NEAR if near else _TIGHT)
+
+    @property
+    def rects(self) -> Sequence[Rect | None]:
+        """The frames as they are now, by number."""
+        return self._rects
+
+    def rect(self, number: int) -> Rect | None:
+        """A frame as it is now; None for −1."""
+        return self._rects[number] if number >= 0 else None
 
     def enter(self, bodies: Sequence[Body], anchor: Point) -> None:
         """Bodies have their place, whatever else is there."""
@@ -378,12 +387,6 @@ def overlapping(where: Mapping[int, Point], pins: Mapping[int, Point]) -> set[in
         else:
             found.add(i)
     return found
-
-
-def instance_of(problem: LayoutProblem, members: Iterable[int]) -> int:
-    """The instance that these are the neurons of, −1 where there is none."""
-    own = set(members)
-    return next((k for k, module in enumerate(problem.modules) if own == set(module.members)), -1)
 
 
 class _CentreCells:

@@ -8,9 +8,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from neurovis_layouts.axes import shift_of
-from neurovis_layouts.occupancy import Occupancy, Wish, lone, overlapping
-from neurovis_spec.layout.geometry import snap
-from neurovis_spec.layout.model import LayoutProblem, Point
+from neurovis_layouts.occupancy import Occupancy, Wish, lone
+from neurovis_spec.layout.geometry import distance, snap
+from neurovis_spec.layout.model import RADIUS, LayoutProblem, Point
+
+#: Rounding to the grid does not make discs overlap.
+_SLACK = 1e-6
 
 
 def fit(free: Sequence[Point], pins: Mapping[int, Point]) -> tuple[list[Point], Point, frozenset[int]]:
@@ -29,20 +32,25 @@ def fit(free: Sequence[Point], pins: Mapping[int, Point]) -> tuple[list[Point], 
     return found, shift, frozenset(moved | pins.keys())
 
 
-def with_origins(problem: LayoutProblem, free: Sequence[Point]) -> dict[int, Point]:
-    """The pins, and for instances whose origin is pinned the places of their neurons, as the free layout (in the
-    picture's coordinates) has these in relation to each other; but for those that stand on pins then.
+def with_origins(problem: LayoutProblem, free: Mapping[int, Point], far: bool = False) -> dict[int, Point]:
+    """The pins, and for instances whose origin is pinned the places of their neurons, as the free layout has these in
+    relation to each other; but for those that stand on pins then, and for instances that it does not have as a whole.
 
-    The origin of an instance whose module pins nothing is where its smallest x and y are.
+    The origin of an instance whose module pins nothing is where its smallest x and y are; with ``far`` its largest y,
+    which is the smallest in a picture that runs the other way.
     """
     found: dict[int, Point] = {}
     for module in problem.modules:
-        if module.origin is None or not module.members:
+        if module.origin is None or not module.members or not free.keys() >= set(module.members):
             continue
-        own = [free[member] for member in module.members]
-        x, y = module.origin[0] - min(a for a, _ in own), module.origin[1] - min(b for _, b in own)
+        own = {member: free[member] for member in module.members}
+        low = min(a for a, _ in own.values()), (max if far else min)(b for _, b in own.values())
+        x, y = module.origin[0] - low[0], module.origin[1] - low[1]
         for member, (a, b) in list(module.pins.items())[:1]:
-            x, y = module.origin[0] + a - free[member][0], module.origin[1] + b - free[member][1]
-        found |= {i: (x + a, y + b) for i, (a, b) in zip(module.members, own, strict=True) if i not in problem.pins}
-    lost = overlapping(found, problem.pins)
-    return dict(sorted({**{i: place for i, place in found.items() if i not in lost}, **problem.pins}.items()))
+            x, y = module.origin[0] + a - own[member][0], module.origin[1] + b - own[member][1]
+        found |= {i: (x + a, y + b) for i, (a, b) in own.items() if i not in problem.pins}
+    close = 2 * RADIUS - _SLACK
+    off = {
+        i: place for i, place in found.items() if all(distance(place, pin) >= close for pin in problem.pins.values())
+    }
+    return dict(sorted({**off, **problem.pins}.items()))

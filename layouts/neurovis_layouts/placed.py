@@ -7,7 +7,7 @@ kept, direction turned; edges go round the discs between their ends where they c
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from neurovis_layouts.blocks import Blocks, routed
@@ -17,14 +17,12 @@ from neurovis_layouts.incremental import kept
 from neurovis_layouts.label_room import roomy
 from neurovis_layouts.label_sides import sided
 from neurovis_layouts.layered.drawing import Drawing
-from neurovis_layouts.pins import fit, with_origins
+from neurovis_layouts.pins import with_origins
 from neurovis_layouts.routing.ends import keys_of
 from neurovis_spec.layout.frames import BOX_ACROSS, PAD_LABEL
-from neurovis_spec.layout.geometry import shifted, snap
+from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import RADIUS, Arrangement, Capabilities, Layout, LayoutProblem, Point, Side
 
-#: So many neurons are arranged around pins frame by frame.
-_MOST_AROUND_PINS = 5000
 #: From labels to other discs: lines of boxes run between them.
 _AIR = BOX_ACROSS - RADIUS + PAD_LABEL
 #: Neighbours are no closer than this.
@@ -93,10 +91,9 @@ def _placed(problem: LayoutProblem, engine: str, how: Arrangement, spacing: floa
 
     blocks = Blocks(problem, formation)
     free = blocks.whole() if problem.modules else blocks.formed(range(len(problem.neurons)))
-    pins = with_origins(problem, free.places)
-    around = bool(problem.modules) and len(problem.neurons) <= _MOST_AROUND_PINS
-    drawing = routed(free if around else _pinned(free, pins), problem.edges)
-    return sided(problem, kept(problem, _layout(problem, engine, drawing), pins, around))
+    pins = with_origins(problem, dict(enumerate(free.places)))
+    layout = _layout(problem, engine, routed(free, problem.edges))
+    return sided(problem, kept(problem, layout, pins))
 
 
 def _layout(problem: LayoutProblem, engine: str, drawing: Drawing) -> Layout:
@@ -106,22 +103,4 @@ def _layout(problem: LayoutProblem, engine: str, drawing: Drawing) -> Layout:
         dict(zip(problem.neurons, drawing.places, strict=True)),
         {edge.name: drawing.routes[key] for edge, key in zip(problem.edges, keys_of(problem.edges), strict=True)},
         {name: side for name, side in zip(problem.neurons, drawing.sides, strict=True) if side is not None},
-    )
-
-
-def _pinned(drawing: Drawing, pins: Mapping[int, Point]) -> Drawing:
-    """The drawing moved to the pins; of what these bend no frame and no route is left."""
-    if not pins:
-        return drawing
-    centres, (dx, dy), bent = fit(drawing.places, pins)
-    broken = {m for own, _ in drawing.frames if bent.intersection(own) for m in own} | bent
-    return Drawing(
-        tuple(centres),
-        {
-            key: tuple((x + dx, y + dy) for x, y in route)
-            for key, route in drawing.routes.items()
-            if not (key[0] in broken or key[1] in broken)
-        },
-        tuple((own, shifted(r, (dx, dy))) for own, r in drawing.frames if not bent.intersection(own)),
-        sides=drawing.sides,
     )

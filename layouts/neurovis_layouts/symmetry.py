@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from neurovis_layouts.axes import axes
+from neurovis_layouts.axes import axes, shift_of
 from neurovis_layouts.frame import from_picture
 from neurovis_layouts.routing.ends import keys_of
 from neurovis_layouts.routing.images import Images, images_of
@@ -81,7 +81,10 @@ def about_pins(problem: LayoutProblem, symmetry: Symmetry, places: FloatArray) -
     turned = replace(problem, pins={i: from_picture(point, problem.direction) for i, point in problem.pins.items()})
     pair = {i: int(symmetry.image[i]) for i in np.flatnonzero(symmetry.paired).tolist()}
     free = [(float(x), float(y)) for x, y in places[: len(problem.neurons)].tolist()]
-    axis, held = next(axes(turned, free, pair, _WIDE * problem.neuron_spacing)) if turned.pins else (0.0, turned.pins)
+    axis, held = 0.0, turned.pins
+    if held:
+        start = shift_of(free, held)[0]
+        axis, held = next(axes(turned, start, pair, _WIDE * problem.neuron_spacing))
     fixed = np.array(sorted(held), dtype=np.int64)
     there = np.array([held[i] for i in fixed.tolist()], dtype=np.float64).reshape(-1, 2)
     return replace(symmetry, axis=axis), fixed, there

@@ -21,7 +21,7 @@ from neurovis_spec.layout.model import (
     ReportingEngine,
     Route,
 )
-from neurovis_spec.layout.refusals import asked_by, refuse
+from neurovis_spec.layout.refusals import refuse
 from neurovis_spec.progress import Progress
 
 
@@ -32,7 +32,7 @@ def lay_out_problem(problem: LayoutProblem, engine: str = "auto", progress: Prog
     """
     name = choose_engine(problem)[0] if engine == "auto" else engine
     chosen = engine_of(name)
-    refuse(asked_by(problem), name, chosen.capabilities)
+    refuse(problem, name, chosen.capabilities)
     with uncollected():
         if progress is not None and chosen.capabilities.progress:
             result = cast(ReportingEngine, chosen).lay_out(problem, progress)

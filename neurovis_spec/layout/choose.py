@@ -11,7 +11,7 @@ from collections.abc import Sequence, Set
 
 from neurovis_spec.layout.engines import engine_of, engines_that
 from neurovis_spec.layout.model import LayoutProblem, LayoutRefusalError, Suits
-from neurovis_spec.layout.refusals import asked_by, refuse
+from neurovis_spec.layout.refusals import refuse
 
 #: A component of so many neurons, with so many connections each within their group, is a tangle.
 _LARGE, _DENSE = 40, 2.5
@@ -60,7 +60,7 @@ def _suited(suits: Suits) -> str:
 def _takes(name: str, problem: LayoutProblem) -> bool:
     """Whether an engine can do what a problem asks for."""
     try:
-        refuse(asked_by(problem), name, engine_of(name).capabilities)
+        refuse(problem, name, engine_of(name).capabilities)
     except LayoutRefusalError:
         return False
     return True

@@ -15,14 +15,14 @@ from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.located import Located
 from neurovis_spec.layout.engines import engine_of, engines_that, they_can
 from neurovis_spec.layout.model import CheckingEngine, LayoutProblem, LayoutRefusalError
-from neurovis_spec.layout.refusals import asked_of, refuse
+from neurovis_spec.layout.refusals import refuse
 from neurovis_spec.plugins import PluginError
 
 #: With more neurons or connections than this an engine takes too long to say what pins it refuses.
 _MOST: Final = 1000
 
 
-def foreseen(network: Network, problem: Callable[[], LayoutProblem], *, memory: bool) -> LayoutRefusalError | None:
+def foreseen(network: Network, problem: Callable[[], LayoutProblem]) -> LayoutRefusalError | None:
     """What would be refused, by the engine of the spec, or by the one that ``auto`` stands for."""
     settings, name = network.layout, network.layout.engine
     if name == "auto":
@@ -33,7 +33,7 @@ def foreseen(network: Network, problem: Callable[[], LayoutProblem], *, memory: 
         name = choose_engine(problem())[0]
     try:
         engine = engine_of(name)
-        refuse(asked_of(network, memory), name, engine.capabilities)
+        refuse(problem(), name, engine.capabilities)
         if engine.capabilities.checks and (_crowded(network) or _bound(network)):
             cast(CheckingEngine, engine).check(problem())
     except LayoutRefusalError as refusal:

@@ -52,7 +52,7 @@ def _compiled(text: str, file: str, folder: Path, root: Path, files: Files) -> C
     refusal = None
     if spec is not None and network is not None and not findings.failed:
         pose = partial(pipeline.pose, network, memory)
-        refusal = pipeline.refusal(spec, request, network, pose, memory=memory is not None)
+        refusal = pipeline.refusal(spec, request, network, pose)
     others = frozenset(place_of(name, folder) for name in findings.sources if name != file)
     found = findings.sorted()
     return Checked(found if refusal is None else (*found, refusal), None if findings.failed else network, others)

@@ -36,7 +36,8 @@ class LayeredEngine:
         from neurovis_layouts.label_sides import sided
         from neurovis_layouts.layered.engine import drawn
 
-        return sided(problem, kept(problem, drawn(problem, self.name)))
+        fresh = drawn(problem, self.name)
+        return sided(problem, kept(problem, fresh) if problem.memory else fresh)
 
     def check(self, problem: LayoutProblem) -> None:
         """Raises the LayoutRefusalError that ``lay_out`` would."""

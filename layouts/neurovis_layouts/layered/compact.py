@@ -68,8 +68,8 @@ Drawn: TypeAlias = Callable[[LayoutProblem, Shape], Drawing]
 
 
 def may_be_folded(problem: LayoutProblem) -> bool:
-    """Whether nothing says where on the page something stands, there are instances, which are folded, or a page is asked
-    for, as signals run one way otherwise, and it is not too large to try."""
+    """Whether nothing says where on the page something stands, and it is not too large to try. Without instances only a
+    page that is asked for is worth that signals run back."""
     fixed = problem.plan or problem.pins or any(module.pins for module in problem.modules)
     asked = problem.modules or problem.aspect is not None
     return bool(asked) and not fixed and len(problem.neurons) + len(problem.edges) <= _MOST

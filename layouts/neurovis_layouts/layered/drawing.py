@@ -42,27 +42,6 @@ class Drawing:
         return around(self.places, self.routes.values(), frames, self.direction, self.labels, self.title)
 
 
-@dataclass(frozen=True, slots=True)
-class FrameMove:
-    """A point p becomes shift + p, reflected on the line along the direction through 0 before that if ``flip``."""
-
-    shift: Point
-    flip: bool = False
-
-    def point(self, point: Point) -> Point:
-        """A point moved."""
-        return self.shift[0] + (-point[0] if self.flip else point[0]), self.shift[1] + point[1]
-
-    def route(self, route: Route) -> Route:
-        """A route moved."""
-        return tuple(self.point(point) for point in route)
-
-    def rect(self, rect: Rect) -> Rect:
-        """A rectangle moved."""
-        (ax, ay), (bx, by) = self.point((rect[0], rect[1])), self.point((rect[2], rect[3]))
-        return min(ax, bx), ay, max(ax, bx), by
-
-
 def around(
     places: Iterable[Point],
     routes: Iterable[Route],

@@ -7,7 +7,6 @@ becomes such a frame where neurons that are not its own would stand in it otherw
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
@@ -15,28 +14,28 @@ from itertools import pairwise
 
 import numpy as np
 
+from neurovis_layouts.alike import Move, shifted_by
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.label_room import covered, flipped, roomy, sides_of
 from neurovis_layouts.layered.bands import FEW, Wanted
 from neurovis_layouts.layered.compact import NONE, RANKS, WHOLE, Fold, Shape, ShapeKey, compact, may_be_folded
 from neurovis_layouts.layered.component_layout import ComponentLayout, planned
-from neurovis_layouts.layered.drawing import Drawing, FrameMove, Piece, entitled, piece_of
+from neurovis_layouts.layered.drawing import Drawing, Piece, entitled, piece_of
 from neurovis_layouts.layered.frame_routing import linked
 from neurovis_layouts.layered.mirror_units import arranged_on_axis, symmetric_units
 from neurovis_layouts.layered.page_plan import facing, in_direction, parts_by_cell
 from neurovis_layouts.layered.parts import Part, columns_of, firm, images_of, may_be_frame, parts_of
-from neurovis_layouts.layered.pinning import Settled, settled
+from neurovis_layouts.layered.pinning import Settled, pinned
 from neurovis_layouts.layered.same_rank import bonded
 from neurovis_layouts.layered.templates import Book, restricted
 from neurovis_layouts.layered.units import Unit
+from neurovis_layouts.pins import with_origins
 from neurovis_layouts.routing.ends import Key, keys_of
+from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
 from neurovis_spec.layout.frames import BOX_DOWN, PAD_LABEL, SLACK, entered
-from neurovis_spec.layout.geometry import Rect, bounds, distance, meet, padded, snap, united
+from neurovis_spec.layout.geometry import Rect, bounds, meet, padded, snap, united
 from neurovis_spec.layout.labels import BOX_WEIGHT, title_room
 from neurovis_spec.layout.model import RADIUS, Direction, LayoutMirror, LayoutProblem, Point, Route, Side
-
-#: What a module pins gives way to pins closer than this.
-_OFF = 0.75
 
 
 class Composer:
@@ -81,28 +80,15 @@ class Composer:
             arranged_on_axis(problem, pair, {m for module in problem.modules for m in module.members})
 
     def _with_origins(self, problem: LayoutProblem) -> dict[int, Point]:
-        """The pins, and for instances whose origin is pinned the places of all of their neurons that keep off these.
-
-        The origin of an instance whose module pins nothing is where its smallest x and y are in the picture: where the
-        direction is up or left, the far end of it along the direction.
-        """
+        """The pins, and for instances whose origin is pinned the places of all of their neurons that keep off these."""
         second = {b for mirror in problem.mirrors for _, b in mirror.pairs}
-        found: dict[int, Point] = {}
+        free: dict[int, Point] = {}
         for module in problem.modules:
-            if module.origin is None:
-                continue
-            drawing = self.kind(int(module.template), problem.direction)
-            flip = not drawing.fixed and module.members[0] in second
-            places = [FrameMove((0.0, 0.0), flip).point(place) for place in drawing.places]
-            x, y = module.origin
-            if not drawing.fixed:
-                first = max if problem.direction in ("up", "left") else min
-                x, y = x - min(px for px, _ in places), y - first(py for _, py in places)
-            for member, (px, py) in zip(module.members, places, strict=True):
-                place = (x + px, y + py)
-                if all(distance(place, other) >= _OFF for other in problem.pins.values()):
-                    found[member] = place
-        return dict(sorted({**found, **problem.pins}.items()))
+            if module.origin is not None:
+                drawing = self.kind(int(module.template), problem.direction)
+                way = shifted_by((0.0, 0.0), not drawing.fixed and module.members[0] in second)
+                free.update(zip(module.members, map(way.point, drawing.places), strict=True))
+        return with_origins(problem, free, problem.direction in ("up", "left"))
 
     def kind(self, number: int, direction: Direction) -> Drawing:
         """The drawing of a kind of instance in a direction, in the frame of an engine that draws in it."""
@@ -189,11 +175,9 @@ class Composer:
             inner = (
                 self._book.problem_of(piece.part.kind) if piece.part.kind >= 0 else _boxed(problem, piece.part, pair)
             )
-            return piece_of(
-                piece.part, self.compose(replace(inner, pins=_around_pins(piece.drawing, pins, inner)), kind=NONE)
-            )
+            return piece_of(piece.part, self.compose(replace(inner, pins=pins), kind=NONE))
 
-        rests = settled(problem, plan, [_resting(plan, piece) for piece in pieces], pair, redraw)
+        rests = pinned(problem, plan, [_resting(plan, piece) for piece in pieces], pair, redraw)
         return _Standing.of(problem, plan, rests, units, columns)
 
     def _upright(self, kind: int) -> bool:
@@ -221,16 +205,14 @@ class Composer:
         def redraw(piece: Piece, pins: Mapping[int, Point]) -> Piece:
             inner = self._inside(problem, piece.part, problem.direction, pair)
             inner = self._book.problem_of(piece.part.kind) if isinstance(inner, Drawing) else inner
-            return piece_of(
-                piece.part, self.compose(replace(inner, pins=_around_pins(piece.drawing, pins, inner)), kind=NONE)
-            )
+            return piece_of(piece.part, self.compose(replace(inner, pins=pins), kind=NONE))
 
         parts, where = parts_by_cell(problem, pair)
         pieces = facing(problem, parts, where, pair, drawn, kind == WHOLE, self._upright(kind))
         plan = ComponentLayout()
         for piece, move in pieces:
             plan.places.update(zip(piece.part.members, map(move.point, piece.drawing.places), strict=True))
-        rests = settled(problem, plan, pieces, pair, redraw)
+        rests = pinned(problem, plan, pieces, pair, redraw)
         return _Standing.of(problem, plan, rests, (), frozenset()).joined(problem, pair, routed)
 
     def _inside(
@@ -260,20 +242,6 @@ class Composer:
         return piece_of(part, drawing)
 
 
-def _around_pins(drawing: Drawing, pins: Mapping[int, Point], inner: LayoutProblem) -> dict[int, Point]:
-    """Absolute pins of a part, and those of its module that keep off them, their origin where the others fit best."""
-    if not inner.pins:
-        return dict(sorted(pins.items()))
-    apart = [(x - drawing.places[i][0], y - drawing.places[i][1]) for i, (x, y) in sorted(pins.items())]
-    origin = snap(math.fsum(x for x, _ in apart) / len(apart)), snap(math.fsum(y for _, y in apart) / len(apart))
-    found = dict(pins)
-    for i, (x, y) in inner.pins.items():
-        place = (x + origin[0], y + origin[1])
-        if i not in found and all(distance(place, other) >= _OFF for other in pins.values()):
-            found[i] = place
-    return dict(sorted(found.items()))
-
-
 def _unit(piece: Piece, kin: int, pair: Mapping[int, int]) -> Unit:
     part, (x, y), rect = piece.part, piece.middle, piece.rect
     flip = part.image_of >= 0
@@ -283,13 +251,13 @@ def _unit(piece: Piece, kin: int, pair: Mapping[int, int]) -> Unit:
     return Unit(part.members, places, reach, kin, alone)
 
 
-def _resting(plan: ComponentLayout, piece: Piece) -> tuple[Piece, FrameMove]:
+def _resting(plan: ComponentLayout, piece: Piece) -> tuple[Piece, Move]:
     """A piece, and the move from its own drawing to its place in the plan."""
     first = piece.part.members[0]
     flip = (piece.part.image_of >= 0) != (min(piece.part.members) in plan.reflected)
     x, y = plan.places[first]
-    dx, dy = FrameMove((0.0, 0.0), flip).point(piece.drawing.places[0])
-    return piece, FrameMove((x - dx, y - dy), flip)
+    dx, dy = shifted_by((0.0, 0.0), flip).point(piece.drawing.places[0])
+    return piece, shifted_by((x - dx, y - dy), flip)
 
 
 def _boxed(problem: LayoutProblem, part: Part, pair: Mapping[int, int]) -> LayoutProblem:
@@ -355,7 +323,7 @@ class _Standing:
         sides = [plan.sides.get(i, side) for i, side in enumerate(sides_of(problem))]
         for piece, move in rests.pieces:
             for member, side in zip(piece.part.members, piece.drawing.sides, strict=True):
-                sides[member] = flipped(side, problem.direction) if side and move.flip else side
+                sides[member] = flipped(side, problem.direction) if side and move.mirrored else side
         lined = [_box(problem, places, sides, name, own) for name, own in problem.boxes]
         frames: list[tuple[tuple[int, ...], Rect]] = []
         for piece, move in rests.pieces:
@@ -406,6 +374,9 @@ class _Standing:
                 if key in known:
                     ends = places[key[0]], places[key[1]]
                     routes[key] = (ends[0], *move.route(route)[1:-1], ends[1])
+        if problem.pins:  # which may have put somebody on them
+            over = Obstacles(places).crowded(list(routes.values()), [key[:2] for key in routes], TOUCH)
+            routes = {key: route for (key, route), on in zip(routes.items(), over, strict=True) if not on}
         links = [i for i, key in enumerate(keys) if key not in routes]
         drawn = list(routes.values())
         if routed:
@@ -424,7 +395,7 @@ class _Standing:
         )  # fmt: skip
 
 
-def _boxes_within(rests: Settled) -> Iterator[tuple[tuple[int, ...], FrameMove, Rect]]:
+def _boxes_within(rests: Settled) -> Iterator[tuple[tuple[int, ...], Move, Rect]]:
     for piece, move in rests.pieces:
         for own, rect in piece.drawing.boxes:
             yield tuple(piece.part.members[m] for m in own), move, rect

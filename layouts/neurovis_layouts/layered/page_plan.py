@@ -14,8 +14,9 @@ from typing import TypeAlias
 
 import numpy as np
 
+from neurovis_layouts.alike import Move, shifted_by
 from neurovis_layouts.frame import from_picture, to_picture
-from neurovis_layouts.layered.drawing import Drawing, FrameMove, Piece
+from neurovis_layouts.layered.drawing import Drawing, Piece
 from neurovis_layouts.layered.parts import Part, imaged, part_of_module
 from neurovis_layouts.layered.plan_places import Slot, placed
 from neurovis_spec.layout import FloatArray, IntArray
@@ -126,7 +127,7 @@ def facing(
     drawn: Drawn,
     whole: bool,
     upright: bool,
-) -> list[tuple[Piece, FrameMove]]:
+) -> list[tuple[Piece, Move]]:
     """Each part in the direction, and as the mirror image, in which the connections between parts are short and the
     page has its proportions, and where it stands. Copies of one instance are drawn in one direction, so that they are
     alike. ``upright``: nothing turns the whole upside down, and frames keep room for titles on their upper sides alone.
@@ -351,11 +352,11 @@ def _placed(
     pieces: Sequence[Piece],
     flips: Sequence[bool],
     even: bool,
-) -> list[tuple[Piece, FrameMove]]:
+) -> list[tuple[Piece, Move]]:
     """Each of the pieces where it stands, mirror images as reflections of each other."""
     moves = placed(problem, slots, _page(problem), pieces, flips, even)
     for k, part in enumerate(parts):
         if part.image_of >= 0:
-            (dx, dy), flipped = moves[part.image_of].shift, moves[part.image_of].flip
-            moves[k] = FrameMove((-dx + 0.0, dy), not flipped)
+            (dx, dy), flipped = moves[part.image_of].shift, moves[part.image_of].mirrored
+            moves[k] = shifted_by((-dx + 0.0, dy), not flipped)
     return [(piece, moves[k]) for k, piece in enumerate(pieces)]

@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from neurovis_layouts.layered.drawing import FrameMove, Piece
+from neurovis_layouts.alike import Move, shifted_by
+from neurovis_layouts.layered.drawing import Piece
 from neurovis_spec.layout.geometry import Rect, bounds, padded, sampled, shifted, snap, united
 from neurovis_spec.layout.model import RADIUS, LayoutProblem, Point
 
@@ -46,7 +47,7 @@ def placed(
     pieces: Sequence[Piece],
     flips: Sequence[bool],
     even: bool,
-) -> dict[int, FrameMove]:
+) -> dict[int, Move]:
     """How the first of each line of parts is moved; ``page`` is how many columns across and rows along there are.
     ``even``: 0 is the middle across, and what is as far from it on either side stands alike."""
     street = max(problem.neuron_spacing, _LEAST)
@@ -60,12 +61,12 @@ def placed(
     streets = _streets(problem, slots, pieces, street)
     rows = 1 if problem.direction in ("down", "up") else 0
     at = [_axis(axis, spans, rooms, page[axis], streets, axis == rows, even and axis == 0) for axis in (0, 1)]
-    moves: dict[int, FrameMove] = {}
+    moves: dict[int, Move] = {}
     for slot, own in zip(slots, shifts, strict=True):
         for k, (dx, dy) in own.items():
-            mx, my = FrameMove((0.0, 0.0), flips[k]).point(_anchor(pieces[k]))
+            mx, my = shifted_by((0.0, 0.0), flips[k]).point(_anchor(pieces[k]))
             x, y = at[0][slot.across] + dx - mx, at[1][slot.along] + dy - my
-            moves[k] = FrameMove((snap(x) + 0.0, snap(y)), flips[k])
+            moves[k] = shifted_by((snap(x) + 0.0, snap(y)), flips[k])
     return moves
 
 
@@ -117,7 +118,7 @@ def _room(piece: Piece, flip: bool) -> _Room:
         drawn = [point for route in drawing.routes.values() for point in sampled(route)]
         rects = [padded(centres, RADIUS), *drawing.labels, *(rect for _, rect in (*drawing.frames, *drawing.boxes))]
         whole = padded(united([*rects, bounds(drawn)] if drawn else rects), -RADIUS)
-    move = FrameMove(FrameMove((0.0, 0.0), flip).point((-x, -y)), flip)
+    move = shifted_by(shifted_by((0.0, 0.0), flip).point((-x, -y)), flip)
     return _Room(move.rect(whole), move.rect(centres))
 
 
