@@ -65,8 +65,8 @@ def canonical(
     these, ``mirrors`` the scope's path, the
     pairs of neurons and the pairs of instances; ``plan`` the path of the instance that is divided, what
     stands in which row and column of it, and how many of them that spans; ``places`` where neurons are as data;
-    ``labels`` how wide and high are those that discs cannot hold; ``aspect`` the width of the page by its height, where one is
-    asked for.
+    ``labels`` how wide and high are those that discs cannot hold; ``aspect`` the width of the page by its height,
+    where one is asked for.
     """
     names = tuple(sorted(neurons, key=natural_key))
     index = {name: i for i, name in enumerate(names)}
