@@ -35,8 +35,8 @@ _CLEAR = (0.1, 0.02)
 _HASTE = 1.5
 #: What it costs to cross a line, in units of length (without: 10 % more crossings in drawings with frames).
 _CROSSING = 4.0
-#: With more lines than this nobody counts how often they cross.
-_MOST_CROSSED = 300
+#: With more lines than this, times those that go round something, nobody counts how often they cross.
+_MOST_CROSSED = 5000
 #: From a corner so many of the nearest frames are seen.
 _NEAREST = 24
 #: Outwards, from each side of a rectangle, and from its corners.
@@ -44,8 +44,8 @@ _OUT = np.array([-1.0, -1.0, 1.0, 1.0])
 _CORNERS = ((0, 1), (0, 3), (2, 1), (2, 3))
 #: What comes this close to a disc may be measured to run over it.
 _BARELY = 0.01
-#: Where more run over discs than this, detours would only move the crowd.
-_MOST = 300
+#: Where more run over discs than this, and than this share of all, detours would only move the crowd.
+_MOST, _SHARE = 60, 0.25
 
 
 def detoured(
@@ -65,7 +65,7 @@ def detoured(
     own = [(edges[i].source, edges[i].target) for i in chosen]
     entered = walls.entered([routes[i] for i in chosen], own)
     clear = obstacles.clearances([routes[i] for i in chosen], own)
-    crowd = sum(clearance < TOUCH + _BARELY for clearance in clear) > _MOST
+    crowd = sum(clearance < TOUCH + _BARELY for clearance in clear) > max(_MOST, _SHARE * len(clear))
     wrong = [
         (-distance(*(centres[end] for end in ends)), i, enters, clearance)
         for i, ends, enters, clearance in zip(chosen, own, entered, clear, strict=True)
@@ -75,7 +75,8 @@ def detoured(
         return {}
     between, found = by_ends(enumerate(edges)), dict[int, Route]()
     right = [routes[i] for i in sorted(routes.keys() - {i for _, i, _, _ in wrong})]
-    detours = Detours(walls, centres, [*right, *drawn] if len(routes) + len(drawn) <= _MOST_CROSSED else None)
+    few = (len(routes) + len(drawn)) * len(wrong) <= _MOST_CROSSED
+    detours = Detours(walls, centres, [*right, *drawn] if few else None)
     for _, i, enters, clearance in sorted(wrong):
         ends = edges[i].source, edges[i].target
         route = detours.route(*ends, len(between[frozenset(ends)]) == 1, ways.get(i, ()))
