@@ -44,8 +44,6 @@ _OUT = np.array([-1.0, -1.0, 1.0, 1.0])
 _CORNERS = ((0, 1), (0, 3), (2, 1), (2, 3))
 #: What comes this close to a disc may be measured to run over it.
 _BARELY = 0.01
-#: Where more run over discs than this, and than this share of all, detours would only move the crowd.
-_MOST, _SHARE = 60, 0.25
 
 
 def detoured(
@@ -56,16 +54,18 @@ def detoured(
     walls: Walls,
     ways: Mapping[int, Sequence[Point]],
     drawn: Sequence[Route] = (),
+    most: int = 300,
 ) -> dict[int, Route]:
     """Detours by edge index for the routes that enter foreign frames or run over discs, where there are some: first
     those between the farthest neurons, which so take the inner lanes round what they share with others. What has a way
     already, from point to point, goes round what is in the way between two of these alone, if none is in a
-    frame. Others cross few lines, of the routes that can stay and of those that are ``drawn``."""
+    frame. Others cross few lines, of the routes that can stay and of those that are ``drawn``.
+    Where more than ``most`` run over discs, detours would only move the crowd: these stay."""
     chosen = sorted(routes)
     own = [(edges[i].source, edges[i].target) for i in chosen]
     entered = walls.entered([routes[i] for i in chosen], own)
     clear = obstacles.clearances([routes[i] for i in chosen], own)
-    crowd = sum(clearance < TOUCH + _BARELY for clearance in clear) > max(_MOST, _SHARE * len(clear))
+    crowd = sum(clearance < TOUCH + _BARELY for clearance in clear) > most
     wrong = [
         (-distance(*(centres[end] for end in ends)), i, enters, clearance)
         for i, ends, enters, clearance in zip(chosen, own, entered, clear, strict=True)
