@@ -37,8 +37,8 @@ _NARROW = 0.6
 _HASTE = 1.5
 #: What it costs to cross a line, in units of length (without: 10 % more crossings in drawings with frames).
 _CROSSING = 4.0
-#: With more lines than this nobody counts how often they cross.
-_MOST_CROSSED = 300
+#: With more lines than this, times those that go round something, nobody counts how often they cross.
+_MOST_CROSSED = 5000
 #: From a corner so many of the nearest frames are seen.
 _NEAREST = 24
 #: Outwards, from each side of a rectangle, and from its corners.
@@ -46,8 +46,6 @@ _OUT = np.array([-1.0, -1.0, 1.0, 1.0])
 _CORNERS = ((0, 1), (0, 3), (2, 1), (2, 3))
 #: What comes this close to a disc may be measured to run over it.
 _BARELY = 0.01
-#: Where more run over discs than this, detours would only move the crowd.
-_MOST = 300
 
 
 def detoured(
@@ -58,16 +56,18 @@ def detoured(
     walls: Walls,
     ways: Mapping[int, Sequence[Point]],
     drawn: Sequence[Route] = (),
+    most: int = 300,
 ) -> dict[int, Route]:
     """Detours by edge index for the routes that enter foreign frames or run over discs, where there are some: first
     those between the farthest neurons, which so take the inner lanes round what they share with others. What has a way
     already, from point to point, goes round what is in the way between two of these alone, if none is in a
-    frame. Others cross few lines, of the routes that can stay and of those that are ``drawn``."""
+    frame. Others cross few lines, of the routes that can stay and of those that are ``drawn``.
+    Where more than ``most`` run over discs, detours would only move the crowd: these stay."""
     chosen = sorted(routes)
     own = [(edges[i].source, edges[i].target) for i in chosen]
     entered = walls.entered([routes[i] for i in chosen], own)
     clear = obstacles.clearances([routes[i] for i in chosen], own)
-    crowd = sum(near < TOUCH + _BARELY and not enters for near, enters in zip(clear, entered, strict=True)) > _MOST
+    crowd = sum(near < TOUCH + _BARELY and not enters for near, enters in zip(clear, entered, strict=True)) > most
     wrong = [
         (-distance(*(centres[end] for end in ends)), i, enters, clearance)
         for i, ends, enters, clearance in zip(chosen, own, entered, clear, strict=True)
@@ -77,7 +77,8 @@ def detoured(
         return {}
     between, found = by_ends(enumerate(edges)), dict[int, Route]()
     right = [routes[i] for i in sorted(routes.keys() - {i for _, i, _, _ in wrong})]
-    detours = Detours(walls, centres, [*right, *drawn] if len(routes) + len(drawn) <= _MOST_CROSSED else None)
+    few = (len(routes) + len(drawn)) * len(wrong) <= _MOST_CROSSED
+    detours = Detours(walls, centres, [*right, *drawn] if few else None)
     for _, i, enters, clearance in sorted(wrong):
         ends = edges[i].source, edges[i].target
         route = detours.route(*ends, len(between[frozenset(ends)]) == 1, ways.get(i, ()))

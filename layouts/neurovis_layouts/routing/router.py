@@ -33,6 +33,9 @@ _MOST_CAREFULLY = 4000
 _MOST_AT_LENGTH = 1000
 #: Nor where all of them together are longer than this by the heights tried.
 _MOST_LENGTH = 250_000.0
+#: Where more than this run over discs they stay, first where neurons stand anywhere, then where they were planned to
+#: have room around them.
+_MOST_AROUND, _MOST_AROUND_PLANNED = 60, 300
 _STEEP_ENOUGH = 0.75
 
 
@@ -72,7 +75,8 @@ def route_all(
     walls = Walls(frames, len(centres))
     few = len(edges) <= min(careful, _MOST_AT_LENGTH)
     ways = {i: [(way.x, way.y) for way in line] for i, line in (waypoints or {}).items()}
-    routes.update(detoured(edges, centres, routes, obstacles, walls, ways, drawn))
+    most = _MOST_AROUND if waypoints is None else _MOST_AROUND_PLANNED
+    routes.update(detoured(edges, centres, routes, obstacles, walls, ways, drawn, most))
     images = images or Images()
     routes.update(images.kept(routes, edges, centres))
     routes.update((i, route) for i, route in (there or {}).items() if few and i in routes)
