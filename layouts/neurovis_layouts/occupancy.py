@@ -137,8 +137,8 @@ class Occupancy:
             if rect is not None and next(self._strangers(number, rect), None) is not None
         }
         points = [point for route in routes for point in sampled(route, _STEP)]
-        self._lines = _CentreCells()
-        for point in points if len(points) <= _MOST else ():
+        self._lines, self._on_lines = _CentreCells(), points if len(points) <= _MOST else []
+        for point in self._on_lines:
             self._lines.add(point)
         self._rules = (_CLEAR, _AMPLE, _TIGHT, _DISCS) if points else (_AMPLE, _TIGHT, _DISCS)
 
@@ -289,9 +289,12 @@ class Occupancy:
             if number in self._open:
                 continue
             before, wider = self._rects[number], padded(rect, rules.margin)
+            x0, y0, x1, y1 = wider
             # who has been near the frame may be
             known = set() if before is None else set(self._strangers(number, padded(before, rules.margin)))
             if any(neuron not in known for neuron in self._strangers(number, wider)):
+                return False
+            if rules.off_lines and before is None and any(x0 < x < x1 and y0 < y < y1 for x, y in self._on_lines):
                 return False
             if any(n not in self._members[number] and meet((*p, *p), wider) for n, p in points):
                 return False
