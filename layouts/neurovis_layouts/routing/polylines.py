@@ -244,6 +244,8 @@ def crossings(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> tup
 def close_segments(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, by: float) -> tuple[IntArray, IntArray]:
     """Which segments from ``a`` to ``b`` and which from ``c`` to ``d`` have rectangles around them that come as close
     to each other as this, or closer, in order."""
+    if not len(a) or not len(c):
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     low, high = np.minimum(a, b) - by, np.maximum(a, b) + by
     least, most = np.minimum(c, d), np.maximum(c, d)
     wide = (high - low).sum(axis=0) * len(c) + (most - least).sum(axis=0) * len(a)
