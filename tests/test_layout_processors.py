@@ -1,4 +1,4 @@
-"""A layout does not depend on the processor: NumPy has other code for newer ones, which rounds some functions otherwise."""
+"""A layout does not depend on the processor: NumPy has other code for newer ones, which rounds some functions anew."""
 
 from __future__ import annotations
 

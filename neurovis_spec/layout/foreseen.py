@@ -8,6 +8,7 @@ finds out while it draws is not foreseen, nor are these in a network so large th
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import Final, cast
 
 from neurovis_spec.compiler.network import Network
@@ -22,9 +23,10 @@ from neurovis_spec.plugins import PluginError
 _MOST: Final = 1000
 
 
-def foreseen(network: Network, problem: Callable[[], LayoutProblem]) -> LayoutRefusalError | None:
+def foreseen(network: Network, problem_of: Callable[[], LayoutProblem]) -> LayoutRefusalError | None:
     """What would be refused, by the engine of the spec, or by the one that ``auto`` stands for."""
     settings, name = network.layout, network.layout.engine
+    problem = cache(problem_of)
     if name == "auto":
         if not (settings.arrange or settings.mirrors or settings.align or settings.plan or _crowded(network)):
             return None  # it stands for none that cannot do the rest

@@ -29,8 +29,8 @@ PAGE = 4 / 3
 #: How long an engine may look for fewer crossings.
 Effort = Literal["quick", "normal", "best"]
 EFFORTS: tuple[Effort, ...] = get_args(Effort)
-#: What a drawing may show best: how signals flow, what is near what in the network, clusters of very many neurons, some
-#: neurons that nearly all drive each other, pins of all neurons, where neurons are as data.
+#: What a drawing may show best: how signals flow, clusters, some neurons that nearly all drive each other, pins of all
+#: neurons, where neurons are as data.
 Suits = Literal["flow", "clusters", "tangle", "pins", "positions"]
 
 #: Radius of a neuron's disc.

@@ -112,7 +112,7 @@ def check_plan(
             if one is not None and other is not None:
                 if (one.seat, other.seat) in told:
                     continue
-                told.add((one.seat, other.seat))
+                told.update(((one.seat, other.seat), (other.seat, one.seat)))
                 if one.seat.image(direction) == other.seat:
                     if one is not other:
                         _check_images(rows, one, other, image, names, findings)
