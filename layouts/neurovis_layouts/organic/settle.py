@@ -50,11 +50,11 @@ def settle(
         force = _PUSH * field(places)
         way = places[wiring.b] - places[wiring.a]
         length = np.sqrt((way**2).sum(axis=1)) + 1e-9
-        # links pull with the power 1 - 19/64 of their length, by roots alone, which every processor rounds alike
+        # links pull with the power 11/16 of their length, by roots alone, which every processor rounds alike
         roots = [length]
-        for _ in range(6):
+        for _ in range(4):
             roots.append(np.sqrt(roots[-1]))
-        stiffness = wiring.weight / (roots[2] * roots[5] * roots[6])
+        stiffness = wiring.weight / (roots[2] * roots[4])
         pull = way * stiffness[:, None]
         for k in (0, 1):
             force[:, k] += np.bincount(wiring.a, pull[:, k], count) - np.bincount(wiring.b, pull[:, k], count)
