@@ -155,6 +155,11 @@ class Alike:
         )
 
 
+def mirror_images(problem: LayoutProblem) -> dict[int, int]:
+    """By neuron, its mirror image, about whatever axis."""
+    return {a: b for mirror in problem.mirrors for pair in mirror.pairs for a, b in (pair, pair[::-1])}
+
+
 def pairs_by_axis(problem: LayoutProblem) -> dict[int, list[tuple[int, int]]]:
     """The pairs of mirror images, those about one axis together, by its scope."""
     found: dict[int, list[tuple[int, int]]] = {}

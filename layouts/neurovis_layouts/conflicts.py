@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from neurovis_layouts.alike import Move, move_of, pairs_by_axis, reflection, same, twice_axis
+from neurovis_layouts.alike import Move, mirror_images, move_of, pairs_by_axis, reflection, same, twice_axis
 from neurovis_layouts.frame import across_of
 from neurovis_layouts.occupancy import overlapping
 from neurovis_spec.layout.geometry import distance, snap
@@ -40,7 +40,10 @@ class Memory:
         there = problem.memory.positions if problem.memory else {}
         self.known = {i: there[name] for i, name in enumerate(problem.neurons) if name in there}
         self._problem, self._fresh = problem, fresh
-        self._hand = _by_hand(problem, self.known)
+        #: the neurons of each outermost instance, by its number
+        self.outer = {k: frozenset(module.members) for k, module in enumerate(problem.modules) if module.parent < 0}
+        self._images = mirror_images(problem)
+        self._hand = _by_hand(problem, self.known, self.outer.values())
         #: twice where the axis of a scope stands, if a pair of it is known
         self.twice: dict[int, float] = {}
         across = across_of(problem.direction)
@@ -54,19 +57,19 @@ class Memory:
 
     def earlier(self, held: Mapping[int, Point], twice: Mapping[int, float]) -> Earlier:
         """Where neurons are wanted, with some ``held`` by pins, and axes at ``twice``, by their scopes."""
-        problem, where = self._problem, {**self.known, **held}
+        where = {**self.known, **held}
         changed = {i for i, point in held.items() if i not in self.known or not same(self.known[i], point)}
-        for own in outermost(problem).values():  # it is drawn around its pins anew
+        for own in self.outer.values():  # it is drawn around its pins anew
             if not changed.isdisjoint(own):
                 where = {i: point for i, point in where.items() if i in held or i not in own}
         lost = self._follow_makes(where, held)
         put = self._hand.keys() & where.keys() - held.keys() - lost
         lost |= self._follow_mirrors(where, put, held, twice)
-        both = together(problem, overlapping({i: where[i] for i in put}, held)) & put
+        both = self.together(overlapping({i: where[i] for i in put}, held)) & put
         put -= both
         lost = (lost | both) - put
         on_top = overlapping({i: where[i] for i in where.keys() - held.keys() - lost}, held)
-        lost |= together(problem, on_top) - (put - on_top)
+        lost |= self.together(on_top) - (put - on_top)
         return Earlier(where, frozenset(put | changed), frozenset(lost & where.keys() - held.keys()))
 
     def _follow_makes(self, where: dict[int, Point], held: Mapping[int, Point]) -> set[int]:
@@ -84,7 +87,7 @@ class Memory:
                 if drawn is not None and now is None:
                     move = _nearest([(where[a], where[b]) for a, b in pairs], flips)
                     where.update({b: move.point(where[a]) for a, b in pairs})
-                    lost |= together(self._problem, [b for _, b in pairs])
+                    lost |= self.together(b for _, b in pairs)
         return lost
 
     def _follow_mirrors(
@@ -92,7 +95,7 @@ class Memory:
     ) -> set[int]:
         """Mirror images made so; those that have to move. The image of what was ``put`` by hand is so, too."""
         across, followed, on_axis = across_of(self._problem.direction), set[int](), set[int]()
-        bent = {i for own in outermost(self._problem).values() if not held.keys().isdisjoint(own) for i in own}
+        bent = {i for own in self.outer.values() if not held.keys().isdisjoint(own) for i in own}
         for scope, pairs in pairs_by_axis(self._problem).items():
             mirror = reflection(across, twice.get(scope, 0.0))
             for a, b in pairs if scope in twice else ():
@@ -107,9 +110,18 @@ class Memory:
                         followed |= {a, b}
                 there = {i for i in (a, b) if i in where}
                 on_axis |= {i for i in there if distance(where[i], mirror.point(where[i])) < 2 * RADIUS - _SLACK}
-        on_axis = together(self._problem, on_axis)  # their images would stand on them
+        on_axis = self.together(on_axis)  # their images would stand on them
         put -= on_axis
-        return together(self._problem, followed) | on_axis
+        return self.together(followed) | on_axis
+
+    def together(self, neurons: Iterable[int]) -> set[int]:
+        """These neurons with all others in the outermost instances around them, and the mirror images of all."""
+        found = set(neurons)
+        found |= {self._images[n] for n in found if n in self._images}
+        for own in self.outer.values():
+            if not found.isdisjoint(own):
+                found |= own
+        return found | {self._images[n] for n in found if n in self._images}
 
 
 def carried(problem: LayoutProblem, layout: Layout, placed: Mapping[int, Point]) -> dict[int, Route]:
@@ -127,9 +139,9 @@ def carried(problem: LayoutProblem, layout: Layout, placed: Mapping[int, Point])
     return found
 
 
-def _by_hand(problem: LayoutProblem, now: Mapping[int, Point]) -> dict[int, Point]:
-    """The neurons that were moved, with where they were. An instance of which only a part was moved is not among them:
-    it contradicts its template, which a file cannot change."""
+def _by_hand(problem: LayoutProblem, now: Mapping[int, Point], outer: Iterable[frozenset[int]]) -> dict[int, Point]:
+    """The neurons that were moved, with where they were. Of the instances that are ``outer``, those of which only a
+    part was moved are not among them: they contradict their template, which a file cannot change."""
     before: dict[int, Point] = {}
     for edge in problem.edges:
         route = problem.memory.routes.get(edge.name) if problem.memory else None
@@ -138,7 +150,7 @@ def _by_hand(problem: LayoutProblem, now: Mapping[int, Point]) -> dict[int, Poin
             before.setdefault(edge.target, route[-1])
     before = {i: point for i, point in before.items() if i in now}
     moved = {i: point for i, point in before.items() if not same(point, now[i])}
-    for own in outermost(problem).values():
+    for own in outer:
         known = sorted(own & before.keys())
         if moved.keys().isdisjoint(known):
             continue
@@ -159,19 +171,3 @@ def _nearest(pairs: Sequence[tuple[Point, Point]], flips: Iterable[Point]) -> Mo
         shift, count = max(votes.items(), key=lambda vote: (vote[1], -abs(vote[0][0]), -abs(vote[0][1]), vote[0]))
         best.append((count, Move(flip, shift)))
     return max(best, key=lambda one: one[0])[1]
-
-
-def together(problem: LayoutProblem, neurons: Iterable[int]) -> set[int]:
-    """These neurons with all others in the outermost instances around them, and the mirror images of all of them."""
-    found = set(neurons)
-    images = {n: mate for mirror in problem.mirrors for a, b in mirror.pairs for n, mate in ((a, b), (b, a))}
-    found |= {images[n] for n in found if n in images}
-    for own in outermost(problem).values():
-        if not found.isdisjoint(own):
-            found |= own
-    return found | {images[n] for n in found if n in images}
-
-
-def outermost(problem: LayoutProblem) -> dict[int, frozenset[int]]:
-    """The neurons of each outermost instance, by its number."""
-    return {k: frozenset(module.members) for k, module in enumerate(problem.modules) if module.parent < 0}

@@ -137,8 +137,8 @@ class Occupancy:
             if rect is not None and next(self._strangers(number, rect), None) is not None
         }
         points = [point for route in routes for point in sampled(route, _STEP)]
-        self._lines, self._on_lines = _CentreCells(), points if len(points) <= _MOST else []
-        for point in self._on_lines:
+        self._lines = _CentreCells()
+        for point in points if len(points) <= _MOST else ():
             self._lines.add(point)
         self._rules = (_CLEAR, _AMPLE, _TIGHT, _DISCS) if points else (_AMPLE, _TIGHT, _DISCS)
 
@@ -269,9 +269,9 @@ class Occupancy:
             for number in self._walls.near(spot)
         )
 
-    def _meets(self, number: int, rect: Rect, gap: float = 0.0) -> bool:
+    def _meets(self, number: int, rect: Rect) -> bool:
         own = self._rects[number]
-        return own is not None and meet(own, rect, gap)
+        return own is not None and meet(own, rect)
 
     def _grown(self, piece: Sequence[Body], anchor: Point) -> dict[int, Rect]:
         """The frames that are new or grow, by number."""
@@ -289,12 +289,11 @@ class Occupancy:
             if number in self._open:
                 continue
             before, wider = self._rects[number], padded(rect, rules.margin)
-            x0, y0, x1, y1 = wider
             # who has been near the frame may be
             known = set() if before is None else set(self._strangers(number, padded(before, rules.margin)))
             if any(neuron not in known for neuron in self._strangers(number, wider)):
                 return False
-            if rules.off_lines and before is None and any(x0 < x < x1 and y0 < y < y1 for x, y in self._on_lines):
+            if rules.off_lines and before is None and self._lines.within(wider):
                 return False
             if any(n not in self._members[number] and meet((*p, *p), wider) for n, p in points):
                 return False
@@ -410,6 +409,16 @@ class _CentreCells:
             for i in (-1, 0, 1)
             for j in (-1, 0, 1)
             for other in self._cells.get((column + i, row + j), ())
+        )
+
+    def within(self, rect: Rect) -> bool:
+        """Whether a centre is inside a rectangle."""
+        x0, y0, x1, y1 = rect
+        return any(
+            x0 < x < x1 and y0 < y < y1
+            for column in range(math.floor(x0), math.floor(x1) + 1)
+            for row in range(math.floor(y0), math.floor(y1) + 1)
+            for x, y in self._cells.get((column, row), ())
         )
 
 

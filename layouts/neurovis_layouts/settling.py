@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 from neurovis_layouts.alike import STAY, Alike, Move, pairs_by_axis, reflection, same, twice_axis
 from neurovis_layouts.axes import axes, shift_of
-from neurovis_layouts.conflicts import Earlier, Memory, carried, outermost, together
+from neurovis_layouts.conflicts import Earlier, Memory, carried
 from neurovis_layouts.frame import across_of, from_picture, to_picture
 from neurovis_layouts.occupancy import AxisSide, Body, Occupancy, Wish, lone
 from neurovis_layouts.rows import GroupRows
@@ -229,7 +229,7 @@ class _Settling:
         where = {**before.where, **there.placed}
         newly = before.newly | (there.placed.keys() - before.where.keys())
         frames = Frames(replace(problem, boxes=()))
-        rects, outer = frames.rects(where, self._routes(where)), outermost(problem)
+        rects, outer = frames.rects(where, self._routes(where)), self._memory.outer
         framed = {i for own in outer.values() for i in own}
         bodies = [lone(i, where[i]) for i in sorted(where.keys() - framed)]
         for number, own in outer.items():
@@ -242,7 +242,7 @@ class _Settling:
                 firm.enter((body,), _HERE)
         stay = newly | held.keys()
         off = [body for body in bodies if stay.isdisjoint(body.members) and not firm.fits((body,), _HERE)]
-        lost = before.lost | together(problem, (i for body in off for i in body.members))
+        lost = before.lost | self._memory.together(i for body in off for i in body.members)
         return Earlier(where, newly, frozenset((lost & where.keys()) - stay))
 
     def _alone(self, neuron: int, placed: Mapping[int, Point]) -> bool:

@@ -36,6 +36,11 @@ class Symmetry:
         paired: BoolArray = self.image != np.arange(len(self.image))
         return paired
 
+    @property
+    def pair(self) -> dict[int, int]:
+        """By who has an image: who that is."""
+        return {i: int(self.image[i]) for i in np.flatnonzero(self.paired).tolist()}
+
     def kept(self, places: FloatArray) -> FloatArray:
         """Places (n, 2) made symmetric, each pair moved as little as that takes."""
         paired = self.paired
@@ -79,12 +84,11 @@ def about_pins(problem: LayoutProblem, symmetry: Symmetry, places: FloatArray) -
     """The symmetry with its axis where the images of pins have room, by ``places`` that are symmetric about 0; who is
     held by a pin, or by that of its image (p,), in order, and where (p, 2), in the engine's frame."""
     turned = replace(problem, pins={i: from_picture(point, problem.direction) for i, point in problem.pins.items()})
-    pair = {i: int(symmetry.image[i]) for i in np.flatnonzero(symmetry.paired).tolist()}
     free = [(float(x), float(y)) for x, y in places[: len(problem.neurons)].tolist()]
     axis, held = 0.0, turned.pins
     if held:
         start = shift_of(free, held)[0]
-        axis, held = next(axes(turned, start, pair, _WIDE * problem.neuron_spacing))
+        axis, held = next(axes(turned, start, symmetry.pair, _WIDE * problem.neuron_spacing))
     fixed = np.array(sorted(held), dtype=np.int64)
     there = np.array([held[i] for i in fixed.tolist()], dtype=np.float64).reshape(-1, 2)
     return replace(symmetry, axis=axis), fixed, there
@@ -109,8 +113,7 @@ def exact(problem: LayoutProblem, symmetry: Symmetry, centres: Sequence[Point]) 
 def routed_alike(problem: LayoutProblem, symmetry: Symmetry, centres: Sequence[Point]) -> tuple[Images, list[Point]]:
     """Which routes are reflections of others, and what these keep off besides the discs: where these would be on the
     other side of the axis, but for what stands there."""
-    pair = {i: int(symmetry.image[i]) for i in np.flatnonzero(symmetry.paired).tolist()}
-    there = np.array(centres, dtype=np.float64)
+    pair, there = symmetry.pair, np.array(centres, dtype=np.float64)
     ghosts = np.array([symmetry.reflected(point) for i, point in enumerate(centres) if i not in pair]).reshape(-1, 2)
     taken = Cells(there, 2 * RADIUS).near(ghosts)[0]
     free: list[Point] = [(x, y) for x, y in np.delete(ghosts, taken, axis=0).tolist()]

@@ -203,6 +203,13 @@ def near_pairs(places: FloatArray, reach: float) -> tuple[IntArray, IntArray, Fl
     return Cells(places, reach).pairs()
 
 
+def lengths(way: FloatArray) -> FloatArray:
+    """(n,) how long vectors (n, 2) are."""
+    x, y = way.T
+    far: FloatArray = np.sqrt(x * x + y * y)
+    return far
+
+
 def squared_distances(x: FloatArray, y: FloatArray, ux: FloatArray, uy: FloatArray) -> FloatArray:
     """How far points are from segments, squared: points (x, y) as seen from where their segments (ux, uy) begin."""
     t = np.clip((x * ux + y * uy) / np.maximum(ux * ux + uy * uy, 1e-12), 0.0, 1.0)

@@ -1,6 +1,6 @@
 """Exchange: neighbours change places where that saves crossings, in many ranks at once.
 
-In: segments and an order that is too large to be sifted. Out: a better order. Every other rank depends only on those
+In: segments and an order. Out: a better order. Every other rank depends only on those
 between, and so does every other pair of neighbours within a rank: four steps weigh every pair, each with a few array
 operations.
 """

@@ -10,11 +10,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
-from neurovis_layouts.alike import Move, shifted_by
+from neurovis_layouts.alike import Move, mirror_images, shifted_by
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.label_room import covered, flipped, roomy, sides_of
 from neurovis_layouts.layered.bands import FEW, Wanted
@@ -76,7 +77,7 @@ class Composer:
             known |= found
             waiting += sorted(found)
         for problem in problems:
-            pair = {a: b for mirror in problem.mirrors for one in mirror.pairs for a, b in (one, one[::-1])}
+            pair = mirror_images(problem)
             arranged_on_axis(problem, pair, {m for module in problem.modules for m in module.members})
 
     def _with_origins(self, problem: LayoutProblem) -> dict[int, Point]:
@@ -102,7 +103,7 @@ class Composer:
         """The drawing of one problem, that of a ``kind`` of instance or of the whole, its modules named by their kinds;
         without ``routed``, and in a draft, no connection between its frames has a route."""
         routed = routed and not self._shape.draft
-        pair = {a: b for mirror in problem.mirrors for one in mirror.pairs for a, b in (one, one[::-1])}
+        pair = mirror_images(problem)
         if problem.plan:
             return self._on_page(problem, pair, routed, kind)
         key = self._shape.of(WHOLE, problem)
@@ -143,7 +144,7 @@ class Composer:
         """Where everything stands with these parts; ``known`` are boxes that are drawn already."""
         pieces: list[Piece] = []
         for part in parts:
-            pieces.append(self._piece(problem, part, pieces, pair, known))
+            pieces.append(self._piece(problem, part, pieces, known))
         kin: dict[str, int] = {}
         for number, piece in enumerate(pieces):
             kin.setdefault(piece.part.family, len(problem.groups) + number)
@@ -171,13 +172,8 @@ class Composer:
         plan = planned(problem, units, bonds, pair, columns, wanted, behind, self._shape.draft)
         self._most[kind, RANKS] = plan.cuts + 1
 
-        def redraw(piece: Piece, pins: Mapping[int, Point]) -> Piece:
-            inner = (
-                self._book.problem_of(piece.part.kind) if piece.part.kind >= 0 else _boxed(problem, piece.part, pair)
-            )
-            return piece_of(piece.part, self.compose(replace(inner, pins=pins), kind=NONE))
-
-        rests = pinned(problem, plan, [_resting(plan, piece) for piece in pieces], pair, redraw)
+        resting = [_resting(plan, piece) for piece in pieces]
+        rests = pinned(problem, plan, resting, pair, partial(self._redrawn, problem))
         return _Standing.of(problem, plan, rests, units, columns)
 
     def _upright(self, kind: int) -> bool:
@@ -196,39 +192,37 @@ class Composer:
                 if part.image_of >= 0:
                     drawing = drawn(parts[part.image_of], direction).drawing
                 else:
-                    inner = self._inside(problem, part, direction, pair)
+                    inner = self._inside(problem, part, direction)
                     drawing = inner if isinstance(inner, Drawing) else self.compose(inner, kind=NONE)
                     drawing = in_direction(drawing, direction, problem.direction)
                 known[key] = piece_of(part, drawing)
             return known[key]
-
-        def redraw(piece: Piece, pins: Mapping[int, Point]) -> Piece:
-            inner = self._inside(problem, piece.part, problem.direction, pair)
-            inner = self._book.problem_of(piece.part.kind) if isinstance(inner, Drawing) else inner
-            return piece_of(piece.part, self.compose(replace(inner, pins=pins), kind=NONE))
 
         parts, where = parts_by_cell(problem, pair)
         pieces = facing(problem, parts, where, pair, drawn, kind == WHOLE, self._upright(kind))
         plan = ComponentLayout()
         for piece, move in pieces:
             plan.places.update(zip(piece.part.members, map(move.point, piece.drawing.places), strict=True))
-        rests = pinned(problem, plan, pieces, pair, redraw)
+        rests = pinned(problem, plan, pieces, pair, partial(self._redrawn, problem))
         return _Standing.of(problem, plan, rests, (), frozenset()).joined(problem, pair, routed)
 
-    def _inside(
-        self, problem: LayoutProblem, part: Part, direction: Direction, pair: Mapping[int, int]
-    ) -> LayoutProblem | Drawing:
+    def _redrawn(self, problem: LayoutProblem, piece: Piece, pins: Mapping[int, Point]) -> Piece:
+        """A piece drawn anew, around pins of its neurons."""
+        part = piece.part
+        inner = self._book.problem_of(part.kind) if part.kind >= 0 else _boxed(problem, part)
+        return piece_of(part, self.compose(replace(inner, pins=pins), kind=NONE))
+
+    def _inside(self, problem: LayoutProblem, part: Part, direction: Direction) -> LayoutProblem | Drawing:
         """An instance's drawing in a direction; of a box, which has none yet, the problem of drawing it alone."""
         if part.kind >= 0:
             return self.kind(part.kind, direction)
-        return replace(_boxed(problem, part, pair), direction=direction)
+        return replace(_boxed(problem, part), direction=direction)
 
     def _piece(
         self,
         problem: LayoutProblem,
         part: Part,
         before: Sequence[Piece],
-        pair: Mapping[int, int],
         known: dict[Part, Drawing],
     ) -> Piece:
         if part.image_of >= 0:
@@ -237,7 +231,7 @@ class Composer:
             drawing = self.kind(part.kind, problem.direction)
         else:
             if part not in known:
-                known[part] = self.compose(_boxed(problem, part, pair), kind=NONE)
+                known[part] = self.compose(_boxed(problem, part), kind=NONE)
             drawing = known[part]
         return piece_of(part, drawing)
 
@@ -260,7 +254,7 @@ def _resting(plan: ComponentLayout, piece: Piece) -> tuple[Piece, Move]:
     return piece, shifted_by((x - dx, y - dy), flip)
 
 
-def _boxed(problem: LayoutProblem, part: Part, pair: Mapping[int, int]) -> LayoutProblem:
+def _boxed(problem: LayoutProblem, part: Part) -> LayoutProblem:
     """A box as a problem of its own."""
     place = {neuron: i for i, neuron in enumerate(part.members)}
     driven = {e.target for e in problem.edges if e.target in place and e.source not in place} | set(problem.entries)

@@ -32,7 +32,7 @@ def mirrored(
     side = {n: 0 if image[n] == n else -1 if levels.nodes[n].members[0][0] in left else 1 for n in image}
     _match_passages(problem, levels, pair, where, image, side)
     half = _folded(levels, image, side)
-    order = _unfolded(levels, ordered(half[0], effort=problem.effort, draft=draft)[1], half[1], image, side)
+    order = _unfolded(ordered(half[0], effort=problem.effort, draft=draft)[1], half[1], image, side)
     for rank in order:
         _about(levels, rank, side, pair)
     result: list[int] = [0] * len(levels.nodes)
@@ -136,7 +136,6 @@ def _folded(levels: Levels, image: Mapping[int, int], side: Mapping[int, int]) -
 
 
 def _unfolded(
-    levels: Levels,
     half: Sequence[Sequence[int]],
     chosen: Sequence[int],
     image: Mapping[int, int],

@@ -26,6 +26,7 @@ from neurovis_layouts.packing import packed
 from neurovis_layouts.symmetry import Symmetry, about_pins, first_of_pairs, symmetry_of
 from neurovis_layouts.wiring import Wiring, parts_of, wiring_of
 from neurovis_spec.layout import BoolArray, Capabilities, FloatArray, IntArray, Layout, LayoutProblem, Progress
+from neurovis_spec.layout.geometry import lengths
 
 #: In spacings: how far three quarters are from their next at most, how long links are in the mean at least, how far
 #: discs are kept apart, and parts.
@@ -157,9 +158,7 @@ def _packed(wiring: Wiring, places: FloatArray, part: IntArray, ready: BoolArray
     aside[:, 1] = _in_flow(wiring, aside[:, 1], part, spacing)
     kept, arcs = Symmetry(image, axis).kept, (wiring.above, wiring.below)
     moved = apart(aside[real], _APART * spacing, np.flatnonzero(ready[real]), arcs, part[real], kept)
-    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
-    np.minimum.at(low, part[real], moved)
-    np.maximum.at(high, part[real], moved)
+    low, high = _bounds(moved, part[real], count)
     filled = np.flatnonzero(np.isfinite(low[:, 0]))
     sizes = [(float(w), float(h)) for w, h in (high - low)[filled].tolist()]
     shift = np.zeros((count, 2))
@@ -188,24 +187,22 @@ def _scales(wiring: Wiring, places: FloatArray, part: IntArray, spacing: float) 
     count = int(part.max()) + 1
     next_one = nearest(places[: wiring.neurons], 1.0)
     links = (wiring.a < wiring.neurons) & (wiring.b < wiring.neurons)
-    way = places[wiring.b[links]] - places[wiring.a[links]]
-    length = np.sqrt((way**2).sum(axis=1))
+    length = lengths(places[wiring.b[links]] - places[wiring.a[links]])
     by_room = _NEXT * spacing / np.maximum(_quantile(part[: wiring.neurons], next_one, count), 1e-3)
     by_link = _LINK * spacing / np.maximum(_mean(part[wiring.a[links]], length, count, 1.0), 1e-3)
-    width, height = (_extent(places, part) + 0.1).T
+    low, high = _bounds(places, part, count)
+    width, height = (high - low + 0.1).T
     by_area = spacing * np.sqrt(_ROOM * np.bincount(part) / (width * height))
     scales: FloatArray = np.maximum(np.minimum(by_room, by_area), by_link)[part]
     return scales
 
 
-def _extent(places: FloatArray, part: IntArray) -> FloatArray:
-    """(count, 2) how wide and how high each part is."""
-    count = int(part.max()) + 1
+def _bounds(places: FloatArray, part: IntArray, count: int) -> tuple[FloatArray, FloatArray]:
+    """(count, 2) the low and the high corner of each part; infinite where there is nothing in it."""
     low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
     np.minimum.at(low, part, places)
     np.maximum.at(high, part, places)
-    extent: FloatArray = high - low
-    return extent
+    return low, high
 
 
 def _quantile(part: IntArray, values: FloatArray, count: int) -> FloatArray:

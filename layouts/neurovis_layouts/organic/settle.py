@@ -16,6 +16,7 @@ from neurovis_layouts.organic.field import Field
 from neurovis_layouts.symmetry import Symmetry
 from neurovis_layouts.wiring import Wiring
 from neurovis_spec.layout import FloatArray, IntArray
+from neurovis_spec.layout.geometry import lengths
 
 #: How strongly points push each other off.
 _PUSH = 0.2
@@ -49,12 +50,10 @@ def settle(
     for step in range(cooling.steps):
         force = _PUSH * field(places)
         way = places[wiring.b] - places[wiring.a]
-        length = np.sqrt((way**2).sum(axis=1)) + 1e-9
+        length = lengths(way) + 1e-9
         # links pull with the power 11/16 of their length, by roots alone, which every processor rounds alike
-        roots = [length]
-        for _ in range(4):
-            roots.append(np.sqrt(roots[-1]))
-        stiffness = wiring.weight / (roots[2] * roots[4])
+        fourth = np.sqrt(np.sqrt(length))
+        stiffness = wiring.weight / (fourth * np.sqrt(np.sqrt(fourth)))
         pull = way * stiffness[:, None]
         for k in (0, 1):
             force[:, k] += np.bincount(wiring.a, pull[:, k], count) - np.bincount(wiring.b, pull[:, k], count)
@@ -65,7 +64,7 @@ def settle(
         active = _PRESS * wiring.pull * (missing > 0)
         held += np.bincount(wiring.below, active, count) + np.bincount(wiring.above, active, count)
         move = force / (held + 1e-9)[:, None]
-        far = np.sqrt((move**2).sum(axis=1)) + 1e-12
+        far = lengths(move) + 1e-12
         longest = cooling.first * (cooling.last / cooling.first) ** (step / max(1, cooling.steps - 1))
         move *= (np.minimum(far, longest) / far)[:, None]
         if fixed is not None:

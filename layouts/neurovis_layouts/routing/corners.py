@@ -12,7 +12,7 @@ import numpy as np
 from neurovis_layouts.routing.polylines import along
 from neurovis_layouts.routing.walls import blocked
 from neurovis_spec.layout import BoolArray, FloatArray, IntArray
-from neurovis_spec.layout.geometry import cubic, pieces_of, squared_distances
+from neurovis_spec.layout.geometry import cubic, lengths, pieces_of, squared_distances
 from neurovis_spec.layout.model import GRID, Point, Route
 
 #: Corners closer to the line than this are none; there are so many at most, else more is none.
@@ -86,7 +86,7 @@ def smoothed(ways: Sequence[tuple[Sequence[Point], float]]) -> tuple[FloatArray,
     inner = np.ones(len(points), dtype=np.bool_)
     inner[first] = inner[last] = False
     corner = np.flatnonzero(inner)
-    legs = _lengths(points[1:] - points[:-1])
+    legs = lengths(points[1:] - points[:-1])
     corner = corner[(legs[corner - 1] >= _SHORT) & (legs[corner] >= _SHORT)]
     owner = np.repeat(np.arange(len(ways), dtype=np.int64), counts)[corner]
     # how much is cut off before each corner and behind it
@@ -104,7 +104,7 @@ def smoothed(ways: Sequence[tuple[Sequence[Point], float]]) -> tuple[FloatArray,
     stops[slot, 0], stops[slot, 1], stops[ends] = start, end, points[last][:, None]
     before = np.concatenate([points[first[:1]], stops[:-1, 1]])
     before[ends[:-1] + 1] = points[first[1:]]
-    straight = _lengths(stops[:, 0] - before) > _SHORT
+    straight = lengths(stops[:, 0] - before) > _SHORT
     pieces = np.empty((len(stops), 2, 4, 2))
     pieces[:, 0, 0], pieces[:, 0, 3] = before, stops[:, 0]
     pieces[:, 0, 1], pieces[:, 0, 2] = (2 * before + stops[:, 0]) / 3, (before + 2 * stops[:, 0]) / 3
@@ -119,12 +119,6 @@ def smoothed(ways: Sequence[tuple[Sequence[Point], float]]) -> tuple[FloatArray,
     border = np.flatnonzero(line[1:] != line[:-1])
     whole[np.append(0, border + 1), 0], whole[np.append(border, -1), 3] = points[first], points[last]
     return whole, line
-
-
-def _lengths(way: FloatArray) -> FloatArray:
-    x, y = way.T
-    far: FloatArray = np.sqrt(x * x + y * y)
-    return far
 
 
 def _part(leg: FloatArray, whole: BoolArray) -> FloatArray:

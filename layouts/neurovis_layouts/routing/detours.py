@@ -23,7 +23,7 @@ from neurovis_layouts.routing.polylines import crossings, polylines
 from neurovis_layouts.routing.route_cost import ALONG, BENDING, ENTERING
 from neurovis_layouts.routing.walls import Walls, blocked, meet
 from neurovis_spec.layout import BoolArray, FloatArray, IntArray
-from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.geometry import distance, lengths
 from neurovis_spec.layout.model import RADIUS, LayoutEdge, Point, Route
 
 #: How far off a frame's border lanes run.
@@ -206,7 +206,7 @@ class Detours:
         points = corners.points
         places: list[Point] = [(x, y) for x, y in points.tolist()]
         extra = np.array([0.0, 0.0, *(BENDING + bends.get(place, 0.0) for place in places[2:])])
-        ahead = _HASTE * _lengths(points - points[1])
+        ahead = _HASTE * lengths(points - points[1])
         best = np.full(len(points), np.inf)
         best[0] = 0.0
         before = np.zeros(len(points), dtype=np.int64)
@@ -223,7 +223,7 @@ class Detours:
                 continue
             done[at] = True
             to = corners.near(at)
-            cost = best[at] + _lengths(points[to] - points[at]) + extra[to]
+            cost = best[at] + lengths(points[to] - points[at]) + extra[to]
             cost += self._taken.beside(places[at], points[to])
             better = (cost < best[to]) & ~done[to]
             if at == 0 and not alone:
@@ -295,10 +295,3 @@ def _taut(way: FloatArray, sides: FloatArray) -> BoolArray:
     (x, y), least = (way * sides).T, 1e-9
     along: BoolArray = ~(((x > least) & (y > least)) | ((x < -least) & (y < -least)))
     return along
-
-
-def _lengths(way: FloatArray) -> FloatArray:
-    """(n,) how long lines (n, 2) are."""
-    x, y = way.T
-    far: FloatArray = np.sqrt(x * x + y * y)
-    return far

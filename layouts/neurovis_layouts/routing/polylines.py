@@ -13,7 +13,7 @@ import numpy as np
 
 from neurovis_layouts.routing.walls import blocked
 from neurovis_spec.layout import BoolArray, FloatArray, IntArray
-from neurovis_spec.layout.geometry import crossing, cubic, pieces_of, squared_distances
+from neurovis_spec.layout.geometry import crossing, cubic, lengths, pieces_of, squared_distances
 from neurovis_spec.layout.model import Route
 
 #: Into how many segments a piece is cut that is not straight, and how far off its chord such a piece reaches, by the
@@ -50,7 +50,7 @@ class Polylines:
         #: of each line its first segment
         self._segments: IntArray = starts[:-1] - np.arange(len(starts) - 1, dtype=np.int64)
         way = self.b - self.a
-        self._way, self._lengths = way, np.sqrt(way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1])
+        self._way, self._lengths = way, lengths(way)
 
     def __len__(self) -> int:
         return len(self.starts) - 1
@@ -85,11 +85,11 @@ class Polylines:
         """(n,) and (n,) how much they turn, in chords of the unit circle, and how much of that where they bend tightly:
         by a radius r it counts 1 / r times."""
         some = np.flatnonzero(self._lengths > 1e-9)
-        unit, lengths, owner = self._way[some] / self._lengths[some, None], self._lengths[some], self.owner[some]
+        unit, far, owner = self._way[some] / self._lengths[some, None], self._lengths[some], self.owner[some]
         turn = unit[1:] - unit[:-1]
-        chords = np.sqrt(turn[:, 0] * turn[:, 0] + turn[:, 1] * turn[:, 1])
+        chords = lengths(turn)
         chords[owner[1:] != owner[:-1]] = 0.0
-        near = np.maximum(np.minimum(lengths[1:], lengths[:-1]), _LEAST)
+        near = np.maximum(np.minimum(far[1:], far[:-1]), _LEAST)
         tight = chords * np.minimum(chords / near, _TIGHTEST)
         return self._sums(chords, owner[1:]), self._sums(tight, owner[1:])
 
@@ -223,8 +223,7 @@ def along(pieces: FloatArray, owner: IntArray, count: int) -> Polylines:
 
 def _left(points: FloatArray, starts: IntArray, lines: IntArray, ring: float) -> FloatArray:
     first = points[starts[:-1]]
-    x, y = (points - first[lines]).T
-    far = np.sqrt(x * x + y * y)
+    far = lengths(points - first[lines])
     number = np.arange(len(points), dtype=np.int64)
     beyond = np.where(far >= ring, number, len(points))
     k = np.minimum(np.minimum.reduceat(beyond, starts[:-1]), starts[1:] - 1)
