@@ -50,8 +50,19 @@ def test_auto_draws_tangles_as_clusters_and_complete_ones_on_a_ring() -> None:
     assert choose_engine(grouped("ABC", 20, layers))[0] == "layered"
 
 
+def test_auto_never_chooses_an_engine_that_takes_fewer_connections(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = tangle(60, tuple(range(1, 60)))
+    assert choose_engine(problem)[0] == "circular"
+    circular = engine_of("circular")
+    few = replace(circular.capabilities, edges=len(problem.edges) - 1)
+    monkeypatch.setattr(type(circular), "capabilities", few)
+    engine, why = choose_engine(problem)
+    assert (engine, why.partition("'")[2]) == ("organic", "circular' does not draw so many neurons and connections")
+    refuse(problem, engine, engine_of(engine).capabilities)
+
+
 @pytest.mark.parametrize("boxed", [False, True])
-def test_auto_never_chooses_an_engine_that_takes_fewer_connections(boxed: bool) -> None:
+def test_auto_draws_large_tangles_by_an_engine_that_takes_them(boxed: bool) -> None:
     problem = tangle(400, tuple(range(1, 60)))
     if boxed:
         problem = replace(problem, boxes=(("half", tuple(range(200))),))

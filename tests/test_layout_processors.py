@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from functools import cache
 
 import pytest
 
@@ -39,6 +40,7 @@ def drawn(engine: str, count: int, links: int, without: str) -> str:
     return result.stdout.strip() if result.returncode == 0 else f"failed: {result.stderr[-300:]}"
 
 
+@cache
 def known() -> str:
     """Those features that this NumPy lets be switched off on this processor."""
     program = "import numpy"

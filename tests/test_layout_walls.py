@@ -247,6 +247,26 @@ def test_a_detour_keeps_to_the_way_that_was_found() -> None:
     assert min(x for x, _ in sampled(without)) < -2
 
 
+def test_a_detour_goes_the_longer_way_round_where_that_crosses_less() -> None:
+    edges, centres = [LayoutEdge("a", 0, 1, 1)], [(0.0, 0.0), (0.0, 10.0), (3.0, 5.0)]
+    walls = Walls([(frozenset({2}), (-2.0, 4.0, 8.0, 6.0))], 3)
+    routes = {0: straight(*centres[:2])}
+    for count, longer in ((0, False), (1, False), (3, True)):
+        drawn = [straight((-20.0, 4.5 + i / 2), (-2.05, 4.5 + i / 2)) for i in range(count)]
+        found = detoured(edges, centres, routes, Obstacles(centres), walls, {}, drawn)[0]
+        assert (max(x for x, _ in sampled(found)) > 8) is longer
+
+
+def test_in_a_crowd_routes_go_round_frames_alone() -> None:
+    edges = [LayoutEdge("over a disc", 0, 1, 1), LayoutEdge("into a frame", 3, 4, 1)]
+    centres = [(0.0, 0.0), (0.0, 10.0), (0.0, 5.0), (9.0, 0.0), (9.0, 10.0), (9.0, 5.0)]
+    walls = Walls([(frozenset({5}), (8.0, 4.0, 10.0, 6.0))], 6)
+    routes = {0: straight(*centres[:2]), 1: straight(*centres[3:5])}
+    for most, gone_round in ((1, [0, 1]), (0, [1])):
+        found = detoured(edges, centres, routes, Obstacles(centres), walls, {}, most=most)
+        assert sorted(found) == gone_round
+
+
 @pytest.mark.parametrize(("sources", "targets"), [(4, 8), (3, 5), (5, 5), (8, 4)])
 def test_full_layers_beside_a_frame_run_as_if_there_were_none(sources: int, targets: int) -> None:
     network = nv.compile_text(

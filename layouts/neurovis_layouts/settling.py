@@ -270,8 +270,8 @@ class _Settling:
         self, there: Occupancy, before: Earlier, held: Mapping[int, Point], axis: float
     ) -> Iterator[tuple[tuple[Body, ...], Point | None]]:
         """What is placed together, each with its copies: wholes, then neurons one by one; what an earlier layout knew
-        and has to move comes first, then what partly placed wholes lack, then what is new. Beside it where it is to
-        stand if it can: where it was, or where it is drawn like what is placed by then."""
+        and has to move comes first, then what partly placed wholes lack, then what is new. With each comes where it
+        should stand, if that is known: where it was, or where it is drawn like what is placed by then."""
         problem, placed = self._problem, there.placed
         done, lost = set(placed), before.lost
         alike = Alike(problem, {**before.where, **placed}, self._axes_at(axis))
@@ -284,17 +284,17 @@ class _Settling:
             done.update(i for copy in singles for i in copy.members)
             return singles, before.where[neuron] if neuron in lost else lead
 
-        for again in (True, False):
-            for neuron in () if again else sorted(self._around, key=lambda i: (i not in firm, i)):
+        for known_before in (True, False):
+            for neuron in () if known_before else sorted(self._around, key=lambda i: (i not in firm, i)):
                 if neuron not in done and not done.isdisjoint(self._around[neuron][-1].members):
                     yield single(neuron)
             for one in sorted(self._wholes, key=lambda one: self._alone(one.members[0], placed)):
-                if not done.isdisjoint(one.members) or (again and not lost.issuperset(one.members)):
+                if not done.isdisjoint(one.members) or (known_before and not lost.issuperset(one.members)):
                     continue
                 counterparts = list(self._copies(alike, one, axis))
                 back = STAY
                 lead = next((copy for copy in counterparts if done.issuperset(copy[0])), None)
-                if again:
+                if known_before:
                     anchor: Point | None = before.where[one.members[0]]
                     shape = self._shape(one, before.where, self._frames.rects(before.where, {}), held)
                 elif lead is not None:
@@ -313,7 +313,7 @@ class _Settling:
                 done.update(i for copy in copies for i in copy.members)
                 yield tuple(copies), anchor
             for neuron in range(len(problem.neurons)):
-                if neuron not in done and (neuron in lost or not again):
+                if neuron not in done and (neuron in lost or not known_before):
                     yield single(neuron)
 
     def _copies(self, alike: Alike, whole: Whole, axis: float) -> Iterator[tuple[tuple[int, ...], Move]]:

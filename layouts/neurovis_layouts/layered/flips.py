@@ -15,6 +15,7 @@ from neurovis_layouts.layered.crossings import Segments
 from neurovis_layouts.layered.levels import Levels
 from neurovis_layouts.layered.order import places
 
+#: So often each frame is tried.
 _ROUNDS = 2
 
 

@@ -25,7 +25,7 @@ from neurovis_layouts.layered.drawing import Drawing, Piece, entitled, piece_of
 from neurovis_layouts.layered.frame_routing import linked
 from neurovis_layouts.layered.mirror_units import arranged_on_axis, symmetric_units
 from neurovis_layouts.layered.page_plan import facing, in_direction, parts_by_cell
-from neurovis_layouts.layered.parts import Part, columns_of, firm, images_of, may_be_frame, parts_of
+from neurovis_layouts.layered.parts import Part, columns_of, firm, images_in, may_be_frame, parts_of
 from neurovis_layouts.layered.pinning import Settled, pinned
 from neurovis_layouts.layered.same_rank import bonded
 from neurovis_layouts.layered.templates import Book, restricted
@@ -241,7 +241,7 @@ def _unit(piece: Piece, kin: int, pair: Mapping[int, int]) -> Unit:
     flip = part.image_of >= 0
     places = tuple((-(px - x) + 0.0 if flip else px - x, py - y) for px, py in piece.drawing.places)
     reach = max(rect[2] - x, x - rect[0]), rect[3] - y
-    alone = not images_of(part, pair) and piece.drawing.axis is None
+    alone = not images_in(part, pair) and piece.drawing.axis is None
     return Unit(part.members, places, reach, kin, alone)
 
 

@@ -98,8 +98,9 @@ class Insertion:
             np.zeros((len(a) + 1, len(b) + 1), dtype=np.int32) for a, b in pairwise(self.order)
         ]
         self.work = 0
-        #: that of the whole at first: its crossings and lengths
+        #: what all connections cost in the order at first: their crossings and their lengths
         self.cost = sum(self._threaded(c, 1) for c in range(len(self.links)))
+        #: by rank, whether some of its slots are shut: within a box, a group that keeps its order, a block
         self._tight = [
             any(self._points[n] and (self._box[n] >= 0 or self._kin[n] >= 0 or len(self._points[n]) > 1) for n in rank)
             for rank in order

@@ -23,7 +23,9 @@ from neurovis_spec.layout.model import Effort
 
 Order = list[list[int]]
 
+#: Neurons of a group give up their order where that leaves less than this share of the crossings.
 _CLEARLY = 0.85
+#: Sweeps, down and up in turns.
 _SWEEPS = 14
 #: Beyond so many pairs of nodes of neighbouring ranks none are put back: one at a time is too slow.
 _MOST_PAIRS = 1_000_000
@@ -36,7 +38,7 @@ def ordered(
     full. Deterministic: every tie falls to the order before, in the end to that of the names."""
     segments = Segments(levels)
     strict = any(node.kin >= 0 for node in levels.nodes)
-    # large levels end far from each other: neither start is better in all of them
+    # in large levels the two starts lead to very different orders, and neither is always better
     starts = levels.ranks, _by_descent(levels)
     crossings, order = min((_swept(levels, segments, start, strict) for start in starts), key=itemgetter(0))
     if strict and crossings:

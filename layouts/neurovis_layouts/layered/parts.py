@@ -55,12 +55,12 @@ def imaged(parts: Sequence[Part], pair: Mapping[int, int]) -> list[Part]:
     first = [
         part
         for part in parts
-        if not (images := images_of(part, pair)) or set(images) == set(part.members) or _leads(part, pair)
+        if not (images := images_in(part, pair)) or set(images) == set(part.members) or _leads(part, pair)
     ]
     result = list(first)
     by_members = {frozenset(part.members): part for part in parts}
     for number, part in enumerate(first):
-        images = images_of(part, pair)
+        images = images_in(part, pair)
         if images and set(images) != set(part.members):
             other = by_members.get(frozenset(images))
             result.append(
@@ -72,11 +72,11 @@ def imaged(parts: Sequence[Part], pair: Mapping[int, int]) -> list[Part]:
 
 def _leads(part: Part, pair: Mapping[int, int]) -> bool:
     """Whether a part is the first of a mirrored pair: that with the first neuron."""
-    images = images_of(part, pair)
+    images = images_in(part, pair)
     return bool(images) and min(part.members) < min(images)
 
 
-def images_of(part: Part, pair: Mapping[int, int]) -> tuple[int, ...]:
+def images_in(part: Part, pair: Mapping[int, int]) -> tuple[int, ...]:
     """The mirror images of a part's neurons in its order, none if not all have one."""
     images = tuple(pair[m] for m in part.members if m in pair)
     return images if len(images) == len(part.members) else ()

@@ -20,7 +20,7 @@ INSTANT = 1000.0
 #: How much more an arc weighs that is in a loop only because units are.
 _ALONG = 100.0
 #: Loops of more units are cut greedily only.
-_SIFTED = 1500
+_MOST_IMPROVED = 1500
 Arcs = Mapping[tuple[int, int], float]
 
 
@@ -41,7 +41,7 @@ def ranks_of(
     kept = {arc: weight * (_ALONG if arc in along else 1.0) for arc, weight in arcs.items()}
     for loop in nx.strongly_connected_components(graph):
         if len(loop) > 1:
-            for position, unit in enumerate(_sifted(_cut(sorted(loop), kept, graph, first, last), kept)):
+            for position, unit in enumerate(_improved(_cut(sorted(loop), kept, graph, first, last), kept)):
                 place[unit] = position
     component = _component_order(graph)
     forward: dict[tuple[int, int], float] = {}
@@ -121,9 +121,9 @@ def _cut(
     return head + tail[::-1]
 
 
-def _sifted(order: list[int], arcs: Arcs) -> list[int]:
+def _improved(order: list[int], arcs: Arcs) -> list[int]:
     """The order after moving units to where fewer arcs run against it, until no such move is left."""
-    if len(order) > _SIFTED:
+    if len(order) > _MOST_IMPROVED:
         return order
     number = {unit: i for i, unit in enumerate(order)}
     costs = np.zeros((len(order), len(order)), dtype=np.int64)

@@ -251,7 +251,7 @@ def _without_needless_loops(problem: LayoutProblem, found: list[Unit], lines: Ma
         for a, b in wired
         if loop_of[rigid.get(a, a)] != loop_of[rigid.get(b, b)] and row[owner[a]] != row[owner[b]]
     )
-    looping = {row for loop in nx.strongly_connected_components(quotient) if len(loop) > 1 for row in loop}
+    looping = {first for loop in nx.strongly_connected_components(quotient) if len(loop) > 1 for first in loop}
     result: list[Unit] = []
     for i, unit in enumerate(found):
         whole = unit.places is not None or row[i] not in looping

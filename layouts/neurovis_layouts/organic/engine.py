@@ -37,6 +37,7 @@ _MOST = 0.75
 _STEP, _NEARLY = 0.1, 3.0
 #: A neuron's share of a picture, in square spacings, at most: discs have to stay in sight.
 _ROOM = 7.0
+#: Steps in which pins pull the rest along.
 _PINNED_STEPS = 60
 #: Steps of trees, and gaps between parts, are not shorter than this, for links to pass between discs.
 _LEAST = 0.85

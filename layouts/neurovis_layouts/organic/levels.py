@@ -18,6 +18,7 @@ from neurovis_spec.layout import FloatArray, IntArray
 COARSEST = 30
 #: A level that saves less than this is not worth it.
 _WORTH = 0.95
+#: So often pairs are looked for among those that have none yet.
 _TRIES = 6
 
 

@@ -26,6 +26,7 @@ from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
 __all__ = ["Waypoint", "route_all"]
 
+#: How far around a neuron others count for where its self-loop has room.
 _NEAR = 3.0
 #: With more edges than this nobody can follow one: discs in the way are not gone round.
 _MOST_CAREFULLY = 4000
@@ -36,6 +37,7 @@ _MOST_LENGTH = 250_000.0
 #: Where more than this run over discs they stay, first where neurons stand anywhere, then where they were planned to
 #: have room around them.
 _MOST_AROUND, _MOST_AROUND_PLANNED = 60, 300
+#: How far apart along the direction the ends of a connection are at least for a curve that runs along it.
 _STEEP_ENOUGH = 0.75
 
 
