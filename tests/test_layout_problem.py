@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import layout_conformance as suite
 from hypothesis import given
 from hypothesis import strategies as st
 from networks_by_hand import cpg_rbf
@@ -29,6 +30,13 @@ def test_edges_stand_by_source_target_and_number() -> None:
     assert sorted(names, key=edge_key) == [
         "K -> O", "K2 -> A", "K2 -> O", "K2 -> O (2)", "K2 -> O (10)", "K10 -> O"
     ]  # fmt: skip
+
+
+@given(st.lists(st.tuples(*[st.sampled_from(["K", "K2", "K10", "K02", "left2.K1", "left10.K1", "_x"])] * 2)))
+def test_edges_of_a_problem_stand_as_their_names_do(pairs: list[tuple[str, str]]) -> None:
+    edges = suite.named(pairs)
+    problem = canonical("x", sorted({name for pair in pairs for name in pair}), edges=edges)
+    assert [edge.name for edge in problem.edges] == sorted((name for name, *_ in edges), key=edge_key)
 
 
 def test_a_problem_is_in_canonical_order() -> None:
