@@ -33,8 +33,8 @@ _SHORT = 1.0
 _CUTS = (4.0, 1.0)
 #: So many corners in a row are left out at once, at first and later on.
 _MOST_CORNERS, _FEW_CORNERS = 9, 2
-#: How far corners are moved, how often each, and how far off the straight way a lone one is tried.
-_MOVES, _PASSES = (1.0, 0.45, 0.2), 4
+#: How far corners are moved, how often one is, and how far off the straight way a lone one is tried.
+_MOVES, _PASSES = (1.0, 0.45, 0.2), 8
 _BOWS = (0.35, 0.7, 1.2, 2.0, 3.2, 5.0)
 #: A new line is better than the old route by this at least.
 _BETTER = 0.4
@@ -42,7 +42,7 @@ _BETTER = 0.4
 #: this at least.
 _HOPELESS, _GAIN = 0.7, 0.05
 #: Of all lines that are tried in a step so many are checked closely.
-_SOME = 24
+_SOME = 48
 _DIAGONAL = 0.7071067811865476
 _AROUND = (
     (1.0, 0.0), (_DIAGONAL, _DIAGONAL), (0.0, 1.0), (-_DIAGONAL, _DIAGONAL),
@@ -89,8 +89,7 @@ def _better(cost: RouteCost, winds: bool) -> Route | None:
         best = None if found is None else tries[found[0]]
     if best is None:
         return None
-    new, old = cost.trespass(best), cost.trespass(cost.route)
-    return best if all(a <= b for a, b in zip(new, old, strict=True)) else None
+    return None if cost.trespasses(best) else best
 
 
 def _searched(cost: RouteCost, now: float) -> Route | None:
@@ -100,14 +99,13 @@ def _searched(cost: RouteCost, now: float) -> Route | None:
     best = _best(cost, product(starts, _CUTS), now + _HOPELESS)
     if best is None:
         return None
-    for far in _MOVES:
-        for _ in range(_PASSES):
-            line, cut = best.line
-            lines = *_moved(line, far), *_fewer(line, _FEW_CORNERS)
-            better = _best(cost, ((line, cut) for line in lines), best.cost - _GAIN, _SOME)
-            if better is None:
-                break
-            best = better
+    for _ in range(_PASSES):
+        line, cut = best.line
+        lines = *_moved(line), *_fewer(line, _FEW_CORNERS)
+        better = _best(cost, ((line, cut) for line in lines), best.cost - _GAIN, _SOME)
+        if better is None:
+            break
+        best = better
     best = _best(cost, product([best.line[0]], _CUTS), best.cost - _GAIN) or best
     return cost.whole(smooth(*best.line)) if best.cost <= now - _BETTER else None
 
@@ -172,12 +170,13 @@ def _fewer(line: tuple[Point, ...], most: int = _MOST_CORNERS) -> Iterator[tuple
             yield line[:first] + line[last + 1 :]
 
 
-def _moved(line: tuple[Point, ...], far: float) -> Iterator[tuple[Point, ...]]:
+def _moved(line: tuple[Point, ...]) -> Iterator[tuple[Point, ...]]:
     """The line with a corner elsewhere."""
-    for k in range(1, len(line) - 1):
-        x, y = line[k]
-        for dx, dy in _AROUND:
-            yield (*line[:k], (x + far * dx, y + far * dy), *line[k + 1 :])
+    for far in _MOVES:
+        for k in range(1, len(line) - 1):
+            x, y = line[k]
+            for dx, dy in _AROUND:
+                yield (*line[:k], (x + far * dx, y + far * dy), *line[k + 1 :])
 
 
 def _bowed(start: Point, end: Point) -> Iterator[tuple[Point, ...]]:

@@ -296,14 +296,24 @@ class RouteCost:
         self._foreign: FloatArray = drawn.rects[foreign]
         self._discs: FloatArray = np.delete(drawn.discs, self._own, axis=0)
 
-    def trespass(self, route: Route) -> tuple[int, float, float]:
-        """How many foreign frames a route enters, by how much it is too close to a disc, both measured exactly, and how
-        often it crosses others; an arc between images goes to its side, whatever it crosses."""
-        lines = polylines([route])
-        entered = int(meet(lines.a, lines.b, self._foreign).any(axis=0).sum())
-        close = max(0.0, TOUCH + _SLACK - self._drawn.obstacles.clearance(route, self._own))
-        even = self._drawn.even(self.edge)
-        return entered, close, 0.0 if even else float(lines.crossed(self._a, self._b)[0])
+    def trespasses(self, route: Route) -> bool:
+        """Whether a route enters more foreign frames than the present one, is too close to a disc by more, both
+        measured exactly, or crosses more; an arc between images goes to its side, whatever it crosses."""
+        for measured in (self._entered, self._too_close, self._crossed):
+            found = measured(route)
+            if found > 0 and found > measured(self.route):
+                return True
+        return False
+
+    def _entered(self, route: Route) -> float:
+        line = polylines([route])
+        return float(meet(line.a, line.b, self._foreign).any(axis=0).sum())
+
+    def _too_close(self, route: Route) -> float:
+        return TOUCH + _SLACK - self._drawn.obstacles.clearance(route, self._own)
+
+    def _crossed(self, route: Route) -> float:
+        return 0.0 if self._drawn.even(self.edge) else float(polylines([route]).crossed(self._a, self._b)[0])
 
     def cost(self) -> float:
         """The cost of the edge's present route."""
