@@ -101,12 +101,12 @@ def _searched(cost: RouteCost, now: float) -> Route | None:
         return None
     for _ in range(_PASSES):
         line, cut = best.line
-        lines = *_moved(line), *_fewer(line, _FEW_CORNERS)
-        better = _best(cost, ((line, cut) for line in lines), best.cost - _GAIN, _SOME)
+        tries = [(line, other) for other in _CUTS if other != cut]
+        tries += ((other, cut) for other in (*_moved(line), *_fewer(line, _FEW_CORNERS)))
+        better = _best(cost, tries, best.cost - _GAIN, _SOME)
         if better is None:
             break
         best = better
-    best = _best(cost, product([best.line[0]], _CUTS), best.cost - _GAIN) or best
     return cost.whole(smooth(*best.line)) if best.cost <= now - _BETTER else None
 
 

@@ -336,16 +336,14 @@ class RouteCost:
         chosen = chosen[np.argsort(costs[chosen], kind="stable")][:most]
         costs, lines = costs[chosen], lines.some(chosen)
         for add in (self._in_the_way, self._beside, self._across):
-            if not len(chosen):
+            near = costs < limit
+            if not near.any():
                 return None
+            if 2 * int(near.sum()) < len(near):  # less work than to weigh them all
+                chosen, costs, lines = chosen[near], costs[near], lines.some(np.flatnonzero(near))
             costs += add(lines)
-            near = np.flatnonzero(costs < limit)
-            if len(near) < len(chosen):
-                chosen, costs, lines = chosen[near], costs[near], lines.some(near)
-        if not len(chosen):
-            return None
         least = int(np.argmin(costs))
-        return int(chosen[least]), float(costs[least])
+        return (int(chosen[least]), float(costs[least])) if costs[least] < limit else None
 
     def _by_itself(self, lines: Polylines) -> FloatArray:
         """(n,) what they cost whatever there is around them."""
