@@ -19,7 +19,11 @@ import neurovis_spec as nv
 from neurovis_spec import pipeline
 from neurovis_spec.layout.geometry import Rect, meet
 from neurovis_spec.scene import Arrowhead, Disc, Rectangle, Scene, Spline, Text, texts
+from neurovis_spec.scene.boxes import Box
 from neurovis_spec.scene.geometry import sample
+from neurovis_spec.scene.obstacles import Obstacles
+from neurovis_spec.scene.themes import THEMES
+from neurovis_spec.scene.titles import Titled, in_one_place
 
 SPECS = Path(__file__).parent.parent / "specs"
 EXAMPLES = [*sorted(SPECS.glob("*.yaml")), SPECS / "hexapod" / "hexapod.yaml"]
@@ -258,6 +262,23 @@ def test_titles_stand_in_one_place_of_narrow_frames_within_frames_and_lines_keep
         x0, y0, x1, y1 = text_rect(title)
         assert title.halo or not ((lines > (x0, y0)) & (lines < (x1, y1))).all(axis=1).any()
         assert not any(meet(text_rect(title), text_rect(other)) for other in titles[:number])
+
+
+def test_a_title_that_has_no_room_in_the_place_of_the_others_stands_in_its_mirror_image() -> None:
+    frames = [(0.0, 0.0, 120.0, 60.0), (200.0, 0.0, 320.0, 60.0)]
+    # only the upper left corner of the first frame is free, and the upper right one of the second
+    kept = [(60.0, 0.0, 120.0, 60.0), (0.0, 25.0, 120.0, 60.0), (200.0, 0.0, 260.0, 60.0), (200.0, 25.0, 320.0, 60.0)]
+    boxes = [Titled(Box(name, name, (0,), rect), rect, rect) for name, rect in zip("ab", frames, strict=True)]
+
+    def placed(kept: list[Rect]) -> list[Text]:
+        titles = in_one_place(boxes, Obstacles([], [], np.zeros((0, 2)), np.zeros(0)), THEMES["default"], kept)
+        return [titles[0], titles[1]]
+
+    left, right = placed(kept)
+    assert left.point == (10.0, right.point[1])
+    assert right.point[0] + texts.width("b", right.size, right.weight) == pytest.approx(320 - 10)
+    # where both have room in the same place they stand there
+    assert [title.point[0] - rect[0] for rect, title in zip(frames, placed(kept[1::2]), strict=True)] == [10.0, 10.0]
 
 
 def test_a_title_does_not_stand_in_the_frame_of_another_box() -> None:

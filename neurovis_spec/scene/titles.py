@@ -50,8 +50,8 @@ def in_one_place(
     boxes: Sequence[Titled], obstacles: Obstacles, theme: Theme, kept: Sequence[Rect] = ()
 ) -> dict[int, Text]:
     """The titles, by number of their boxes, of one size and in the one place that has room for the most of them; of
-    several that in which they cover least, rather within the frames and not too small. None is on what is ``kept`` for
-    others."""
+    several that in which they cover least, rather within the frames and not too small. One that has no room there is in
+    the mirror image of the place, as in the other half of a picture. None is on what is ``kept`` for others."""
     around = [obstacles.near(_grown(item)) for item in boxes]
     best: tuple[int, int, dict[int, _Title]] = 0, 0, {}
     for closer, (size, inset, gap) in enumerate(_INSIDE):
@@ -65,9 +65,10 @@ def in_one_place(
                     worded: dict[int, _Title] = {}
                     for i in members:
                         text = boxes[i].box.title if whole else boxes[i].box.name
-                        for title in _at(boxes[i], text, size, slot, around[i], taken, _TOO_MUCH)[:1]:
+                        for title in _at(boxes[i], text, size, slot, around[i], taken, _TOO_MUCH):
                             if title.hits < _TOO_MUCH and title.taken[2] + inset < boxes[i].rect[2] + 1.01:
                                 worded[i] = title
+                                break
                     wordings.append(worded)
                 chosen: dict[int, _Title] = min(wordings, key=_worth)
                 found.update(chosen)
@@ -136,17 +137,19 @@ _WORDINGS = (
 
 @dataclass(frozen=True, slots=True)
 class _Title:
-    """What a title says, how large, where its baseline begins, and what it covers there."""
+    """What a title says, how large, where its baseline begins, what it covers there, and whether it stands in the
+    mirror image of its place."""
 
     text: str
     size: float
     start: Point
     taken: Rect
     hits: int
+    over: bool
 
 
 def _worth(titles: Mapping[int, _Title]) -> tuple[int, int]:
-    return -len(titles), sum(title.hits for title in titles.values())
+    return -len(titles), sum(title.hits + _OVER * title.over for title in titles.values())
 
 
 def _found(boxes: Sequence[tuple[Titled, Obstacles]]) -> list[_Title] | None:
@@ -206,6 +209,8 @@ _OUTSIDE = (2, 3)
 #: what it costs a title to stand outside of its frame: less than a line that it covers; and to be closer to it or
 #: smaller, by one step
 _BEYOND, _CLOSER = 10, 1
+#: what it costs a title to stand in the mirror image of the place: so much that only one that has no room there does
+_OVER = 1_000
 #: how far letters reach above and below their baseline, by their size
 _HEIGHT, _DEPTH = 0.78, 0.22
 #: elsewhere, from the best on: the corners, flush with the frame outside, along the rows, beside the frame, then close
@@ -234,14 +239,14 @@ def _at(
     if (slot.slid and right < left) or y - _HEIGHT * size < top or y + _DEPTH * size > bottom:
         return []
     found: list[_Title] = []
-    for start in (left + slot.slid * (right - left), right - slot.slid * (right - left)):
+    for over, start in ((False, left + slot.slid * (right - left)), (True, right - slot.slid * (right - left))):
         x = min(max(start, low), high - width)
         if x != start and slot.aside == _BESIDE:
             continue
         taken = (x - 1, y - _HEIGHT * size, x + width + 1, y + _DEPTH * size)
         hits = obstacles.hits(taken, _CROSSED) + _TOO_MUCH * sum(meet(taken, other) for other in kept)
         hits += foreign * sum(meet(taken, other) for other in item.foreign)
-        found.append(_Title(text, size, (x, y), taken, hits))
+        found.append(_Title(text, size, (x, y), taken, hits, over))
     return found
 
 
