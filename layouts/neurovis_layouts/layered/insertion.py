@@ -259,7 +259,9 @@ class Insertion:
             if begun:
                 here = lines[r][1]
                 if self._tight[r]:
-                    here = here + np.array([self._shut(r, self.links[c].box) for c in begun])
+                    boxes = [self.links[c].box for c in begun]
+                    shut = {box: self._shut(r, box) for box in set(boxes)}
+                    here = here + np.array([shut[box] for box in boxes])
                 self.work += 2 + len(begun) * costs.size // _NUMBERS
                 found.append(np.minimum.reduce(here[:, :, None] + costs, axis=1))
             if r in ends:
