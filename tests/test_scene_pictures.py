@@ -23,7 +23,7 @@ from neurovis_spec.scene.boxes import Box
 from neurovis_spec.scene.geometry import sample
 from neurovis_spec.scene.obstacles import Obstacles
 from neurovis_spec.scene.themes import THEMES
-from neurovis_spec.scene.titles import Titled, in_one_place
+from neurovis_spec.scene.titles import Titled, in_one_place, outline
 
 SPECS = Path(__file__).parent.parent / "specs"
 EXAMPLES = [*sorted(SPECS.glob("*.yaml")), SPECS / "hexapod" / "hexapod.yaml"]
@@ -279,6 +279,15 @@ def test_a_title_that_has_no_room_in_the_place_of_the_others_stands_in_its_mirro
     assert right.point[0] + texts.width("b", right.size, right.weight) == pytest.approx(320 - 10)
     # where both have room in the same place they stand there
     assert [title.point[0] - rect[0] for rect, title in zip(frames, placed(kept[1::2]), strict=True)] == [10.0, 10.0]
+
+
+def test_a_title_close_to_its_frame_does_not_cover_it() -> None:
+    rect = (0.0, 0.0, 34.0, 60.0)
+    obstacles = Obstacles([], [], np.zeros((0, 2)), np.zeros(0))
+    obstacles.add_frame(outline(rect))
+    title = in_one_place([Titled(Box("abc", "abc", (0,), rect), rect, rect)], obstacles, THEMES["default"])[0]
+    assert title.point[0] == 5.0  # nearer to the side than the ten units that titles leave where they can
+    assert not title.halo
 
 
 def test_a_title_does_not_stand_in_the_frame_of_another_box() -> None:

@@ -201,7 +201,7 @@ class _Slot:
 
 _GAP, _CLOSE, _BESIDE = 5.0, 5.0, -1.0
 #: how large all titles are in one place, and how far from the sides of their frames
-_INSIDE = ((_SIZE, TITLE_INSET, _GAP), *((size, _CLOSE, 2.0) for size in (_SIZE, *_SMALLER)))
+_INSIDE = ((_SIZE, TITLE_INSET, _GAP), *((size, _CLOSE, 3.0) for size in (_SIZE, *_SMALLER)))
 _ROWS = 4
 #: where titles stand in one place: in which row, and how far across their frames
 _PLACES = tuple((row, slid) for row in range(_ROWS) for slid in (0.0, 1.0, 0.5))
