@@ -19,8 +19,8 @@ Order = list[list[int]]
 
 #: By effort: how many times the budget and the patience.
 _TIMES: dict[Effort, float] = {"quick": 1 / 8, "normal": 1, "best": 10}
-#: Operations on arrays in all, some 7 µs each. Two fifths more leave 5 % fewer crossings in the Rome graphs of sample 11
-#: (see ``benchmarks/layout.py``).
+#: Operations on arrays in all, some 7 µs each. Two fifths more leave 5 % fewer crossings in the Rome graphs of sample
+#: 11 (see ``benchmarks/layout.py``).
 _BUDGET = 36_000
 #: Most nodes that are taken out together; four or twelve are as good.
 _MOST = 7
