@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from neurovis_layouts.routing import route_all
+from neurovis_layouts.routing import detours, route_all
 from neurovis_layouts.routing.corners import rounded
 from neurovis_layouts.routing.detours import Detours, detoured
 from neurovis_layouts.routing.obstacles import Obstacles
@@ -254,6 +254,17 @@ def test_a_detour_goes_the_longer_way_round_where_that_crosses_less() -> None:
     for count, longer in ((0, False), (1, False), (3, True)):
         drawn = [straight((-20.0, 4.5 + i / 2), (-2.05, 4.5 + i / 2)) for i in range(count)]
         found = detoured(edges, centres, routes, Obstacles(centres), walls, {}, drawn)[0]
+        assert (max(x for x, _ in sampled(found)) > 8) is longer
+
+
+def test_nobody_counts_what_detours_cross_once_many_corners_were_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    centres = [(0.0, 0.0), (0.0, 10.0), (3.0, 5.0)]
+    walls = Walls([(frozenset({2}), (-2.0, 4.0, 8.0, 6.0))], 3)
+    lines = [straight((-20.0, 4.5 + i / 2), (-2.05, 4.5 + i / 2)) for i in range(3)]
+    for most, longer in ((1000, True), (-1, False)):
+        monkeypatch.setattr(detours, "_MOST_SEEN_FROM", most)
+        found = Detours(walls, centres, lines).route(0, 1, True)
+        assert found is not None
         assert (max(x for x, _ in sampled(found)) > 8) is longer
 
 

@@ -39,6 +39,8 @@ _HASTE = 1.5
 _CROSSING = 4.0
 #: With more lines than this, times those that go round something, nobody counts how often they cross.
 _MOST_CROSSED = 5000
+#: From more corners than this nobody counts either: where discs stand in rows, ways among them took 18 s.
+_MOST_SEEN_FROM = 1000
 #: From a corner so many of the nearest frames are seen.
 _NEAREST = 24
 #: Outwards, from each side of a rectangle, and from its corners.
@@ -135,11 +137,15 @@ class Detours:
         x0, y0, x1, y1 = walls.rects.T
         self._standing: BoolArray = walls.inside & (x > x0) & (x < x1) & (y > y0) & (y < y1)
         self._taken = _Taken()
+        #: from how many corners ways have been sought
+        self._seen_from = 0
         self._between: dict[tuple[int, int], list[Point]] = {}
 
     def route(self, source: int, target: int, alone: bool, by: Sequence[Point] = ()) -> Route | None:
         """A way round, ``by`` these points if there is one, None where there is none at all; one that is not ``alone``
         between its ends and has no such points keeps off the straight line and off those before it."""
+        if self._seen_from > _MOST_SEEN_FROM:
+            self._lines = None
         found = (self._line(source, target, True, by) if by else None) or self._line(source, target, alone)
         if found is None:
             return None
@@ -222,6 +228,7 @@ class Detours:
             if done[at]:
                 continue
             done[at] = True
+            self._seen_from += 1
             to = corners.near(at)
             cost = best[at] + lengths(points[to] - points[at]) + extra[to]
             cost += self._taken.beside(places[at], points[to])
