@@ -275,11 +275,12 @@ class RouteCost:
 
     def __init__(self, drawn: Drawn, edge: int) -> None:
         self._drawn, self.edge, self.route = drawn, edge, drawn.routes[edge]
+        self._present = polylines([self.route])
         self._own = drawn.edges[edge].source, drawn.edges[edge].target
         self._far = max(distance(self.route[0], self.route[-1]), 1e-9)
         # what leads to its own level runs back whatever way it takes
         level = abs(self.route[0][1] - self.route[-1][1]) < _ONWARD
-        self._onward = not level and float(polylines([self.route]).backward()[0]) < _ONWARD
+        self._onward = not level and float(self._present.backward()[0]) < _ONWARD
         self._reflect = len(drawn.both(edge)) > 1
         #: which ends are on the axis, where the route and its image meet
         self._on_axis = [self._reflect and 2 * drawn.centres[neuron][0] == drawn.images.twice for neuron in self._own]
@@ -299,25 +300,24 @@ class RouteCost:
     def trespasses(self, route: Route) -> bool:
         """Whether a route enters more foreign frames than the present one, is too close to a disc by more, both
         measured exactly, or crosses more; an arc between images goes to its side, whatever it crosses."""
-        for measured in (self._entered, self._too_close, self._crossed):
-            found = measured(route)
-            if found > 0 and found > measured(self.route):
-                return True
-        return False
-
-    def _entered(self, route: Route) -> float:
         line = polylines([route])
-        return float(meet(line.a, line.b, self._foreign).any(axis=0).sum())
+        entered, close = self._entered(line), self._too_close(route)
+        if (entered and entered > self._entered(self._present)) or (close > 0 and close > self._too_close(self.route)):
+            return True
+        return not self._drawn.even(self.edge) and self._crossed(line) > self._crossed(self._present)
+
+    def _entered(self, line: Polylines) -> int:
+        return int(meet(line.a, line.b, self._foreign).any(axis=0).sum())
 
     def _too_close(self, route: Route) -> float:
         return TOUCH + _SLACK - self._drawn.obstacles.clearance(route, self._own)
 
-    def _crossed(self, route: Route) -> float:
-        return 0.0 if self._drawn.even(self.edge) else float(polylines([route]).crossed(self._a, self._b)[0])
+    def _crossed(self, line: Polylines) -> float:
+        return float(line.crossed(self._a, self._b)[0])
 
     def cost(self) -> float:
         """The cost of the edge's present route."""
-        found = self.cheapest(polylines([self.route]), np.inf)
+        found = self.cheapest(self._present, np.inf)
         return found[1] if found is not None else np.inf
 
     def whole(self, route: Route) -> Route:
