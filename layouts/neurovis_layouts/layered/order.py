@@ -47,7 +47,7 @@ def ordered(
             strict, order = False, other
     if draft or not crossings or sum(len(a) * len(b) for a, b in pairwise(order)) > _MOST_PAIRS:
         return levels, order
-    return reinserted(levels, order, strict, free, effort)
+    return reinserted(levels, order, strict, free, effort)[1:]
 
 
 def crossings(levels: Levels, order: Order) -> int:

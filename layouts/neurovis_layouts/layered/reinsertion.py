@@ -34,12 +34,13 @@ def reinserted(
     strict: bool,
     free: AbstractSet[int] = frozenset(),
     effort: Effort = "normal",
-) -> tuple[Levels, Order]:
-    """Levels and order; with ``strict`` neurons of a group keep their order in each rank; the ``free`` nodes
+) -> tuple[int, Levels, Order]:
+    """Crossings, levels and order; with ``strict`` neurons of a group keep their order in each rank; the ``free`` nodes
     stand in any rank in which what leads down leads down."""
     state = Insertion(levels, order, strict, free)
-    _Search(state, _TIMES[effort]).run()
-    return levels_in(levels, state)
+    cost = _Search(state, _TIMES[effort]).run()
+    crossings = (cost - sum(state.rank[link.lower] - state.rank[link.upper] for link in state.links)) // CROSSING
+    return crossings, *levels_in(levels, state)
 
 
 class _Search:
@@ -56,8 +57,8 @@ class _Search:
         self._patience = int(_PATIENCE * times * len(self._nodes))
         self._dice = _dice()
 
-    def run(self) -> None:
-        """Leave the state that costs least of all that were found."""
+    def run(self) -> int:
+        """The least cost that was found; the state is that."""
         state = self._state
         best = now = self._descent(state.cost)
         found = state.keep()
@@ -76,6 +77,7 @@ class _Search:
             else:
                 state.restore(kept)
         state.restore(found)
+        return best
 
     def _descent(self, cost: int) -> int:
         """Every node put back by itself, until none gains."""
