@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 import warnings
 
 import pytest
@@ -8,6 +9,7 @@ import neurovis_spec as nv
 from neurovis_spec.layout import LayoutProblem, LayoutRefusalError
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.geometry import sampled
+from neurovis_spec.layout.model import RADIUS
 from neurovis_spec.layout.problem import canonical
 
 BODY = {"A": (0.0, 0.0), "B": (1e-6, 0.0), "C": (0.0, 2e-6), "D": (3e-6, 2e-6)}
@@ -65,6 +67,16 @@ def test_neurons_without_a_position_stand_beside_what_they_are_connected_to() ->
     assert at["A"][1] < at["E"][1] < at["C"][1]
     assert abs(at["F"][1] - at["E"][1]) + abs(at["F"][0] - at["E"][0]) < 2
     assert at["G"][1] == at["H"][1] > max(at[name][1] for name in "ABCDEF")
+
+
+def test_what_has_no_position_gives_way_to_what_has_one() -> None:
+    places = {"A": (0.0, 0.0), "B": (2.0, 0.0), "C": (4.0, 1.0)}
+    edges = [(f"{name} -> {other}", name, other, 1) for name, other in ("AE", "BE", "CE", "EF")]
+    alone = lay_out_problem(canonical("x", [*"ABC"], places=places), "spatial").positions
+    among = lay_out_problem(canonical("x", [*"ABCEF"], edges=edges, places=places), "spatial").positions
+    for axis in (0, 1):  # E would stand close to B, between all three
+        assert len({alone[name][axis] - among[name][axis] for name in "ABC"}) == 1
+    assert math.dist(among["E"], among["B"]) >= 2 * RADIUS
 
 
 def test_routes_do_not_make_the_picture_much_larger_than_what_it_shows() -> None:

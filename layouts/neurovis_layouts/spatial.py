@@ -2,7 +2,7 @@
 
 In: a problem of which neurons have a ``position``. Out: a layout with x to the right and y downwards, both as given and
 scaled by one factor that gives most discs room; those that are still too close move aside. What has no position stands
-beside what it is connected to. Pins win.
+beside what it is connected to, and gives way to what has one. Pins win.
 """
 
 from __future__ import annotations
@@ -55,12 +55,16 @@ class SpatialEngine:
         if pinned.any():
             places += (there[pinned] - places[fixed[pinned]]).mean(axis=0)
         places[fixed] = there
-        places = _beside(places, problem)
-        places = _fanned(places, _CROWD * problem.neuron_spacing)
+        known[fixed] = True
+        held, spacing = np.flatnonzero(known), problem.neuron_spacing
+        places[held] = _fanned(places[held], _CROWD * spacing)
         places[fixed] = there
-        return drawn(
-            problem, self.name, apart(places, _APART * problem.neuron_spacing, fixed), frames=False, highest=_HIGHEST
-        )
+        places[held] = apart(places[held], _APART * spacing, np.searchsorted(held, fixed))
+        if not known.all():  # what has a place stays there
+            free = np.flatnonzero(~known)
+            places[free] = _fanned(_beside(places, problem), _CROWD * spacing)[free]
+            places = apart(places, _APART * spacing, held)
+        return drawn(problem, self.name, places, frames=False, highest=_HIGHEST)
 
 
 def _data(problem: LayoutProblem) -> FloatArray:
