@@ -268,6 +268,16 @@ def test_nobody_counts_what_detours_cross_once_many_corners_were_looked_at(monke
         assert (max(x for x, _ in sampled(found)) > 8) is longer
 
 
+def test_a_detour_does_not_turn_back_between_two_corners() -> None:
+    centres = [(11.24, 7.2), (2.56, 18.1), (2.5, 14.0), (4.76, 10.9), (4.15, 16.9)]
+    sides = (3.8, 12.0), (-9.0, 1.3)  # lines on either side, that stop short of the frame
+    lines = [straight((one, 12 + i / 2), (other, 12 + i / 2)) for one, other in sides for i in range(3)]
+    walls = Walls([(frozenset({2}), (1.35, 10.3, 3.54, 17.5))], len(centres))
+    found = Detours(walls, centres, lines).route(0, 1, True)
+    assert found is not None
+    assert min(x for x, _ in found) == 2.56
+
+
 def test_in_a_crowd_routes_go_round_frames_alone() -> None:
     edges = [LayoutEdge("over a disc", 0, 1, 1), LayoutEdge("into a frame", 3, 4, 1)]
     centres = [(0.0, 0.0), (0.0, 10.0), (0.0, 5.0), (9.0, 0.0), (9.0, 10.0), (9.0, 5.0)]

@@ -201,9 +201,24 @@ class Detours:
             line = np.array(path, dtype=np.float64)
             new = meet(line[:-1], line[1:], whole).any(axis=0) & ~met
             if len(path) > 2 - alone and not new.any():
-                return path
+                return self._pulled(path, whole, alone)
             met |= new
         return None
+
+    def _pulled(self, path: list[Point], rects: FloatArray, alone: bool) -> list[Point]:
+        """The line without corners at which it turns back, as it may between two of one rectangle though each leg is
+        taut, where it enters nothing and crosses no more lines without them."""
+        k = 1
+        while k < len(path) - 1 and len(path) > 3 - alone:
+            before, here, behind = np.array(path[k - 1 : k + 2], dtype=np.float64)
+            a, b = np.stack([before, here, before]), np.stack([here, behind, behind])
+            which = crossings(a, b, self._lines.a, self._lines.b)[0] if self._lines is not None else np.zeros(0)
+            more = np.count_nonzero(which == 2) > np.count_nonzero(which < 2)
+            if (here - before) @ (behind - here) < 0 and not more and not meet(a[2:], b[2:], rects).any():
+                path = path[:k] + path[k + 1 :]
+            else:
+                k += 1
+        return path
 
     def _shortest(
         self, corners: _Corners, rects: FloatArray, bends: Mapping[Point, float], alone: bool
