@@ -8,6 +8,8 @@ from itertools import pairwise
 
 import layout_conformance as suite
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 
 import neurovis_spec as nv
 from neurovis_spec.layout import Direction, Layout, LayoutProblem, LayoutRefusalError, Point
@@ -156,6 +158,26 @@ def test_the_promises_of_the_engine_hold(network: str) -> None:
     suite.check_routes(problem, layout)
     assert not suite.frames_meet(layout, problem)
     assert suite.through_frames(layout, problem) == []
+
+
+ENDS = ["left1.A", "left2.D", "right1.A", "right2.D", "R1", "R2", "T1", "T2", "Z", "V1", "V2"]
+PAIRED = [("T1", "left1.A"), ("T2", "right1.A")]
+
+
+@pytest.mark.parametrize("plan", [ROWS, "[[left, ~, right]]", "[[left1, T1, V, T2, right1]]"])
+@given(pairs=st.lists(st.tuples(st.sampled_from(ENDS), st.sampled_from(ENDS)), max_size=8, unique=True))
+@settings(deadline=None, max_examples=6)
+@example(pairs=[*PAIRED, ("V1", "right1.A"), ("Z", "right2.D")])
+@example(pairs=[("T1", "T2"), ("T2", "V1"), ("V1", "Z"), ("V1", "left1.A"), ("V1", "right1.A")])
+def test_what_has_no_mirror_image_keeps_off_what_has_one(plan: str, pairs: list[tuple[str, str]]) -> None:
+    more = "".join(f"  {one} -> {other}: 1\n" for one, other in pairs if (one, other) not in PAIRED)
+    text = BODY.replace("PLAN", plan).replace("DIRECTION", "down").replace("Z: {}", "Z: {}, V: {count: 2}")
+    text = text.replace("  T1 -> left1.B: 1\n", f"  T1 -> left1.B: 1\n{more}")
+    problem = problem_of(nv.compile_text(text).network)
+    layout = lay_out_problem(problem, "layered")
+    suite.check_positions(problem, layout)
+    found = metrics(layout, problem)
+    assert (found["overlaps"], found["symmetry"]) == (0, 1)
 
 
 @pytest.mark.parametrize(("width", "fits"), [(2, True), (3, False)])

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from typing import TypeAlias
 
@@ -74,7 +75,8 @@ def _seats(problem: LayoutProblem, pair: Mapping[int, int]) -> dict[_Members, in
         near[owner[edge.source]][owner[edge.target]] += 1
         near[owner[edge.target]][owner[edge.source]] += 1
     below = len(seat)
-    pulls = {members: _pull(problem, near[members], seat, _symmetric(members, pair)) for members in loose}
+    cells = {members: _cells(problem, members, pair) for members in loose}
+    pulls = {members: _pull(near[members], seat, cells[members]) for members in loose}
     while pulls:
         members = max(pulls, key=lambda one: (pulls[one][0], [-m for m in one]))
         many, to = pulls.pop(members)
@@ -86,23 +88,29 @@ def _seats(problem: LayoutProblem, pair: Mapping[int, int]) -> dict[_Members, in
             pulls.pop(image)
             seated.append(image)
         for other in {other for one in seated for other in near[one] if other in pulls}:
-            pulls[other] = _pull(problem, near[other], seat, _symmetric(other, pair))
+            pulls[other] = _pull(near[other], seat, cells[other])
     return _together(problem, seat)
 
 
-def _pull(
-    problem: LayoutProblem, near: Counter[_Members], seat: Mapping[_Members, int], middle: bool
-) -> tuple[int, int]:
-    """How many connections something has with the cell with which it has most, and that cell; ``middle``: one that is
-    its own mirror image."""
-    below = len(problem.plan)
+def _cells(problem: LayoutProblem, members: _Members, pair: Mapping[int, int]) -> frozenset[int]:
+    """The cells in which something may stand that none names: what has a mirror image in those that have one, and where
+    others have one what has none, or is its own, on the axis."""
+    image = {i: _mirrored(problem, i) for i in range(len(problem.plan))}
+    if not pair:
+        return frozenset(image)
+    if members[0] in pair and not _symmetric(members, pair):
+        return frozenset(i for i, other in image.items() if other >= 0)
+    return frozenset(i for i, other in image.items() if other == i)
+
+
+def _pull(near: Counter[_Members], seat: Mapping[_Members, int], cells: AbstractSet[int]) -> tuple[int, int]:
+    """How many connections something has with that of the ``cells`` with which it has most, and that cell."""
     pulls: Counter[int] = Counter()
     for members, times in near.items():
-        cell = seat.get(members, below)
-        if cell < below and (not middle or _mirrored(problem, cell) == cell):
-            pulls[cell] += times
+        if members in seat and seat[members] in cells:
+            pulls[seat[members]] += times
     best = max(pulls.values(), default=0)
-    return best, min((i for i, times in pulls.items() if times == best), default=below)
+    return best, min((i for i, times in pulls.items() if times == best), default=-1)
 
 
 def _together(problem: LayoutProblem, seat: Mapping[_Members, int]) -> dict[_Members, int]:
