@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import networkx as nx
+import numpy as np
 
 from neurovis_layouts.formations import columns, grid
 from neurovis_layouts.label_room import at_ends, covered, excess, sides_of
@@ -26,16 +27,19 @@ from neurovis_layouts.layered.levels import Levels, levels_of
 from neurovis_layouts.layered.mirror import mirrored, symmetric
 from neurovis_layouts.layered.order import crossings, ordered
 from neurovis_layouts.layered.place import placed, reaches
-from neurovis_layouts.layered.ranks import INSTANT, ranks_of
+from neurovis_layouts.layered.ranks import INSTANT, levelled, ranks_of
 from neurovis_layouts.layered.staggered import staggered
 from neurovis_layouts.layered.units import Unit
-from neurovis_layouts.packing import packed
+from neurovis_layouts.packing import gap_in, packed
 from neurovis_layouts.routing import Waypoint
-from neurovis_spec.layout.geometry import snap
+from neurovis_spec.layout import FloatArray
+from neurovis_spec.layout.geometry import distance, snap
 from neurovis_spec.layout.model import LayoutProblem, Point, Side
 
 #: Between components that nothing connects.
 _APART = 1.5
+#: Among more components than this nobody looks for gaps.
+_MOST_PARTS = 50
 #: That a row stands behind another outweighs any connection.
 _ROW = 1000 * INSTANT
 
@@ -124,11 +128,47 @@ def planned(
     if alone and not (few and connected):
         parts.append(_unconnected(problem, [units[u] for u in alone]))
     plan = ComponentLayout()
-    extents = [part_plan.extent() for part_plan in parts]
+    wholes = _in_gaps(problem, parts)
+    extents = [whole.extent() for whole in wholes]
     corners = packed([(high[0] - low[0], high[1] - low[1]) for low, high in extents], _APART)
-    for part_plan, (x, y), (low, _) in zip(parts, corners, extents, strict=True):
-        plan.add(part_plan, (x - low[0], y - low[1]))
+    for whole, (x, y), (low, _) in zip(wholes, corners, extents, strict=True):
+        plan.add(whole, (x - low[0], y - low[1]))
     return plan
+
+
+def _in_gaps(problem: LayoutProblem, parts: Sequence[ComponentLayout]) -> list[ComponentLayout]:
+    """The parts, each that has room in a gap of a larger one as part of that."""
+    largest = sorted(range(len(parts)), key=lambda part: (-len(parts[part].places), part))
+    drawn: dict[int, FloatArray] = {}
+    for part in largest if len(parts) <= _MOST_PARTS else ():
+        low, high = parts[part].extent()
+        for host, pieces in drawn.items():
+            corner = gap_in(pieces, (high[0] - low[0], high[1] - low[1]), _APART)
+            if corner is not None:
+                shift = corner[0] - low[0], corner[1] - low[1]
+                parts[host].add(parts[part], shift)
+                drawn[host] = np.concatenate([pieces, _pieces(problem, parts[part]) + np.tile(shift, 2)])
+                break
+        else:
+            drawn[part] = _pieces(problem, parts[part])
+    return [plan for part, plan in enumerate(parts) if part in drawn or not drawn]
+
+
+def _pieces(problem: LayoutProblem, plan: ComponentLayout) -> FloatArray:
+    """(n, 4) what is drawn: neurons, frames and labels, and about where connections will run."""
+    found = [(*point, *point) for point in plan.places.values()]
+    if plan.cut:  # bands, with lines between them
+        (x0, y0), (x1, y1) = plan.extent()
+        return np.array([(x0, y0, x1, y1)])
+    found += [(*low, *high) for low, high in zip(plan.corners[::2], plan.corners[1::2], strict=True)]
+    for i, edge in enumerate(problem.edges):
+        if edge.source in plan.places and edge.target in plan.places:
+            ends = sorted((plan.places[edge.source], plan.places[edge.target]), key=lambda place: place[1])
+            line = [ends[0], *((way.x, way.y) for way in plan.ways.get(i, ())), ends[1]]
+            for one, other in pairwise(line):
+                steps = np.linspace(one, other, 2 + int(2 * distance(one, other)))
+                found += [(x, y, x, y) for x, y in steps.tolist()]
+    return np.array(found)
 
 
 def _hosts(
@@ -270,7 +310,13 @@ def _ranks(
     arcs.update({(owner[a], owner[b]): _ROW for a, b in behind if a in owner and b in owner and owner[a] != owner[b]})
     first = {owner[m] for m in problem.entries if m in owner}
     last = {owner[m] for m in problem.exits if m in owner}
-    ranks = ranks_of(len(numbers), arcs, first, last, along)
+    templates = {module.members: module.template for module in problem.modules}
+    kinds = {
+        numbers[bond]: templates[unit.members]
+        for unit, bond in zip(units, bonds, strict=True)
+        if unit.members in templates
+    }
+    ranks = levelled(ranks_of(len(numbers), arcs, first, last, along), arcs, kinds)
     return [ranks[numbers[bond]] for bond in bonds]
 
 

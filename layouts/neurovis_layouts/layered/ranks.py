@@ -2,12 +2,12 @@
 
 In: units and the connections between them. Out: a rank for each, from 0. Connections that go back against the ranks
 are as few as a greedy choice and moves of single units make them; the ranks are those with the shortest connections in
-all (``simplex``).
+all (``simplex``). Instances of one kind come beside each other where that makes the whole shorter.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 
 import networkx as nx
@@ -65,6 +65,31 @@ def ranks_of(
         for unit, level in zip(number, shortened([rank[unit] for unit in number], arcs_within), strict=True):
             rank[unit] = level
     return rank
+
+
+def levelled(ranks: Sequence[int], arcs: Collection[tuple[int, int]], kinds: Mapping[int, str]) -> list[int]:
+    """The ranks where instances stand beside one of their kind farther on, if that leaves a rank without any: the rank
+    is as high as a neuron then, not as an instance. ``kinds`` says what is an instance of what. No arc turns round.
+
+    >>> levelled([0, 1, 1, 2], [(0, 1), (0, 2), (2, 3)], {1: "leg", 3: "leg"})
+    [0, 2, 1, 2]
+    """
+    rank = list(ranks)
+    for level in sorted({rank[unit] for unit in kinds}, reverse=True):
+        until = [max(rank)] * len(rank)
+        for a, b in arcs:
+            one, other = (a, b) if rank[a] < rank[b] else (b, a)
+            until[one] = min(until[one], rank[other] - 1)
+        here = [unit for unit in kinds if rank[unit] == level]
+        farthest = [
+            max(rank[other] for other, kind in kinds.items() if kind == kinds[unit] and rank[other] <= until[unit])
+            for unit in here
+        ]
+        if min(farthest) > level:
+            for unit, farther in zip(here, farthest, strict=True):
+                rank[unit] = farther
+    place = {level: number for number, level in enumerate(sorted(set(rank)))}
+    return [place[level] for level in rank]
 
 
 def _component_order(graph: nx.DiGraph[int]) -> list[int]:
