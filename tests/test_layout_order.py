@@ -7,10 +7,8 @@ from itertools import pairwise, permutations, product
 from random import Random
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from neurovis_layouts.layered import exchange
 from neurovis_layouts.layered.crossings import Ints, Segments, inversions
 from neurovis_layouts.layered.exchange import Exchange
 from neurovis_layouts.layered.levels import Levels, Node, Segment
@@ -147,8 +145,5 @@ def test_exchanges_save_what_they_say(levels: Levels) -> None:
     before = by_pairs(levels, levels.ranks)
     after, order = Exchange(Segments(levels), classes).improved(before, ranks)
     assert after == by_pairs(levels, [rank.tolist() for rank in order]) <= before
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(exchange, "_MANY", -1)
-        assert Exchange(Segments(levels), classes).improved(before, ranks)[0] == after
     kept = [[n for n in rank if levels.nodes[n].kin == 0 and levels.nodes[n].box == -1] for rank in order]
     assert all(nodes == sorted(nodes) for nodes in kept)

@@ -14,8 +14,6 @@ import numpy as np
 from neurovis_layouts.layered.crossings import Ints, Segments
 
 _MOST_ROUNDS = 60
-#: More pairs of segments than this are not compared one by one.
-_MANY = 400_000
 #: A round that saves less than this share of all crossings is the last.
 _HARDLY = 1 / 4000
 
@@ -75,27 +73,16 @@ class _Ends:
 
     def __init__(self, nodes: int, own: Ints, other: Ints, port: Ints) -> None:
         order = np.argsort(own, kind="stable")
-        self.other, self.port = other[order], port[order]
+        self.own, self.other, self.port = own[order], other[order], port[order]
         self.degree = np.bincount(own, minlength=nodes)
         self.start = np.cumsum(self.degree) - self.degree
 
     def gains(self, left: Ints, right: Ints, place: Ints, ports: int) -> Ints:
-        """For pairs of neighbours how many crossings they have with each other now, less those if exchanged."""
+        """For pairs of neighbours how many crossings they have with each other now, less those if exchanged: each end
+        of the left node is searched among the sorted ends of the right one."""
         key = place[self.other] * ports + self.port
-        across = self.degree[right]
-        pairs = self.degree[left] * across
-        if int(pairs.sum()) > _MANY:
-            return self._by_search(left, right, key)
-        number, step = _within(pairs)
-        first, second = np.divmod(step, across[number])
-        signs = np.sign(key[self.start[left][number] + first] - key[self.start[right][number] + second])
-        return np.bincount(number, signs, len(pairs)).astype(np.int64)
-
-    def _by_search(self, left: Ints, right: Ints, key: Ints) -> Ints:
-        """``gains`` for many segments: each end of the left node is searched among the sorted ends of the right one."""
-        wide = int(key.max()) + 1
-        owner = np.repeat(np.arange(len(self.degree), dtype=np.int64), self.degree) * wide
-        every = np.sort(owner + key)
+        wide = int(key.max(initial=0)) + 1
+        every = np.sort(self.own * wide + key)
         number, step = _within(self.degree[left])
         wanted = right[number] * wide + key[self.start[left][number] + step]
         start, degree = self.start[right][number], self.degree[right][number]
