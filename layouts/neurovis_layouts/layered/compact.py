@@ -31,8 +31,8 @@ _SHORT = 24.0
 _BACK = 10.0
 #: So many numbers of bands one after the other are tried in vain.
 _IN_VAIN = 2
-#: In no more bands or rows than this, nor more neurons and connections; nor are all kinds tried more often.
-_MOST_FOLDS, _MOST, _ROUNDS = 8, 3000, 1
+#: In no more bands or rows than this, nor more neurons and connections.
+_MOST_FOLDS, _MOST = 8, 3000
 
 
 #: What can be folded: the ranks of a kind of instance, or of the whole (its number, RANKS), or the rows of instances of
@@ -82,12 +82,8 @@ def compact(problem: LayoutProblem, drawn: Drawn, most: Mapping[Fold, int]) -> S
     if _stretched(problem, drawing) < _STRETCHED or max(_size(drawing, problem.direction)) < _SHORT:
         return Shape()
     first = least = _cost(problem, drawing)
-    for _ in range(_ROUNDS):
-        before = least
-        for fold in sorted(most):
-            least, shape = _folded(problem, drawn, fold, most[fold], least, shape)
-        if least == before:
-            break
+    for fold in sorted(most):
+        least, shape = _folded(problem, drawn, fold, most[fold], least, shape)
     return replace(shape, draft=False) if least < _WORTH * first else Shape()
 
 

@@ -47,7 +47,6 @@ class Composer:
         self._book = Book(problem)
         self._kinds: dict[tuple[int, Direction, ShapeKey], Drawing] = {}
         self._shape = Shape()
-        self._wholes: dict[ShapeKey, _Standing] = {}
         #: what can be folded, and how often at most
         self._most: dict[Fold, int] = {}
 
@@ -69,14 +68,8 @@ class Composer:
         """Raises LayoutRefusalError where an arrangement cannot be symmetric, in the problem or in a kind of instance,
         before anything is drawn."""
         whole = self._book.whole()
-        problems, known = [whole], {int(module.template) for module in whole.modules}
-        waiting = sorted(known)
-        while waiting:
-            problems.append(self._book.problem_of(waiting.pop()))
-            found = {int(module.template) for module in problems[-1].modules} - known
-            known |= found
-            waiting += sorted(found)
-        for problem in problems:
+        kinds = sorted({int(module.template) for module in whole.modules})
+        for problem in (whole, *map(self._book.problem_of, kinds)):
             pair = mirror_images(problem)
             arranged_on_axis(problem, pair, {m for module in problem.modules for m in module.members})
 
@@ -106,19 +99,13 @@ class Composer:
         pair = mirror_images(problem)
         if problem.plan:
             return self._on_page(problem, pair, routed, kind)
-        key = self._shape.of(WHOLE, problem)
-        if kind == WHOLE and key in self._wholes:
-            return self._wholes[key].joined(problem, pair, routed)
-        standing = self._standing(problem, pair, kind)
-        if kind == WHOLE:
-            self._wholes[key] = standing
-        return standing.joined(problem, pair, routed)
+        return self._standing(problem, pair, kind).joined(problem, pair, routed)
 
     def _standing(self, problem: LayoutProblem, pair: Mapping[int, int], kind: int) -> _Standing:
         """Where everything stands, with those boxes as frames or columns that foreign neurons would stand in."""
         frames = firm(problem, pair)
         loose = {i for i in range(len(problem.boxes)) if i not in frames and may_be_frame(problem, i, pair)}
-        known: dict[Part, Drawing] = {}
+        known: dict[tuple[Part, Direction], Piece] = {}
         while True:
             parts = parts_of(problem, frames, pair)
             standing = self._attempt(problem, parts, pair, known, kind)
@@ -137,14 +124,12 @@ class Composer:
         problem: LayoutProblem,
         parts: Sequence[Part],
         pair: Mapping[int, int],
-        known: dict[Part, Drawing],
+        known: dict[tuple[Part, Direction], Piece],
         kind: int,
         columns: AbstractSet[int] = frozenset(),
     ) -> _Standing:
         """Where everything stands with these parts; ``known`` are boxes that are drawn already."""
-        pieces: list[Piece] = []
-        for part in parts:
-            pieces.append(self._piece(problem, part, pieces, known))
+        pieces = [self._piece(problem, part, problem.direction, parts, known) for part in parts]
         kin: dict[str, int] = {}
         for number, piece in enumerate(pieces):
             kin.setdefault(piece.part.family, len(problem.groups) + number)
@@ -184,19 +169,10 @@ class Composer:
 
     def _on_page(self, problem: LayoutProblem, pair: Mapping[int, int], routed: bool, kind: int) -> Drawing:
         """The drawing of a problem whose cells say what stands in which row and column."""
-        known: dict[tuple[tuple[int, ...], Direction], Piece] = {}
+        known: dict[tuple[Part, Direction], Piece] = {}
 
         def drawn(part: Part, direction: Direction) -> Piece:
-            key = part.members, direction
-            if key not in known:
-                if part.image_of >= 0:
-                    drawing = drawn(parts[part.image_of], direction).drawing
-                else:
-                    inner = self._inside(problem, part, direction)
-                    drawing = inner if isinstance(inner, Drawing) else self.compose(inner, kind=NONE)
-                    drawing = in_direction(drawing, direction, problem.direction)
-                known[key] = piece_of(part, drawing)
-            return known[key]
+            return self._piece(problem, part, direction, parts, known)
 
         parts, where = parts_by_cell(problem, pair)
         pieces = facing(problem, parts, where, pair, drawn, kind == WHOLE, self._upright(kind))
@@ -212,28 +188,24 @@ class Composer:
         inner = self._book.problem_of(part.kind) if part.kind >= 0 else _boxed(problem, part)
         return piece_of(part, self.compose(replace(inner, pins=pins), kind=NONE))
 
-    def _inside(self, problem: LayoutProblem, part: Part, direction: Direction) -> LayoutProblem | Drawing:
-        """An instance's drawing in a direction; of a box, which has none yet, the problem of drawing it alone."""
-        if part.kind >= 0:
-            return self.kind(part.kind, direction)
-        return replace(_boxed(problem, part), direction=direction)
-
     def _piece(
         self,
         problem: LayoutProblem,
         part: Part,
-        before: Sequence[Piece],
-        known: dict[Part, Drawing],
+        direction: Direction,
+        parts: Sequence[Part],
+        known: dict[tuple[Part, Direction], Piece],
     ) -> Piece:
-        if part.image_of >= 0:
-            drawing = before[part.image_of].drawing
-        elif part.kind >= 0:
-            drawing = self.kind(part.kind, problem.direction)
-        else:
-            if part not in known:
-                known[part] = self.compose(_boxed(problem, part), kind=NONE)
-            drawing = known[part]
-        return piece_of(part, drawing)
+        """One of the parts, drawn in a direction, or as it is ``known``; a mirror image as what it is the image of."""
+        lead = parts[part.image_of] if part.image_of >= 0 else part
+        key = lead, direction
+        if key not in known:
+            if lead.kind >= 0:
+                drawing = self.kind(lead.kind, direction)
+            else:
+                drawing = self.compose(replace(_boxed(problem, lead), direction=direction), kind=NONE)
+            known[key] = piece_of(lead, in_direction(drawing, direction, problem.direction))
+        return replace(known[key], part=part)
 
 
 def _unit(piece: Piece, kin: int, pair: Mapping[int, int]) -> Unit:
@@ -257,19 +229,13 @@ def _resting(plan: ComponentLayout, piece: Piece) -> tuple[Piece, Move]:
 def _boxed(problem: LayoutProblem, part: Part) -> LayoutProblem:
     """A box as a problem of its own."""
     place = {neuron: i for i, neuron in enumerate(part.members)}
-    driven = {e.target for e in problem.edges if e.target in place and e.source not in place} | set(problem.entries)
-    drives = {e.source for e in problem.edges if e.source in place and e.target not in place} | set(problem.exits)
-    edges = [(place[e.source], place[e.target], e) for e in problem.edges if e.source in place and e.target in place]
     pairs = tuple(
         (place[a], place[b]) for mirror in problem.mirrors for a, b in mirror.pairs if a in place and b in place
     )
     lines = (tuple(place[m] for m in line if m in place) for line in problem.align)
     return replace(
-        restricted(problem, part.members),
-        edges=tuple(replace(e, source=a, target=b) for a, b, e in edges),
+        restricted(problem, [part.members]),
         title=title_room(problem.boxes[part.box][0], BOX_WEIGHT) if part.box >= 0 else 0.0,
-        entries=tuple(sorted(place[m] for m in driven - drives if m in place)),
-        exits=tuple(sorted(place[m] for m in drives - driven if m in place)),
         mirrors=(LayoutMirror(-1, pairs),) if pairs else (),
         align=tuple(line for line in lines if len(line) > 1),
     )

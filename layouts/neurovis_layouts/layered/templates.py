@@ -7,7 +7,7 @@ of one kind, and so are two that are mirror images of each other.
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeAlias
 
@@ -18,7 +18,6 @@ from neurovis_spec.layout.model import (
     LayoutEdge,
     LayoutGroup,
     LayoutMirror,
-    LayoutModule,
     LayoutProblem,
     LayoutRefusalError,
 )
@@ -33,7 +32,6 @@ class Book:
     def __init__(self, problem: LayoutProblem) -> None:
         """Raises LayoutRefusalError where a mirror pairs what cannot be mirror images."""
         self._problem = problem
-        self._keys = keys_of(problem.edges)
         modules = problem.modules
         self._around: list[list[int]] = [[] for _ in problem.neurons]
         for number, module in enumerate(modules):
@@ -52,16 +50,6 @@ class Book:
         for line in problem.align:
             self._align(-1, line)
         self._join_inner()
-        self._inner: list[list[int]] = [[] for _ in modules]
-        self._driven: list[set[int]] = [set() for _ in modules]
-        self._driving: list[set[int]] = [set() for _ in modules]
-        for index, edge in enumerate(problem.edges):
-            source, target = self._around[edge.source], self._around[edge.target]
-            for number in source:
-                (self._inner[number].append(index) if number in target else self._driving[number].add(edge.source))
-            for number in target:
-                if number not in source:
-                    self._driven[number].add(edge.target)
         self._copies: dict[int, list[int]] = {}
         for number in range(len(modules)):
             self._copies.setdefault(self._find(number), []).append(number)
@@ -140,23 +128,12 @@ class Book:
     def _of(self, kind: int) -> LayoutProblem:
         copies = self._copies[kind]
         modules = self._problem.modules
-        local = {number: {n: i for i, n in enumerate(modules[number].members)} for number in copies}
-        edges: dict[Key, int] = {}
-        entries: set[int] = set()
-        exits: set[int] = set()
         pairs: set[tuple[int, int]] = set()
         lines: set[tuple[int, ...]] = set()
         cells: set[LayoutCell] = set()
         pins: dict[int, tuple[float, float]] = {}
         for number in copies:
-            place = local[number]
-            for index in self._inner[number]:
-                source, target, times = self._keys[index]
-                edges.setdefault((place[source], place[target], times), self._problem.edges[index].delay)
-            entries.update(place[n] for n in self._driven[number])
-            entries.update(place[n] for n in self._problem.entries if n in place)
-            exits.update(place[n] for n in self._driving[number])
-            exits.update(place[n] for n in self._problem.exits if n in place)
+            place = {n: i for i, n in enumerate(modules[number].members)}
             pairs.update((place[a], place[b]) for a, b in self._pairs.get(number, ()))
             lines.update(tuple(place[n] for n in line) for line in self._lines.get(number, ()))
             cells.update(
@@ -166,13 +143,10 @@ class Book:
             )
             for neuron, point in modules[number].pins.items():
                 pins.setdefault(place[neuron], point)
-        part = restricted(self._problem, modules[copies[0]].members, copies[0])
+        part = restricted(self._problem, [modules[number].members for number in copies], f"{modules[copies[0]].path}.")
         titles = instance_titles((module.path, module.module) for module in modules)
         return replace(
             part,
-            edges=tuple(LayoutEdge(f"{k}", k[0], k[1], delay) for k, delay in sorted(edges.items())),
-            entries=tuple(sorted(entries - exits)),
-            exits=tuple(sorted(exits - entries)),
             modules=tuple(replace(m, template=str(self._find(self._number[m.path]))) for m in part.modules),
             mirrors=_mirror(sorted(pairs)),
             align=tuple(sorted(lines)),
@@ -186,63 +160,63 @@ def _mirror(pairs: Sequence[tuple[int, int]]) -> tuple[LayoutMirror, ...]:
     return (LayoutMirror(-1, tuple(sorted(set(pairs)))),) if pairs else ()
 
 
-def restricted(problem: LayoutProblem, members: Sequence[int], within: int = -1) -> LayoutProblem:
-    """The problem of these neurons alone, counted from 0 in the order given, without edges, pins, mirrors and lines.
+def restricted(problem: LayoutProblem, copies: Sequence[Sequence[int]], within: str = "") -> LayoutProblem:
+    """The problem of the neurons of one of these ``copies`` alone, counted from 0 in the order given, without pins,
+    mirrors and lines: connected as they are in any copy, and entered and left where any is.
 
-    ``within`` is the instance that they are, whose own instances are the outermost then.
+    ``within`` is how the paths of the instances in it begin, which may hold as many neurons as what is around them.
     """
+    members = copies[0]
     place = {neuron: i for i, neuron in enumerate(members)}
+    where = {neuron: (number, i) for number, own in enumerate(copies) for i, neuron in enumerate(own)}
+    edges: dict[Key, int] = {}
+    entries = {where[n][1] for n in problem.entries if n in where}
+    exits = {where[n][1] for n in problem.exits if n in where}
+    for edge, (a, b, times) in zip(problem.edges, keys_of(problem.edges), strict=True):
+        source, target = where.get(a), where.get(b)
+        if source and target and source[0] == target[0]:
+            edges.setdefault((source[1], target[1], times), edge.delay)
+            continue
+        if source:
+            exits.add(source[1])
+        if target:
+            entries.add(target[1])
 
     def inside(neurons: Sequence[int]) -> tuple[int, ...]:
         return tuple(place[n] for n in neurons if n in place)
 
-    whole = len(members)
     groups = tuple(LayoutGroup(g.name, found) for g in problem.groups if (found := inside(g.members)))
     arrange = tuple((found, how) for of, how in problem.arrange if len(found := inside(of)) == len(of))
-    boxes = tuple((name, found) for name, of in problem.boxes if len(found := inside(of)) == len(of) < whole)
-    kept = _within(problem, within) if within >= 0 else _whole(problem, place)
+    boxes = tuple((name, found) for name, of in problem.boxes if len(found := inside(of)) == len(of) < len(members))
+    kept = [
+        i
+        for i, module in enumerate(problem.modules)
+        if module.members and module.path.startswith(within) and len(inside(module.members)) == len(module.members)
+    ]
     number = {old: new for new, old in enumerate(kept)}
     modules = tuple(
-        LayoutModule(
-            problem.modules[i].path,
-            problem.modules[i].module,
-            number.get(problem.modules[i].parent, -1),
-            inside(problem.modules[i].members),
-            problem.modules[i].template,
-            _at(problem.modules[i].pins, place),
+        replace(
+            module,
+            parent=number.get(module.parent, -1),
+            members=inside(module.members),
+            pins={place[n]: point for n, point in module.pins.items()},
+            origin=None,
         )
-        for i in kept
-        if problem.modules[i].members
+        for module in (problem.modules[i] for i in kept)
     )
     return LayoutProblem(
         problem.network,
         tuple(problem.neurons[n] for n in members),
         groups,
-        (),
+        tuple(LayoutEdge(f"{key}", key[0], key[1], delay) for key, delay in sorted(edges.items())),
         direction=problem.direction,
         arrange=arrange,
         boxes=boxes,
         neuron_spacing=problem.neuron_spacing,
         rank_spacing=problem.rank_spacing,
+        entries=tuple(sorted(entries - exits)),
+        exits=tuple(sorted(exits - entries)),
         modules=modules,
         effort=problem.effort,
         labels=tuple(problem.labels[n] for n in members) if problem.labels else (),
     )
-
-
-def _within(problem: LayoutProblem, instance: int) -> list[int]:
-    """The instances within an instance, which may hold as many neurons as what is around them."""
-    inside = {instance}
-    for number, module in enumerate(problem.modules):  # an instance stands before those within it
-        if module.parent in inside:
-            inside.add(number)
-    return sorted(inside - {instance})
-
-
-def _whole(problem: LayoutProblem, neurons: Container[int]) -> list[int]:
-    """The instances that have no other neurons than these."""
-    return [i for i, module in enumerate(problem.modules) if all(n in neurons for n in module.members)]
-
-
-def _at(pins: Mapping[int, tuple[float, float]], place: Mapping[int, int]) -> dict[int, tuple[float, float]]:
-    return {place[n]: point for n, point in pins.items()}
