@@ -24,8 +24,9 @@ from neurovis_layouts.layered.flips import reflected
 from neurovis_layouts.layered.fold_ports import with_exits
 from neurovis_layouts.layered.folds import folded, interleaved, stacked
 from neurovis_layouts.layered.levels import Levels, levels_of
-from neurovis_layouts.layered.mirror import mirrored, symmetric
+from neurovis_layouts.layered.mirror import mirrored
 from neurovis_layouts.layered.order import crossings, ordered
+from neurovis_layouts.layered.parts import symmetric
 from neurovis_layouts.layered.place import placed, reaches
 from neurovis_layouts.layered.ranks import INSTANT, levelled, ranks_of
 from neurovis_layouts.layered.staggered import staggered
@@ -101,11 +102,7 @@ def planned(
     ``wanted`` where it can be cut, which no axis can. ``behind`` are pairs of
     neurons of which the second stands in a later rank. Of a ``draft`` only the size counts.
     """
-    if pair:
-        return _component(
-            problem, units, bonds, (), range(len(problem.edges)), pair, frozenset(), wanted, behind, draft
-        )
-    connected, alone = components_of(problem, units, bonds)
+    connected, alone = ([list(range(len(units)))], []) if pair else components_of(problem, units, bonds)
     largest = max(connected, key=lambda part: sum(len(units[u].members) for u in part), default=None)
     parts: list[ComponentLayout] = []
     hosts = _hosts(problem, units, connected, alone)
@@ -121,10 +118,12 @@ def planned(
         own, tied = [units[u] for u in part], [bonds[u] for u in part]
         parts.append(
             _component(
-                problem, own, tied, guests, edges.get(k, []), {}, columns, wanted if part == largest else UNCUT, behind,
-                draft,
+                problem, own, tied, guests, edges.get(k, []), pair, columns, wanted if part == largest else UNCUT,
+                behind, draft,
             )
         )  # fmt: skip
+    if pair:
+        return parts[0]
     if alone and not (few and connected):
         parts.append(_unconnected(problem, [units[u] for u in alone]))
     plan = ComponentLayout()
@@ -337,9 +336,7 @@ def _one_on_axis(
     units: Sequence[Unit], bonds: Sequence[int], rank: Sequence[int], pair: Mapping[int, int]
 ) -> list[int]:
     """Ranks in which no two units have to stand on the axis."""
-    fixed = [
-        u for u, unit in enumerate(units) if symmetric(unit.members, pair) and pair.get(unit.members[0]) in unit.members
-    ]
+    fixed = [u for u, unit in enumerate(units) if symmetric(unit.members, pair)]
     result = [2 * len(units) * r for r in rank]
     taken: dict[int, int] = {}
     for u in fixed:

@@ -17,6 +17,7 @@ from itertools import pairwise
 import networkx as nx
 
 from neurovis_layouts.layered.levels import Levels, Segment
+from neurovis_layouts.layered.parts import symmetric
 from neurovis_layouts.layered.units import Unit
 from neurovis_spec.layout.model import LayoutProblem
 
@@ -98,7 +99,7 @@ def _free(problem: LayoutProblem, units: Sequence[Unit], bonds: Sequence[int], p
     return {
         u
         for u, unit in enumerate(units)
-        if unit.reach is not None and bonds[u] not in bound and pair.get(unit.members[0]) not in unit.members
+        if unit.reach is not None and bonds[u] not in bound and not symmetric(unit.members, pair)
     }
 
 
@@ -272,4 +273,4 @@ def stacked(levels: Levels, folds: Folds) -> Levels:
             segments[r] = [replace(s, weight=s.weight * _LEAVING) for s in segments[r]]
         elif r in folds.ranks:
             segments[r] += [Segment(above[c], 0.0, below[c], 0.0, _COLUMN) for c in above if c in below]
-    return Levels(levels.nodes, levels.ranks, segments, levels.passages, levels.spines)
+    return replace(levels, segments=segments)

@@ -8,11 +8,12 @@ the room they take is the same on both sides.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 from neurovis_layouts.layered.levels import Levels, Node, Segment
 from neurovis_layouts.layered.order import ordered
+from neurovis_layouts.layered.parts import symmetric
 from neurovis_layouts.routing.ends import keys_of
 from neurovis_spec.layout.model import LayoutProblem
 
@@ -42,15 +43,10 @@ def mirrored(
     return order, result
 
 
-def symmetric(members: Iterable[int], pair: Mapping[int, int]) -> bool:
-    """Whether these neurons, which are their own image, have to stand on the axis, since they hold mirror images."""
-    return any(member in pair for member in members)
-
-
 def _about(levels: Levels, rank: list[int], side: Mapping[int, int], pair: Mapping[int, int]) -> None:
     """What has to stand on the axis in the middle, what need not beside it, with room for as much on the other side."""
     centre = [n for n in rank if side[n] == 0]
-    fixed = [n for n in centre if symmetric((m for m, _, _ in levels.nodes[n].members), pair)]
+    fixed = [n for n in centre if symmetric([m for m, _, _ in levels.nodes[n].members], pair)]
     if not fixed or len(centre) == 1:
         return
     loose = [n for n in centre if n not in fixed]

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 from neurovis_layouts.formations import offsets
 from neurovis_layouts.frame import from_picture
+from neurovis_layouts.layered.parts import symmetric
 from neurovis_layouts.layered.units import Unit, units_of
 from neurovis_spec.layout.model import Arrangement, LayoutProblem, LayoutRefusalError, Point
 
@@ -70,7 +71,7 @@ def _arranged(
 ) -> Unit | None:
     """An arrangement that holds mirror images of each other: a block on the axis, in which these stand opposite."""
     own = set(members)
-    if own & framed or not any(pair.get(m) in own for m in members):
+    if own & framed or not symmetric(members, pair):
         return None
     spacing = max(problem.neuron_spacing, 0.65)
     inner = any(e.source in own and e.target in own and e.source != e.target for e in problem.edges)

@@ -18,7 +18,7 @@ import numpy as np
 from neurovis_layouts.alike import Move, shifted_by
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.layered.drawing import Drawing, Piece
-from neurovis_layouts.layered.parts import Part, imaged, part_of_module
+from neurovis_layouts.layered.parts import Part, imaged, part_of_module, symmetric
 from neurovis_layouts.layered.plan_places import Slot, placed
 from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.geometry import Rect, crossing
@@ -98,7 +98,7 @@ def _cells(problem: LayoutProblem, members: _Members, pair: Mapping[int, int]) -
     image = {i: _mirrored(problem, i) for i in range(len(problem.plan))}
     if not pair:
         return frozenset(image)
-    if members[0] in pair and not _symmetric(members, pair):
+    if members[0] in pair and not symmetric(members, pair):
         return frozenset(i for i, other in image.items() if other >= 0)
     return frozenset(i for i, other in image.items() if other == i)
 
@@ -226,7 +226,7 @@ def _flipped(
     """Draw each of these parts as its mirror image where that costs less; what all costs then."""
     now = cost()
     for k in own:
-        if drawn(parts[k], turns[k]).drawing.fixed or _symmetric(parts[k].members, pair):
+        if drawn(parts[k], turns[k]).drawing.fixed or symmetric(parts[k].members, pair):
             continue
         flip(k)
         then = cost()
@@ -242,15 +242,9 @@ def _directions(problem: LayoutProblem, part: Part, pair: Mapping[int, int], dra
     whole, one whose module pins its neurons as they are pinned."""
     if drawn(part, problem.direction).drawing.fixed:
         return (problem.direction,)
-    if _symmetric(part.members, pair):
+    if symmetric(part.members, pair):
         return (problem.direction, _OPPOSITE[problem.direction])
     return ("down", "up", "right", "left")
-
-
-def _symmetric(members: Sequence[int], pair: Mapping[int, int]) -> bool:
-    """Whether some of these neurons are mirror images of others of them."""
-    own = set(members)
-    return any(pair.get(m) in own for m in members)
 
 
 def in_direction(drawing: Drawing, of: Direction, frame: Direction) -> Drawing:
@@ -330,7 +324,7 @@ def _check_mirrors(
     for k, part in enumerate(parts):
         first = part.image_of
         if first < 0:
-            if not _symmetric(part.members, pair):
+            if not symmetric(part.members, pair):
                 continue
             first = k
         place = where[first]

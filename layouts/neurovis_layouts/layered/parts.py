@@ -6,9 +6,9 @@ stand between them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from neurovis_spec.layout.model import LayoutProblem
 
@@ -52,34 +52,30 @@ def part_of_module(problem: LayoutProblem, module: int) -> Part:
 
 def imaged(parts: Sequence[Part], pair: Mapping[int, int]) -> list[Part]:
     """Mirror images marked as such; a box that has no box for its image gets one without a line."""
-    first = [
-        part
-        for part in parts
-        if not (images := images_in(part, pair)) or set(images) == set(part.members) or _leads(part, pair)
-    ]
-    result = list(first)
     by_members = {frozenset(part.members): part for part in parts}
-    for number, part in enumerate(first):
-        images = images_in(part, pair)
-        if images and set(images) != set(part.members):
-            other = by_members.get(frozenset(images))
-            result.append(
-                Part(images, part.kind, -1 if other is None else other.box, -1 if other is None else other.module,
-                     "" if other is None else other.family, number)
-            )  # fmt: skip
-    return result
-
-
-def _leads(part: Part, pair: Mapping[int, int]) -> bool:
-    """Whether a part is the first of a mirrored pair: that with the first neuron."""
-    images = images_in(part, pair)
-    return bool(images) and min(part.members) < min(images)
+    first: list[Part] = []
+    images: list[Part] = []
+    for part in parts:
+        others = images_in(part, pair)
+        if others and set(others) != set(part.members):
+            if min(others) < min(part.members):
+                continue
+            other = by_members.get(frozenset(others), Part(others))
+            images.append(replace(other, members=others, kind=part.kind, image_of=len(first)))
+        first.append(part)
+    return first + images
 
 
 def images_in(part: Part, pair: Mapping[int, int]) -> tuple[int, ...]:
     """The mirror images of a part's neurons in its order, none if not all have one."""
     images = tuple(pair[m] for m in part.members if m in pair)
     return images if len(images) == len(part.members) else ()
+
+
+def symmetric(members: Sequence[int], pair: Mapping[int, int]) -> bool:
+    """Whether some of these neurons are mirror images of others of them."""
+    own = set(members)
+    return any(pair.get(m) in own for m in own)
 
 
 def firm(problem: LayoutProblem, pair: Mapping[int, int]) -> set[int]:
@@ -100,7 +96,7 @@ def may_be_frame(problem: LayoutProblem, box: int, pair: Mapping[int, int]) -> b
     if any(own & set(m.members) and not set(m.members) <= own for m in problem.modules if m.parent < 0):
         return False
     images = {pair[m] for m in own if m in pair}
-    return not images or images == own - _free(own, pair) or (len(images) == len(own) and not images & own)
+    return images <= own or (len(images) == len(own) and not images & own)
 
 
 def columns_of(problem: LayoutProblem, parts: Sequence[Part], boxes: AbstractSet[int]) -> frozenset[int]:
@@ -113,7 +109,3 @@ def columns_of(problem: LayoutProblem, parts: Sequence[Part], boxes: AbstractSet
             found.add(box)
             taken |= own
     return frozenset(found)
-
-
-def _free(own: Iterable[int], pair: Mapping[int, int]) -> set[int]:
-    return {m for m in own if m not in pair}
