@@ -97,41 +97,30 @@ def _ways(
 ) -> dict[int, list[Point]]:
     """The ways of what is cut: down below its band, up in the street beside that, and from above into the next. Lines
     that do not cross where they are cut do not do so there."""
-    chains: dict[int, list[tuple[int, float]]] = {}
+    first: dict[int, int] = {}
+    found: dict[int, list[Point]] = {}
     for i, (upper, a, lower, b) in levels.ends.items():
-        first, last = levels.nodes[upper].rank, levels.nodes[lower].rank
-        if any(first <= cut < last for cut in bottoms):
-            chains[i] = [(upper, a), *((n, 0.0) for n in levels.passages.get(i, ())), (lower, b)]
-    found = {i: [(places[n][0] + a, places[n][1]) for n, a in chain] for i, chain in chains.items()}
-    ways: dict[int, list[Point]] = {i: [] for i in chains}
-    lanes: dict[tuple[int, int], int] = {}
-    for cut in bottoms:
-        here = [i for i, chain in chains.items() if levels.nodes[chain[0][0]].rank <= cut < _last(levels, chain)]
-
-        def ends(i: int, cut: int = cut) -> tuple[float, float]:
-            at = cut - levels.nodes[chains[i][0][0]].rank
-            return -found[i][at][0], -found[i][at + 1][0]
-
-        lanes.update({(i, cut): lane for lane, i in enumerate(sorted(here, key=lambda i: (ends(i), i)))})
-    many = {cut: sum(c == cut for _, c in lanes) for cut in bottoms}
-    for i, chain in chains.items():
-        first = levels.nodes[chain[0][0]].rank
-        for step, point in enumerate(found[i]):
-            if 0 < step < len(chain) - 1:
-                ways[i].append(point)
-            cut = first + step
-            if (i, cut) not in lanes:
-                continue
-            lane, number = lanes[i, cut], list(bottoms).index(cut)
-            x = streets[number] + (lane - (many[cut] - 1) / 2) * _LINE
-            low = bottoms[cut] + _BESIDE + lane * _LINE
-            high = -_BESIDE - (many[cut] - 1 - lane) * _LINE
-            ways[i] += [(point[0], low), (x, low), (x, high), (found[i][step + 1][0], high)]
+        if any(levels.nodes[upper].rank <= cut < levels.nodes[lower].rank for cut in bottoms):
+            first[i] = levels.nodes[upper].rank
+            chain = [(upper, a), *((n, 0.0) for n in levels.passages.get(i, ())), (lower, b)]
+            found[i] = [(places[n][0] + a, places[n][1]) for n, a in chain]
+    corners: dict[tuple[int, int], list[Point]] = {}
+    for (cut, bottom), street in zip(bottoms.items(), streets, strict=False):
+        here: list[tuple[float, float, int]] = []
+        for i, line in found.items():
+            if 0 <= (at := cut - first[i]) < len(line) - 1:
+                here.append((-line[at][0], -line[at + 1][0], i))
+        for lane, (start, end, i) in enumerate(sorted(here)):
+            x = street + (lane - (len(here) - 1) / 2) * _LINE
+            low = bottom + _BESIDE + lane * _LINE
+            high = -_BESIDE - (len(here) - 1 - lane) * _LINE
+            corners[i, cut] = [(-start, low), (x, low), (x, high), (-end, high)]
+    ways: dict[int, list[Point]] = {}
+    for i, line in found.items():
+        ways[i] = list(corners.get((i, first[i]), ()))
+        for rank, point in enumerate(line[1:-1], first[i] + 1):
+            ways[i] += [point, *corners.get((i, rank), ())]
     return ways
-
-
-def _last(levels: Levels, chain: Sequence[tuple[int, float]]) -> int:
-    return levels.nodes[chain[-1][0]].rank
 
 
 def _rank(levels: Levels, places: Sequence[Point], number: int) -> _Rank:
