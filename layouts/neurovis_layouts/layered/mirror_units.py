@@ -21,22 +21,15 @@ def symmetric_units(problem: LayoutProblem, frames: Sequence[Unit], pair: Mappin
 
     Raises LayoutRefusalError where an arrangement cannot be symmetric.
     """
-    if not pair:
-        return list(units_of(problem, frames))
     framed = {m for unit in frames for m in unit.members}
     second = {b for mirror in problem.mirrors for _, b in mirror.pairs} - framed
     blocks = arranged_on_axis(problem, pair, framed)
-    done = {m for unit in blocks for m in unit.members}
-    solid = [*frames, *blocks]
-    found = list(units_of(problem, solid, frozenset(second - done)))
+    solid = framed | {m for unit in blocks for m in unit.members}
     result: list[Unit] = []
-    for unit in found:
-        if unit in solid:
-            result.append(unit)
-            continue
-        for piece in _pure(unit, pair):
+    for unit in units_of(problem, [*frames, *blocks], second - solid):
+        for piece in [unit] if unit.members[0] in solid else _pure(unit, pair):
             result.append(piece)
-            if piece.members[0] in pair:
+            if piece.members[0] in pair and piece.members[0] not in solid:
                 result.append(_reflected(piece, pair))
     return sorted(result, key=lambda unit: min(unit.members))
 

@@ -8,6 +8,7 @@ a loop (a half-centre oscillator, a ring, a reservoir) are one block: a row wher
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
@@ -41,9 +42,7 @@ class Unit:
     lift: float = 0.0
 
 
-def units_of(
-    problem: LayoutProblem, frames: Sequence[Unit] = (), absent: AbstractSet[int] = frozenset()
-) -> tuple[Unit, ...]:
+def units_of(problem: LayoutProblem, frames: Sequence[Unit], absent: AbstractSet[int]) -> list[Unit]:
     """The units, ordered by their first neuron, ``frames`` among them as they are; ``absent`` neurons are in none."""
     framed = {member for unit in frames for member in unit.members} | absent
     asked = [*frames, *_arranged(problem, framed)]
@@ -61,9 +60,9 @@ def units_of(
     lone += [i for i in range(len(problem.neurons)) if i not in taken]
     found += _of_lone(problem, sorted(lone))
     lines = _lines(problem)
-    found = _loops_on_lines(found, asked, lines, max(problem.neuron_spacing, 0.65))
-    found = _without_needless_loops(problem, _off_lines(problem, found, lines), lines)
-    return tuple(sorted(found, key=lambda unit: min(unit.members)))
+    found = asked + _on_lines(problem, found[len(asked) :], asked, lines)
+    found = _without_needless_loops(problem, found, lines)
+    return sorted(found, key=lambda unit: min(unit.members))
 
 
 def _arranged(problem: LayoutProblem, framed: AbstractSet[int]) -> list[Unit]:
@@ -172,60 +171,53 @@ def _lines(problem: LayoutProblem) -> dict[int, int]:
     return found
 
 
-def _loops_on_lines(
-    found: Sequence[Unit], asked: Sequence[Unit], lines: Mapping[int, int], spacing: float
+def _on_lines(
+    problem: LayoutProblem, found: Sequence[Unit], asked: Sequence[Unit], lines: Mapping[int, int]
 ) -> list[Unit]:
-    """Loops that were made blocks although nobody ``asked`` for it give way to lines that they would contradict: a loop
-    whose neurons are all on one line is a row; of others those on one line share a rank, and the rest find their own.
-    """
-    rigid = {member: i for i, unit in enumerate(found) if unit.places is not None for member in unit.members}
-    reach: dict[int, set[int]] = {}
-    for member, line in lines.items():
-        if member in rigid:
-            reach.setdefault(line, set()).add(rigid[member])
-    result: list[Unit] = list(asked)
-    for unit in found[len(asked) :]:
-        bound: dict[int, list[Point]] = {}
-        for member, place in zip(unit.members, unit.places or (), strict=False):
-            if member in lines:
-                bound.setdefault(lines[member], []).append(place)
-        bent = any(len({along for _, along in places}) > 1 for places in bound.values())
-        if not bent and sum(len(reach[line]) > 1 for line in bound) <= 1:
-            result.append(unit)
-        elif len(bound) == 1 and all(member in lines for member in unit.members):
-            result.append(replace(unit, places=tuple(offsets("row", len(unit.members), spacing * _LINE))))
-        else:
-            together: dict[int, list[int]] = {}
-            for member in sorted(unit.members):
-                together.setdefault(lines.get(member, -1 - member), []).append(member)
-            result += [Unit(tuple(members)) for members in together.values()]
-    return result
-
-
-def _off_lines(problem: LayoutProblem, found: Sequence[Unit], lines: Mapping[int, int]) -> list[Unit]:
-    """Split groups of which only a part is on a line with others: the line binds those that it names, not the rest."""
-    if not lines:
-        return list(found)
-    owner = {member: i for i, unit in enumerate(found) for member in unit.members}
-    reach: dict[int, set[int]] = {}
-    for member, line in lines.items():
-        if member in owner:
-            reach.setdefault(line, set()).add(owner[member])
+    """Units that nobody ``asked`` for give way to lines that they would contradict: a loop whose neurons are all on one
+    line is a row. Of others, and of a group of which only a part is on a line with others, those on one line share a
+    rank, and the rest find their own: a line binds those that it names."""
     wired = {end for edge in problem.edges if edge.source != edge.target for end in (edge.source, edge.target)}
-    result: list[Unit] = []
-    for unit in found:
-        bound = {lines[member] for member in unit.members if member in lines}
-        whole = len(bound) == 1 and all(member in lines for member in unit.members)
-        if unit.places is not None or whole or all(len(reach[line]) == 1 for line in bound):
-            result.append(unit)
-            continue
+
+    def apart(unit: Unit) -> list[Unit]:
         together: dict[int, list[int]] = {}
-        for member in unit.members:
+        for member in sorted(unit.members):
             # what nothing is connected to has no rank to find, and stays together
             key = lines.get(member, -2 - member if member in wired else -1)
             together.setdefault(key, []).append(member)
-        result += [Unit(tuple(members)) for members in together.values()]
+        return [Unit(tuple(members)) for members in together.values()]
+
+    touched = _touched([unit for unit in (*asked, *found) if unit.places is not None], lines)
+    settled: list[Unit] = []
+    for unit in found:
+        bound: dict[int, set[float]] = {}
+        for member, (_, along) in zip(unit.members, unit.places or (), strict=False):
+            if member in lines:
+                bound.setdefault(lines[member], set()).add(along)
+        bent = any(len(different) > 1 for different in bound.values())
+        if not bent and sum(touched[line] > 1 for line in bound) <= 1:
+            settled.append(unit)
+        elif _on_one(unit, lines):
+            wide = max(problem.neuron_spacing, 0.65) * _LINE
+            settled.append(replace(unit, places=tuple(offsets("row", len(unit.members), wide))))
+        else:
+            settled += apart(unit)
+    touched = _touched([*asked, *settled], lines)
+    result: list[Unit] = []
+    for unit in settled:
+        alone = all(touched[lines[member]] == 1 for member in unit.members if member in lines)
+        result += [unit] if unit.places is not None or alone or _on_one(unit, lines) else apart(unit)
     return result
+
+
+def _touched(units: Iterable[Unit], lines: Mapping[int, int]) -> Counter[int]:
+    """How many units each line touches."""
+    return Counter(line for unit in units for line in {lines[m] for m in unit.members if m in lines})
+
+
+def _on_one(unit: Unit, lines: Mapping[int, int]) -> bool:
+    """Whether all neurons of a unit are on one line."""
+    return len({lines.get(member) for member in unit.members}) == 1 and unit.members[0] in lines
 
 
 def _without_needless_loops(problem: LayoutProblem, found: list[Unit], lines: Mapping[int, int]) -> list[Unit]:
