@@ -5,9 +5,10 @@ In: places, routes and frames. Out: the same moved, and the room that they take 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
+from neurovis_layouts.alike import Move, shifted_by
 from neurovis_layouts.layered.parts import Part
 from neurovis_layouts.routing.ends import Key
 from neurovis_spec.layout.frames import TITLE, enclosing
@@ -37,33 +38,21 @@ class Drawing:
     title: float = 0.0
 
     def rect(self) -> Rect:
-        """The frame around all of it."""
+        """The frame around neurons, routes, frames and labels: on the grid, so that it moves exactly. There is room for
+        the title where the picture has its top: across the direction on both sides, since the frame may be turned
+        round."""
+        line = [point for route in self.routes.values() for point in sampled(route, 0.3)]
         frames = [rect for _, rect in (*self.frames, *self.boxes)]
-        return around(self.places, self.routes.values(), frames, self.direction, self.labels, self.title)
-
-
-def around(
-    places: Iterable[Point],
-    routes: Iterable[Route],
-    frames: Sequence[Rect],
-    direction: Direction = "down",
-    labels: Sequence[Rect] = (),
-    title: float = 0.0,
-) -> Rect:
-    """The frame around neurons, routes, frames and labels: on the grid, so that it moves exactly. There is room for the
-    ``title``, so wide, where the picture has its top: across the direction on both sides, since the frame may be turned
-    round."""
-    line = [point for route in routes for point in sampled(route, 0.3)]
-    rect = enclosing(bounds(places), bounds(line) if line else None, frames, labels)
-    x0, y0, x1, y1 = entitled(rect, title, direction)
-    match direction:
-        case "down":
-            y0 -= TITLE
-        case "up":
-            y1 += TITLE
-        case "right" | "left":
-            x0, x1 = x0 - TITLE, x1 + TITLE
-    return _down(x0), _down(y0), _up(x1), _up(y1)
+        rect = enclosing(bounds(self.places), bounds(line) if line else None, frames, self.labels)
+        x0, y0, x1, y1 = entitled(rect, self.title, self.direction)
+        match self.direction:
+            case "down":
+                y0 -= TITLE
+            case "up":
+                y1 += TITLE
+            case "right" | "left":
+                x0, x1 = x0 - TITLE, x1 + TITLE
+        return _down(x0), _down(y0), _up(x1), _up(y1)
 
 
 def entitled(rect: Rect, title: float, direction: Direction) -> Rect:
@@ -72,6 +61,12 @@ def entitled(rect: Rect, title: float, direction: Direction) -> Rect:
         return widened(rect, title)
     y0, x0, y1, x1 = widened((rect[1], rect[0], rect[3], rect[2]), title)
     return x0, y0, x1, y1
+
+
+def brought(point: Point, to: Point, flip: bool) -> Move:
+    """The move by which a point comes to another, reflected across an upright axis if ``flip``."""
+    x, y = shifted_by((0.0, 0.0), flip).point(point)
+    return shifted_by((to[0] - x, to[1] - y), flip)
 
 
 def _down(value: float) -> float:
@@ -84,12 +79,17 @@ def _up(value: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A part, its drawing with the frame around it, and the point of it that is the middle of its unit."""
+    """A part, its drawing, and the frame around that."""
 
     part: Part
     drawing: Drawing
-    middle: Point
     rect: Rect
+
+    @property
+    def middle(self) -> Point:
+        """The point that is the middle of its unit."""
+        x0, y0, x1, y1 = self.rect
+        return (x0 + x1) / 2 if self.drawing.axis is None else self.drawing.axis, (y0 + y1) / 2
 
     @property
     def framed(self) -> bool:
@@ -101,14 +101,9 @@ class Piece:
         if not self.framed or self.drawing.direction in ("down", "up"):
             return self
         x0, y0, x1, y1 = self.rect
-        return _piece(self.part, self.drawing, (x0 + TITLE, y0, x1, y1) if flip else (x0, y0, x1 - TITLE, y1))
+        return replace(self, rect=(x0 + TITLE, y0, x1, y1) if flip else (x0, y0, x1 - TITLE, y1))
 
 
 def piece_of(part: Part, drawing: Drawing) -> Piece:
     """A part as drawn."""
-    return _piece(part, drawing, drawing.rect())
-
-
-def _piece(part: Part, drawing: Drawing, rect: Rect) -> Piece:
-    x = (rect[0] + rect[2]) / 2 if drawing.axis is None else drawing.axis
-    return Piece(part, drawing, (x, (rect[1] + rect[3]) / 2), rect)
+    return Piece(part, drawing, drawing.rect())

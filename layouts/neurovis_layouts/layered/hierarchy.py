@@ -7,7 +7,7 @@ becomes such a frame where neurons that are not its own would stand in it otherw
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from functools import partial
@@ -21,7 +21,7 @@ from neurovis_layouts.label_room import covered, flipped, roomy, sides_of
 from neurovis_layouts.layered.bands import FEW, Wanted
 from neurovis_layouts.layered.compact import NONE, RANKS, WHOLE, Fold, Shape, ShapeKey, compact, may_be_folded
 from neurovis_layouts.layered.component_layout import ComponentLayout, planned
-from neurovis_layouts.layered.drawing import Drawing, Piece, entitled, piece_of
+from neurovis_layouts.layered.drawing import Drawing, Piece, brought, entitled, piece_of
 from neurovis_layouts.layered.frame_routing import linked
 from neurovis_layouts.layered.mirror_units import arranged_on_axis, symmetric_units
 from neurovis_layouts.layered.page_plan import facing, in_direction, parts_by_cell
@@ -131,14 +131,13 @@ class Composer:
         """Where everything stands with these parts; ``known`` are boxes that are drawn already."""
         pieces = [self._piece(problem, part, problem.direction, parts, known) for part in parts]
         kin: dict[str, int] = {}
-        for number, piece in enumerate(pieces):
-            kin.setdefault(piece.part.family, len(problem.groups) + number)
-        frames = [_unit(piece, kin[piece.part.family] if piece.part.family else -1, pair) for piece in pieces]
-        units = symmetric_units(problem, frames, pair)
         families: dict[tuple[str, int], list[int]] = {}
-        for piece in pieces:
+        for number, piece in enumerate(pieces, len(problem.groups)):
             if piece.part.family:
+                kin.setdefault(piece.part.family, number)
                 families.setdefault((piece.part.family, piece.part.kind), []).append(min(piece.part.members))
+        frames = [_unit(piece, kin.get(piece.part.family, -1), pair) for piece in pieces]
+        units = symmetric_units(problem, frames, pair)
         rows: list[list[int]] = []
         behind: list[tuple[int, int]] = []
         lines = {m for line in problem.align for m in line}
@@ -221,9 +220,7 @@ def _resting(plan: ComponentLayout, piece: Piece) -> tuple[Piece, Move]:
     """A piece, and the move from its own drawing to its place in the plan."""
     first = piece.part.members[0]
     flip = (piece.part.image_of >= 0) != (min(piece.part.members) in plan.reflected)
-    x, y = plan.places[first]
-    dx, dy = shifted_by((0.0, 0.0), flip).point(piece.drawing.places[0])
-    return piece, shifted_by((x - dx, y - dy), flip)
+    return piece, brought(piece.drawing.places[0], plan.places[first], flip)
 
 
 def _boxed(problem: LayoutProblem, part: Part) -> LayoutProblem:
@@ -286,13 +283,14 @@ class _Standing:
                 sides[member] = flipped(side, problem.direction) if side and move.mirrored else side
         lined = [_box(problem, places, sides, name, own) for name, own in problem.boxes]
         frames: list[tuple[tuple[int, ...], Rect]] = []
+        boxes: list[tuple[tuple[int, ...], Rect]] = []
         for piece, move in rests.pieces:
             part = piece.part
-            frames += [(tuple(part.members[m] for m in own), move.rect(rect)) for own, rect in piece.drawing.frames]
-            if part.module >= 0 or part.box >= 0:
+            for found, inner in ((frames, piece.drawing.frames), (boxes, piece.drawing.boxes)):
+                found += [(tuple(part.members[m] for m in own), move.rect(rect)) for own, rect in inner]
+            if piece.framed:
                 frames.append((part.members, move.rect(piece.rect)))
         frames += [(problem.boxes[i][1], lined[i]) for i in sorted(columns)]
-        boxes = [(own, move.rect(rect)) for own, move, rect in _boxes_within(rests)]
         done = {frozenset(own) for own, _ in (*frames, *boxes)}
         centres = np.array(places, dtype=np.float64).reshape(-1, 2)
         boxes += [
@@ -353,12 +351,6 @@ class _Standing:
             tuple(places), routes, self.frames, self.boxes, axis, fixed, problem.direction, tuple(self.sides), labels,
             problem.title,
         )  # fmt: skip
-
-
-def _boxes_within(rests: Settled) -> Iterator[tuple[tuple[int, ...], Move, Rect]]:
-    for piece, move in rests.pieces:
-        for own, rect in piece.drawing.boxes:
-            yield tuple(piece.part.members[m] for m in own), move, rect
 
 
 def _box(

@@ -13,7 +13,7 @@ from itertools import combinations
 from neurovis_layouts.alike import Move, same, shifted_by
 from neurovis_layouts.frame import across_of, from_picture, in_picture, to_picture
 from neurovis_layouts.layered.component_layout import ComponentLayout
-from neurovis_layouts.layered.drawing import Piece
+from neurovis_layouts.layered.drawing import Piece, brought
 from neurovis_layouts.settling import Whole, settled
 from neurovis_spec.layout.frames import Frames
 from neurovis_spec.layout.geometry import Rect, bounds, meet, padded
@@ -99,9 +99,7 @@ def _frames_of(piece: Piece, move: Move) -> Iterator[tuple[tuple[int, ...], Rect
 def _fitting(piece: Piece, move: Move, at: Sequence[Point]) -> Move | None:
     """The move that takes a drawing to where its neurons stand."""
     for flip in (move.mirrored, not move.mirrored):
-        reflection = shifted_by((0.0, 0.0), flip)
-        (x, y), (dx, dy) = at[0], reflection.point(piece.drawing.places[0])
-        there = shifted_by((x - dx, y - dy), flip)
+        there = brought(piece.drawing.places[0], at[0], flip)
         if all(same(there.point(place), point) for place, point in zip(piece.drawing.places, at, strict=True)):
             return there
     return None

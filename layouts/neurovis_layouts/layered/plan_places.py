@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from neurovis_layouts.alike import Move, shifted_by
-from neurovis_layouts.layered.drawing import Piece
+from neurovis_layouts.layered.drawing import Piece, brought
 from neurovis_spec.layout.geometry import Rect, bounds, padded, sampled, shifted, snap, united
 from neurovis_spec.layout.model import RADIUS, LayoutProblem, Point
 
@@ -112,13 +112,13 @@ def _stacked(
 def _room(piece: Piece, flip: bool) -> _Room:
     """What a part takes up around its anchor: its frame, or where none is drawn discs, labels and routes, from which
     others keep off as neurons do from each other, from centre to centre."""
-    drawing, (x, y) = piece.drawing, _anchor(piece)
+    drawing = piece.drawing
     centres, whole = bounds(drawing.places), piece.rect
     if not piece.framed:
         drawn = [point for route in drawing.routes.values() for point in sampled(route)]
         rects = [padded(centres, RADIUS), *drawing.labels, *(rect for _, rect in (*drawing.frames, *drawing.boxes))]
         whole = padded(united([*rects, bounds(drawn)] if drawn else rects), -RADIUS)
-    move = shifted_by(shifted_by((0.0, 0.0), flip).point((-x, -y)), flip)
+    move = brought(_anchor(piece), (0.0, 0.0), flip)
     return _Room(move.rect(whole), move.rect(centres))
 
 
