@@ -90,10 +90,10 @@ def planned(
     units: Sequence[Unit],
     bonds: Sequence[int],
     pair: Mapping[int, int],
-    columns: AbstractSet[int] = frozenset(),
-    wanted: Wanted = UNCUT,
-    behind: Sequence[tuple[int, int]] = (),
-    draft: bool = False,
+    columns: AbstractSet[int],
+    wanted: Wanted,
+    behind: Sequence[tuple[int, int]],
+    draft: bool,
 ) -> ComponentLayout:
     """All components laid out and packed; units without connections beside the last rank of the largest component.
 

@@ -10,7 +10,8 @@ from collections import Counter
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import accumulate, pairwise
+from operator import itemgetter
 
 from neurovis_layouts.label_room import excess, sides_of
 from neurovis_layouts.layered.units import Unit
@@ -91,25 +92,16 @@ def levels_of(
                 node = _aside(node, sides[node.members[0][0]])
             index = _add(levels, node)
             where.update({member: (index, dx) for member, dx, _ in node.members})
-    spans: list[tuple[int, int]] = []
+    spans: list[tuple[int, int, Ends]] = []
     for i in edges:
-        edge = problem.edges[i]
-        span = abs(levels.nodes[where[edge.source][0]].rank - levels.nodes[where[edge.target][0]].rank)
-        if span:
-            spans.append((span, i))
-    budget = _MOST_PASSAGES
-    with_passages: set[int] = set()
-    for span, i in sorted(spans):
-        budget -= span - 1
-        if budget >= 0:
-            with_passages.add(i)
-    for _, i in sorted(spans, key=lambda item: item[1]):
-        if i in with_passages:
-            edge = problem.edges[i]
-            one, other = where[edge.source], where[edge.target]
-            if levels.nodes[one[0]].rank > levels.nodes[other[0]].rank:
-                one, other = other, one
-            _connect(levels, i, (*one, *other))
+        one, other = where[problem.edges[i].source], where[problem.edges[i].target]
+        upper, lower = sorted((one, other), key=lambda end: levels.nodes[end[0]].rank)
+        if span := levels.nodes[lower[0]].rank - levels.nodes[upper[0]].rank:
+            spans.append((span, i, (*upper, *lower)))
+    passages = accumulate(span - 1 for span, *_ in sorted(spans))
+    near = [one for one, many in zip(sorted(spans), passages, strict=True) if many <= _MOST_PASSAGES]
+    for _, i, ends in sorted(near, key=itemgetter(1)):
+        _connect(levels, i, ends)
     return levels
 
 

@@ -19,7 +19,7 @@ from neurovis_spec.layout.model import LayoutProblem
 
 
 def mirrored(
-    problem: LayoutProblem, levels: Levels, pair: Mapping[int, int], draft: bool = False
+    problem: LayoutProblem, levels: Levels, pair: Mapping[int, int], draft: bool
 ) -> tuple[list[list[int]], list[int]]:
     """The symmetric order, and the image of each node; of a ``draft`` only lengths matter. Adds passages to the
     levels."""

@@ -28,8 +28,6 @@ from neurovis_spec.layout.model import Direction, LayoutProblem, LayoutRefusalEr
 Drawn = Callable[[Part, Direction], Piece]
 
 _Members: TypeAlias = tuple[int, ...]
-#: Columns across and rows along, in the engine's frame.
-_Span: TypeAlias = tuple[range, range]
 #: Rounds in which each part may turn to face the others; after the second hardly any does.
 _ROUNDS = 3
 #: What it costs to cross a line, in units of the layout; of more lines than this crossings are not counted.
@@ -183,6 +181,19 @@ def facing(
             if other == k or part.image_of == k:
                 flips[other] = not flips[other]
 
+    def flipped(own: Sequence[int]) -> float:
+        """Draw each of these parts as its mirror image where that costs less; what all costs then."""
+        now = cost()
+        for k in own:
+            if drawn(parts[k], turns[k]).drawing.fixed or symmetric(parts[k].members, pair):
+                continue
+            flip(k)
+            if (then := cost()) < now - 1e-9:
+                now = then
+            else:
+                flip(k)
+        return now
+
     best = cost()
     for _ in range(_ROUNDS):
         before = best
@@ -190,7 +201,7 @@ def facing(
             for direction in _directions(problem, parts[own[0]], pair, drawn):
                 kept, held = list(turns), list(flips)
                 turn(own, direction)
-                now = _flipped(own, parts, pair, drawn, turns, flip, cost)
+                now = flipped(own)
                 if now < best - 1e-9:
                     best = now
                 else:
@@ -212,29 +223,6 @@ def _crossings(lines: FloatArray, one: IntArray, other: IntArray) -> int:
     """How many of these pairs of straight lines (n, 2, 2) cross."""
     (a, b), (c, d) = lines[one].transpose(1, 2, 0), lines[other].transpose(1, 2, 0)
     return int(crossing(*a, *(b - a), *c, *(d - c))[1].sum())
-
-
-def _flipped(
-    own: Sequence[int],
-    parts: Sequence[Part],
-    pair: Mapping[int, int],
-    drawn: Drawn,
-    turns: Sequence[Direction],
-    flip: Callable[[int], None],
-    cost: Callable[[], float],
-) -> float:
-    """Draw each of these parts as its mirror image where that costs less; what all costs then."""
-    now = cost()
-    for k in own:
-        if drawn(parts[k], turns[k]).drawing.fixed or symmetric(parts[k].members, pair):
-            continue
-        flip(k)
-        then = cost()
-        if then < now - 1e-9:
-            now = then
-        else:
-            flip(k)
-    return now
 
 
 def _directions(problem: LayoutProblem, part: Part, pair: Mapping[int, int], drawn: Drawn) -> tuple[Direction, ...]:
@@ -273,7 +261,7 @@ def in_direction(drawing: Drawing, of: Direction, frame: Direction) -> Drawing:
 
 def _slots(problem: LayoutProblem, parts: Sequence[Part], where: Mapping[int, int]) -> list[Slot]:
     """The cells with their parts, and where something stands below all, a row for that."""
-    spans = _spans(problem)
+    spans = [_span(problem.direction, cell.seat) for cell in problem.plan]
     held: dict[int, list[int]] = {}
     for k, place in where.items():
         held.setdefault(place, []).append(k)
@@ -293,13 +281,8 @@ def _page(problem: LayoutProblem) -> tuple[int, int]:
     return (seat.width, seat.height) if problem.direction in ("down", "up") else (seat.height, seat.width)
 
 
-def _spans(problem: LayoutProblem) -> list[_Span]:
-    """The columns across and the rows along that each cell spans, in the engine's frame."""
-    return [_span(problem.direction, cell.seat) for cell in problem.plan]
-
-
-def _span(direction: Direction, seat: Seat) -> _Span:
-    """From rows and columns of the page to the engine's frame."""
+def _span(direction: Direction, seat: Seat) -> tuple[range, range]:
+    """The columns across and the rows along that a cell spans, in the engine's frame."""
     down, right = range(seat.row, seat.row + seat.rows), range(seat.column, seat.column + seat.columns)
     match direction:
         case "down":

@@ -43,9 +43,9 @@ def placed(
     order: Sequence[Sequence[int]],
     neuron_spacing: float,
     rank_spacing: float,
-    partner: Sequence[int] | None = None,
-    columns: AbstractSet[int] = frozenset(),
-    fanned: AbstractSet[int] = frozenset(),
+    partner: Sequence[int] | None,
+    columns: AbstractSet[int],
+    fanned: AbstractSet[int],
 ) -> list[Point]:
     """x across (the middle of the whole is 0) and y along (the first rank is at 0) of every node.
 
@@ -64,8 +64,6 @@ def placed(
     if partner is not None:
         across = [(x - across[partner[node]]) / 2 for node, x in enumerate(across)]
     along = _along(levels, order, across, rank_spacing, fanned)
-    if not across:
-        return []
     xs = [across[i] for i, node in enumerate(levels.nodes) if node.members]
     middle = 0.0 if partner is not None else (min(xs) + max(xs)) / 2
     return [(snap(x - middle), along[node.rank] + node.lift) for x, node in zip(across, levels.nodes, strict=True)]
