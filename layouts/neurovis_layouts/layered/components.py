@@ -19,7 +19,7 @@ def components_of(
 ) -> tuple[list[list[int]], list[int]]:
     """Components of several connected units or of one block, as unit indices; and units without connections.
 
-    Components that a box or a bond joins are one.
+    Components that a box joins are one, and those that share a rank: ``bonds`` are each unit's first mate in it.
     """
     owner = {member: i for i, unit in enumerate(units) for member in unit.members}
     graph: nx.Graph[int] = nx.Graph()
@@ -28,11 +28,7 @@ def components_of(
     for _, members in problem.boxes:
         mates = [owner[m] for m in members if graph.degree(owner[m]) or units[owner[m]].places is not None]
         graph.add_edges_from(pairwise(mates))
-    tied: dict[int, list[int]] = {}
-    for unit, bond in enumerate(bonds):
-        tied.setdefault(bond, []).append(unit)
-    for mates in tied.values():
-        graph.add_edges_from(pairwise(mates))
+    graph.add_edges_from(enumerate(bonds))
     connected: list[list[int]] = []
     alone: list[int] = []
     for component in sorted(sorted(part) for part in nx.connected_components(graph)):

@@ -37,28 +37,24 @@ def ranks_of(
     graph: nx.DiGraph[int] = nx.DiGraph()
     graph.add_nodes_from(range(count))
     graph.add_edges_from(arcs)
-    place = [0] * count
     kept = {arc: weight * (_ALONG if arc in along else 1.0) for arc, weight in arcs.items()}
-    for loop in nx.strongly_connected_components(graph):
-        if len(loop) > 1:
-            for position, unit in enumerate(_improved(_cut(sorted(loop), kept, graph, first, last), kept)):
-                place[unit] = position
-    component = _component_order(graph)
+    loop_of, place = [0] * count, [0] * count
+    for k, loop in enumerate(nx.strongly_connected_components(graph)):
+        units = _improved(_cut(sorted(loop), kept, graph, first, last), kept) if len(loop) > 1 else loop
+        for position, unit in enumerate(units):
+            loop_of[unit], place[unit] = k, position
     forward: dict[tuple[int, int], float] = {}
     for (a, b), weight in arcs.items():
         # within a loop an arc against the cut order is turned round
-        turned = component[a] == component[b] and place[a] > place[b]
+        turned = loop_of[a] == loop_of[b] and place[a] > place[b]
         key = (b, a) if turned else (a, b)
         forward[key] = forward.get(key, 0.0) + weight
-    before: list[list[int]] = [[] for _ in range(count)]
-    after: list[list[int]] = [[] for _ in range(count)]
-    for a, b in sorted(forward):
-        after[a].append(b)
-        before[b].append(a)
-    order = sorted(range(count), key=lambda unit: (component[unit], place[unit]))
+    acyclic: nx.DiGraph[int] = nx.DiGraph()
+    acyclic.add_nodes_from(range(count))
+    acyclic.add_edges_from(forward)
     rank = [0] * count
-    for unit in order:
-        rank[unit] = max((rank[other] + 1 for other in before[unit]), default=0)
+    for unit in nx.topological_sort(acyclic):
+        rank[unit] = max((rank[other] + 1 for other in acyclic.predecessors(unit)), default=0)
     for part in nx.connected_components(graph.to_undirected(as_view=True)):
         number = {unit: i for i, unit in enumerate(sorted(part))}
         arcs_within = [(number[a], number[b], int(weight)) for (a, b), weight in forward.items() if a in part]
@@ -90,16 +86,6 @@ def levelled(ranks: Sequence[int], arcs: Collection[tuple[int, int]], kinds: Map
                 rank[unit] = farther
     place = {level: number for number, level in enumerate(sorted(set(rank)))}
     return [place[level] for level in rank]
-
-
-def _component_order(graph: nx.DiGraph[int]) -> list[int]:
-    """For each node the position of its strongly connected component in a topological order."""
-    components = list(nx.strongly_connected_components(graph))  # sinks first, by Tarjan's algorithm
-    result = [0] * graph.number_of_nodes()
-    for position, component in enumerate(reversed(components)):
-        for node in component:
-            result[node] = position
-    return result
 
 
 def _cut(
