@@ -25,7 +25,7 @@ from neurovis_layouts.layered.drawing import Drawing, Piece, brought, entitled, 
 from neurovis_layouts.layered.frame_routing import linked
 from neurovis_layouts.layered.mirror_units import arranged_on_axis, symmetric_units
 from neurovis_layouts.layered.page_plan import facing, in_direction, parts_by_cell
-from neurovis_layouts.layered.parts import Part, columns_of, firm, images_in, may_be_frame, parts_of
+from neurovis_layouts.layered.parts import Part, columns_of, holds_instance, images_in, may_be_frame, parts_of
 from neurovis_layouts.layered.pinning import Settled, pinned
 from neurovis_layouts.layered.same_rank import bonded
 from neurovis_layouts.layered.templates import Book, restricted
@@ -103,8 +103,8 @@ class Composer:
 
     def _standing(self, problem: LayoutProblem, pair: Mapping[int, int], kind: int) -> _Standing:
         """Where everything stands, with those boxes as frames or columns that foreign neurons would stand in."""
-        frames = firm(problem, pair)
-        loose = {i for i in range(len(problem.boxes)) if i not in frames and may_be_frame(problem, i, pair)}
+        loose = {i for i in range(len(problem.boxes)) if may_be_frame(problem, i, pair)}
+        frames = {i for i in loose if holds_instance(problem, i)}
         known: dict[tuple[Part, Direction], Piece] = {}
         while True:
             parts = parts_of(problem, frames, pair)

@@ -9,10 +9,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
 
-from neurovis_layouts.formations import offsets
-from neurovis_layouts.frame import from_picture
 from neurovis_layouts.layered.parts import symmetric
-from neurovis_layouts.layered.units import Unit, units_of
+from neurovis_layouts.layered.units import Unit, formation, units_of
 from neurovis_spec.layout.model import Arrangement, LayoutProblem, LayoutRefusalError, Point
 
 
@@ -66,9 +64,7 @@ def _arranged(
     own = set(members)
     if own & framed or not symmetric(members, pair):
         return None
-    spacing = max(problem.neuron_spacing, 0.65)
-    inner = any(e.source in own and e.target in own and e.source != e.target for e in problem.edges)
-    points = [from_picture(p, problem.direction) for p in offsets(how, len(members), spacing * (1.5 if inner else 1.0))]
+    points = formation(problem, members, how)
     left = sorted((p for p in points if p[0] < 0), key=points.index)
     middle = [p for p in points if p[0] == 0]
     first = {a for mirror in problem.mirrors for a, _ in mirror.pairs}

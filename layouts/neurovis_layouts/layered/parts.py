@@ -78,14 +78,10 @@ def symmetric(members: Sequence[int], pair: Mapping[int, int]) -> bool:
     return any(pair.get(m) in own for m in own)
 
 
-def firm(problem: LayoutProblem, pair: Mapping[int, int]) -> set[int]:
-    """Boxes that have to be frames from the start: around whole instances."""
-    outer = [set(m.members) for m in problem.modules if m.parent < 0]
-    return {
-        i
-        for i, (_, members) in enumerate(problem.boxes)
-        if may_be_frame(problem, i, pair) and any(m <= set(members) for m in outer)
-    }
+def holds_instance(problem: LayoutProblem, box: int) -> bool:
+    """Whether a box is around a whole instance, so that it has to be a frame from the start."""
+    own = set(problem.boxes[box][1])
+    return any(own.issuperset(m.members) for m in problem.modules if m.parent < 0)
 
 
 def may_be_frame(problem: LayoutProblem, box: int, pair: Mapping[int, int]) -> bool:

@@ -66,16 +66,18 @@ def units_of(problem: LayoutProblem, frames: Sequence[Unit], absent: AbstractSet
 
 
 def _arranged(problem: LayoutProblem, framed: AbstractSet[int]) -> list[Unit]:
-    spacing = max(problem.neuron_spacing, 0.65)
     found: list[Unit] = []
     for whole, how in problem.arrange:
         members = tuple(member for member in whole if member not in framed)
-        if not members:
-            continue
-        wide = spacing * (1.5 if _graph(problem, members).size() else 1.0)
-        places = offsets(how, len(members), wide)
-        found.append(Unit(members, tuple(from_picture(place, problem.direction) for place in places)))
+        if members:
+            found.append(Unit(members, formation(problem, members, how)))
     return found
+
+
+def formation(problem: LayoutProblem, members: Sequence[int], how: Arrangement) -> tuple[Point, ...]:
+    """Where neurons that are arranged stand about their middle: farther apart where something connects them."""
+    wide = max(problem.neuron_spacing, 0.65) * (1.5 if _graph(problem, members).size() else 1.0)
+    return tuple(from_picture(place, problem.direction) for place in offsets(how, len(members), wide))
 
 
 def _graph(problem: LayoutProblem, members: Iterable[int]) -> nx.DiGraph[int]:
