@@ -28,8 +28,9 @@ _ASIDE, _OFF, _STEP, _MOST = 4.0, 0.5, 0.25, 50_000
 #: How far off their wish more than two bodies are placed alike: looking for a place that all of them have farther off
 #: takes their number times as long, and what is so far off is not seen to be alike.
 _TOGETHER = 8.0
-#: Side of the cells in which rectangles are looked up; one that covers more cells than this is near everything.
-_CELL, _COUNTED = 4.0, 4096
+#: Sides of the cells in which centres and frames are looked up; a rectangle that covers more cells than this is near
+#: everything.
+_SMALL, _WIDE, _COUNTED = 1.0, 4.0, 4096
 #: Discs that touch do not overlap, whatever rounding says.
 _TOUCHING = 2 * RADIUS - 1e-9
 #: The same, of coordinates that have been rounded to be written into a file.
@@ -123,7 +124,7 @@ class Occupancy:
         self._frames, self._sides = frames, sides
         self._members = [] if frames is None else frames.members
         self._rects = list(rects) or [None] * len(self._members)
-        self._cells, self._discs, self._walls = _CentreCells(), _Field(), _Field()
+        self._discs, self._walls = _Cells(_SMALL), _Cells(_WIDE)
         self._bounds: Rect | None = None
         for neuron, point in placed.items():
             self._enter(neuron, point)
@@ -131,15 +132,11 @@ class Occupancy:
             if rect is not None:
                 self._wall(number, rect)
         #: frames in which somebody foreign stands: they are not drawn
-        self._open = {
-            number
-            for number, rect in enumerate(rects)
-            if rect is not None and next(self._strangers(number, rect), None) is not None
-        }
+        self._open = {number for number, rect in enumerate(rects) if rect is not None and self._strangers(number, rect)}
         points = [point for route in routes for point in sampled(route, _STEP)]
-        self._lines = _CentreCells()
-        for point in points if len(points) <= _MOST else ():
-            self._lines.add(point)
+        self._lines = _Cells(_SMALL)
+        for number, point in enumerate(points if len(points) <= _MOST else ()):
+            self._lines.add(number, (*point, *point))
         self._rules = (_CLEAR, _AMPLE, _TIGHT, _DISCS) if points else (_AMPLE, _TIGHT, _DISCS)
 
     def settle(self, wishes: Sequence[Wish]) -> list[int]:
@@ -189,7 +186,6 @@ class Occupancy:
 
     def _enter(self, neuron: int, point: Point) -> None:
         self.placed[neuron] = point
-        self._cells.add(point)
         self._discs.add(neuron, (*point, *point))
         self._bounds = united([(*point, *point), self._bounds or (*point, *point)])
 
@@ -204,9 +200,9 @@ class Occupancy:
         for rules in self._rules if far else self._rules[:-2]:
             steps: Iterable[Point] = _steps(wish.along)
             if not far:
-                steps = takewhile(_near, steps)
+                steps = _upto(_TOGETHER, steps)
             if rules.off_lines:
-                steps = () if in_row else takewhile(_aside, steps)
+                steps = () if in_row else _upto(_ASIDE, steps)
             places = ((wish.anchor[0] + x, wish.anchor[1] + y) for x, y in steps)
             for anchor in places if rules.off_lines else chain(places, (place for place, _ in beyond)):
                 if self._free(wish.bodies, anchor, rules):
@@ -240,12 +236,12 @@ class Occupancy:
 
     def _free(self, piece: Sequence[Body], anchor: Point, rules: _Rules) -> bool:
         """Whether all copies of a piece have room where they would stand."""
-        inside = _CentreCells()
+        inside = _Cells(_SMALL)
         points: list[tuple[int, Point]] = []
         for copy in piece:
             side = self._sides.get(copy.offsets[0][0])
             for neuron, point in copy.spots(anchor):
-                if not self._cells.free(point, rules.clear) or not inside.free(point, rules.clear):
+                if not self._discs.free(point, rules.clear) or not inside.free(point, rules.clear):
                     return False
                 if rules.off_lines and copy.frame < 0 and not self._lines.free(point, _OFF):
                     return False
@@ -253,8 +249,8 @@ class Occupancy:
                     return False
                 side = None  # the others of an instance are where its first is
                 points.append((neuron, point))
-            for _, point in points[-len(copy.offsets) :]:
-                inside.add(point)
+            for neuron, point in points[-len(copy.offsets) :]:
+                inside.add(neuron, (*point, *point))
         if not rules.framed:
             return True
         return not any(self._enters(neuron, point, rules.margin) for neuron, point in points) and self._apart(
@@ -263,15 +259,8 @@ class Occupancy:
 
     def _enters(self, neuron: int, point: Point, margin: float) -> bool:
         """Whether a neuron would stand in a foreign frame."""
-        spot = padded((*point, *point), margin)
-        return any(
-            number not in self._open and neuron not in self._members[number] and self._meets(number, spot)
-            for number in self._walls.near(spot)
-        )
-
-    def _meets(self, number: int, rect: Rect) -> bool:
-        own = self._rects[number]
-        return own is not None and meet(own, rect)
+        near = self._walls.near(padded((*point, *point), margin)) - self._open
+        return any(neuron not in self._members[number] for number in near)
 
     def _grown(self, piece: Sequence[Body], anchor: Point) -> dict[int, Rect]:
         """The frames that are new or grow, by number."""
@@ -290,10 +279,10 @@ class Occupancy:
                 continue
             before, wider = self._rects[number], padded(rect, rules.margin)
             # who has been near the frame may be
-            known = set() if before is None else set(self._strangers(number, padded(before, rules.margin)))
-            if any(neuron not in known for neuron in self._strangers(number, wider)):
+            known = set() if before is None else self._strangers(number, padded(before, rules.margin))
+            if not self._strangers(number, wider) <= known:
                 return False
-            if rules.off_lines and before is None and self._lines.within(wider):
+            if rules.off_lines and before is None and self._lines.near(wider):
                 return False
             if any(n not in self._members[number] and meet((*p, *p), wider) for n, p in points):
                 return False
@@ -316,12 +305,9 @@ class Occupancy:
                     return False
         return True
 
-    def _strangers(self, number: int, rect: Rect) -> Iterator[int]:
+    def _strangers(self, number: int, rect: Rect) -> set[int]:
         """The neurons in a rectangle that do not belong to this frame."""
-        for neuron in self._discs.near(rect):
-            x, y = self.placed[neuron]
-            if neuron not in self._members[number] and meet((x, y, x, y), rect):
-                yield neuron
+        return self._discs.near(rect) - self._members[number]
 
     def _touched(self, copy: Body, anchor: Point) -> dict[int, Rect]:
         """The frames that hold neurons of a copy, and as much of each as these need."""
@@ -353,16 +339,6 @@ def _shared(one: Rect, other: Rect) -> float:
     return max(0.0, across) * max(0.0, along)
 
 
-def _near(step: Point) -> bool:
-    """Whether a step from a wish is one that many bodies make together; else each goes its own way."""
-    return step[0] * step[0] + step[1] * step[1] <= _TOGETHER * _TOGETHER
-
-
-def _aside(step: Point) -> bool:
-    """Whether a step from a wish is one to which lines are worth keeping off."""
-    return step[0] * step[0] + step[1] * step[1] <= _ASIDE * _ASIDE
-
-
 @cache
 def _steps(along: tuple[bool, bool]) -> Sequence[Point]:
     """Steps from a wish, the nearest first, sideways before along: fine ones near it, coarse ones far off."""
@@ -378,82 +354,62 @@ def _steps(along: tuple[bool, bool]) -> Sequence[Point]:
     return found
 
 
+def _upto(far: float, steps: Iterable[Point]) -> Iterable[Point]:
+    """The first of these steps, which are no longer than that."""
+    return takewhile(lambda step: step[0] * step[0] + step[1] * step[1] <= far * far, steps)
+
+
 def overlapping(where: Mapping[int, Point], pins: Mapping[int, Point]) -> set[int]:
     """The neurons that would stand on a pin, or on one before them that does not."""
-    taken, found = _CentreCells(), set[int]()
-    for point in pins.values():
-        taken.add(point)
+    taken, found = _Cells(_SMALL), set[int]()
+    for i, point in pins.items():
+        taken.add(i, (*point, *point))
     for i, point in sorted(where.items()):
         if taken.free(point, _WRITTEN):
-            taken.add(point)
+            taken.add(i, (*point, *point))
         else:
             found.add(i)
     return found
 
 
-class _CentreCells:
-    """Centres in square cells, to ask whether a place is free."""
+class _Cells:
+    """Rectangles, and points, by number in square cells of this width, to look up what is near."""
 
-    def __init__(self) -> None:
-        self._cells: dict[tuple[int, int], list[Point]] = {}
-
-    def add(self, point: Point) -> None:
-        """Add a centre."""
-        self._cells.setdefault((math.floor(point[0]), math.floor(point[1])), []).append(point)
-
-    def free(self, point: Point, clear: float) -> bool:
-        """Whether no centre is closer than ``clear``, at most 1."""
-        column, row = math.floor(point[0]), math.floor(point[1])
-        return all(
-            distance(point, other) >= clear
-            for i in (-1, 0, 1)
-            for j in (-1, 0, 1)
-            for other in self._cells.get((column + i, row + j), ())
-        )
-
-    def within(self, rect: Rect) -> bool:
-        """Whether a centre is inside a rectangle."""
-        x0, y0, x1, y1 = rect
-        return any(
-            x0 < x < x1 and y0 < y < y1
-            for column in range(math.floor(x0), math.floor(x1) + 1)
-            for row in range(math.floor(y0), math.floor(y1) + 1)
-            for x, y in self._cells.get((column, row), ())
-        )
-
-
-class _Field:
-    """Rectangles by cell, to look up what is near."""
-
-    def __init__(self) -> None:
+    def __init__(self, width: float) -> None:
+        self._width = width
+        self._rects: dict[int, Rect] = {}
         self._cells: dict[tuple[int, int], set[int]] = {}
         #: those that cover more cells than are worth counting
         self._large: set[int] = set()
-        self._all: set[int] = set()
 
     def add(self, number: int, rect: Rect) -> None:
-        """Add a rectangle."""
-        self._all.add(number)
-        if _area(rect) > _COUNTED:
+        """Add a rectangle, or the same grown."""
+        self._rects[number] = rect
+        cells = self._covered(rect)
+        if cells is None:
             self._large.add(number)
-        else:
-            for cell in _cells(rect):
-                self._cells.setdefault(cell, set()).add(number)
+        for cell in cells or ():
+            self._cells.setdefault(cell, set()).add(number)
 
     def near(self, rect: Rect) -> set[int]:
-        """Those that share a cell with a rectangle, and perhaps others."""
-        if _area(rect) > _COUNTED:
-            return self._all
-        return self._large.union(*(self._cells.get(cell, ()) for cell in _cells(rect)))
+        """Those that share more than an edge with a rectangle."""
+        return {number for number in self._about(rect) if meet(self._rects[number], rect)}
 
+    def free(self, point: Point, clear: float) -> bool:
+        """Whether no point is closer than ``clear``."""
+        about = self._about(padded((*point, *point), clear))
+        return all(distance(point, self._rects[number][:2]) >= clear for number in about)
 
-def _area(rect: Rect) -> float:
-    """About how many cells a rectangle covers."""
-    return ((rect[2] - rect[0]) / _CELL + 1) * ((rect[3] - rect[1]) / _CELL + 1)
+    def _about(self, rect: Rect) -> Iterable[int]:
+        """Those that share a cell with a rectangle, and perhaps more."""
+        cells = self._covered(rect)
+        if cells is None:
+            return self._rects
+        return self._large.union(*(self._cells[cell] for cell in cells if cell in self._cells))
 
-
-def _cells(rect: Rect) -> Iterator[tuple[int, int]]:
-    x0, y0, x1, y1 = (math.floor(value / _CELL) for value in rect)
-    for column in range(x0, x1 + 1):
-        for row in range(y0, y1 + 1):
-            yield column, row
+    def _covered(self, rect: Rect) -> list[tuple[int, int]] | None:
+        """The cells that a rectangle covers; None where these are too many."""
+        x0, y0, x1, y1 = (math.floor(value / self._width) for value in rect)
+        if (x1 - x0 + 1) * (y1 - y0 + 1) > _COUNTED:
+            return None
+        return [(column, row) for column in range(x0, x1 + 1) for row in range(y0, y1 + 1)]
