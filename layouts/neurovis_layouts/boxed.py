@@ -69,7 +69,7 @@ def boxes_apart(
     problem: LayoutProblem,
     places: FloatArray,
     spacing: float,
-    symmetry: Symmetry | None = None,
+    symmetry: Symmetry,
     labels: FloatArray | None = None,
 ) -> FloatArray:
     """The places (n, 2) of a problem's neurons, each box and instance by itself, discs ``spacing`` apart, and
@@ -82,7 +82,6 @@ def boxes_apart(
     places = places.copy()
     pinned = np.zeros(count, dtype=np.bool_)
     pinned[list(problem.pins)] = True
-    symmetry = symmetry or Symmetry(np.arange(count))
     pinned |= pinned[symmetry.image]
     sizes = _Sizes(spacing, np.full((count, 4), np.nan) if labels is None else labels)
     _divided(places, _Box(np.arange(count), boxes, np.zeros(4), np.zeros(2)), pinned, sizes, symmetry)
@@ -148,9 +147,9 @@ def _divided(places: FloatArray, box: _Box, pinned: BoolArray, sizes: _Sizes, sy
         else:
             _divided(places, inner, pinned, sizes, symmetry)
     own, still = box.members, pinned.copy()
-    frames = _Frames(places, box, pinned, symmetry, sizes.labels)
     if box.within:
-        for inner, way in zip(box.within, frames.pushed(), strict=True):
+        centres, half, ways = _pushed(places, box, pinned, sizes.labels, symmetry)
+        for inner, way in zip(box.within, ways, strict=True):
             places[inner.members] += way
         places[:] = symmetry.kept(places)
         still[np.concatenate([inner.members for inner in box.within])] = True
@@ -161,7 +160,7 @@ def _divided(places: FloatArray, box: _Box, pinned: BoolArray, sizes: _Sizes, sy
     for turn in range(_TURNS if len(free) else 0):
         before = places[free]
         if box.within:
-            places[free] = _outside(before, frames.centres, frames.half, bodies)
+            places[free] = _outside(before, centres, half, bodies)
             places[:] = symmetry.kept(places)
         if turn and np.abs(places[free] - before).max() < _SETTLED:
             break
@@ -171,73 +170,47 @@ def _divided(places: FloatArray, box: _Box, pinned: BoolArray, sizes: _Sizes, sy
         places[:] = symmetry.kept(places)
 
 
-class _Frames:
-    """The frames of the boxes in a box, among the pins there: ``centres`` and ``half`` of their sizes (k, 2)."""
-
-    def __init__(
-        self, places: FloatArray, box: _Box, pinned: BoolArray, symmetry: Symmetry, labels: FloatArray
-    ) -> None:
-        self._axis = symmetry.axis
-        if not box.within:
-            return
-        alone = np.setdiff1d(box.members, np.concatenate([inner.members for inner in box.within]))
-        posts = places[alone[pinned[alone]]]
-        rects = [inner.rect(places, labels) for inner in box.within]
-        low = np.array([*(low for low, _ in rects), *(posts - RADIUS)])
-        high = np.array([*(high for _, high in rects), *(posts + RADIUS)])
-        self._count = len(box.within)
-        self._held = np.array([*(pinned[inner.members].any() for inner in box.within), *(True for _ in posts)])
-        self._half = (high - low) / 2
-        self._all = (low + high) / 2
-        self._image = np.array([*(_image(box.within, inner, symmetry) for inner in box.within), *(-1 for _ in posts)])
-
-    @property
-    def centres(self) -> FloatArray:
-        """(k, 2) where the frames are."""
-        centres: FloatArray = self._all[: self._count]
-        return centres
-
-    @property
-    def half(self) -> FloatArray:
-        """(k, 2) half of their widths and heights."""
-        half: FloatArray = self._half[: self._count]
-        return half
-
-    def pushed(self) -> FloatArray:
-        """(k, 2) how far the frames have moved now that no two overlap, but for those held by pins. One that is its own
-        mirror image moves along the axis, others as their images do."""
-        centres, half, held = self._all.copy(), self._half + _GAP, self._held
-        one, other = np.triu_indices(len(centres), 1)
-        movable = ~(held[one] & held[other])
-        one, other = one[movable], other[movable]
-        # how much of a push each of two takes
-        share = np.where(held[one], 0.0, np.where(held[other], 1.0, 0.5))
-        on_axis = self._image == np.arange(len(centres))
-        along = on_axis[one] & (on_axis[other] | held[other]) | held[one] & on_axis[other]
-        for turn in range(_ROUNDS):
-            way = centres[other] - centres[one]
-            missing = half[one] + half[other] - np.abs(way)
-            close = np.flatnonzero((missing > 1e-6).all(axis=1))
-            if not len(close):
-                break
-            if turn >= _PATIENCE:
-                middle = centres.mean(axis=0)
-                centres = np.where(held[:, None], centres, middle + _GROWTH * (centres - middle))
-            axis = np.where(along[close], 1, np.argmin(missing[close], axis=1))
-            step = 0.5 * missing[close, axis] + 1e-3
-            step *= np.where(way[close, axis] < 0, -1.0, 1.0)
-            np.add.at(centres, (other[close], axis), (1 - share[close]) * step)
-            np.add.at(centres, (one[close], axis), -share[close] * step)
-            centres = self._kept(centres)
-        moved: FloatArray = (centres - self._all)[: self._count]
-        self._all = centres
-        return moved
-
-    def _kept(self, centres: FloatArray) -> FloatArray:
-        images = self._image >= 0
-        theirs = centres[self._image] * (-1.0, 1.0) + (2 * self._axis, 0.0)
-        kept: FloatArray = np.where((images & ~self._held)[:, None], (centres + theirs) / 2, centres)
-        return kept
+def _pushed(
+    places: FloatArray, box: _Box, pinned: BoolArray, labels: FloatArray, symmetry: Symmetry
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Where the frames of the boxes in a box are when no two overlap, nor the pins beside them, half of their sizes,
+    and how far they have moved for that (k, 2 each). Those with pins stay; one that is its own mirror image moves along
+    the axis, others as their images do."""
+    alone = np.setdiff1d(box.members, np.concatenate([inner.members for inner in box.within]))
+    posts = places[alone[pinned[alone]]]
+    rects = [inner.rect(places, labels) for inner in box.within]
+    low = np.array([*(low for low, _ in rects), *(posts - RADIUS)])
+    high = np.array([*(high for _, high in rects), *(posts + RADIUS)])
+    held = np.array([*(pinned[inner.members].any() for inner in box.within), *(True for _ in posts)])
+    image = np.array([*(_image(box.within, inner, symmetry) for inner in box.within), *(-1 for _ in posts)])
+    start, half = (low + high) / 2, (high - low) / 2
+    centres, room = start, half + _GAP
+    one, other = np.triu_indices(len(centres), 1)
+    movable = ~(held[one] & held[other])
+    one, other = one[movable], other[movable]
+    # how much of a push each of two takes
+    share = np.where(held[one], 0.0, np.where(held[other], 1.0, 0.5))
+    on_axis = image == np.arange(len(centres))
+    along = on_axis[one] & (on_axis[other] | held[other]) | held[one] & on_axis[other]
+    for turn in range(_ROUNDS):
+        way = centres[other] - centres[one]
+        missing = room[one] + room[other] - np.abs(way)
+        close = np.flatnonzero((missing > 1e-6).all(axis=1))
+        if not len(close):
+            break
+        if turn >= _PATIENCE:
+            middle = centres.mean(axis=0)
+            centres = np.where(held[:, None], centres, middle + _GROWTH * (centres - middle))
+        axis = np.where(along[close], 1, np.argmin(missing[close], axis=1))
+        step = 0.5 * missing[close, axis] + 1e-3
+        step *= np.where(way[close, axis] < 0, -1.0, 1.0)
+        centres = centres.copy()
+        np.add.at(centres, (other[close], axis), (1 - share[close]) * step)
+        np.add.at(centres, (one[close], axis), -share[close] * step)
+        theirs = centres[image] * (-1.0, 1.0) + (2 * symmetry.axis, 0.0)
+        centres = np.where(((image >= 0) & ~held)[:, None], (centres + theirs) / 2, centres)
+    count = len(box.within)
+    return centres[:count], half[:count], (centres - start)[:count]
 
 
 def _image(boxes: Sequence[_Box], box: _Box, symmetry: Symmetry) -> int:

@@ -73,9 +73,7 @@ def drawn(
     return sided(problem, kept(problem, fresh, pins, frames))
 
 
-def drawn_apart(
-    problem: LayoutProblem, engine: str, places: FloatArray, spacing: float, symmetry: Symmetry | None = None
-) -> Layout:
+def drawn_apart(problem: LayoutProblem, engine: str, places: FloatArray, spacing: float, symmetry: Symmetry) -> Layout:
     """The layout at places near these (n, 2): discs ``spacing`` apart, nothing foreign in a frame, and labels on
     nothing, as far as pins allow."""
     if not any(wide for wide, _ in problem.labels):
