@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from neurovis_layouts.frame import to_picture, turned
+from neurovis_layouts.frame import across_of, to_picture, turned
 from neurovis_spec.layout.frames import PAD_LABEL
 from neurovis_spec.layout.geometry import Rect, meet, padded
 from neurovis_spec.layout.labels import label_rect
@@ -27,23 +27,23 @@ def sides_of(problem: LayoutProblem) -> tuple[Side | None, ...]:
     """On which side of its disc each label stands; None where the disc holds it."""
     if not problem.labels:
         return (None,) * len(problem.neurons)
-    outer = flipped(_usual(problem.direction), problem.direction)
+    usual = best_first(problem.direction)[0]
+    outer = flipped(usual, across_of(problem.direction))
     first = {a for mirror in problem.mirrors for a, b in mirror.pairs if a != b}
-    return tuple(
-        None if not wide else outer if i in first else _usual(problem.direction)
-        for i, (wide, _) in enumerate(problem.labels)
-    )
+    return tuple(None if not wide else outer if i in first else usual for i, (wide, _) in enumerate(problem.labels))
 
 
-def _usual(direction: Direction) -> Side:
-    return "right" if direction in ("down", "up") else "below"
+def best_first(direction: Direction) -> tuple[Side, ...]:
+    """The sides on which labels may stand, the best first."""
+    beside: tuple[Side, ...] = ("right", "left")
+    aligned: tuple[Side, ...] = ("below", "above")
+    return beside + aligned if across_of(direction) == 0 else aligned + beside
 
 
-def flipped(side: Side, direction: Direction) -> Side:
-    """A side after a reflection across the direction."""
-    if direction in ("down", "up"):
-        return "left" if side == "right" else "right" if side == "left" else side
-    return "above" if side == "below" else "below" if side == "above" else side
+def flipped(side: Side, across: int) -> Side:
+    """A side after a reflection of this coordinate."""
+    ends: tuple[Side, Side] = ("below", "above") if across else ("right", "left")
+    return ends[1 - ends.index(side)] if side in ends else side
 
 
 def rect_of(room: Point, side: Side, direction: Direction, place: Point = (0.0, 0.0)) -> Rect:
@@ -69,7 +69,7 @@ def excess(problem: LayoutProblem, neuron: int) -> Point:
     along, before it and behind it."""
     if not problem.labels or not problem.labels[neuron][0]:
         return 0.0, 0.0
-    _, _, across, along = rect_of(problem.labels[neuron], _usual(problem.direction), problem.direction)
+    _, _, across, along = rect_of(problem.labels[neuron], best_first(problem.direction)[0], problem.direction)
     if problem.direction in ("down", "up"):
         return max(0.0, across + AIR - _HALF), 0.0
     return 0.0, max(0.0, along + AIR / 2 - _ALONG)

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from neurovis_layouts.alike import Alike, Move
-from neurovis_layouts.label_room import AIR
+from neurovis_layouts.label_room import AIR, best_first, flipped
 from neurovis_spec.layout import FloatArray
 from neurovis_spec.layout.frames import TITLE
 from neurovis_spec.layout.geometry import Cells, Rect, meet, pieces_of, points_in_turn
@@ -23,12 +23,6 @@ from neurovis_spec.layout.model import Direction, Layout, LayoutProblem, Side
 
 #: How far apart points on lines are, at most, and how near to a label a line may be.
 _STEP, _LINE = 0.1, 0.04
-#: The best sides first, where signals run down or up, and across.
-_DOWN: tuple[Side, ...] = ("right", "left", "below", "above")
-_ACROSS: tuple[Side, ...] = ("below", "above", "right", "left")
-_FLIPPED: Mapping[Side, tuple[int, Side]] = {
-    "right": (0, "left"), "left": (0, "right"), "below": (1, "above"), "above": (1, "below")
-}  # fmt: skip
 #: So often labels are tried: one that moves makes room for others.
 _ROUNDS = 3
 
@@ -86,13 +80,14 @@ def _candidates(
     """The sides on which labels that are alike may stand, those given first."""
     if all(i in given for i, _ in mates):
         yield {i: given[i] for i, _ in mates}
-    for side in _DOWN if direction in ("down", "up") else _ACROSS:
+    for side in best_first(direction):
         yield {i: _moved(side, move) for i, move in mates}
 
 
 def _moved(side: Side, move: Move) -> Side:
-    axis, other = _FLIPPED[side]
-    return other if move.flip[axis] < 0 else side
+    for across in (0, 1):
+        side = flipped(side, across) if move.flip[across] < 0 else side
+    return side
 
 
 class _Trial:
@@ -100,16 +95,17 @@ class _Trial:
 
     def __init__(self, problem: LayoutProblem, layout: Layout) -> None:
         self.beside = [i for i, (wide, _) in enumerate(problem.labels) if wide]
+        self._sides = best_first("down")
         ground = Ground(layout, problem)
         places = [layout.positions[problem.neurons[i]] for i in self.beside]
         self._rects: dict[tuple[int, Side], Rect] = {}
         self._free: dict[tuple[int, Side], bool] = {}
         for i, place in zip(self.beside, places, strict=True):
-            for side in _DOWN:
+            for side in self._sides:
                 rect = self._rects[i, side] = label_rect(place, problem.labels[i], side)
                 air, title = (0.0, 0.0) if layout.labels.get(problem.neurons[i]) == side else (AIR / 4, TITLE)
                 self._free[i, side] = ground.free(i, rect, air, title)
-        self._lines = _lines(layout, places, np.array([[self._rects[i, s] for s in _DOWN] for i in self.beside]))
+        self._lines = _lines(layout, places, np.array([[self._rects[i, s] for s in self._sides] for i in self.beside]))
         self._row = {i: row for row, i in enumerate(self.beside)}
 
     def cost(self, sides: Mapping[int, Side], others: Mapping[int, Side]) -> tuple[int, int]:
@@ -121,7 +117,7 @@ class _Trial:
             for k, other in there.items()
             if k != i
         )
-        return blocked, sum(int(self._lines[self._row[i], _DOWN.index(side)]) for i, side in sides.items())
+        return blocked, sum(int(self._lines[self._row[i], self._sides.index(side)]) for i, side in sides.items())
 
 
 def _lines(layout: Layout, places: Sequence[tuple[float, float]], rects: FloatArray) -> FloatArray:

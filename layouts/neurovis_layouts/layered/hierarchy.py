@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from neurovis_layouts.alike import Move, mirror_images, shifted_by
-from neurovis_layouts.frame import from_picture, to_picture
+from neurovis_layouts.frame import across_of, from_picture, to_picture
 from neurovis_layouts.label_room import covered, flipped, roomy, sides_of
 from neurovis_layouts.layered.bands import FEW, Wanted
 from neurovis_layouts.layered.compact import NONE, RANKS, WHOLE, Fold, Shape, ShapeKey, compact, may_be_folded
@@ -280,7 +280,7 @@ class _Standing:
         sides = [plan.sides.get(i, side) for i, side in enumerate(sides_of(problem))]
         for piece, move in rests.pieces:
             for member, side in zip(piece.part.members, piece.drawing.sides, strict=True):
-                sides[member] = flipped(side, problem.direction) if side and move.mirrored else side
+                sides[member] = flipped(side, across_of(problem.direction)) if side and move.mirrored else side
         lined = [_box(problem, places, sides, name, own) for name, own in problem.boxes]
         frames: list[tuple[tuple[int, ...], Rect]] = []
         boxes: list[tuple[tuple[int, ...], Rect]] = []
