@@ -16,9 +16,7 @@ from neurovis_layouts.frame import to_picture
 from neurovis_layouts.incremental import kept
 from neurovis_layouts.label_room import roomy
 from neurovis_layouts.label_sides import sided
-from neurovis_layouts.layered.drawing import Drawing
 from neurovis_layouts.pins import with_origins
-from neurovis_layouts.routing.ends import keys_of
 from neurovis_spec.layout.frames import BOX_ACROSS, PAD_LABEL
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import RADIUS, Arrangement, Capabilities, Layout, LayoutProblem, Point, Side
@@ -59,17 +57,10 @@ def _boxes_together(problem: LayoutProblem) -> list[int]:
     for number, (_, members) in enumerate(problem.boxes):
         for member in members:
             box_of.setdefault(member, number)
-    order: list[int] = []
-    seen = [False] * len(problem.neurons)
-    mates: dict[int, list[int]] = {}
-    for neuron, number in sorted(box_of.items()):
-        mates.setdefault(number, []).append(neuron)
-    for neuron in range(len(problem.neurons)):
-        for member in mates[box_of[neuron]] if neuron in box_of else [neuron]:
-            if not seen[member]:
-                seen[member] = True
-                order.append(member)
-    return order
+    first: dict[int, int] = {}
+    for neuron in sorted(box_of):
+        first.setdefault(box_of[neuron], neuron)
+    return sorted(range(len(problem.neurons)), key=lambda i: (first[box_of[i]] if i in box_of else i, i))
 
 
 def _placed(problem: LayoutProblem, engine: str, how: Arrangement, spacing: float) -> Layout:
@@ -92,15 +83,5 @@ def _placed(problem: LayoutProblem, engine: str, how: Arrangement, spacing: floa
     blocks = Blocks(problem, formation)
     free = blocks.whole() if problem.modules else blocks.formed(range(len(problem.neurons)))
     pins = with_origins(problem, dict(enumerate(free.places)))
-    layout = _layout(problem, engine, routed(free, problem.edges))
+    layout = routed(free, problem.edges).layout(problem, engine)
     return sided(problem, kept(problem, layout, pins))
-
-
-def _layout(problem: LayoutProblem, engine: str, drawing: Drawing) -> Layout:
-    return Layout(
-        problem.network,
-        engine,
-        dict(zip(problem.neurons, drawing.places, strict=True)),
-        {edge.name: drawing.routes[key] for edge, key in zip(problem.edges, keys_of(problem.edges), strict=True)},
-        {name: side for name, side in zip(problem.neurons, drawing.sides, strict=True) if side is not None},
-    )

@@ -9,12 +9,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from neurovis_layouts.alike import Move, shifted_by
+from neurovis_layouts.frame import to_picture
 from neurovis_layouts.layered.parts import Part
-from neurovis_layouts.routing.ends import Key
+from neurovis_layouts.routing.ends import Key, keys_of
 from neurovis_spec.layout.frames import TITLE, enclosing
 from neurovis_spec.layout.geometry import Rect, bounds, sampled
 from neurovis_spec.layout.labels import widened
-from neurovis_spec.layout.model import GRID, Direction, Point, Route, Side
+from neurovis_spec.layout.model import GRID, Direction, Layout, LayoutProblem, Point, Route, Side
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +37,20 @@ class Drawing:
     labels: tuple[Rect, ...] = ()
     #: how wide the title of its frame is
     title: float = 0.0
+
+    def layout(self, problem: LayoutProblem, engine: str, direction: Direction = "down") -> Layout:
+        """It as the layout of a problem, turned from the frame of an engine that draws in a direction."""
+        names, keys = problem.neurons, keys_of(problem.edges)
+        return Layout(
+            problem.network,
+            engine,
+            {name: to_picture(place, direction) for name, place in zip(names, self.places, strict=True)},
+            {
+                edge.name: tuple(to_picture(point, direction) for point in self.routes[key])
+                for edge, key in zip(problem.edges, keys, strict=True)
+            },
+            {name: side for name, side in zip(names, self.sides, strict=True) if side is not None},
+        )
 
     def rect(self) -> Rect:
         """The frame around neurons, routes, frames and labels: on the grid, so that it moves exactly. There is room for

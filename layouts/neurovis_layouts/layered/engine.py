@@ -11,9 +11,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from neurovis_layouts.frame import from_picture, to_picture
+from neurovis_layouts.frame import from_picture
 from neurovis_layouts.layered.hierarchy import Composer
-from neurovis_layouts.routing.ends import keys_of
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point
 
 
@@ -21,20 +20,7 @@ def drawn(problem: LayoutProblem, engine: str) -> Layout:
     """The layout of a problem as if there were no earlier one. Raises LayoutRefusalError for what cannot be met."""
     if not problem.neurons:
         return Layout(problem.network, engine, {}, {})
-    drawing = Composer(_framed(problem)).whole()
-    return Layout(
-        problem.network,
-        engine,
-        {
-            name: to_picture(place, problem.direction)
-            for name, place in zip(problem.neurons, drawing.places, strict=True)
-        },
-        {
-            edge.name: tuple(to_picture(point, problem.direction) for point in drawing.routes[key])
-            for edge, key in zip(problem.edges, keys_of(problem.edges), strict=True)
-        },
-        {name: side for name, side in zip(problem.neurons, drawing.sides, strict=True) if side is not None},
-    )
+    return Composer(_framed(problem)).whole().layout(problem, engine, problem.direction)
 
 
 def checked(problem: LayoutProblem) -> None:
