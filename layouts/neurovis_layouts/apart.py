@@ -39,7 +39,7 @@ def jitter(count: int) -> FloatArray:
 def apart(
     places: FloatArray,
     want: float,
-    fixed: IntArray | None = None,
+    fixed: IntArray,
     arcs: tuple[IntArray, IntArray] | None = None,
     part: IntArray | None = None,
     kept: Callable[[FloatArray], FloatArray] | None = None,
@@ -53,8 +53,7 @@ def apart(
     part = np.zeros(count, dtype=np.int64) if part is None else part
     want = max(want, LEAST + 0.02)
     hold = np.ones((count, 1))
-    if fixed is not None:
-        hold[fixed] = 0.0
+    hold[fixed] = 0.0
     places = places + hold * jitter(count) / 1024
     places = kept(places) if kept else places
     if arcs is not None:
@@ -114,11 +113,14 @@ def _centres(places: FloatArray, part: IntArray) -> FloatArray:
 def _collected(count: int, one: IntArray, other: IntArray, push: FloatArray) -> FloatArray:
     """The mean of the pushes on each place, away from each other."""
     times = np.bincount(one, minlength=count) + np.bincount(other, minlength=count)
-    total = np.stack(
-        [np.bincount(other, push[:, k], count) - np.bincount(one, push[:, k], count) for k in (0, 1)], axis=1
-    )
-    moves: FloatArray = total * (_EAGER / np.maximum(times, 1))[:, None]
+    moves: FloatArray = pushed(count, one, other, push) * (_EAGER / np.maximum(times, 1))[:, None]
     return moves
+
+
+def pushed(count: int, one: IntArray, other: IntArray, push: FloatArray) -> FloatArray:
+    """(count, 2) what pairs that push each other off add up to at each place, the pushes (k, 2) being on the other."""
+    sums = [np.bincount(other, push[:, k], count) - np.bincount(one, push[:, k], count) for k in (0, 1)]
+    return np.stack(sums, axis=1)
 
 
 def _below(y: FloatArray, above: IntArray, below: IntArray) -> FloatArray:

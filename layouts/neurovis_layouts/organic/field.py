@@ -14,6 +14,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from neurovis_layouts.apart import pushed
 from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.geometry import near_pairs
 
@@ -34,15 +35,9 @@ def pair_field(mass: FloatArray, one: IntArray, other: IntArray) -> Field:
 
     def field(places: FloatArray) -> FloatArray:
         way = places[other] - places[one]
-        return _pushed(len(mass), one, other, way * (both / ((way**2).sum(axis=1) + _SOFT))[:, None])
+        return pushed(len(mass), one, other, way * (both / ((way**2).sum(axis=1) + _SOFT))[:, None])
 
     return field
-
-
-def _pushed(count: int, one: IntArray, other: IntArray, push: FloatArray) -> FloatArray:
-    """(count, 2) what pairs that push each other off add up to at each point."""
-    sums = [np.bincount(other, push[:, k], count) - np.bincount(one, push[:, k], count) for k in (0, 1)]
-    return np.stack(sums, axis=1)
 
 
 class GridField:
@@ -93,7 +88,7 @@ class GridField:
         one, other, way, far = near_pairs(places, min(2 * cell, _REACH * self._unit))
         lacking = _fading((far / cell) ** 2) / (far**2 + _SOFT)
         push = way * (lacking * self._mass[one] * self._mass[other])[:, None]
-        return _pushed(len(places), one, other, push)
+        return pushed(len(places), one, other, push)
 
 
 def _fading(x: FloatArray) -> FloatArray:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from neurovis_layouts.apart import pushed
 from neurovis_layouts.organic.field import Field
 from neurovis_layouts.symmetry import Symmetry
 from neurovis_layouts.wiring import Wiring
@@ -54,9 +55,7 @@ def settle(
         # links pull with the power 11/16 of their length, by roots alone, which every processor rounds alike
         fourth = np.sqrt(np.sqrt(length))
         stiffness = wiring.weight / (fourth * np.sqrt(np.sqrt(fourth)))
-        pull = way * stiffness[:, None]
-        for k in (0, 1):
-            force[:, k] += np.bincount(wiring.a, pull[:, k], count) - np.bincount(wiring.b, pull[:, k], count)
+        force += pushed(count, wiring.b, wiring.a, way * stiffness[:, None])
         held = np.bincount(wiring.a, stiffness, count) + np.bincount(wiring.b, stiffness, count)
         missing = drop - (places[wiring.below, 1] - places[wiring.above, 1])
         press = _PRESS * wiring.pull * np.maximum(missing, 0)
