@@ -49,7 +49,9 @@ def pinned(
     free = [plan.places[i] for i in range(len(problem.neurons))]
     if not problem.pins:
         return Settled(free, list(pieces))
-    turned = _turned(problem)
+    # as it is in the picture, and without memory: what that says is seen to later
+    pins = {i: to_picture(point, problem.direction) for i, point in problem.pins.items()}
+    turned = replace(problem, pins=pins, memory=None)
     boxes = [piece.part.box for piece, _ in pieces if piece.part.box >= 0 and piece.part.module < 0]
     frames = Frames(replace(turned, boxes=tuple(problem.boxes[box] for box in boxes)))
     numbers = {own: number for number, own in reversed(list(enumerate(frames.members)))}
@@ -60,7 +62,7 @@ def pinned(
     ]
     found = settled(turned, frames, [to_picture(point, problem.direction) for point in free], wholes)
     places = [from_picture(point, problem.direction) for point in found.at]
-    (dx, dy), pins = from_picture(found.shift, problem.direction), problem.pins
+    dx, dy = from_picture(found.shift, problem.direction)
     held = {*pins, *(pair[i] for i in pins if i in pair)}
     _refuse(problem, [piece for piece, _ in pieces], found.at, held)
     moved = frozenset(i for i, (x, y) in enumerate(free) if places[i] != (x + dx, y + dy) or i in held)
@@ -81,12 +83,6 @@ def pinned(
             piece, fitting = replace(drawn[key], part=part), shifted_by((x, y))
         done.append((piece, fitting))
     return Settled(places, done, (dx, dy), moved, found.axis)
-
-
-def _turned(problem: LayoutProblem) -> LayoutProblem:
-    """The problem with its pins as they are in the picture, and without memory: what that says is seen to later."""
-    pins = {i: to_picture(point, problem.direction) for i, point in problem.pins.items()}
-    return replace(problem, pins=pins, memory=None)
 
 
 def _frames_of(piece: Piece, move: Move) -> Iterator[tuple[tuple[int, ...], Rect]]:
