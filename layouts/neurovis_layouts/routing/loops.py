@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -60,87 +59,44 @@ def loop(centre: Point, way: Point, handle: float, wide: float = 0.59) -> Route:
     return centre, (x + ax - bx, y + ay - by), (x + ax + bx, y + ay + by), centre
 
 
-class Loops:
-    """The loops of one neuron: each is chosen where there is most room, off those that are there already."""
+def loops(
+    centre: Point,
+    index: int,
+    near: Sequence[Point],
+    tangents: Sequence[Point],
+    obstacles: Obstacles,
+    walls: Walls,
+    there: Sequence[Route],
+    count: int,
+) -> list[Route]:
+    """So many loops of one neuron beside those that are ``there``: each where there is most room, off those before it,
+    and in no foreign frame, unless there is no room for such a one. ``near`` are neighbours' centres, ``tangents`` unit
+    vectors in which other edges leave or arrive."""
+    crowds = [_crowd(centre, way, near) + _traffic(way, tangents) + cost for way, cost in _WAYS]
 
-    def __init__(
-        self,
-        centre: Point,
-        index: int,
-        near: Sequence[Point],
-        tangents: Sequence[Point],
-        obstacles: Obstacles,
-        walls: Walls,
-    ) -> None:
-        """``near`` are neighbours' centres, ``tangents`` unit vectors in which other edges leave or arrive."""
-        self._centre, self._own, self._obstacles, self._walls = centre, (index, index), obstacles, walls
-        self._crowds = [_crowd(centre, way, near) + _traffic(way, tangents) + cost for way, cost in _WAYS]
-        self._there: set[Route] = set()
-        #: those that came since the last choice
-        self._new: list[Route] = []
-        #: the loops to choose from, their points that are seen, and how much too close each is to one that is there
-        self._choice = self._tried(_SHAPES)
-        self._lines: list[FloatArray] = []
-        self._close: list[float] = [0.0] * len(self._choice)
+    def tried(shapes: Sequence[tuple[float, float]]) -> tuple[list[Route], FloatArray]:
+        """The loops of these shapes, way by way, and what they cost, but for being close to other loops."""
+        routes = [loop(centre, way, *shape) for way, _ in _WAYS for shape in shapes]
+        own = [(index, index)] * len(routes)
+        clear, entering = np.array(obstacles.clearances(routes, own)), np.array(walls.entered(routes, own))
+        costs = np.repeat(crowds, len(shapes)) + np.tile(0.12 * np.arange(len(shapes)), len(crowds))
+        costs += 8 * np.maximum(0.0, REACH - clear) + ENTERING * entering + ENTERING * (clear <= TOUCH)
+        return routes, costs
 
-    def add(self, route: Route) -> None:
-        """Add a loop that is drawn already, to be kept clear of."""
-        if route not in self._there:
-            self._there.add(route)
-            self._new.append(route)
-
-    def best(self) -> Route:
-        """The loop with most room; one that enters no foreign frame, unless there is no room for such a one."""
-        self._look()
-        found = self._least([False] * len(self._choice))
-        if self._walls.entered([found], [self._own])[0]:
-            routes = [tried.route for tried in self._choice]
-            found = self._least(self._walls.entered(routes, [self._own] * len(routes)))
-        return found
-
-    def _look(self) -> None:
-        """Compare what there is to choose from with the loops that are there since the last time."""
-        if self._new and not self._lines:
-            self._choice = self._tried(_FURTHER)
-            self._lines = [_seen(tried.route) for tried in self._choice]
-            self._close = [0.0] * len(self._choice)
-        for other in map(_seen, self._new):
-            self._close = [
-                max(close, _APART - _between(line, other)) for line, close in zip(self._lines, self._close, strict=True)
-            ]
-        self._new.clear()
-
-    def _least(self, entering: Sequence[bool]) -> Route:
-        """The cheapest loop; of equals the first way, and of its shapes the first."""
-        costs = [
-            tried.crowd + (tried.nearing + ENTERING * enters + tried.over) + _TOGETHER * close
-            for tried, enters, close in zip(self._choice, entering, self._close, strict=True)
-        ]
-        return self._choice[min(range(len(costs)), key=lambda number: (costs[number], number))].route
-
-    def _tried(self, shapes: Sequence[tuple[float, float]]) -> list[_Tried]:
-        """The loops of these shapes, way by way."""
-        routes = [loop(self._centre, way, *shape) for way, _ in _WAYS for shape in shapes]
-        clear = self._obstacles.clearances(routes, [self._own] * len(routes))
-        return [
-            _Tried(
-                route,
-                self._crowds[number // len(shapes)] + 0.12 * (number % len(shapes)),
-                8 * max(0.0, REACH - clear[number]),
-                ENTERING * (clear[number] <= TOUCH),
-            )
-            for number, route in enumerate(routes)
-        ]
-
-
-@dataclass(frozen=True, slots=True)
-class _Tried:
-    """A loop, what it costs for what it stands among, for being close to a disc and for running over one."""
-
-    route: Route
-    crowd: float
-    nearing: float
-    over: float
+    found: list[Route] = []
+    if count and not there:
+        routes, costs = tried(_SHAPES)
+        found.append(routes[int(np.argmin(costs))])
+    if len(found) < count:
+        routes, costs = tried(_FURTHER)
+        lines = list(map(_seen, routes))
+        close, new = np.zeros(len(routes)), [*there, *found]
+        while len(found) < count:
+            for other in map(_seen, new):
+                close = np.maximum(close, [_APART - _between(line, other) for line in lines])
+            new = [routes[int(np.argmin(costs + _TOGETHER * close))]]
+            found += new
+    return found
 
 
 def _seen(route: Route) -> FloatArray:

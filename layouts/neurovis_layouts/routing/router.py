@@ -16,7 +16,7 @@ from neurovis_layouts.routing.curves import Waypoint, curve
 from neurovis_layouts.routing.detours import detoured
 from neurovis_layouts.routing.images import Images
 from neurovis_layouts.routing.improve import MOST_IMPROVED, improved
-from neurovis_layouts.routing.loops import Loops
+from neurovis_layouts.routing.loops import loops
 from neurovis_layouts.routing.obstacles import Obstacles
 from neurovis_layouts.routing.ports import Port, leanings
 from neurovis_layouts.routing.route_cost import Drawn
@@ -75,21 +75,20 @@ def route_all(
     rest = [i for i, edge in enumerate(edges) if i not in routes and edge.source != edge.target]
     routes.update(_bows(edges, centres, rest, obstacles, highest))
     walls = Walls(frames, len(centres))
-    few = len(edges) <= min(careful, _MOST_AT_LENGTH)
     ways = {i: [(way.x, way.y) for way in line] for i, line in (waypoints or {}).items()}
     most = _MOST_AROUND if waypoints is None else _MOST_AROUND_PLANNED
     routes.update(detoured(edges, centres, routes, obstacles, walls, ways, drawn, most))
     images = images or Images()
     routes.update(images.kept(routes, edges, centres))
-    routes.update((i, route) for i, route in (there or {}).items() if few and i in routes)
+    routes.update((i, route) for i, route in (there or {}).items() if i in routes)
     free = set(routes) - (there or {}).keys() - {image for i, image in images.of.items() if image != i}
     if planned:
         free = {i for i in free if images.of.get(i) == i}
     if free and len(edges) <= MOST_IMPROVED:
         routes.update(improved(Drawn(edges, centres, routes, frames, drawn, images), free))
-    loops = _loops(edges, centres, routes, near, walls, there or {})
-    routes.update(loops)
-    routes.update(images.kept(loops, edges, centres))
+    looped = _loops(edges, centres, routes, near, walls, there or {})
+    routes.update(looped)
+    routes.update(images.kept(looped, edges, centres))
     return [routes[i] for i in range(len(edges))]
 
 
@@ -104,25 +103,7 @@ def _curves(
     chosen: Sequence[int],
     waypoints: Mapping[int, Sequence[Waypoint]],
 ) -> dict[int, Route]:
-    lean = _lean(edges, centres, chosen, waypoints)
-    return {
-        i: curve(
-            centres[edges[i].source],
-            centres[edges[i].target],
-            waypoints.get(i, ()),
-            (lean[i, True], lean[i, False]),
-        )
-        for i in chosen
-    }
-
-
-def _lean(
-    edges: Sequence[LayoutEdge],
-    centres: Sequence[Point],
-    chosen: Sequence[int],
-    waypoints: Mapping[int, Sequence[Waypoint]],
-) -> dict[tuple[int, bool], float]:
-    """How each end of each edge leans: ports by disc and side."""
+    """Curves along the direction, from port to port: these lean by disc and side."""
     sides: dict[tuple[int, bool], list[Port]] = {}
     for i in chosen:
         edge = edges[i]
@@ -140,7 +121,15 @@ def _lean(
     lean: dict[tuple[int, bool], float] = {}
     for ports in sides.values():
         lean.update(leanings(ports))
-    return lean
+    return {
+        i: curve(
+            centres[edges[i].source],
+            centres[edges[i].target],
+            waypoints.get(i, ()),
+            (lean[i, True], lean[i, False]),
+        )
+        for i in chosen
+    }
 
 
 def _bows(
@@ -203,8 +192,11 @@ def _loops(
     walls: Walls,
     there: Mapping[int, Route],
 ) -> dict[int, Route]:
-    looping = [i for i, edge in enumerate(edges) if edge.source == edge.target]
-    tangents: dict[int, list[Point]] = {edges[i].source: [] for i in looping}
+    looping: dict[int, list[int]] = {}
+    for i, edge in enumerate(edges):
+        if edge.source == edge.target:
+            looping.setdefault(edge.source, []).append(i)
+    tangents: dict[int, list[Point]] = {own: [] for own in looping}
     for i, route in sorted(routes.items()):
         if edges[i].source in tangents:
             tangents[edges[i].source].append(_unit(route[0], route[1]))
@@ -216,13 +208,12 @@ def _loops(
     for own, neighbour in zip(owns[number].tolist(), other.tolist(), strict=True):
         if neighbour != own:
             near[own].append(centres[neighbour])
-    loops = {own: Loops(centres[own], own, near[own], tangents[own], obstacles, walls) for own in tangents}
-    result = {i: there[i] for i in looping if i in there}
-    for i, route in result.items():
-        loops[edges[i].source].add(route)
-    for i in (i for i in looping if i not in result):
-        result[i] = loops[edges[i].source].best()
-        loops[edges[i].source].add(result[i])
+    result: dict[int, Route] = {}
+    for own, mine in looping.items():
+        result.update({i: there[i] for i in mine if i in there})
+        new, old = [i for i in mine if i not in result], [result[i] for i in mine if i in result]
+        made = loops(centres[own], own, near[own], tangents[own], obstacles, walls, old, len(new))
+        result.update(zip(new, made, strict=True))
     return result
 
 
