@@ -16,7 +16,7 @@ from neurovis_layouts.packing import packed
 from neurovis_layouts.pins import fit
 from neurovis_layouts.routing import route_all
 from neurovis_layouts.routing.ends import Key, keys_of
-from neurovis_spec.layout.geometry import Rect, shifted, snap
+from neurovis_spec.layout.geometry import Rect, shifted, snap, snapped
 from neurovis_spec.layout.labels import instance_titles, label_rects
 from neurovis_spec.layout.model import LayoutEdge, LayoutProblem, Point, Route, Side
 
@@ -136,10 +136,8 @@ def routed(drawing: Drawing, edges: Sequence[LayoutEdge]) -> Drawing:
     new = [i for i, key in enumerate(keys) if key not in drawing.routes]
     walls = [(frozenset(own), rect) for own, rect in drawing.frames]
     made = route_all([edges[i] for i in new], drawing.places, frames=walls, drawn=list(drawing.routes.values()))
-    routes = dict(drawing.routes)
-    for i, route in zip(new, made, strict=True):
-        routes[keys[i]] = (route[0], *((snap(x), snap(y)) for x, y in route[1:-1]), route[-1])
-    return replace(drawing, routes=routes)
+    found = {keys[i]: snapped(route) for i, route in zip(new, made, strict=True)}
+    return replace(drawing, routes={**drawing.routes, **found})
 
 
 def _moved(point: Point, shift: Point) -> Point:

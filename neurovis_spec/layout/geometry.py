@@ -37,6 +37,11 @@ def snap(value: float) -> float:
     return round(value * _PER_UNIT) / _PER_UNIT + 0.0
 
 
+def snapped(route: Route) -> Route:
+    """A route with all but its ends on the grid."""
+    return route[0], *((snap(x), snap(y)) for x, y in route[1:-1]), route[-1]
+
+
 def turn(part: float) -> Point:
     """Cosine and sine of ``part`` of a full turn, by series: the same bits on every machine.
 
@@ -167,7 +172,7 @@ class Cells:
         keys = self._keys(points)
         found: list[tuple[IntArray, IntArray, FloatArray]] = []
         for column in (-self._rows, 0, self._rows):
-            point, place = _ranges(self._begin(keys + (column - 1)), self._begin(keys + (column + 2)))
+            point, place = ranges(self._begin(keys + (column - 1)), self._begin(keys + (column + 2)))
             x, y = self._places[place, 0] - points[point, 0], self._places[place, 1] - points[point, 1]
             squared = x * x + y * y
             near = squared < self._reach * self._reach
@@ -181,7 +186,7 @@ class Cells:
         # each cell with half of those around it, and what is in it with what follows
         for step in (0, 1, self._rows - 1, self._rows, self._rows + 1):
             begin = self._begin(keys + step) if step else np.arange(len(keys), dtype=np.int64) + 1
-            one, other = _ranges(begin, self._begin(keys + (step + 1)))
+            one, other = ranges(begin, self._begin(keys + (step + 1)))
             ones.append(one)
             others.append(other)
         one, other = np.concatenate(ones), np.concatenate(others)
@@ -191,8 +196,9 @@ class Cells:
         return self._order[one[near]], self._order[other[near]], way[near], np.sqrt(squared[near])
 
 
-def _ranges(begin: IntArray, end: IntArray) -> tuple[IntArray, IntArray]:
-    """For ranges of numbers, all those within them, each behind the number of its range."""
+def ranges(begin: IntArray, end: IntArray) -> tuple[IntArray, IntArray]:
+    """For ranges of numbers, all those within them, each behind the number of its range; of one that ends before it
+    begins none."""
     counts = np.maximum(end - begin, 0)
     which = np.repeat(np.arange(len(counts), dtype=np.int64), counts)
     return which, begin[which] + np.arange(len(which), dtype=np.int64) - np.repeat(np.cumsum(counts) - counts, counts)

@@ -16,7 +16,7 @@ from neurovis_layouts.routing.corners import smooth
 from neurovis_layouts.routing.ends import Key
 from neurovis_layouts.routing.images import images_of
 from neurovis_layouts.routing.obstacles import REACH
-from neurovis_spec.layout.geometry import Rect, bounds, distance, meet, snap
+from neurovis_spec.layout.geometry import Rect, bounds, distance, meet, snapped
 from neurovis_spec.layout.model import GRID, LayoutEdge, LayoutProblem, Point, Route
 
 #: How much of the corners of a line from band to band is cut off.
@@ -40,45 +40,47 @@ def linked(
     the frame of its neuron; ``drawn`` are the routes within the frames."""
     edges = [problem.edges[i] for i in links]
     framed = [(frozenset(members), rect) for members, rect in (*frames, *boxes, *labels)]
-    planned = _passing(problem, plan, rests)
+    ways: dict[int, list[Waypoint]] = {}
+    begun: dict[int, Route] = {}
+    (dx, dy), places = rests.shift, rests.places
+    for k, (i, edge) in enumerate(zip(links, edges, strict=True)):
+        if not rests.moved.isdisjoint((edge.source, edge.target)):
+            continue  # the plan has its ends elsewhere
+        if i in plan.ways:
+            passing = [Waypoint(way.x + dx, way.y + dy, way.half) for way in plan.ways[i]]
+            ways[k] = passing if plan.places[edge.source][1] < plan.places[edge.target][1] else passing[::-1]
+        if i in plan.cut:
+            between = [(x + dx, y + dy) for x, y in plan.cut[i]]
+            line = [places[edge.source], *between, places[edge.target]]
+            begun[k] = _cut(line, places, [rect for _, rect in labels])
     # what has all waypoints that it needs from the plan keeps them
     firm = {k for k, i in enumerate(links) if i in plan.firm} if frames and not rests.moved else set()
     own = [keys[i] for i in links]
     routes = route_all(
         edges,
-        rests.places,
-        {k: planned[i] for k, i in enumerate(links) if i in planned},
+        places,
+        ways,
         _bowed(edges, units),
         frames=framed,
         drawn=drawn,
-        begun=_cut(problem, links, plan, rests, [rect for _, rect in labels]),
-        images=images_of(own, rests.places, pair, rests.axis),
+        begun=begun,
+        images=images_of(own, places, pair, rests.axis),
         planned=firm,
     )
-    return {key: tuple(_snapped(route)) for key, route in zip(own, routes, strict=True)}
+    return {key: snapped(route) for key, route in zip(own, routes, strict=True)}
 
 
-def _cut(
-    problem: LayoutProblem, links: Sequence[int], plan: ComponentLayout, rests: Settled, labels: Sequence[Rect]
-) -> dict[int, Route]:
-    """The routes from band to band, of edges whose ends stand where the plan has them; an end that has nothing between
-    it and the street, and no label in the way, is left straight for that."""
-    found: dict[int, Route] = {}
-    dx, dy = rests.shift
-    for k, i in enumerate(links):
-        own = problem.edges[i].source, problem.edges[i].target
-        if i not in plan.cut or not rests.moved.isdisjoint(own):
-            continue
-        line = [rests.places[own[0]], *((x + dx, y + dy) for x, y in plan.cut[i]), rests.places[own[1]]]
-        for _ in range(2):  # from either end
-            aslant = _aslant(line)
-            beside = any(_beside(place, line[0], line[2][0]) for place in rests.places)
-            if not beside and not any(meet(rect, bounds([line[0], aslant])) for rect in labels):
-                line = [line[0], aslant, *line[3:]]
-            line.reverse()
-        apart = [a for a, b in pairwise(line) if distance(a, b) > GRID]
-        found[k] = smooth([*apart, line[-1]], _CUT)
-    return found
+def _cut(line: list[Point], places: Sequence[Point], labels: Sequence[Rect]) -> Route:
+    """The route along a line from band to band; an end that has nothing between it and the street, and no label in the
+    way, is left straight for that."""
+    for _ in range(2):  # from either end
+        aslant = _aslant(line)
+        beside = any(_beside(place, line[0], line[2][0]) for place in places)
+        if not beside and not any(meet(rect, bounds([line[0], aslant])) for rect in labels):
+            line = [line[0], aslant, *line[3:]]
+        line = line[::-1]
+    apart = [a for a, b in pairwise(line) if distance(a, b) > GRID]
+    return smooth([*apart, line[-1]], _CUT)
 
 
 def _beside(place: Point, start: Point, street: float) -> bool:
@@ -94,25 +96,9 @@ def _aslant(line: Sequence[Point]) -> Point:
     return turn[0], y + (far if end[1] > y else -far)
 
 
-def _snapped(route: Route) -> list[Point]:
-    return [route[0], *((snap(x), snap(y)) for x, y in route[1:-1]), route[-1]]
-
-
 def _bowed(edges: Sequence[LayoutEdge], units: Sequence[Unit]) -> frozenset[int]:
     """Edges within a block that is no frame."""
     block = {
         m: k for k, unit in enumerate(units) if unit.places is not None and unit.reach is None for m in unit.members
     }
     return frozenset(i for i, e in enumerate(edges) if e.source in block and block[e.source] == block.get(e.target))
-
-
-def _passing(problem: LayoutProblem, plan: ComponentLayout, rests: Settled) -> dict[int, list[Waypoint]]:
-    """The plan's waypoints, of edges whose ends stand where the plan has them."""
-    ways: dict[int, list[Waypoint]] = {}
-    dx, dy = rests.shift
-    for i, line in sorted(plan.ways.items()):
-        edge = problem.edges[i]
-        if edge.source not in rests.moved and edge.target not in rests.moved:
-            passing = [Waypoint(way.x + dx, way.y + dy, way.half) for way in line]
-            ways[i] = passing if plan.places[edge.source][1] < plan.places[edge.target][1] else passing[::-1]
-    return ways

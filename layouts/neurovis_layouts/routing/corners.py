@@ -10,7 +10,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from neurovis_layouts.routing.polylines import along
-from neurovis_layouts.routing.walls import blocked
 from neurovis_spec.layout import BoolArray, FloatArray, IntArray
 from neurovis_spec.layout.geometry import cubic, lengths, pieces_of, squared_distances
 from neurovis_spec.layout.model import GRID, Point, Route
@@ -67,8 +66,7 @@ def rounded(line: Sequence[Point], rects: FloatArray) -> Route:
     rectangles (f, 4); with sharp ones where it always does."""
     pieces, owner = smoothed([(line, cut) for cut in _CUTS])
     lines = along(pieces, owner, len(_CUTS))
-    inside = blocked(lines.a, lines.b, rects)
-    chosen = int(np.argmin(np.append(np.bincount(lines.owner, inside, len(_CUTS))[:-1], 0)))
+    chosen = int(np.argmin([*lines.enter(rects)[:-1], False]))
     return _route(pieces[owner == chosen])
 
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from neurovis_layouts.routing.ends import Key
-from neurovis_spec.layout.geometry import snap
+from neurovis_spec.layout.geometry import snap, snapped
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
 
@@ -28,8 +28,7 @@ class Images:
         found: dict[int, Route] = {}
         for i, other in self.of.items():
             if i in routes:
-                route = routes[i]
-                found[i] = route[0], *((snap(x), snap(y)) for x, y in route[1:-1]), route[-1]
+                found[i] = snapped(routes[i])
                 found[other] = self.even(found[i]) if i == other else self.reflected(found[i], edges[other], centres)
         return found
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from neurovis_layouts.routing.walls import blocked
 from neurovis_spec.layout import BoolArray, FloatArray, IntArray
-from neurovis_spec.layout.geometry import crossing, cubic, lengths, pieces_of, squared_distances
+from neurovis_spec.layout.geometry import crossing, cubic, lengths, pieces_of, ranges, squared_distances
 from neurovis_spec.layout.model import Route
 
 #: Into how many segments a piece is cut that is not straight, and how far off its chord such a piece reaches, by the
@@ -57,13 +57,9 @@ class Polylines:
 
     def some(self, chosen: IntArray) -> Polylines:
         """The lines with these numbers."""
-        counts = (self.starts[1:] - self.starts[:-1])[chosen]
-        ends = np.cumsum(counts)
-        place = np.arange(int(ends[-1]) if len(ends) else 0, dtype=np.int64)
-        return Polylines(
-            self.points[place + np.repeat(self.starts[chosen] - ends + counts, counts)],
-            np.concatenate([np.zeros(1, dtype=np.int64), ends]),
-        )
+        first, last = self.starts[chosen], self.starts[chosen + 1]
+        starts = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(last - first)])
+        return Polylines(self.points[ranges(first, last)[1]], starts)
 
     def and_then(self, others: Polylines) -> Polylines:
         """These and others behind them."""
@@ -149,9 +145,8 @@ class Polylines:
         before = np.concatenate([np.zeros(1), np.cumsum(self._lengths)])
         offset = before[self._segments]
         step = np.maximum(apart, total / _MOST)
-        counts = np.maximum(np.ceil((total - 2 * off) / step), 0).astype(np.int64)
-        owner = np.repeat(np.arange(len(self), dtype=np.int64), counts)
-        number = np.arange(len(owner), dtype=np.int64) - np.repeat(np.cumsum(counts) - counts, counts)
+        counts = np.ceil((total - 2 * off) / step).astype(np.int64)
+        owner, number = ranges(np.zeros_like(counts), counts)
         at = offset[owner] + off + step[owner] * number
         segment = np.clip(np.searchsorted(before, at, side="right") - 1, 0, len(self._lengths) - 1)
         share = (at - before[segment]) / np.maximum(self._lengths[segment], 1e-9)
@@ -262,16 +257,8 @@ def _overlapping(low: FloatArray, high: FloatArray, least: FloatArray, most: Flo
     """Which intervals from ``low`` to ``high`` and which from ``least`` to ``most`` share a point: either the second
     begins within the first, or the first within the second."""
     firsts, seconds = np.argsort(low), np.argsort(least)
-    i, begun = _ranges(np.searchsorted(least[seconds], low), np.searchsorted(least[seconds], high, side="right"))
-    j, within = _ranges(
+    i, begun = ranges(np.searchsorted(least[seconds], low), np.searchsorted(least[seconds], high, side="right"))
+    j, within = ranges(
         np.searchsorted(low[firsts], least, side="right"), np.searchsorted(low[firsts], most, side="right")
     )
     return np.concatenate([i, firsts[within]]), np.concatenate([seconds[begun], j])
-
-
-def _ranges(begin: IntArray, end: IntArray) -> tuple[IntArray, IntArray]:
-    """All numbers of ranges, and the ranges that they are of."""
-    counts = end - begin
-    owner = np.repeat(np.arange(len(begin), dtype=np.int64), counts)
-    number = np.arange(len(owner), dtype=np.int64) + np.repeat(begin - np.cumsum(counts) + counts, counts)
-    return owner, number
