@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from neurovis_layouts.routing.bows import BowSought, clear_bows
-from neurovis_layouts.routing.obstacles import REACH, Obstacles
+from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
 
 from neurovis_spec.layout.geometry import straight
 from neurovis_spec.layout.model import Point, Route
@@ -18,7 +18,7 @@ points = st.tuples(st.floats(-6, 6, allow_nan=False), st.floats(-8, 8, allow_nan
 
 @given(st.lists(places, min_size=2, max_size=25, unique=True), st.data())
 @settings(deadline=None)
-def test_crowded_routes_are_those_whose_clearance_is_too_small(centres: list[Point], data: st.DataObject) -> None:
+def test_what_runs_over_a_disc_has_too_small_a_clearance(centres: list[Point], data: st.DataObject) -> None:
     obstacles = Obstacles(centres)
     ends = st.tuples(st.integers(0, len(centres) - 1), st.integers(0, len(centres) - 1))
     own = data.draw(st.lists(ends, min_size=1, max_size=12))
@@ -26,16 +26,16 @@ def test_crowded_routes_are_those_whose_clearance_is_too_small(centres: list[Poi
     for source, target in own:
         between = data.draw(st.lists(points, min_size=2, max_size=2) | st.lists(points, min_size=5, max_size=5))
         routes.append((centres[source], *between, centres[target]))
-    found = obstacles.crowded(routes, own, REACH - 0.1)
-    assert found == [obstacles.clearance(route, ends) < REACH - 0.1 for route, ends in zip(routes, own, strict=True)]
+    found = obstacles.run_over(routes, own)
+    assert found == [obstacles.clearance(route, ends) < TOUCH for route, ends in zip(routes, own, strict=True)]
 
 
-@pytest.mark.parametrize(("middle", "crowded"), [((5.0, 0.34), True), ((5.0, 0.36), False), ((5.0, -0.34), True)])
-def test_a_line_is_crowded_by_a_disc_beside_it_but_not_by_its_own_ends(middle: Point, crowded: bool) -> None:
+@pytest.mark.parametrize(("middle", "over"), [((5.0, 0.29), True), ((5.0, 0.31), False), ((5.0, -0.29), True)])
+def test_a_line_runs_over_a_disc_beside_it_but_not_over_its_own_ends(middle: Point, over: bool) -> None:
     obstacles = Obstacles([(0.0, 0.0), (10.0, 0.0), middle])
     line = straight((0.0, 0.0), (10.0, 0.0))
-    assert obstacles.crowded([line], [(0, 1)], REACH - 0.1) == [crowded]
-    assert obstacles.crowded([line], [(0, 2)], REACH - 0.1) == [True]
+    assert obstacles.run_over([line], [(0, 1)]) == [over]
+    assert obstacles.run_over([line], [(0, 2)]) == [True]
 
 
 def test_a_disc_between_two_points_of_a_line_is_not_overlooked() -> None:
@@ -45,9 +45,9 @@ def test_a_disc_between_two_points_of_a_line_is_not_overlooked() -> None:
         assert obstacles.clearance(straight((0.0, 0.0), (10.0, 0.0)), (0, 1)) == pytest.approx(0.2995)
 
 
-def test_nothing_crowds_where_there_is_nothing() -> None:
-    assert Obstacles(()).crowded([straight((0.0, 0.0), (1.0, 0.0))], [(0, 1)], 0.3) == [False]
-    assert Obstacles([(0.0, 0.0)]).crowded([], [], 0.3) == []
+def test_nothing_is_run_over_where_there_is_nothing() -> None:
+    assert Obstacles(()).run_over([straight((0.0, 0.0), (1.0, 0.0))], [(0, 1)]) == [False]
+    assert Obstacles([(0.0, 0.0)]).run_over([], []) == []
 
 
 @given(st.lists(places, min_size=2, max_size=20, unique=True), st.data())

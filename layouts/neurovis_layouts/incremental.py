@@ -6,18 +6,19 @@ was, routes included; what is new, or runs into something new, is routed anew, a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from neurovis_layouts.alike import Alike, Move
 from neurovis_layouts.conflicts import carried
-from neurovis_layouts.frame import from_picture, to_picture
+from neurovis_layouts.frame import from_picture, to_picture, turned
 from neurovis_layouts.occupancy import overlapping
 from neurovis_layouts.pins import with_origins
 from neurovis_layouts.routing import route_all
-from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
+from neurovis_layouts.routing.ends import keys_of
+from neurovis_layouts.routing.obstacles import Obstacles
 from neurovis_layouts.routing.walls import Frame, Walls
 from neurovis_layouts.settling import Whole, settled
 from neurovis_spec.layout.frames import Frames
@@ -70,7 +71,7 @@ def kept(problem: LayoutProblem, fresh: Layout, pins: Mapping[int, Point] | None
     new = [i for i in range(len(problem.edges)) if i not in routes]
     twins = _Twins(problem, centres) if problem.modules or problem.mirrors else None
     if twins is not None:
-        _draw_alike(problem, ways, twins, new, routes)
+        ways.add_clear(twins.copied(new, routes), routes)
     # such as those within a new instance
     along = carried(problem, fresh, dict(enumerate(centres)))
     ways.add_clear({i: route for i, route in along.items() if i not in routes}, routes)
@@ -85,7 +86,7 @@ def kept(problem: LayoutProblem, fresh: Layout, pins: Mapping[int, Point] | None
     rest = [i for i in range(len(problem.edges)) if i not in routes]
     routes.update(_found(problem, ways, rest, routes))
     if twins is not None:
-        _draw_alike(problem, ways, twins, new, routes)
+        ways.add_clear(twins.copied(new, routes), routes)
     return Layout(
         fresh.network,
         fresh.engine,
@@ -121,17 +122,16 @@ class _Ways:
                     found.append((own, rect))
         return found
 
+    def ends(self, chosen: Iterable[int]) -> list[tuple[int, int]]:
+        """Between which neurons these edges are."""
+        return [(self.problem.edges[i].source, self.problem.edges[i].target) for i in chosen]
+
     def add_clear(self, found: Mapping[int, Route], routes: dict[int, Route]) -> None:
         """Add those of the found routes, by edge, that have a clear way."""
-        clear = self._clear(list(found), list(found.values()), self.walls({**routes, **found}))
-        routes.update({i: route for (i, route), free in zip(found.items(), clear, strict=True) if free})
-
-    def _clear(self, chosen: Sequence[int], routes: Sequence[Route], walls: Sequence[Frame]) -> list[bool]:
-        """For each of these edges whether it has a clear way on this route."""
-        ends = [(self.problem.edges[i].source, self.problem.edges[i].target) for i in chosen]
-        over = self._obstacles.crowded(routes, ends, TOUCH)
-        through = Walls(walls, len(self.centres)).entered(routes, ends)
-        return [not (a or b) for a, b in zip(over, through, strict=True)]
+        lines, ends = list(found.values()), self.ends(found)
+        through = Walls(self.walls({**routes, **found}), len(self.centres)).entered(lines, ends)
+        wrong = zip(found, self._obstacles.run_over(lines, ends), through, strict=True)
+        routes.update({i: found[i] for i, over, enters in wrong if not (over or enters)})
 
 
 def _found(problem: LayoutProblem, ways: _Ways, rest: Sequence[int], routes: Mapping[int, Route]) -> dict[int, Route]:
@@ -145,7 +145,7 @@ def _found(problem: LayoutProblem, ways: _Ways, rest: Sequence[int], routes: Map
     ends = {frozenset((problem.edges[i].source, problem.edges[i].target)) for i in rest}
     shown = [i for i, e in enumerate(problem.edges) if frozenset((e.source, e.target)) in ends]
     walls = ways.walls(routes) if len(shown) <= _CAREFULLY else []
-    walls = [(own, bounds([flat(rect[:2]), flat(rect[2:])])) for own, rect in walls]
+    walls = [(own, turned(rect, problem.direction)) for own, rect in walls]
     edges, centres = [problem.edges[i] for i in shown], [flat(point) for point in ways.centres]
     others = [tuple(map(flat, routes[i])) for i in sorted(routes.keys() - set(shown))]
     there = {k: tuple(map(flat, routes[i])) for k, i in enumerate(shown) if i in routes}
@@ -163,19 +163,17 @@ def _old_routes(problem: LayoutProblem, memory: Layout, ways: _Ways) -> dict[int
         route = memory.routes.get(edge.name)
         if route is not None and (route[0], route[-1]) == (ways.centres[edge.source], ways.centres[edge.target]):
             routes[i] = route
-    chosen = list(routes)
-    ends = [(problem.edges[i].source, problem.edges[i].target) for i in chosen]
     new = [k for k, known in enumerate(there) if not known]
     place = {neuron: k for k, neuron in enumerate(new)}
-    over = Obstacles([ways.centres[k] for k in new]).crowded(
-        [routes[i] for i in chosen], [(place.get(a, -1), place.get(b, -1)) for a, b in ends], TOUCH
+    over = Obstacles([ways.centres[k] for k in new]).run_over(
+        list(routes.values()), [(place.get(a, -1), place.get(b, -1)) for a, b in ways.ends(routes)]
     )
-    through = _entering(problem, memory, ways, chosen, routes)
-    return {i: routes[i] for i, a, b in zip(chosen, over, through, strict=True) if not (a or b)}
+    through = _entering(problem, memory, ways, routes, routes)
+    return {i: routes[i] for i, a, b in zip(routes, over, through, strict=True) if not (a or b)}
 
 
 def _entering(
-    problem: LayoutProblem, memory: Layout, ways: _Ways, chosen: Sequence[int], routes: Mapping[int, Route]
+    problem: LayoutProblem, memory: Layout, ways: _Ways, chosen: Iterable[int], routes: Mapping[int, Route]
 ) -> list[bool]:
     """For each of these edges whether its route runs through a frame that is not drawn as it was."""
     places = zip(problem.neurons, ways.centres, strict=True)
@@ -183,60 +181,49 @@ def _entering(
     old = {i: memory.routes[edge.name] for i, edge in enumerate(problem.edges) if edge.name in memory.routes}
     before = ways.frames.rects(known, old)
     changed = [wall for wall in ways.walls(routes) if wall[1] not in before]
-    ends = [(problem.edges[i].source, problem.edges[i].target) for i in chosen]
-    return Walls(changed, len(ways.centres)).entered([routes[i] for i in chosen], ends)
+    return Walls(changed, len(ways.centres)).entered([routes[i] for i in chosen], ways.ends(chosen))
 
 
 class _Twins:
     """Which edges are drawn alike: those between neurons that are."""
 
     def __init__(self, problem: LayoutProblem, centres: Sequence[Point]) -> None:
-        self._edges = problem.edges
+        self._centres, self._edges, self._keys = centres, problem.edges, keys_of(problem.edges)
+        self._number = {key: i for i, key in enumerate(self._keys)}
         self._alike = Alike(problem, dict(enumerate(centres)))
-        self._between: dict[tuple[int, int], list[int]] = {}
-        for i, edge in enumerate(problem.edges):
-            self._between.setdefault((edge.source, edge.target), []).append(i)
 
-    def of(self, edge: int) -> Iterator[tuple[int, Move]]:
+    def of(self, edge: int) -> dict[int, Move]:
         """The edges drawn like this one, itself first, each with the move from its route. Of two between the same
         neurons, there and back, the one is: both would be one line."""
-        source, target = self._edges[edge].source, self._edges[edge].target
-        place = self._between[source, target].index(edge)
-        targets = dict(self._alike.of(target))
+        source, target, place = self._keys[edge]
         by_move: dict[Move, list[int]] = {}
-        for mate, move in targets.items():
+        for mate, move in self._alike.of(target):
             by_move.setdefault(move, []).append(mate)
         found: dict[frozenset[int], tuple[int, Move]] = {}
         for mate, move in self._alike.of(source):
             for other in by_move.get(move, ()):
-                equal = self._between.get((mate, other), [])
-                ends = frozenset((mate, other))
+                twin, ends = self._number.get((mate, other, place)), frozenset((mate, other))
                 # the one that is reflected less, whichever end was asked for first
-                if place < len(equal) and (ends not in found or found[ends][1].flip < move.flip):
-                    found[ends] = equal[place], move
-        yield from found.values()
+                if twin is not None and (ends not in found or found[ends][1].flip < move.flip):
+                    found[ends] = twin, move
+        return dict(found.values())
 
-
-def _draw_alike(
-    problem: LayoutProblem, ways: _Ways, twins: _Twins, new: Sequence[int], routes: dict[int, Route]
-) -> None:
-    """The routes of new edges copied, where their way is clear, from those drawn alike: from an earlier one, such as
-    within another instance of the make, else from the first that has been found."""
-    fresh = set(new)
-    waiting = set(new)
-    found: dict[int, Route] = {}
-    for i in new:
-        if i not in waiting:
-            continue
-        alike = dict(twins.of(i))
-        waiting -= alike.keys()
-        lead = next((k for k in alike if k in routes and k not in fresh), i)
-        if lead not in routes:
-            continue
-        back = alike[lead].inverse()
-        for twin, move in alike.items():
-            if twin in fresh and twin != lead:
-                along, edge = back.then(move), problem.edges[twin]
-                inner = map(along.point, routes[lead][1:-1])
-                found[twin] = (ways.centres[edge.source], *inner, ways.centres[edge.target])
-    ways.add_clear(found, routes)
+    def copied(self, new: Sequence[int], routes: Mapping[int, Route]) -> dict[int, Route]:
+        """Routes for new edges like those drawn alike: like an earlier one, such as within another instance of the
+        make, else like the first that has been found."""
+        fresh, waiting = set(new), set(new)
+        found: dict[int, Route] = {}
+        for i in new:
+            if i not in waiting:
+                continue
+            alike = self.of(i)
+            waiting -= alike.keys()
+            lead = next((k for k in alike if k in routes and k not in fresh), i)
+            if lead not in routes:
+                continue
+            back = alike[lead].inverse()
+            for twin, move in alike.items():
+                if twin in fresh and twin != lead:
+                    inner, edge = back.then(move).route(routes[lead][1:-1]), self._edges[twin]
+                    found[twin] = (self._centres[edge.source], *inner, self._centres[edge.target])
+        return found

@@ -32,7 +32,7 @@ from neurovis_layouts.layered.templates import Book, restricted
 from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.pins import with_origins
 from neurovis_layouts.routing.ends import Key, keys_of
-from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
+from neurovis_layouts.routing.obstacles import Obstacles
 from neurovis_spec.layout.frames import BOX_DOWN, PAD_LABEL, SLACK, entered
 from neurovis_spec.layout.geometry import Rect, bounds, meet, padded, snap, united
 from neurovis_spec.layout.labels import BOX_WEIGHT, title_room
@@ -333,7 +333,7 @@ class _Standing:
                     ends = places[key[0]], places[key[1]]
                     routes[key] = (ends[0], *move.route(route)[1:-1], ends[1])
         if problem.pins:  # which may have put somebody on them
-            over = Obstacles(places).crowded(list(routes.values()), [key[:2] for key in routes], TOUCH)
+            over = Obstacles(places).run_over(list(routes.values()), [key[:2] for key in routes])
             routes = {key: route for (key, route), on in zip(routes.items(), over, strict=True) if not on}
         links = [i for i, key in enumerate(keys) if key not in routes]
         drawn = list(routes.values())

@@ -34,9 +34,9 @@ class Obstacles:
         """The least distance of the route to a foreign centre, at most ``REACH``."""
         return self.clearances([route], [own])[0]
 
-    def crowded(self, routes: Sequence[Route], own: Sequence[tuple[int, int]], enough: float) -> list[bool]:
-        """For each route whether its clearance is less than ``enough`` (at most ``REACH``)."""
-        return [clearance < enough for clearance in self.clearances(routes, own)]
+    def run_over(self, routes: Sequence[Route], own: Sequence[tuple[int, int]]) -> list[bool]:
+        """For each route whether it runs over a foreign disc."""
+        return [clearance < TOUCH for clearance in self.clearances(routes, own)]
 
     def clearances(self, routes: Sequence[Route], own: Sequence[tuple[int, int]]) -> list[float]:
         """For each route the least distance to a centre that is none of its two ``own`` neurons', at most ``REACH``."""
