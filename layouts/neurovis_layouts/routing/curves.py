@@ -34,30 +34,24 @@ def handle(across: float, along: float) -> float:
 def curve(start: Point, end: Point, ways: Sequence[Waypoint], lean: tuple[float, float]) -> Route:
     """The route. ``lean`` are the sideways shares at both ends."""
     sign = 1.0 if end[1] > start[1] else -1.0
-    knots = [start]
-    slopes = [0.0]
-    for way, leaning in zip(ways, _slopes(start, end, ways), strict=True):
+    #: points that it passes, and its slope there
+    knots = [(start, 0.0)]
+    for way, slope in zip(ways, _slopes(start, end, ways), strict=True):
         if way.half > 0:
-            knots += [(way.x, way.y - sign * way.half), (way.x, way.y + sign * way.half)]
-            slopes += [0.0, 0.0]
+            knots += [((way.x, way.y - sign * way.half), 0.0), ((way.x, way.y + sign * way.half), 0.0)]
         else:
-            knots.append((way.x, way.y))
-            slopes.append(leaning)
-    knots.append(end)
-    slopes.append(0.0)
+            knots.append(((way.x, way.y), slope))
+    knots.append((end, 0.0))
     points: list[Point] = [start]
-    for i in range(len(knots) - 1):
-        (ax, ay), (bx, by) = knots[i], knots[i + 1]
+    for i, (((ax, ay), before), ((bx, by), behind)) in enumerate(pairwise(knots)):
         along = by - ay
         share = handle(bx - ax, along)
-        first = _leaning(ax, ay, lean[0], sign, share * abs(along))
-        if i > 0:
-            reach = min(share, 0.5) * along
-            first = (ax + slopes[i] * reach, ay + reach)
-        second = _leaning(bx, by, lean[1], -sign, share * abs(along))
-        if i < len(knots) - 2:
-            reach = min(share, 0.5) * along
-            second = (bx - slopes[i + 1] * reach, by - reach)
+        reach, length = min(share, 0.5) * along, share * abs(along)
+        first, second = (ax + before * reach, ay + reach), (bx - behind * reach, by - reach)
+        if i == 0:
+            first = _leaning(ax, ay, lean[0], sign, length)
+        if i == len(knots) - 2:
+            second = _leaning(bx, by, lean[1], -sign, length)
         points += [first, second, (bx, by)]
     return tuple(points)
 

@@ -7,10 +7,8 @@ mirror images one is drawn and the other reflected, and what joins two images of
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass
 from itertools import product
 
 from neurovis_layouts.routing.corners import corners, smooth, smoothed
@@ -101,54 +99,49 @@ def _searched(cost: RouteCost, now: float) -> Route | None:
     if best is None:
         return None
     for _ in range(_PASSES):
-        line, cut = best.line
+        least, (line, cut) = best
         tries = [(line, other) for other in _CUTS if other != cut]
         tries += ((other, cut) for other in (*_moved(line), *_fewer(line, _FEW_CORNERS)))
-        better = _best(cost, tries, best.cost - _GAIN, _SOME)
+        better = _best(cost, tries, least - _GAIN, _SOME)
         if better is None:
             break
         best = better
-    return cost.whole(smooth(*best.line)) if best.cost <= now - _BETTER else None
+    least, chosen = best
+    return cost.whole(smooth(*chosen)) if least <= now - _BETTER else None
 
 
-@dataclass(frozen=True, slots=True)
-class _Try:
-    """A line and what it costs."""
-
-    cost: float
-    line: _Line
-
-
-def _best(cost: RouteCost, tries: Iterable[_Line], limit: float, most: int | None = None) -> _Try | None:
-    """The best of these lines, None where all cost more than the limit; at most so many are checked closely."""
+def _best(cost: RouteCost, tries: Iterable[_Line], limit: float, most: int | None = None) -> tuple[float, _Line] | None:
+    """What the best of these lines costs, and that line, None where all cost more than the limit; at most so many are
+    checked closely."""
     ways = [(cost.line(line), cut) for line, cut in tries]
     if not ways:
         return None
     found = cost.cheapest(along(*smoothed(ways), len(ways)), limit, most)
-    return None if found is None else _Try(found[1], ways[found[0]])
+    return None if found is None else (found[1], ways[found[0]])
 
 
 def _shifted(route: Route) -> Iterator[Route]:
     """The route this far to either side, but for its ends."""
-    for by in _SHIFTS:
-        for side in (by, -by):
-            yield _beside(route, side)
-
-
-def _beside(route: Route, by: float) -> Route:
-    result = [route[0]]
-    for number in range(1, len(route) - 1):
+    last, square = len(route) - 1, list[tuple[float, float, float]]()
+    for number in range(1, last):
         # a knot and what is before and behind it move as one, so that the line stays smooth
         knot = (number + 1) // 3 * 3
-        around = (max(knot - 1, 0), min(knot + 1, len(route) - 1)), (max(knot - 3, 0), min(knot + 3, len(route) - 1))
-        for before, behind in around:
-            dx, dy = route[behind][0] - route[before][0], route[behind][1] - route[before][1]
-            length = math.sqrt(dx * dx + dy * dy)
+        for far in (1, 3):
+            before, behind = route[max(knot - far, 0)], route[min(knot + far, last)]
+            length = distance(before, behind)
             if length > 0:
                 break
-        x, y = route[number]
-        result.append((x + by * dy / length, y - by * dx / length) if length > 0 else (x, y))
-    return *result, route[-1]
+        square.append((behind[1] - before[1], before[0] - behind[0], length or 1.0))
+    for by in _SHIFTS:
+        for side in (by, -by):
+            yield (
+                route[0],
+                *(
+                    (x + side * dx / length, y + side * dy / length)
+                    for (x, y), (dx, dy, length) in zip(route[1:-1], square, strict=True)
+                ),
+                route[-1],
+            )
 
 
 def _turned(route: Route) -> Iterator[Route]:
