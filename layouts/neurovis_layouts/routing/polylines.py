@@ -68,10 +68,9 @@ class Polylines:
 
     def replaced(self, number: int, line: Polylines) -> Polylines:
         """The same with another line in place of one."""
-        first, last = self.starts[number : number + 2].tolist()
-        starts = self.starts.copy()
-        starts[number + 1 :] += len(line.points) - (last - first)
-        return Polylines(np.concatenate([self.points[:first], line.points, self.points[last:]]), starts)
+        chosen = np.arange(len(self), dtype=np.int64)
+        chosen[number] = len(self)
+        return self.and_then(line).some(chosen)
 
     def lengths(self) -> FloatArray:
         """(n,) how long they are."""
