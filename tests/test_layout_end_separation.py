@@ -102,6 +102,6 @@ def test_where_ends_are_many_they_stay_as_even_as_they_are() -> None:
         centres = [(6 * x, 6 * y) for x, y in (turn(i / count) for i in range(count))]
         pairs = [(a, b) for a in range(count) for b in range(count) if a != b]
         edges = [LayoutEdge(f"{a} -> {b}", a, b, 1) for a, b in pairs]
-        routes = {i: bow(centres[a], centres[b], high) for i, (a, b) in enumerate(pairs)}
+        routes = {i: bow(centres[a], centres[b], high, 0.3) for i, (a, b) in enumerate(pairs)}
         found = improved(Drawn(edges, centres, routes), routes.keys())
         assert bool(found) == turned

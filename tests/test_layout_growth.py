@@ -83,7 +83,7 @@ def test_a_way_round_many_frames_meets_few_of_them(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(walls, "meetings", counted)
     centres = [(4.0 * i, 4.0 * j) for i in range(20) for j in range(20)]
     frames = [(frozenset({k}), (x - 1.5, y - 1.5, x + 1.5, y + 1.5)) for k, (x, y) in enumerate(centres)]
-    detours = Detours(Walls(frames, len(centres)), centres)
+    detours = Detours(Walls(frames, len(centres)), centres, None)
     draw = random.Random(1)
     ways = [tuple(draw.sample(range(400), 2)) for _ in range(200)]
     assert all(detours.route(a, b, True) for a, b in ways)

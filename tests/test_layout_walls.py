@@ -145,7 +145,7 @@ def test_edges_between_the_same_neurons_take_detours_of_their_own() -> None:
 
 def test_where_there_is_no_way_round_there_is_no_detour() -> None:
     shut = Walls([(frozenset({1}), (-2.0, y, 12.0, y + 4.0)) for y in (-5.0, -1.0, 3.0)], 3)
-    assert Detours(shut, [(0.0, 0.0), (5.0, 0.0), (10.0, 0.0)]).route(0, 2, True) is None
+    assert Detours(shut, [(0.0, 0.0), (5.0, 0.0), (10.0, 0.0)], None).route(0, 2, True) is None
 
 
 def test_a_loop_keeps_out_of_the_frame_beside_it() -> None:
@@ -218,8 +218,8 @@ layout: {{engine: layered, mirror: [[left, right], [C1, C2]], direction: left}}
 
 def test_a_disc_is_gone_round_as_a_frame_of_its_size_is() -> None:
     ends = [(0.0, 0.0), (10.0, 0.5)]
-    disc = Detours(Walls((), 3), [*ends, (5.0, 0.2)])
-    frame = Detours(Walls([(frozenset({2}), (4.7, -0.1, 5.3, 0.5))], 3), [*ends, (90.0, 90.0)])
+    disc = Detours(Walls((), 3), [*ends, (5.0, 0.2)], None)
+    frame = Detours(Walls([(frozenset({2}), (4.7, -0.1, 5.3, 0.5))], 3), [*ends, (90.0, 90.0)], None)
     for _ in range(3):  # each in a lane of its own
         found = disc.route(0, 1, False)
         assert found is not None
@@ -231,7 +231,7 @@ def test_a_disc_is_gone_round_as_a_frame_of_its_size_is() -> None:
 def test_a_disc_beside_its_label_is_gone_round_with_it() -> None:
     ends, disc = [(0.0, 0.5), (10.0, 0.5)], (5.0, 0.0)
     label = frozenset({2}), (4.2, 0.4, 5.8, 0.7)
-    found = Detours(Walls([label], 3), [*ends, disc]).route(0, 1, True)
+    found = Detours(Walls([label], 3), [*ends, disc], None).route(0, 1, True)
     assert found is not None
     line = sampled(found, 0.05)
     assert min(distance(point, disc) for point in line) > 0.3
@@ -242,7 +242,9 @@ def test_a_detour_keeps_to_the_way_that_was_found() -> None:
     edges, centres = [LayoutEdge("a", 0, 1, 1)], [(0.0, 0.0), (0.0, 10.0), (3.0, 5.0)]
     walls = Walls([(frozenset({2}), (-2.0, 4.0, 8.0, 6.0))], 3)
     routes, ways = {0: straight(*centres[:2])}, {0: [(8.5, 3.5), (8.5, 6.5)]}
-    with_way, without = (detoured(edges, centres, routes, Obstacles(centres), walls, line)[0] for line in (ways, {}))
+    with_way, without = (
+        detoured(edges, centres, routes, Obstacles(centres), walls, line, (), 300)[0] for line in (ways, {})
+    )
     assert max(x for x, _ in sampled(with_way)) > 8
     assert min(x for x, _ in sampled(without)) < -2
 
@@ -253,7 +255,7 @@ def test_a_detour_goes_the_longer_way_round_where_that_crosses_less() -> None:
     routes = {0: straight(*centres[:2])}
     for count, longer in ((0, False), (1, False), (3, True)):
         drawn = [straight((-20.0, 4.5 + i / 2), (-2.05, 4.5 + i / 2)) for i in range(count)]
-        found = detoured(edges, centres, routes, Obstacles(centres), walls, {}, drawn)[0]
+        found = detoured(edges, centres, routes, Obstacles(centres), walls, {}, drawn, 300)[0]
         assert (max(x for x, _ in sampled(found)) > 8) is longer
 
 
@@ -284,7 +286,7 @@ def test_in_a_crowd_routes_go_round_frames_alone() -> None:
     walls = Walls([(frozenset({5}), (8.0, 4.0, 10.0, 6.0))], 6)
     routes = {0: straight(*centres[:2]), 1: straight(*centres[3:5])}
     for most, gone_round in ((1, [0, 1]), (0, [1])):
-        found = detoured(edges, centres, routes, Obstacles(centres), walls, {}, most=most)
+        found = detoured(edges, centres, routes, Obstacles(centres), walls, {}, (), most)
         assert sorted(found) == gone_round
 
 

@@ -5,7 +5,6 @@ In: two centres, the obstacles, how far the route should bow at least. Out: a ro
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
@@ -20,7 +19,7 @@ MANY_TRIES, FEW_TRIES = 12, 2
 _ENOUGH = REACH - 0.03
 
 
-def bow(start: Point, end: Point, height: float, hold: float = 0.3) -> Route:
+def bow(start: Point, end: Point, height: float, hold: float) -> Route:
     """A curve whose control points stand ``height`` to the left of the way, ``hold`` of it from the ends."""
     if height == 0 or start == end:
         return straight(start, end)
@@ -48,7 +47,7 @@ class BowSought:
 
 
 def clear_bows(
-    wishes: Sequence[BowSought], obstacles: Obstacles, tries: int = MANY_TRIES, highest: float = math.inf
+    wishes: Sequence[BowSought], obstacles: Obstacles, tries: int, highest: float
 ) -> list[tuple[Route, float, float]]:
     """For each wish the flattest bow clear of foreign discs, else the clearest; its clearance and height. ``tries`` is
     how many heights are tried on a side, up to ``highest`` times the way."""

@@ -57,8 +57,8 @@ def detoured(
     obstacles: Obstacles,
     walls: Walls,
     ways: Mapping[int, Sequence[Point]],
-    drawn: Sequence[Route] = (),
-    most: int = 300,
+    drawn: Sequence[Route],
+    most: int,
 ) -> dict[int, Route]:
     """Detours by edge index for the routes that enter foreign frames or run over discs, where there are some: first
     those between the farthest neurons, which so take the inner lanes round what they share with others. What has a way
@@ -125,7 +125,7 @@ class _Taken:
 class Detours:
     """Finds detours, one after the other."""
 
-    def __init__(self, walls: Walls, centres: Sequence[Point], lines: Sequence[Route] | None = None) -> None:
+    def __init__(self, walls: Walls, centres: Sequence[Point], lines: Sequence[Route] | None) -> None:
         """``lines`` are there, to be crossed as little as can be; so are detours then, from the first one on."""
         self._walls = walls
         self._lines = None if lines is None else polylines(lines)

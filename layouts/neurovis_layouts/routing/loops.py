@@ -48,7 +48,7 @@ _APART, _TOGETHER, _SEEN = 0.14, 40.0, 0.36
 _STEP = 0.05
 
 
-def loop(centre: Point, way: Point, handle: float, wide: float = 0.59) -> Route:
+def loop(centre: Point, way: Point, handle: float, wide: float) -> Route:
     """A loop towards ``way`` (a unit vector); the handles are ``handle`` long along it. It begins on its upper (else
     left) side, so that loops of a mirrored pair are mirror images."""
     (x, y), (ux, uy) = centre, way
