@@ -112,6 +112,22 @@ def test_a_name_in_neighbouring_cells_spans_them() -> None:
     assert in_order(at, [["R"], ["left1"], ["left2"]], 1)
 
 
+def test_copies_in_a_column_are_reflected_together() -> None:
+    legs = [f"{side}{i}" for side in "LR" for i in (1, 2, 3)]
+    text = (
+        "neurovis: 1\nname: walker\nmodules:\n  leg:\n    neurons: {A: {bias: 1}, G: {bias: 1}, H: {}, S: {}, T: {}, "
+        "P: {}, Q: {}, R: {}}\n    connections: {A -> H: 1, G -> S + T: 1, H -> S + T: 1, S -> S + T + P + Q: 1, "
+        "T -> S + T + R: 1}\ninstances: {"
+        + ", ".join(f"{leg}: {{module: leg}}" for leg in legs)
+        + "}\nconnections:\n"
+        + "".join(f"  {s}{i + 1}.S -> {s}{i}.H: 1\n  {s}{i}.T -> {s}{i + 1}.H: 1\n" for s in "LR" for i in (1, 2))
+        + "".join(f"  L{i}.T -> R{i}.H: 1\n  R{i}.T -> L{i}.H: 1\n" for i in (1, 2, 3))
+        + "layout: {mirror: [[L1, R1], [L2, R2], [L3, R3]], plan: [[L1, R1], [L2, R2], [L3, R3]]}\n"
+    )
+    at = nv.compile_text(text).layout().positions
+    assert len({at[f"L{i}.A"][0] < at[f"L{i}.P"][0] for i in (1, 2, 3)}) == 1
+
+
 def test_pins_are_kept_and_take_their_copies_place() -> None:
     text = BODY.replace("PLAN", ROWS).replace("DIRECTION", "down") + "  positions: {R1: [3, 20]}\n"
     at = nv.compile_text(text).layout().positions

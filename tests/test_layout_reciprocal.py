@@ -20,7 +20,7 @@ from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.geometry import distance, sampled, straight
 from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.model import Point, Route
-from neurovis_spec.layout.problem import canonical
+from neurovis_spec.layout.problem import canonical, problem_of
 
 HEAD = "neurovis: 1\nname: pair\nneurons: {L: {count: 2, bias: 1}, R: {count: 2}, M: {}}\n"
 DIRECTIONS: tuple[Direction, ...] = ("down", "up", "right", "left")
@@ -43,6 +43,24 @@ def pairs(routes: Iterable[str]) -> list[tuple[str, str]]:
         return frozenset(name.split(" (")[0].split(" -> "))
 
     return [(a, b) for a, b in combinations(sorted(routes), 2) if ends(a) == ends(b) and len(ends(a)) == 2]
+
+
+@pytest.mark.parametrize(("direction", "across"), [("down", 0), ("right", 1)])
+def test_two_chains_that_inhibit_each_other_stand_side_by_side(direction: str, across: int) -> None:
+    compiled = nv.compile_text(
+        "neurovis: 1\nname: swimmer\nneurons: {L: {count: 5, bias: 1}, R: {count: 5}}\nconnections:\n"
+        "  L -> R: {weight: -1, pattern: one_to_one}\n  R -> L: {weight: -1, pattern: one_to_one}\n"
+        + "".join(f"  {s}{a} -> {s}{b}: 1\n" for s in "LR" for i in range(1, 5) for a, b in ((i, i + 1), (i + 1, i)))
+        + f"layout: {{direction: {direction}, mirror: [[L, R]]}}\n"
+    )
+    problem = problem_of(compiled.network)
+    layout = lay_out_problem(problem, "layered")
+    for i in range(1, 6):
+        left, right = layout.positions[f"L{i}"], layout.positions[f"R{i}"]
+        assert left[1 - across] == right[1 - across]
+        assert left[across] == layout.positions["L1"][across]
+        assert left[across] < right[across]
+    assert metrics(layout, problem)["crossings"] == 0
 
 
 def test_a_half_centre_has_an_arc_above_and_one_below() -> None:

@@ -176,22 +176,25 @@ def facing(
             if k in own or part.image_of in own:
                 turns[k] = direction
 
-    def flip(k: int) -> None:
-        for other, part in enumerate(parts):
-            if other == k or part.image_of == k:
-                flips[other] = not flips[other]
+    def flip(own: Sequence[int]) -> None:
+        for k, part in enumerate(parts):
+            if k in own or part.image_of in own:
+                flips[k] = not flips[k]
+
+    column = {k: slot.across for slot in slots for line in slot.lines for k in line}
 
     def flipped(own: Sequence[int]) -> float:
-        """Draw each of these parts as its mirror image where that costs less; what all costs then."""
+        """Draw these parts as their mirror images, all of one column, where that costs less; what all costs then."""
         now = cost()
-        for k in own:
-            if drawn(parts[k], turns[k]).drawing.fixed or symmetric(parts[k].members, pair):
-                continue
-            flip(k)
+        if drawn(parts[own[0]], turns[own[0]]).drawing.fixed or symmetric(parts[own[0]].members, pair):
+            return now
+        for across in dict.fromkeys(column[k] for k in own):
+            mates = [k for k in own if column[k] == across]
+            flip(mates)
             if (then := cost()) < now - 1e-9:
                 now = then
             else:
-                flip(k)
+                flip(mates)
         return now
 
     best = cost()

@@ -3,7 +3,8 @@
 In: a LayoutProblem. Out: units in canonical order, each neuron in exactly one. A group shares a rank, unless
 connections within it run forward (a chain), or only some of its neurons are on a line with others: then each of its
 neurons finds its own, as if it were in no group. Neurons that drive each other in
-a loop (a half-centre oscillator, a ring, a reservoir) are one block: a row where they are a line, else a ring.
+a loop (a half-centre oscillator, a ring, a reservoir) are one block: a row or a column where they are a line, else a
+ring.
 """
 
 from __future__ import annotations
@@ -139,7 +140,8 @@ def _returns(graph: nx.DiGraph[int], members: Sequence[int]) -> bool:
 
 
 def _block(problem: LayoutProblem, members: Sequence[int]) -> Unit:
-    """A row where the connections are a line of neighbours, else a ring; along a line or circle in its own order."""
+    """A row where the connections are a line of neighbours, a column beside that of its mirror image where the two are
+    connected neuron by neuron, else a ring; along a line or circle in its own order."""
     spacing = max(problem.neuron_spacing, 0.65)
     graph = _graph(problem, members).to_undirected()
     degrees = [degree for _, degree in graph.degree()]
@@ -150,10 +152,20 @@ def _block(problem: LayoutProblem, members: Sequence[int]) -> Unit:
         order = list(nx.dfs_preorder_nodes(graph, min(ends) if ends else min(members), sort_neighbors=sorted))
         if ends:
             how, wide = "row", _PAIR if len(members) == 2 else _LINE
+            if len(members) > 2 and _beside_its_image(problem, members):
+                how = "column"
     if how == "ring" and len(order) in (4, 6):
         # with a side on top, not a corner: connections from above and to below find their way between
         return Unit(tuple(order), tuple(_on_its_side(offsets("ring", len(order), spacing * wide))))
     return Unit(tuple(order), tuple(offsets(how, len(order), spacing * wide)))
+
+
+def _beside_its_image(problem: LayoutProblem, members: Sequence[int]) -> bool:
+    """Whether most of these neurons are connected with their mirror images, which are others."""
+    image = {a: b for mirror in problem.mirrors for pair in mirror.pairs for a, b in (pair, pair[::-1])}
+    ends = {(edge.source, edge.target) for edge in problem.edges}
+    across = [m for m in members if m in image and not {(m, image[m]), (image[m], m)}.isdisjoint(ends)]
+    return 2 * len(across) > len(members) and not {image[m] for m in across} & set(members)
 
 
 def _on_its_side(places: Sequence[Point]) -> list[Point]:
