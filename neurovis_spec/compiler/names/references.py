@@ -217,6 +217,9 @@ def resolve_part(part: Part, text: Located[str], directory: Directory, findings:
         if isinstance(found, str):
             whole = f"{part.low.text}..{part.low.text.rstrip('0123456789')}{part.high.text}"
             hint = f"write {shorten(whole, 200)}" if part.high.text.isdecimal() else None
+            other, _, own = part.high.text.partition(".")
+            if own and directory.instance(part.low.text) and directory.instance(other):
+                hint = f"name each instance, as in {part.low.text}.{own} + {part.high.text}"
             findings.error("bad-range", span, f"'{shorten(part.text)}' is no range: {found}", hint)
         return UNKNOWN if isinstance(found, str) else found
     result = directory.find(part.text)
