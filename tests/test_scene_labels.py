@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+import pytest
+
 import neurovis_spec as nv
 from neurovis_spec import pipeline
-from neurovis_spec.scene import Disc, Text
+from neurovis_spec.scene import Disc, Text, beside
 from neurovis_spec.scene.texts import width
 
 LONG = "a very long label that goes on for forty"
@@ -89,6 +92,18 @@ def test_a_label_beside_a_disc_keeps_off_the_line_of_a_box_where_it_can() -> Non
     assert found["shoulder"].text == "shoulder"
     assert not found["shoulder"].on_disc
     assert not found["shoulder"].halo
+
+
+@pytest.mark.parametrize(("border", "right"), [([], True), ([[1.0, 0.0]], False)])
+def test_a_label_lies_on_lines_rather_than_on_the_border_of_a_frame(border: list[list[float]], right: bool) -> None:
+    around = [(x, y) for x, y in np.stack(np.meshgrid(*2 * [np.arange(-2, 2, 0.1)]), -1).reshape(-1, 2).tolist()]
+    lines = np.array([(x, y) for x, y in around if x < 0.4 or abs(y) > 0.3])  # to the right there is none
+    field = beside.Field(
+        np.zeros((1, 2)), np.full(1, 0.35), lines, np.array(border).reshape(-1, 2), (-3, -3, 3, 3), 50.0, False,
+        np.zeros((0, 4)),
+    )  # fmt: skip
+    found = beside.placed([beside.Wanted((0,), (4.0,))], field, lambda _: 10.0, 66.0)
+    assert (found[0] == beside.Slot(1, 0)) is right
 
 
 NAMED = """neurovis: 1

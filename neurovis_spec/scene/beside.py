@@ -73,12 +73,14 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """Discs, sample points of lines and the extent, in layout units; how far labels are to reach beyond it, to either
-    side, in page units; whether signals run across; what is ``taken`` (k, 4), in layout units."""
+    """Discs, sample points of lines and of the ``borders`` of frames, and the extent, in layout units; how far labels
+    are to reach beyond it, to either side, in page units; whether signals run across; what is ``taken`` (k, 4), in
+    layout units."""
 
     places: FloatArray
     radii: FloatArray
     dots: FloatArray
+    borders: FloatArray
     extent: Rect
     reach: float
     level: bool
@@ -133,8 +135,10 @@ class _Ground:
         self._order = np.argsort(field.places[:, 0], kind="stable")
         self._places, self._radii = field.places[self._order], field.radii[self._order]
         self._largest = float(field.radii.max(initial=0.0))
-        self._dots = field.dots[np.argsort(field.dots[:, 0], kind="stable")]
-        self._xs, self._dots_xs = self._places[:, 0].copy(), self._dots[:, 0].copy()
+        self._dots, self._borders = (
+            dots[np.argsort(dots[:, 0], kind="stable")] for dots in (field.dots, field.borders)
+        )
+        self._xs = self._places[:, 0].copy()
         self._where, self._each = field.places.tolist(), field.radii.tolist()
         self._scale = 1.0
         self._size_of: Callable[[float], float] = float
@@ -171,18 +175,22 @@ class _Ground:
         return x + x0, y + y0, x + x1, y + y1
 
     def _best(self, one: Wanted) -> tuple[Slot, ...] | None:
-        """The free sides that lie on the fewest lines, of these that for which the layout kept room, or the best; None
-        where none are free."""
-        best: tuple[int, tuple[Slot, ...]] | None = None
+        """The free sides on which labels cross the fewest borders of frames, of these those on the fewest lines, of
+        these that for which the layout kept room, or the best; None where none are free."""
+        best: tuple[tuple[int, int], tuple[Slot, ...]] | None = None
         usual = _LEVEL if self._field.level else _SIDES
         mirrored = ((slot, slot.mirrored(self._field.level)) for slot in usual)
         for sides in (*((one.kept,) if one.kept else ()), *mirrored):
             if not self._may(one, sides):
                 continue
-            lines = sum(self._lines(claim) for claim in self._all(one, sides))
-            if best is None or lines < best[0]:
-                best = lines, sides
-            if lines == 0:
+            claims = self._all(one, sides)
+            cost = (
+                sum(self._on(self._borders, one) > 0 for one in claims),
+                sum(self._on(self._dots, one) for one in claims),
+            )
+            if best is None or cost < best[0]:
+                best = cost, sides
+            if cost == (0, 0):
                 break
         return None if best is None else best[1]
 
@@ -210,11 +218,12 @@ class _Ground:
         hit = (away < self._radii[near] - 1e-9) & (self._order[near] != index)
         return not hit.any()
 
-    def _lines(self, claim: Rect) -> int:
+    def _on(self, dots: FloatArray, claim: Rect) -> int:
+        """How many of these points (n, 2), which are sorted, a label touches."""
         air = _LINE / self._scale
         x0, y0, x1, y1 = claim[0] - air, claim[1] - air, claim[2] + air, claim[3] + air
-        first, last = np.searchsorted(self._dots_xs, (x0, x1))
-        heights = self._dots[int(first) : int(last), 1]
+        first, last = np.searchsorted(dots[:, 0], (x0, x1))
+        heights = dots[int(first) : int(last), 1]
         return int(np.count_nonzero((heights > y0) & (heights < y1)))
 
 

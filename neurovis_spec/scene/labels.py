@@ -78,14 +78,16 @@ class Label:
 @dataclass(frozen=True, slots=True)
 class Ground:
     """What labels stand on: discs, in layout units (``places``, ``radii``) and where ``scale`` and ``shift`` put them
-    in the picture; sample points of the lines, in layout units; the extent of it all; and how far labels are to reach
-    beyond it, to either side, in page units; what other texts have ``taken`` of the picture (k, 4)."""
+    in the picture; sample points of the lines, and of the ``borders`` of frames, in layout units; the extent of it all;
+    and how far labels are to reach beyond it, to either side, in page units; what other texts have ``taken`` of the
+    picture (k, 4)."""
 
     places: FloatArray
     radii: FloatArray
     scale: float
     shift: Point
     dots: FloatArray
+    borders: FloatArray
     extent: Rect
     reach: float
     taken: FloatArray
@@ -203,8 +205,8 @@ def _beside(
             both = (index, partner)
             widths = tuple(texts.width(said[one], 1.0, WEIGHT) for one in both)
             wanted.append(Wanted(both, widths, max(until[index], until[partner]), kept(*both)))
-    taken = (ground.taken - np.tile(ground.shift, 2)) / ground.scale
-    field = Field(ground.places, ground.radii, ground.dots, ground.extent, ground.reach, _level(network), taken)
+    level, taken = _level(network), (ground.taken - np.tile(ground.shift, 2)) / ground.scale
+    field = Field(ground.places, ground.radii, ground.dots, ground.borders, ground.extent, ground.reach, level, taken)
     found = placed(wanted, field, size_beside, ground.scale)
     result: dict[int, Label] = {}
     for index, slot in found.items():

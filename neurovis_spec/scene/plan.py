@@ -156,8 +156,8 @@ def plan(
     titles = in_one_place(titled, obstacles, theme, [_mapped(rect, frame) for rect in rooms.values()])
     labels: list[Label | None] = [None] * len(spots)
     if settings.labels:
-        inner = [outline(box.rect, 4 / UNIT) if box.sector is None else box.sector.border(4 / UNIT) for box in boxes]
-        inner += [(points - (frame.left, frame.top)) / frame.scale for points in _dots(guides)]
+        borders = [outline(box.rect, 4 / UNIT) if box.sector is None else box.sector.border(4 / UNIT) for box in boxes]
+        inner = [(points - (frame.left, frame.top)) / frame.scale for points in _dots(guides)]
         inner += samples([routes[i] for i in kept], 24)
         reach = margin_beside(network, RADIUS * frame.scale, wanted.rooms) if margin > MARGIN else 0.0
         ground = Ground(
@@ -166,6 +166,7 @@ def plan(
             frame.scale,
             (frame.left, frame.top),
             np.concatenate([np.zeros((0, 2)), *inner]),
+            np.concatenate([np.zeros((0, 2)), *borders]),
             extent,
             reach,
             obstacles.texts(),
