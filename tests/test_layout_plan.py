@@ -180,9 +180,10 @@ ENDS = ["left1.A", "left2.D", "right1.A", "right2.D", "R1", "R2", "T1", "T2", "Z
 PAIRED = [("T1", "left1.A"), ("T2", "right1.A")]
 
 
-@pytest.mark.parametrize("plan", [ROWS, "[[left, ~, right]]", "[[left1, T1, V, T2, right1]]"])
+@pytest.mark.parametrize("plan", [ROWS, "[[left, ~, right]]", "[[left1, T1, V, T2, right1]]", "[[T1, V, T2]]"])
 @given(pairs=st.lists(st.tuples(st.sampled_from(ENDS), st.sampled_from(ENDS)), max_size=8, unique=True))
-@settings(deadline=None, max_examples=6)
+@settings(deadline=None, max_examples=5)
+@example(pairs=[("T1", "right2.A")])  # images that change sides
 @example(pairs=[*PAIRED, ("V1", "right1.A"), ("Z", "right2.D")])
 @example(pairs=[("T1", "T2"), ("T2", "V1"), ("V1", "Z"), ("V1", "left1.A"), ("V1", "right1.A")])
 def test_what_has_no_mirror_image_keeps_off_what_has_one(plan: str, pairs: list[tuple[str, str]]) -> None:

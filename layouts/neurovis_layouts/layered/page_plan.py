@@ -273,7 +273,8 @@ def _slots(problem: LayoutProblem, parts: Sequence[Part], where: Mapping[int, in
     named = {cell.members for cell in problem.plan}
     slots: list[Slot] = []
     for i, own in sorted(held.items()):
-        own.sort(key=lambda k: (parts[k].members not in named, k))  # what no cell names is behind what one does
+        # what no cell names is behind what one does, and mirrored cells hold theirs in one order
+        own.sort(key=lambda k: (parts[k].members not in named, k if parts[k].image_of < 0 else parts[k].image_of))
         slots.append(Slot(*spans[i], tuple(_lines(parts, own))))
     return slots
 
