@@ -139,7 +139,7 @@ def _in_gaps(problem: LayoutProblem, parts: Sequence[ComponentLayout]) -> list[C
     """The parts, each that has room in a gap of a larger one as part of that."""
     largest = sorted(range(len(parts)), key=lambda part: (-len(parts[part].places), part))
     drawn: dict[int, FloatArray] = {}
-    for part in largest if len(parts) <= _MOST_PARTS else ():
+    for part in largest if 1 < len(parts) <= _MOST_PARTS else ():
         low, high = parts[part].extent()
         for host, pieces in drawn.items():
             corner = gap_in(pieces, (high[0] - low[0], high[1] - low[1]), _APART)
