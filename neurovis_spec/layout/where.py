@@ -47,6 +47,9 @@ _PARTS: Final[Mapping[str, Sequence[str]]] = {
 #: These speak of all of a part, not of neurons.
 _WHOLE: Final = "-unsupported"
 _APART: Final = "move one of them, where a pin or the layout file says where it is, or let it go"
+_TOGETHER: Final = (
+    "let a box hold what stands together: whole instances, both sides of a mirror, one cell of a plan; or leave it out"
+)
 _NUMBER: Final = re.compile(r"(?P<stem>.*\D)(?P<number>\d+)", re.ASCII)
 
 
@@ -97,7 +100,10 @@ def note_clashes(found: Iterable[Clash], spec: Spec, request: Request, network: 
     sections = _Sections(spec, request, network)
     for clash in found:
         span = _place("frames-overlap", clash.about, spec, sections, None)
-        findings.warning("frames-overlap", span or Span(*spec.name.span), clash.message, _APART)
+        pinned = any(True for section in sections.all() for _ in _entries(section, "positions"))
+        remembered = spec.layout is not None and spec.layout.file is not None
+        help_ = _APART if pinned or remembered else _TOGETHER
+        findings.warning("frames-overlap", span or Span(*spec.name.span), clash.message, help_)
 
 
 def _place(code: str, about: Sequence[str], spec: Spec, sections: _Sections, chosen: str | None) -> Span | None:
