@@ -270,16 +270,6 @@ def test_nobody_counts_what_detours_cross_once_many_corners_were_looked_at(monke
         assert (max(x for x, _ in sampled(found)) > 8) is longer
 
 
-def test_of_two_ways_round_a_frame_the_shorter_takes_the_inner_lane() -> None:
-    edges = [LayoutEdge("far", 0, 2, 1), LayoutEdge("near", 0, 1, 1)]
-    centres = [(1.0, 0.0), (1.0, 8.0), (1.0, 14.0), (0.0, 4.0), (0.0, 6.5)]
-    walls = Walls([(frozenset({3}), (-2.0, 3.0, 3.0, 5.0))], len(centres))
-    routes = {i: straight(centres[edge.source], centres[edge.target]) for i, edge in enumerate(edges)}
-    found = detoured(edges, centres, routes, Obstacles(centres), walls, {}, [], 300)
-    far, near = (max(x for x, _ in sampled(found[i])) for i in (0, 1))
-    assert 3 < near < far
-
-
 def test_a_detour_does_not_turn_back_between_two_corners() -> None:
     centres = [(11.24, 7.2), (2.56, 18.1), (2.5, 14.0), (4.76, 10.9), (4.15, 16.9)]
     sides = (3.8, 12.0), (-9.0, 1.3)  # lines on either side, that stop short of the frame

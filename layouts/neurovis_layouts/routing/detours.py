@@ -61,7 +61,7 @@ def detoured(
     most: int,
 ) -> dict[int, Route]:
     """Detours by edge index for the routes that enter foreign frames or run over discs, where there are some: first
-    those between the nearest neurons, which so take the inner lanes round what they share with others. What has a way
+    those between the farthest neurons, which so take the inner lanes round what they share with others. What has a way
     already, from point to point, goes round what is in the way between two of these alone, if none is in a
     frame. Others cross few lines, of the routes that can stay and of those that are ``drawn``.
     Where more than ``most`` run over discs, detours would only move the crowd: these stay."""
@@ -71,7 +71,7 @@ def detoured(
     clear = obstacles.clearances([routes[i] for i in chosen], own)
     crowd = sum(near < TOUCH + _BARELY and not enters for near, enters in zip(clear, entered, strict=True)) > most
     wrong = [
-        (distance(*(centres[end] for end in ends)), i, enters, clearance)
+        (-distance(*(centres[end] for end in ends)), i, enters, clearance)
         for i, ends, enters, clearance in zip(chosen, own, entered, clear, strict=True)
         if enters or (clearance < TOUCH + _BARELY and not crowd)
     ]
