@@ -98,12 +98,12 @@ def where(
 def note_clashes(found: Iterable[Clash], spec: Spec, request: Request, network: Network, findings: Findings) -> None:
     """Note warnings (``frames-overlap``) where the spec makes frames lie on each other."""
     sections = _Sections(spec, request, network)
+    pinned = any(True for section in sections.all() for _ in _entries(section, "positions"))
+    remembered = spec.layout is not None and spec.layout.file is not None
+    hint = _APART if pinned or remembered else _TOGETHER
     for clash in found:
         span = _place("frames-overlap", clash.about, spec, sections, None)
-        pinned = any(True for section in sections.all() for _ in _entries(section, "positions"))
-        remembered = spec.layout is not None and spec.layout.file is not None
-        help_ = _APART if pinned or remembered else _TOGETHER
-        findings.warning("frames-overlap", span or Span(*spec.name.span), clash.message, help_)
+        findings.warning("frames-overlap", span or Span(*spec.name.span), clash.message, hint)
 
 
 def _place(code: str, about: Sequence[str], spec: Spec, sections: _Sections, chosen: str | None) -> Span | None:

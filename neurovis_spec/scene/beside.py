@@ -135,8 +135,9 @@ class _Ground:
         self._order = np.argsort(field.places[:, 0], kind="stable")
         self._places, self._radii = field.places[self._order], field.radii[self._order]
         self._largest = float(field.radii.max(initial=0.0))
+        #: (2, n) across and down, from left to right
         self._dots, self._borders = (
-            dots[np.argsort(dots[:, 0], kind="stable")] for dots in (field.dots, field.borders)
+            np.ascontiguousarray(dots[np.argsort(dots[:, 0], kind="stable")].T) for dots in (field.dots, field.borders)
         )
         self._xs = self._places[:, 0].copy()
         self._where, self._each = field.places.tolist(), field.radii.tolist()
@@ -185,8 +186,8 @@ class _Ground:
                 continue
             claims = self._all(one, sides)
             cost = (
-                sum(self._on(self._borders, one) > 0 for one in claims),
-                sum(self._on(self._dots, one) for one in claims),
+                sum(self._on(self._borders, claim) > 0 for claim in claims),
+                sum(self._on(self._dots, claim) for claim in claims),
             )
             if best is None or cost < best[0]:
                 best = cost, sides
@@ -219,11 +220,11 @@ class _Ground:
         return not hit.any()
 
     def _on(self, dots: FloatArray, claim: Rect) -> int:
-        """How many of these points (n, 2), which are sorted, a label touches."""
+        """How many of these points (2, n), which are sorted, a label touches."""
         air = _LINE / self._scale
         x0, y0, x1, y1 = claim[0] - air, claim[1] - air, claim[2] + air, claim[3] + air
-        first, last = np.searchsorted(dots[:, 0], (x0, x1))
-        heights = dots[int(first) : int(last), 1]
+        first, last = np.searchsorted(dots[0], (x0, x1))
+        heights = dots[1, int(first) : int(last)]
         return int(np.count_nonzero((heights > y0) & (heights < y1)))
 
 

@@ -34,13 +34,15 @@ from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.packing import gap_in, packed
 from neurovis_layouts.routing import Waypoint
 from neurovis_spec.layout import FloatArray
-from neurovis_spec.layout.geometry import distance, snap
-from neurovis_spec.layout.model import LayoutProblem, Point, Side
+from neurovis_spec.layout.geometry import Rect, angular, pieces_of, points_on, shifted, snap
+from neurovis_spec.layout.model import LayoutProblem, Point, Route, Side
 
 #: Between components that nothing connects.
 _APART = 1.5
 #: Among more components than this nobody looks for gaps.
 _MOST_PARTS = 50
+#: How far apart points on connections are that gaps keep off, about.
+_STEP = 0.5
 #: That a row stands behind another outweighs any connection.
 _ROW = 1000 * INSTANT
 
@@ -61,12 +63,13 @@ class ComponentLayout:
     cuts: int = 0
     #: the corners of edges from band to band, which have no waypoints
     cut: dict[int, Sequence[Point]] = field(default_factory=dict)
-    #: how far the frames and the passages reach
-    corners: list[Point] = field(default_factory=list)
+    #: the frames, and what labels cover
+    rects: list[Rect] = field(default_factory=list)
 
     def extent(self) -> tuple[Point, Point]:
         """The low and the high corner of all."""
-        points = [*self.places.values(), *self.corners]
+        points = [*self.places.values(), *(point for line in self.cut.values() for point in line)]
+        points += [(x, y) for x0, y0, x1, y1 in self.rects for x, y in ((x0, y0), (x1, y1))]
         xs = [x for x, _ in points] + [way.x for ways in self.ways.values() for way in ways]
         ys = [y for _, y in points]
         return (min(xs), min(ys)), (max(xs), max(ys))
@@ -75,7 +78,7 @@ class ComponentLayout:
         """Put another beside it."""
         dx, dy = shift
         self.places.update({i: (x + dx, y + dy) for i, (x, y) in other.places.items()})
-        self.corners += [(x + dx, y + dy) for x, y in other.corners]
+        self.rects += [shifted(rect, shift) for rect in other.rects]
         self.reflected |= other.reflected
         self.sides.update(other.sides)
         self.firm |= other.firm
@@ -137,9 +140,10 @@ def planned(
 
 def _in_gaps(problem: LayoutProblem, parts: Sequence[ComponentLayout]) -> list[ComponentLayout]:
     """The parts, each that has room in a gap of a larger one as part of that."""
-    largest = sorted(range(len(parts)), key=lambda part: (-len(parts[part].places), part))
+    if not 1 < len(parts) <= _MOST_PARTS:
+        return list(parts)
     drawn: dict[int, FloatArray] = {}
-    for part in largest if 1 < len(parts) <= _MOST_PARTS else ():
+    for part in sorted(range(len(parts)), key=lambda part: (-len(parts[part].places), part)):
         low, high = parts[part].extent()
         for host, pieces in drawn.items():
             corner = gap_in(pieces, (high[0] - low[0], high[1] - low[1]), _APART)
@@ -150,24 +154,23 @@ def _in_gaps(problem: LayoutProblem, parts: Sequence[ComponentLayout]) -> list[C
                 break
         else:
             drawn[part] = _pieces(problem, parts[part])
-    return [plan for part, plan in enumerate(parts) if part in drawn or not drawn]
+    return [parts[part] for part in sorted(drawn)]
 
 
 def _pieces(problem: LayoutProblem, plan: ComponentLayout) -> FloatArray:
-    """(n, 4) what is drawn: neurons, frames and labels, and about where connections will run."""
-    found = [(*point, *point) for point in plan.places.values()]
-    if plan.cut:  # bands, with lines between them
+    """(n, 4) what is drawn: neurons, frames and labels, and about where connections will run; of what stands in bands
+    all at once."""
+    if plan.cut:
         (x0, y0), (x1, y1) = plan.extent()
         return np.array([(x0, y0, x1, y1)])
-    found += [(*low, *high) for low, high in zip(plan.corners[::2], plan.corners[1::2], strict=True)]
+    lines: list[Route] = []
     for i, edge in enumerate(problem.edges):
         if edge.source in plan.places and edge.target in plan.places:
             ends = sorted((plan.places[edge.source], plan.places[edge.target]), key=lambda place: place[1])
-            line = [ends[0], *((way.x, way.y) for way in plan.ways.get(i, ())), ends[1]]
-            for one, other in pairwise(line):
-                steps = np.linspace(one, other, 2 + int(2 * distance(one, other)))
-                found += [(x, y, x, y) for x, y in steps.tolist()]
-    return np.array(found)
+            lines.append(angular([ends[0], *((way.x, way.y) for way in plan.ways.get(i, ())), ends[1]]))
+    places = np.array(list(plan.places.values()))
+    points = np.concatenate([places, points_on(*pieces_of(lines), _STEP)[0]])
+    return np.concatenate([np.tile(points, 2), np.array(plan.rects).reshape(-1, 4)])
 
 
 def _hosts(
@@ -238,7 +241,7 @@ def _component(
         for member, dx, dy in node.members:
             plan.places[member] = (x + dx, y + dy)
         if node.framed:
-            plan.corners += [(x - node.reach[0], y - node.reach[1]), (x + node.reach[0], y + node.reach[1])]
+            plan.rects.append((x - node.reach[0], y - node.reach[1], x + node.reach[0], y + node.reach[1]))
     spans = list(zip(*reaches(levels, order), strict=True))
     for i, passages in levels.passages.items():
         plan.ways[i] = [_passage(places[n], *spans[levels.nodes[n].rank]) for n in passages]
@@ -250,8 +253,7 @@ def _component(
         if wanted.bands > 1:
             _in_bands(problem, plan, levels, found)
     sides = {**dict(enumerate(sides_of(problem))), **plan.sides}
-    for rect in covered(problem, plan.places, sides, sorted(plan.places)).values():
-        plan.corners += [(rect[0], rect[1]), (rect[2], rect[3])]
+    plan.rects += covered(problem, plan.places, sides, sorted(plan.places)).values()
     return plan
 
 
@@ -265,10 +267,9 @@ def _in_bands(problem: LayoutProblem, plan: ComponentLayout, levels: Levels, ban
     """Move what stands in each band there."""
     shift = [bands.shifts[bands.band[node.rank]] for node in levels.nodes]
     own = {m: shift[n] for n, node in enumerate(levels.nodes) for m, _, _ in node.members}
-    framed = [n for n, node in enumerate(levels.nodes) if node.framed for _ in range(2)]
+    framed = [n for n, node in enumerate(levels.nodes) if node.framed]
     plan.places.update({m: (x + own[m][0], y + own[m][1]) for m, (x, y) in plan.places.items()})
-    plan.corners = [(x + shift[n][0], y + shift[n][1]) for n, (x, y) in zip(framed, plan.corners, strict=True)]
-    plan.corners += [point for line in bands.ways.values() for point in line]
+    plan.rects = [shifted(rect, shift[n]) for n, rect in zip(framed, plan.rects, strict=True)]
     rank = {m: node.rank for node in levels.nodes for m, _, _ in node.members}
     for i, line in bands.ways.items():
         plan.cut[i] = line if rank[problem.edges[i].source] < rank[problem.edges[i].target] else line[::-1]

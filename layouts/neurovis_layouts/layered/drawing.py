@@ -38,15 +38,15 @@ class Drawing:
     #: how wide the title of its frame is
     title: float = 0.0
 
-    def layout(self, problem: LayoutProblem, engine: str, direction: Direction = "down") -> Layout:
-        """It as the layout of a problem, turned from the frame of an engine that draws in a direction."""
+    def layout(self, problem: LayoutProblem, engine: str) -> Layout:
+        """It as the layout of a problem, turned from the frame of an engine that draws in its direction."""
         names, keys = problem.neurons, keys_of(problem.edges)
         return Layout(
             problem.network,
             engine,
-            {name: to_picture(place, direction) for name, place in zip(names, self.places, strict=True)},
+            {name: to_picture(place, self.direction) for name, place in zip(names, self.places, strict=True)},
             {
-                edge.name: tuple(to_picture(point, direction) for point in self.routes[key])
+                edge.name: tuple(to_picture(point, self.direction) for point in self.routes[key])
                 for edge, key in zip(problem.edges, keys, strict=True)
             },
             {name: side for name, side in zip(names, self.sides, strict=True) if side is not None},

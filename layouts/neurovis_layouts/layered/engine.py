@@ -20,7 +20,7 @@ def drawn(problem: LayoutProblem, engine: str) -> Layout:
     """The layout of a problem as if there were no earlier one. Raises LayoutRefusalError for what cannot be met."""
     if not problem.neurons:
         return Layout(problem.network, engine, {}, {})
-    return Composer(_framed(problem)).whole().layout(problem, engine, problem.direction)
+    return Composer(_framed(problem)).whole().layout(problem, engine)
 
 
 def checked(problem: LayoutProblem) -> None:

@@ -73,7 +73,8 @@ def _seats(problem: LayoutProblem, pair: Mapping[int, int]) -> dict[_Members, in
         near[owner[edge.source]][owner[edge.target]] += 1
         near[owner[edge.target]][owner[edge.source]] += 1
     below = len(seat)
-    cells = {members: _cells(problem, members, pair) for members in loose}
+    mirrored = [_mirrored(problem, cell) for cell in range(below)]
+    cells = {members: _cells(mirrored, members, pair) for members in loose}
     pulls = {members: _pull(near[members], seat, cells[members]) for members in loose}
     while pulls:
         members = max(pulls, key=lambda one: (pulls[one][0], [-m for m in one]))
@@ -82,7 +83,7 @@ def _seats(problem: LayoutProblem, pair: Mapping[int, int]) -> dict[_Members, in
         seat[members] = to if many else below
         seated = [members]
         if image in pulls:
-            seat[image] = _mirrored(problem, to) if many else below
+            seat[image] = mirrored[to] if many else below
             pulls.pop(image)
             seated.append(image)
         for other in {other for one in seated for other in near[one] if other in pulls}:
@@ -90,15 +91,14 @@ def _seats(problem: LayoutProblem, pair: Mapping[int, int]) -> dict[_Members, in
     return _together(problem, seat)
 
 
-def _cells(problem: LayoutProblem, members: _Members, pair: Mapping[int, int]) -> frozenset[int]:
+def _cells(mirrored: Sequence[int], members: _Members, pair: Mapping[int, int]) -> frozenset[int]:
     """The cells in which something may stand that none names: what has a mirror image in those that have one, and where
-    others have one what has none, or is its own, on the axis."""
-    image = {i: _mirrored(problem, i) for i in range(len(problem.plan))}
+    others have one what has none, or is its own, on the axis. ``mirrored`` are the images of cells."""
     if not pair:
-        return frozenset(image)
+        return frozenset(range(len(mirrored)))
     if members[0] in pair and not symmetric(members, pair):
-        return frozenset(i for i, other in image.items() if other >= 0)
-    return frozenset(i for i, other in image.items() if other == i)
+        return frozenset(cell for cell, image in enumerate(mirrored) if image >= 0)
+    return frozenset(cell for cell, image in enumerate(mirrored) if image == cell)
 
 
 def _pull(near: Counter[_Members], seat: Mapping[_Members, int], cells: AbstractSet[int]) -> tuple[int, int]:

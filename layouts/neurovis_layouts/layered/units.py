@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import networkx as nx
 
+from neurovis_layouts.alike import mirror_images
 from neurovis_layouts.formations import offsets
 from neurovis_layouts.frame import from_picture
 from neurovis_spec.layout.geometry import snap, turn
@@ -162,9 +163,9 @@ def _block(problem: LayoutProblem, members: Sequence[int]) -> Unit:
 
 def _beside_its_image(problem: LayoutProblem, members: Sequence[int]) -> bool:
     """Whether most of these neurons are connected with their mirror images, which are others."""
-    image = {a: b for mirror in problem.mirrors for pair in mirror.pairs for a, b in (pair, pair[::-1])}
-    ends = {(edge.source, edge.target) for edge in problem.edges}
-    across = [m for m in members if m in image and not {(m, image[m]), (image[m], m)}.isdisjoint(ends)]
+    image = mirror_images(problem)
+    graph = _graph(problem, {*members, *(image[m] for m in members if m in image)}).to_undirected()
+    across = [m for m in members if m in image and graph.has_edge(m, image[m])]
     return 2 * len(across) > len(members) and not {image[m] for m in across} & set(members)
 
 

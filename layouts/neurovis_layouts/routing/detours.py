@@ -211,14 +211,21 @@ class Detours:
         k = 1
         while k < len(path) - 1 and len(path) > 3 - alone:
             before, here, behind = np.array(path[k - 1 : k + 2], dtype=np.float64)
-            a, b = np.stack([before, here, before]), np.stack([here, behind, behind])
-            which = crossings(a, b, self._lines.a, self._lines.b)[0] if self._lines is not None else np.zeros(0)
-            more = np.count_nonzero(which == 2) > np.count_nonzero(which < 2)
-            if (here - before) @ (behind - here) < 0 and not more and not meet(a[2:], b[2:], rects).any():
+            back = (here - before) @ (behind - here) < 0
+            if back and self._may_run(np.stack([before, here, before]), np.stack([here, behind, behind]), rects):
                 path = path[:k] + path[k + 1 :]
             else:
                 k += 1
         return path
+
+    def _may_run(self, a: FloatArray, b: FloatArray, rects: FloatArray) -> bool:
+        """Whether the third of these legs enters nothing and crosses no more lines than the first two together."""
+        if meet(a[2:], b[2:], rects).any():
+            return False
+        if self._lines is None:
+            return True
+        which, _, _ = crossings(a, b, self._lines.a, self._lines.b)
+        return bool(np.count_nonzero(which == 2) <= np.count_nonzero(which < 2))
 
     def _shortest(
         self, corners: _Corners, rects: FloatArray, bends: Mapping[Point, float], alone: bool

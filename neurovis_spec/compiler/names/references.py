@@ -215,11 +215,7 @@ def resolve_part(part: Part, text: Located[str], directory: Directory, findings:
     if isinstance(part, NeuronRange):
         found = directory.range(part.low.text, part.high.text)
         if isinstance(found, str):
-            whole = f"{part.low.text}..{part.low.text.rstrip('0123456789')}{part.high.text}"
-            hint = f"write {shorten(whole, 200)}" if part.high.text.isdecimal() else None
-            other, _, own = part.high.text.partition(".")
-            if own and directory.instance(part.low.text) and directory.instance(other):
-                hint = f"name each instance, as in {part.low.text}.{own} + {part.high.text}"
+            hint = _range_help(part.low.text, part.high.text, directory)
             findings.error("bad-range", span, f"'{shorten(part.text)}' is no range: {found}", hint)
         return UNKNOWN if isinstance(found, str) else found
     result = directory.find(part.text)
@@ -228,6 +224,17 @@ def resolve_part(part: Part, text: Located[str], directory: Directory, findings:
         _unknown(part.text, span, directory, findings)
         result = None if right is None else directory.find(right)
     return UNKNOWN if result is None else result
+
+
+def _range_help(low: str, high: str, directory: Directory) -> str | None:
+    """A help line for ends between which there is no range."""
+    if high.isdecimal():
+        whole = f"{low}..{low.rstrip('0123456789')}{high}"
+        return f"write {shorten(whole, 200)}"
+    instance, _, own = high.partition(".")
+    if own and directory.instance(low) and directory.instance(instance):
+        return f"name each instance, as in {low}.{own} + {high}"
+    return None
 
 
 def _unknown(name: str, span: Span, directory: Directory, findings: Findings) -> None:
