@@ -56,3 +56,10 @@ def test_a_package_cannot_replace_a_built_in(entry: str, tmp_path: Path, monkeyp
         "neurovis: 1\nname: x\nactivations: {tanh: {value: x}}\nneurons: {A: {activation: tanh, bias: 1}}\n"
     )
     assert [one.code for one in own.warnings] == ["replaces-builtin"]
+
+
+def test_a_source_tree_that_is_not_installed_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Built-ins are found through entry points; without any a spec must not fail at the first name it takes from them."""
+    monkeypatch.setattr(plugins, "names", lambda group: ())
+    with pytest.raises(plugins.PluginError, match="not installed here, only found on the path: run 'pip install"):
+        builtin.installed.__wrapped__()

@@ -24,6 +24,7 @@ from neurovis_spec.language.yaml.reader import read_text
 #: the entry point of our own library
 OURS = "builtin"
 _SECTIONS = ("activations", "models", "rules")
+_NOT_INSTALLED = "neurovis is not installed here, only found on the path: run 'pip install -e .' in its folder"
 
 
 class Hidden(NamedTuple):
@@ -43,11 +44,15 @@ class Installed(NamedTuple):
 @cache
 def installed() -> Installed:
     """All library files: ours, then in the order of the entry points' names, and of the files'; each without what one
-    before it defines already. Raises SpecError if one is invalid."""
+    before it defines already. Raises SpecError if one is invalid, PluginError if ours are not registered: the source
+    tree is on the path, but the package is not installed."""
+    known = plugins.names(plugins.LIBRARIES)
+    if OURS not in known:
+        raise plugins.PluginError(_NOT_INSTALLED)
     result: list[Library] = []
     owners: dict[tuple[str, str], str] = {}
     hidden: dict[tuple[str, str], Hidden] = {}
-    for name in sorted(plugins.names(plugins.LIBRARIES), key=lambda name: (name != OURS, name)):
+    for name in sorted(known, key=lambda name: (name != OURS, name)):
         package = plugins.package(plugins.LIBRARIES, name)
         for file in sorted((f for f in files(package).iterdir() if f.name.endswith(".yaml")), key=lambda f: f.name):
             library = _read(file.read_text(encoding="utf-8"), f"{name}/{file.name}")
