@@ -59,7 +59,7 @@ def test_a_package_cannot_replace_a_built_in(entry: str, tmp_path: Path, monkeyp
 
 
 def test_a_source_tree_that_is_not_installed_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Built-ins are found through entry points; without any a spec must not fail at the first name it takes from them."""
+    """Built-ins are found through entry points; without any a spec fails at the first name that it takes from them."""
     monkeypatch.setattr(plugins, "names", lambda group: ())
     with pytest.raises(plugins.PluginError, match="not installed here, only found on the path: run 'pip install"):
         builtin.installed.__wrapped__()
