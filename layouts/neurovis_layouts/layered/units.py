@@ -4,7 +4,7 @@ In: a LayoutProblem. Out: units in canonical order, each neuron in exactly one. 
 connections within it run forward (a chain), or only some of its neurons are on a line with others: then each of its
 neurons finds its own, as if it were in no group. Neurons that drive each other in
 a loop (a half-centre oscillator, a ring, a reservoir) are one block: a row or a column where they are a line, else a
-ring.
+ring, with the one neuron in its middle that all of it is connected with.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import networkx as nx
 from neurovis_layouts.alike import mirror_images
 from neurovis_layouts.formations import offsets
 from neurovis_layouts.frame import from_picture
-from neurovis_spec.layout.geometry import snap, turn
+from neurovis_spec.layout.geometry import distance, snap, turn
 from neurovis_spec.layout.model import Arrangement, LayoutProblem, Point
 
 #: Loops of more neurons than this are unrolled along the direction instead of drawn as a ring.
@@ -63,7 +63,7 @@ def units_of(problem: LayoutProblem, frames: Sequence[Unit], absent: AbstractSet
     found += _of_lone(problem, sorted(lone))
     lines = _lines(problem)
     found = asked + _on_lines(problem, found[len(asked) :], asked, lines)
-    found = _without_needless_loops(problem, found, lines)
+    found = _with_hubs(problem, _without_needless_loops(problem, found, lines), lines)
     return sorted(found, key=lambda unit: min(unit.members))
 
 
@@ -167,6 +167,39 @@ def _beside_its_image(problem: LayoutProblem, members: Sequence[int]) -> bool:
     graph = _graph(problem, {*members, *(image[m] for m in members if m in image)}).to_undirected()
     across = [m for m in members if m in image and graph.has_edge(m, image[m])]
     return 2 * len(across) > len(members) and not {image[m] for m in across} & set(members)
+
+
+def _with_hubs(problem: LayoutProblem, found: Sequence[Unit], lines: Mapping[int, int]) -> list[Unit]:
+    """Rings, each with the one neuron in its middle that is connected both ways with all of it and of no other, as the
+    inhibition of a ring attractor is: none that is pinned, on a line, in another box, or a mirror image where the ring
+    is not."""
+    image, near = mirror_images(problem), _graph(problem, range(len(problem.neurons)))
+    single = {unit.members[0] for unit in found if len(unit.members) == 1 and unit.places is None}
+    rings = [unit for unit in found if unit.reach is None and _centre(unit.places or ()) is not None]
+    among = [[m for m in single if near.succ[m].keys() & near.pred[m].keys() >= set(unit.members)] for unit in rings]
+    times = Counter(m for some in among for m in some)
+    hubs: list[Unit] = []
+    for unit, some in zip(rings, among, strict=True):
+        if len(some) != 1 or times[some[0]] > 1 or some[0] in problem.pins or some[0] in lines:
+            continue
+        whole, first = {*unit.members, some[0]}, unit.members[0]
+        together = all(whole.isdisjoint(own) or whole.issubset(own) for _, own in problem.boxes)
+        if together and (some[0] in image) == (image.get(first, first) not in whole):
+            places = unit.places or ()
+            hubs.append(
+                replace(unit, members=(*unit.members, some[0]), places=(*places, _centre(places) or (0.0, 0.0)))
+            )
+    held = {member for unit in hubs for member in unit.members}
+    return [*hubs, *(unit for unit in found if held.isdisjoint(unit.members))]
+
+
+def _centre(places: Sequence[Point]) -> Point | None:
+    """The middle of a ring of more than four; None if this is none."""
+    if len(places) <= 4:
+        return None
+    centre = snap(sum(x for x, _ in places) / len(places)), snap(sum(y for _, y in places) / len(places))
+    far = [distance(centre, place) for place in places]
+    return centre if max(far) - min(far) < 0.01 else None
 
 
 def _on_its_side(places: Sequence[Point]) -> list[Point]:
