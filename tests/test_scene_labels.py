@@ -6,11 +6,13 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 import neurovis_spec as nv
 from neurovis_spec import pipeline
 from neurovis_spec.scene import Disc, Text, beside
-from neurovis_spec.scene.texts import width
+from neurovis_spec.scene.texts import shorten, width
 
 LONG = "a very long label that goes on for forty"
 SPEC = f"""
@@ -33,6 +35,22 @@ def test_every_neuron_of_a_row_has_a_shortened_label() -> None:
         assert LONG.startswith(text[:-1].rstrip())
         assert len(text) >= 8
     assert all(LONG in group.title for group in scene.groups if group.data.get("neuron") in ("A1", "A2", "A3"))
+
+
+@example("obstacle_avoidance_interneuron", 1.0, 15.0)
+@given(st.text("il mW_…é", min_size=1, max_size=40), st.floats(0.5, 20), st.floats(0, 30))
+def test_a_shortened_text_uses_all_of_its_room(text: str, size: float, sizes: float) -> None:
+    """Whatever the unit is in which its letters are measured: names beside discs are, in sizes."""
+    found = shorten(text, size, sizes * size)
+    if found == text:
+        assert width(text, size) <= sizes * size
+        return
+    assert width(text, size) > sizes * size
+    assert width(found, size) <= sizes * size
+    kept = len(found) - 1 if found else 0
+    assert text.startswith(found[:kept])
+    longer = [text[:end].rstrip() + "…" for end in range(kept + 1, len(text))]
+    assert all(width(one, size) > sizes * size for one in longer if len(one) > kept + 1)
 
 
 def labels(spec: str) -> dict[str, Text]:

@@ -6,6 +6,7 @@ In: strings. Out: widths in user units, shorter strings.
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 
 from neurovis_spec.text_width import FAMILIES, SUBSCRIPT_DROP, SUBSCRIPT_SIZE, width, with_subscript
 
@@ -15,16 +16,18 @@ __all__ = ["FAMILIES", "SUBSCRIPT_DROP", "SUBSCRIPT_SIZE", "number", "shorten", 
 def shorten(text: str, size: float, room: float, weight: int = 400) -> str:
     """The text, or as much of it as fits into ``room`` with an ellipsis; empty where not even one character fits.
 
-    >>> shorten("a long name", 10, 40)
-    'a lon…'
+    >>> shorten("a long name", 10, 40), shorten("a long name", 1, 4)
+    ('a lon…', 'a lon…')
     """
     if width(text, size, weight) <= room:
         return text
-    for end in range(min(len(text) - 1, math.ceil(room)), 0, -1):
-        candidate = text[:end].rstrip() + "…"
-        if width(candidate, size, weight) <= room:
-            return candidate
-    return ""
+    # the more of it there is, the wider it is
+    end = bisect_right(range(1, len(text)), room, key=lambda end: width(_begun(text, end), size, weight))
+    return _begun(text, end) if end else ""
+
+
+def _begun(text: str, end: int) -> str:
+    return text[:end].rstrip() + "…"
 
 
 def number(value: float, digits: int = 3, sign: bool = False) -> str:
