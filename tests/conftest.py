@@ -10,12 +10,16 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import settings
 
+from neurovis_spec.interrupts import ENDING
+
 if TYPE_CHECKING:
     from ros_worlds import World
 
-# A shell that starts the tests in the background has them ignore Ctrl-C, and so all that they start; some test it.
-if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+# A shell that starts the tests in the background, or nohup, has them ignore signals that end a process, and so all that
+# they start; some test these.
+for _number in ENDING:
+    if signal.getsignal(_number) is signal.SIG_IGN:
+        signal.signal(_number, signal.default_int_handler if _number == signal.SIGINT else signal.SIG_DFL)
 
 # How long an example takes says something of the machine, not of the program. The examples are the same in each run, so
 # that a change is judged by what it changes; --hypothesis-profile=explore looks for new ones.
