@@ -173,22 +173,23 @@ def _with_hubs(problem: LayoutProblem, found: Sequence[Unit], lines: Mapping[int
     """Rings, each with the one neuron in its middle that is connected both ways with all of it and of no other, as the
     inhibition of a ring attractor is: none that is pinned, on a line, in another box, or a mirror image where the ring
     is not."""
+    blocks = [(unit, _centre(unit.places or ())) for unit in found if unit.reach is None]
+    rings = [(unit, centre) for unit, centre in blocks if centre is not None]
+    if not rings:
+        return list(found)
     image, near = mirror_images(problem), _graph(problem, range(len(problem.neurons)))
     single = {unit.members[0] for unit in found if len(unit.members) == 1 and unit.places is None}
-    rings = [unit for unit in found if unit.reach is None and _centre(unit.places or ()) is not None]
-    among = [[m for m in single if near.succ[m].keys() & near.pred[m].keys() >= set(unit.members)] for unit in rings]
+    mates = {m: near.succ[m].keys() & near.pred[m].keys() for unit, _ in rings for m in unit.members}
+    among = [sorted(single.intersection(*(mates[m] for m in unit.members))) for unit, _ in rings]
     times = Counter(m for some in among for m in some)
     hubs: list[Unit] = []
-    for unit, some in zip(rings, among, strict=True):
+    for (unit, centre), some in zip(rings, among, strict=True):
         if len(some) != 1 or times[some[0]] > 1 or some[0] in problem.pins or some[0] in lines:
             continue
-        whole, first = {*unit.members, some[0]}, unit.members[0]
-        together = all(whole.isdisjoint(own) or whole.issubset(own) for _, own in problem.boxes)
+        whole, first = (*unit.members, some[0]), unit.members[0]
+        together = all(len(set(own).intersection(whole)) in (0, len(whole)) for _, own in problem.boxes)
         if together and (some[0] in image) == (image.get(first, first) not in whole):
-            places = unit.places or ()
-            hubs.append(
-                replace(unit, members=(*unit.members, some[0]), places=(*places, _centre(places) or (0.0, 0.0)))
-            )
+            hubs.append(replace(unit, members=whole, places=(*(unit.places or ()), centre)))
     held = {member for unit in hubs for member in unit.members}
     return [*hubs, *(unit for unit in found if held.isdisjoint(unit.members))]
 
