@@ -26,10 +26,13 @@ class Ended(KeyboardInterrupt):
         self.number = number
 
 
-def end_like_ctrl_c() -> None:
-    """Have the other signals raise Ended, as Ctrl-C raises KeyboardInterrupt; not those that are ignored (nohup)."""
+def raise_at_signals() -> None:
+    """Have each of these signals raise Ended; not those that are ignored (nohup).
+
+    Ctrl-C as well: where a KeyboardInterrupt of Python's own comes up in code that was compiled from text, as in the
+    making of a dataclass, Python kills the process at its end though it was caught, and the exit status is lost."""
     for number in ENDING:
-        if signal.getsignal(number) == signal.SIG_DFL:
+        if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
             signal.signal(number, _raise)
 
 

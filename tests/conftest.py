@@ -37,6 +37,15 @@ def update_golden(request: pytest.FixtureRequest) -> bool:
     return bool(request.config.getoption("--update-golden"))
 
 
+@pytest.fixture
+def signal_handlers() -> Iterator[None]:
+    """Afterwards signals that end a process have the handlers that they had before."""
+    before = {number: signal.getsignal(number) for number in ENDING}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
 @pytest.fixture(params=("kilted", "jazzy", "one"))
 def ros(request: pytest.FixtureRequest) -> Iterator[World]:
     """Each ROS that there is for the tests; ``ros_worlds`` is for Linux alone."""

@@ -11,7 +11,7 @@ import pytest
 from ros_alone import Alone
 
 import neurovis_spec as nv
-from neurovis_spec.interrupts import end_like_ctrl_c, heeded
+from neurovis_spec.interrupts import heeded, raise_at_signals
 from neurovis_spec.ros.middleware import Arrival
 from neurovis_spec.ros.run import Course, NodeRun
 
@@ -51,6 +51,7 @@ def interrupted(node: Alone) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.usefixtures("signal_handlers")
 def test_who_asks_twice_for_an_end_waits_for_what_is_safe(number: signal.Signals) -> None:
     """As with Ctrl-C pressed twice: the second one ends it at once, but not before."""
     again = [number]
@@ -60,13 +61,9 @@ def test_who_asks_twice_for_an_end_waits_for_what_is_safe(number: signal.Signals
             os.kill(os.getpid(), again.pop())
 
     node = alone(ask_again)
-    before = signal.getsignal(signal.SIGTERM)
-    end_like_ctrl_c()
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            interrupted(node)
-    finally:
-        signal.signal(signal.SIGTERM, before)
+    raise_at_signals()
+    with pytest.raises(KeyboardInterrupt):
+        interrupted(node)
     assert is_safe(node)
 
 

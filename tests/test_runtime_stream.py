@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import signal
+import subprocess
+import sys
 import threading
 import tracemalloc
 import zipfile
@@ -15,7 +17,7 @@ from small_specs import compiled
 import neurovis_spec as nv
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.interrupts import ENDING, deferred, end_like_ctrl_c
+from neurovis_spec.interrupts import ENDING, Ended, deferred, raise_at_signals
 from neurovis_spec.runtime.memory import TooLargeError
 from neurovis_spec.runtime.recording import Recording, RecordingError, after_rows, ended
 from neurovis_spec.runtime.state import State
@@ -203,6 +205,7 @@ def test_ctrl_c_before_the_first_step_leaves_what_was_there(
 
 
 @pytest.mark.parametrize("number", ENDING)
+@pytest.mark.usefixtures("signal_handlers")
 def test_a_signal_waits_for_the_end_of_a_block_and_a_second_one_does_not(number: signal.Signals) -> None:
     done: list[object] = []
 
@@ -213,32 +216,37 @@ def test_a_signal_waits_for_the_end_of_a_block_and_a_second_one_does_not(number:
                 done.append(asked.number)
         done.append("never reached")
 
-    before = {one: signal.getsignal(one) for one in ENDING}
-    try:
-        end_like_ctrl_c()
-        during = {one: signal.getsignal(one) for one in ENDING}
-        for times in (1, 2):
-            with pytest.raises(KeyboardInterrupt):
-                work(times)
-        assert {one: signal.getsignal(one) for one in ENDING} == during
-    finally:
-        for one, handler in before.items():
-            signal.signal(one, handler)
+    raise_at_signals()
+    during = {one: signal.getsignal(one) for one in ENDING}
+    for times in (1, 2):
+        with pytest.raises(Ended):
+            work(times)
+    assert {one: signal.getsignal(one) for one in ENDING} == during
     assert done == [number, number]
 
 
+@pytest.mark.usefixtures("signal_handlers")
 def test_a_signal_that_is_ignored_stays_ignored() -> None:
-    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    try:
-        end_like_ctrl_c()
-        with deferred() as asked:
-            signal.raise_signal(signal.SIGHUP)
-        assert not asked
-        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
-    finally:
-        signal.signal(signal.SIGHUP, before)
-        for one in ENDING[1:]:
-            signal.signal(one, signal.SIG_DFL)
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    raise_at_signals()
+    with deferred() as asked:
+        signal.raise_signal(signal.SIGHUP)
+    assert not asked
+    assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+
+
+def test_the_exit_status_is_said_though_a_signal_came_in_code_made_from_text(tmp_path: Path) -> None:
+    """Dataclasses make such code while the program is imported."""
+    (tmp_path / "ends.py").write_text(
+        "import os, signal, sys\n"
+        "from neurovis_spec.interrupts import raise_at_signals\n"
+        "raise_at_signals()\n"
+        "try:\n"
+        "    exec('os.kill(os.getpid(), signal.SIGINT)\\nfor _ in range(10**7): pass')\n"
+        "except KeyboardInterrupt:\n"
+        "    sys.exit(128 + signal.SIGINT)\n"
+    )
+    assert subprocess.run([sys.executable, "-m", "ends"], cwd=tmp_path).returncode == 128 + signal.SIGINT
 
 
 def test_elsewhere_than_in_the_main_thread_nothing_waits() -> None:

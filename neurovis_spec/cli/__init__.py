@@ -11,14 +11,14 @@ from __future__ import annotations
 import gc
 import sys
 
-from neurovis_spec.interrupts import Ended, end_like_ctrl_c
+from neurovis_spec.interrupts import Ended, raise_at_signals
 
 
 def main() -> None:
     """Run ``neurovis`` on the arguments of the process; ends it."""
     gc.set_threshold(200_000, 20, 100)  # a process that soon ends need not look for cycles all the time
     try:
-        end_like_ctrl_c()
+        raise_at_signals()
         from neurovis_spec.cli.commands import neurovis
 
         neurovis.main(prog_name="neurovis")
