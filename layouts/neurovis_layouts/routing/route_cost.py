@@ -18,7 +18,7 @@ from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
 from neurovis_layouts.routing.polylines import END, STEP, Polylines, polylines
 from neurovis_layouts.routing.walls import Frame, Walls, meet
 from neurovis_spec.layout import BoolArray, FloatArray, IntArray
-from neurovis_spec.layout.geometry import distance, padded, straight
+from neurovis_spec.layout.geometry import distance, distinct, padded, straight
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
 # What a route costs, in units that only compare: a crossing is about one. Those without an underscore are what detours
@@ -161,7 +161,7 @@ class Drawn:
         loops = (first == last) & (first >= 0)
         shape += _CROSSING * self._lines.crossed(self._lines.a[loops], self._lines.b[loops])[:count]
         cells, owner = self._lines.cells()
-        border: IntArray = np.bincount(owner[np.isin(cells, self._borders)], minlength=len(self._lines))[:count]
+        border: IntArray = np.bincount(owner[_among(cells, self._borders)], minlength=len(self._lines))[:count]
         shape += np.where(STEP * border > _PASSING, ALONG * STEP * border, 0.0)
         # in a fan each has its place
         shape *= [float(len(self._between[frozenset(ends)]) <= _FAN) for ends in own]
@@ -183,7 +183,7 @@ class Drawn:
         many = len(self.edges) + 1
         # each edge once in a cell
         lines = self.cell_edges > -2
-        cell, edge = np.divmod(np.unique(self.cells[lines] * many + self.cell_edges[lines] + 1), many)
+        cell, edge = np.divmod(distinct(self.cells[lines] * many + self.cell_edges[lines] + 1), many)
         shared: BoolArray = np.zeros(len(cell), dtype=np.bool_)
         shared[1:] |= cell[1:] == cell[:-1]
         shared[:-1] |= cell[1:] == cell[:-1]
@@ -377,9 +377,7 @@ class RouteCost:
         if self._mates is not None:
             cost += _SAME * lines.on(self._mates) + self._drawn.astray(self.edge, lines)
         cells, owner = lines.cells()
-        if len(self._cells):
-            there = self._cells[np.minimum(np.searchsorted(self._cells, cells), len(self._cells) - 1)] == cells
-            cost += ALONG * STEP * np.bincount(owner[there], minlength=len(lines))
+        cost += ALONG * STEP * np.bincount(owner[_among(cells, self._cells)], minlength=len(lines))
         return cost
 
     def _across(self, lines: Polylines) -> FloatArray:
@@ -393,6 +391,14 @@ class RouteCost:
                 one = lines.some(np.array([k], dtype=np.int64))
                 cost[k] += _CROSSING * float(one.crossed(one.a * flip + shift, one.b * flip + shift)[0])
         return cost
+
+
+def _among(cells: IntArray, some: IntArray) -> BoolArray:
+    """(k,) which cells are among some others, which are in order."""
+    if not len(some):
+        return np.zeros(len(cells), dtype=np.bool_)
+    found: BoolArray = some[np.minimum(np.searchsorted(some, cells), len(some) - 1)] == cells
+    return found
 
 
 def _together(far: FloatArray, alike: BoolArray | np.bool_) -> FloatArray:
@@ -411,4 +417,4 @@ def _border_cells(rects: FloatArray) -> IntArray:
             # cells leave the ends of lines out
             routes += [straight((x0 - END, y), (x1 + END, y)) for y in (y0, y1)]
             routes += [straight((x, y0 - END), (x, y1 + END)) for x in (x0, x1)]
-    return np.unique(polylines(routes).cells()[0]) if routes else np.zeros(0, dtype=np.int64)
+    return distinct(polylines(routes).cells()[0]) if routes else np.zeros(0, dtype=np.int64)
