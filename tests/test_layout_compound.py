@@ -101,7 +101,7 @@ def attempt(problem: LayoutProblem) -> tuple[Layout | None, str]:
         return None, refusal.code
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(problem=walkers())
 def test_instances_of_one_make_are_one_drawing(problem: LayoutProblem) -> None:
     layout = suite.check(problem, "layered")
@@ -127,7 +127,7 @@ def test_mirror_images_are_exact(problem: LayoutProblem) -> None:
     assert metrics(layout, problem)["symmetry"] == 1
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=70, deadline=None)
 @given(problem=walkers(pinned=True))
 def test_pins_hold_and_everything_else_gives_way(problem: LayoutProblem) -> None:
     layout, refusal = attempt(problem)
@@ -142,7 +142,7 @@ def test_pins_hold_and_everything_else_gives_way(problem: LayoutProblem) -> None
     assert all(distance(a, b) >= 0.6 - 1e-9 for a, b in combinations(points, 2))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(problem=walkers(), seed=st.integers(0, 1000))
 def test_the_order_of_the_input_does_not_show(problem: LayoutProblem, seed: int) -> None:
     shuffle = random.Random(seed).sample

@@ -474,7 +474,7 @@ def test_nothing_breaks_on_whatever_somebody_is_typing(somewhere: Path, data: st
     check(document)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=25)
 @given(st.data())
 def test_a_rename_there_and_back_changes_nothing(somewhere: Path, data: st.DataObject) -> None:
     """Whatever is renamed, wherever it is named: what is said stays, and the way back leads to the very same texts."""

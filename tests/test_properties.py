@@ -15,7 +15,7 @@ import neurovis_spec as nv
 from neurovis_spec.runtime.recording import Recording
 
 STEPS = 40
-LAW = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+LAW = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
 
 def by_name(recording: Recording) -> tuple[dict[str, list[float]], dict[str, list[float]]]:

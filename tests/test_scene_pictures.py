@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from random_specs import Spec, specs
 
 import neurovis_spec as nv
@@ -156,6 +156,7 @@ def test_hard_networks_touch_nothing_they_should_not(name: str) -> None:
     check(hard(name).scene)
 
 
+@settings(max_examples=50)
 @given(specs())
 def test_any_network_touches_nothing_it_should_not(spec: Spec) -> None:
     check(drawn(nv.compile_text(json.dumps(spec)), step=2).scene)
