@@ -46,6 +46,8 @@ _NEAREST = 24
 #: Outwards, from each side of a rectangle, and from its corners.
 _OUT = np.array([-1.0, -1.0, 1.0, 1.0])
 _CORNERS = ((0, 1), (0, 3), (2, 1), (2, 3))
+#: The corners of all lanes: how far off, and which corner.
+_AROUND = tuple((off, corner) for off in _LANES for corner in _CORNERS)
 #: What comes this close to a disc may be measured to run over it.
 _BARELY = 0.01
 
@@ -91,17 +93,13 @@ def detoured(
 
 @dataclass(frozen=True, slots=True)
 class _Taken:
-    """Where detours run: how much it costs to bend at a corner that they bend at, and what stretches of which lines
-    across (0: at this x) and along (1: at this y) they run on. Each corner and each stretch that is shared costs what a
-    unit ``ALONG`` another line does."""
+    """Where detours run: what stretches of which lines across (0: at this x) and along (1: at this y) they run on. Each
+    stretch that is shared costs what a unit ``ALONG`` another line does."""
 
-    corners: dict[Point, float] = field(default_factory=dict)
     lines: dict[tuple[int, float], list[Point]] = field(default_factory=dict)
 
     def add(self, path: Sequence[Point]) -> None:
-        """Add a detour: later ones that use its corners or run along it cost more."""
-        for point in path[1:-1]:
-            self.corners[point] = self.corners.get(point, 0.0) + ALONG
+        """Add a detour: later ones that run along it cost more."""
         for a, b in pairwise(path):
             for axis in (0, 1):
                 if a[axis] == b[axis]:
@@ -113,13 +111,28 @@ class _Taken:
         times = np.zeros(len(points), dtype=np.int64)
         for axis in (0, 1):
             stretches = self.lines.get((axis, at[axis]))
-            on = np.flatnonzero(points[:, axis] == at[axis]) if stretches else ()
-            if len(on):
+            if stretches:
+                on = np.flatnonzero(points[:, axis] == at[axis])
                 low, high = np.array(stretches, dtype=np.float64).T
                 other, here = points[on, 1 - axis, None], at[1 - axis]
                 shared = (np.minimum(other, here) < high) & (np.maximum(other, here) > low)
                 times[on] += shared.sum(axis=1)
         return ALONG * times.astype(np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class _Around:
+    """What a way goes round: rectangles ``rects`` (f, 4), the same as far as it keeps off them ``whole``, the
+    ``corners`` (c, f, 2) of all lanes around them, and how much it costs to bend at each, ``bends`` (c, f)."""
+
+    rects: FloatArray
+    whole: FloatArray
+    corners: FloatArray
+    bends: FloatArray
+
+    def some(self, chosen: BoolArray) -> _Around:
+        """Some of the rectangles."""
+        return _Around(self.rects[chosen], self.whole[chosen], self.corners[:, chosen], self.bends[:, chosen])
 
 
 class Detours:
@@ -136,6 +149,10 @@ class Detours:
         x, y = self._centres.T[:, :, None]
         x0, y0, x1, y1 = walls.rects.T
         self._standing: BoolArray = walls.inside & (x > x0) & (x < x1) & (y > y0) & (y < y1)
+        #: (c, f, 2) the corners of all lanes around each rectangle, (c, f) how much it costs to bend there: more at
+        #: those that detours bend at already
+        self._corners: FloatArray = np.stack([self._rects[:, at] + off * _OUT[list(at)] for off, at in _AROUND])
+        self._bends: FloatArray = np.full(self._corners.shape[:2], BENDING)
         self._taken = _Taken()
         #: from how many corners ways have been sought
         self._seen_from = 0
@@ -151,6 +168,8 @@ class Detours:
             return None
         path, rects = found
         self._taken.add(path)
+        for point in path[1:-1]:
+            self._bends[(self._corners == point).all(axis=2)] += ALONG
         self._between.setdefault((min(source, target), max(source, target)), []).extend(path[1:-1])
         route = rounded(path, rects)
         if self._lines is not None:
@@ -163,45 +182,38 @@ class Detours:
         """The line that a detour follows, ``by`` these points, and what it keeps off."""
         ends = self._centres[[source, target]]
         stops = np.concatenate([ends[:1], np.array(by, dtype=np.float64).reshape(-1, 2), ends[1:]])
-        same = self._between.get((min(source, target), max(source, target)), ())
-        # of all between the same ends each bends at corners of its own
-        bends = {**self._taken.corners, **dict.fromkeys(same, ENTERING)}
         foreign = self._walls.foreign(source, target)
         # discs in foreign frames are behind the borders of these
         loose: BoolArray = self._standing[:, foreign].sum(axis=1) == 0
         loose[[source, target]] = False
-        rects = self._rects[np.concatenate([foreign, loose])]
+        chosen = np.concatenate([foreign, loose])
+        rects, corners, bends = self._rects[chosen], self._corners[:, chosen], self._bends[:, chosen]
+        # of all between the same ends each bends at corners of its own
+        for point in self._between.get((min(source, target), max(source, target)), ()):
+            bends[(corners == point).all(axis=2)] = BENDING + ENTERING
         for clear in _CLEAR:
-            whole = rects + clear * _OUT
+            around = _Around(rects, rects + clear * _OUT, corners, bends)
             path: list[Point] = []
-            for k, hit in enumerate(meet(stops[:-1], stops[1:], whole)):
-                leg = self._round(stops[k : k + 2], hit, rects, whole, bends, alone)
+            for k, hit in enumerate(meet(stops[:-1], stops[1:], around.whole)):
+                leg = self._round(stops[k : k + 2], hit, around, alone)
                 if leg is None:
                     break
                 path += leg if k == 0 else leg[1:]
             else:
-                return path, whole
+                return path, around.whole
         return None
 
-    def _round(
-        self,
-        ends: FloatArray,
-        hit: BoolArray,
-        rects: FloatArray,
-        whole: FloatArray,
-        bends: Mapping[Point, float],
-        alone: bool,
-    ) -> list[Point] | None:
+    def _round(self, ends: FloatArray, hit: BoolArray, around: _Around, alone: bool) -> list[Point] | None:
         """The shortest line round what is in its way: at first what the straight line has ``hit``, then whatever the
-        last one ran into. It keeps off rectangles ``whole`` and bends at the corners of ``rects``."""
+        last one ran into."""
         if alone and not hit.any():
             return [(x, y) for x, y in ends.tolist()]
-        met = hit if alone else hit | meet(ends[:1], ends[1:], rects + _OUT)[0]
-        while path := self._shortest(_Corners(ends, rects[met]), whole[met], bends, alone):
+        met = hit if alone else hit | meet(ends[:1], ends[1:], around.rects + _OUT)[0]
+        while path := self._shortest(ends, around.some(met), alone):
             line = np.array(path, dtype=np.float64)
-            new = meet(line[:-1], line[1:], whole).any(axis=0) & ~met
+            new = meet(line[:-1], line[1:], around.whole).any(axis=0) & ~met
             if len(path) > 2 - alone and not new.any():
-                return self._pulled(path, whole, alone)
+                return self._pulled(path, around.whole, alone)
             met |= new
         return None
 
@@ -227,13 +239,11 @@ class Detours:
         which, _, _ = crossings(a, b, self._lines.a, self._lines.b)
         return bool(np.count_nonzero(which == 2) <= np.count_nonzero(which < 2))
 
-    def _shortest(
-        self, corners: _Corners, rects: FloatArray, bends: Mapping[Point, float], alone: bool
-    ) -> list[Point] | None:
+    def _shortest(self, ends: FloatArray, around: _Around, alone: bool) -> list[Point] | None:
         """The shortest line from the first end to the second by way of corners, which enters none of the rectangles."""
+        corners = _Corners(ends, around)
         points = corners.points
-        places: list[Point] = [(x, y) for x, y in points.tolist()]
-        extra = np.array([0.0, 0.0, *(BENDING + bends.get(place, 0.0) for place in places[2:])])
+        extra = np.concatenate([np.zeros(2), around.bends.ravel()])
         ahead = _HASTE * lengths(points - points[1])
         best = np.full(len(points), np.inf)
         best[0] = 0.0
@@ -246,19 +256,19 @@ class Detours:
                 line = [at]
                 while line[-1]:
                     line.append(int(before[line[-1]]))
-                return [places[n] for n in line[::-1]]
+                return [(x, y) for x, y in points[line[::-1]].tolist()]
             if done[at]:
                 continue
             done[at] = True
             self._seen_from += 1
-            to = corners.near(at)
+            to, (x, y) = corners.near(at), points[at].tolist()
             cost = best[at] + lengths(points[to] - points[at]) + extra[to]
-            cost += self._taken.beside(places[at], points[to])
+            cost += self._taken.beside((x, y), points[to])
             better = (cost < best[to]) & ~done[to]
             if at == 0 and not alone:
                 better &= to != 1
             to, cost = to[better], cost[better]
-            seen = corners.sees(at, to, rects)
+            seen = corners.sees(at, to)
             to, cost = to[seen], cost[seen]
             if self._lines is not None:
                 here = np.repeat(points[None, at], len(to), axis=0)
@@ -287,35 +297,36 @@ def _closed(walls: Walls) -> FloatArray:
 
 
 class _Corners:
-    """Both ends of a way, and the corners of all lanes around rectangles (f, 4), behind each other: ``points``
-    (n, 2)."""
+    """Both ends of a way, and the corners around what it goes round, behind each other: ``points`` (n, 2)."""
 
-    def __init__(self, ends: FloatArray, rects: FloatArray) -> None:
-        self._rects = rects
-        corners = [rects[:, (x, y)] + off * _OUT[[x, y]] for off in _LANES for x, y in _CORNERS]
-        sides = np.repeat(np.tile(_OUT[np.array(_CORNERS)], (len(_LANES), 1)), len(rects), axis=0)
-        self.points: FloatArray = np.concatenate([ends, *corners])
+    def __init__(self, ends: FloatArray, around: _Around) -> None:
+        self._rects, self._whole = around.rects, around.whole
+        self.points: FloatArray = np.concatenate([ends, around.corners.reshape(-1, 2)])
+        sides = np.repeat(np.array([_OUT[list(at)] for _, at in _AROUND]), len(around.rects), axis=0)
         #: to which sides a corner points
         self._sides: FloatArray = np.concatenate([np.zeros((2, 2)), sides])
+        self._others = np.arange(1, len(self.points), dtype=np.int64)
 
     def near(self, at: int) -> IntArray:
         """The second end, and the corners around the rectangles that are nearest to a point."""
         here, rects = self.points[at], self._rects
-        chosen = np.arange(len(rects), dtype=np.int64)
-        if len(rects) > _NEAREST:
-            x, y = np.maximum(np.maximum(rects[:, :2] - here, here - rects[:, 2:]), 0.0).T
-            chosen = np.sort(np.argsort(x * x + y * y, kind="stable")[:_NEAREST])
-        around = np.arange(len(_LANES) * len(_CORNERS), dtype=np.int64)[:, None] * len(rects) + chosen
+        if len(rects) <= _NEAREST:
+            return self._others
+        x, y = np.maximum(np.maximum(rects[:, :2] - here, here - rects[:, 2:]), 0.0).T
+        chosen = np.sort(np.argsort(x * x + y * y, kind="stable")[:_NEAREST])
+        around = np.arange(len(_AROUND), dtype=np.int64)[:, None] * len(rects) + chosen
         return np.concatenate([np.ones(1, dtype=np.int64), around.ravel() + 2])
 
-    def sees(self, at: int, to: IntArray, rects: FloatArray) -> BoolArray:
-        """(k,) whether a line may run from a point to these: clear of the rectangles, and taut at both ends."""
+    def sees(self, at: int, to: IntArray) -> BoolArray:
+        """(k,) whether a line may run from a point to these, in order: clear of the rectangles, and taut at both
+        ends."""
         here, there = self.points[at], self.points[to]
         seen: BoolArray = _taut(there - here, self._sides[to]) & _taut(there - here, self._sides[at])
+        chosen = np.flatnonzero(seen)
         # the second end may be far away, the corners are not
-        for chosen in (seen & (to == 1), seen & (to != 1)):
-            line = there[chosen]
-            seen[chosen] = ~blocked(np.repeat(here[None, :], len(line), axis=0), line, rects)
+        ends = int(len(chosen) > 0 and to[chosen[0]] == 1)
+        for line in (chosen[:ends], chosen[ends:]):
+            seen[line] = ~blocked(here[None, :], there[line], self._whole)
         return seen
 
 

@@ -62,9 +62,10 @@ def meet(a: FloatArray, b: FloatArray, rects: FloatArray) -> BoolArray:
 
 
 def blocked(a: FloatArray, b: FloatArray, rects: FloatArray) -> BoolArray:
-    """(k,) whether the segments from ``a`` (k, 2) to ``b`` (k, 2) enter any of the rectangles (f, 4)."""
-    entered: BoolArray = np.zeros(len(a), dtype=np.bool_)
-    if len(a):
+    """(k,) whether the segments from ``a`` (k, 2), or (1, 2) for all, to ``b`` (k, 2) enter any of the rectangles
+    (f, 4)."""
+    entered: BoolArray = np.zeros(len(b), dtype=np.bool_)
+    if len(b):
         # segments that are close to each other are compared with what is near these alone
         low, high = np.minimum(a, b).min(axis=0), np.maximum(a, b).max(axis=0)
         close = ((rects[:, :2] < high) & (rects[:, 2:] > low)).all(axis=1)
