@@ -106,6 +106,8 @@ class Insertion:
             for rank in order
         ]
         self._out: set[int] = set()
+        #: by rank the entries that were in it when slots were last found to be shut, and those by box
+        self._known: list[tuple[list[int], dict[int, Counts]]] = [([], {}) for _ in order]
 
     def _find_links(self, levels: Levels) -> None:
         """Points, links, and the links of each node on both sides."""
@@ -325,6 +327,15 @@ class Insertion:
     def _shut(self, r: int, box: int) -> Counts:
         """For each slot of a rank ``_SHUT`` where it lies within a block or another box, or outside of ``box`` though
         that is in the rank; else 0."""
+        entries, known = self._known[r]
+        if entries is not self.order[r]:
+            known = {}
+            self._known[r] = self.order[r], known
+        if box not in known:
+            known[box] = self._found_shut(r, box)
+        return known[box]
+
+    def _found_shut(self, r: int, box: int) -> Counts:
         node, boxes = self._owners(r)
         within = (node[1:] == node[:-1]) & (node[1:] >= 0)
         within |= (boxes[1:] == boxes[:-1]) & (boxes[1:] >= 0) & (boxes[1:] != box)
@@ -340,7 +351,7 @@ class Insertion:
         """``_shut`` for a node, which also has to keep its place in the order of its group."""
         if not self._tight[r]:
             return np.zeros(len(self.order[r]) + 1, dtype=np.int32)
-        found = self._shut(r, int(self._box[node]))
+        found = self._shut(r, int(self._box[node])).copy()
         if self._kin[node] >= 0:
             other, boxes = self._owners(r)
             alike = (other >= 0) & (self._kin[other] == self._kin[node]) & (boxes == self._box[node])

@@ -321,10 +321,11 @@ class _Corners:
         """(k,) whether a line may run from a point to these, in order: clear of the rectangles, and taut at both
         ends."""
         here, there = self.points[at], self.points[to]
-        seen: BoolArray = _taut(there - here, self._sides[to]) & _taut(there - here, self._sides[at])
+        way = there - here
+        seen: BoolArray = _taut(way, self._sides[to]) & _taut(way, self._sides[at])
         chosen = np.flatnonzero(seen)
-        # the second end may be far away, the corners are not
-        ends = int(len(chosen) > 0 and to[chosen[0]] == 1)
+        # the second end may be far away, the corners are not: of many rectangles few are near these
+        ends = int(len(self._whole) > _NEAREST and len(chosen) > 0 and to[chosen[0]] == 1)
         for line in (chosen[:ends], chosen[ends:]):
             seen[line] = ~blocked(here[None, :], there[line], self._whole)
         return seen

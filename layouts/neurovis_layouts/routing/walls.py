@@ -20,6 +20,8 @@ Frame: TypeAlias = tuple[frozenset[int], Rect]
 
 #: How far apart the points of a route are that must not lie in a foreign frame.
 _STEP = 0.1
+#: So few rectangles are all compared with segments, wherever they are.
+_FEW = 16
 
 
 class Walls:
@@ -65,11 +67,11 @@ def blocked(a: FloatArray, b: FloatArray, rects: FloatArray) -> BoolArray:
     """(k,) whether the segments from ``a`` (k, 2), or (1, 2) for all, to ``b`` (k, 2) enter any of the rectangles
     (f, 4)."""
     entered: BoolArray = np.zeros(len(b), dtype=np.bool_)
-    if len(b):
+    if len(b) and len(rects) > _FEW:
         # segments that are close to each other are compared with what is near these alone
         low, high = np.minimum(a, b).min(axis=0), np.maximum(a, b).max(axis=0)
-        close = ((rects[:, :2] < high) & (rects[:, 2:] > low)).all(axis=1)
-        entered[meetings(a, b, rects[close])[0]] = True
+        rects = rects[((rects[:, :2] < high) & (rects[:, 2:] > low)).all(axis=1)]
+    entered[meetings(a, b, rects)[0]] = True
     return entered
 
 
