@@ -253,8 +253,8 @@ def test_a_detour_goes_the_longer_way_round_where_that_crosses_less() -> None:
     edges, centres = [LayoutEdge("a", 0, 1, 1)], [(0.0, 0.0), (0.0, 10.0), (3.0, 5.0)]
     walls = Walls([(frozenset({2}), (-2.0, 4.0, 8.0, 6.0))], 3)
     routes = {0: straight(*centres[:2])}
-    for count, longer in ((0, False), (1, False), (3, True)):
-        drawn = [straight((-20.0, 4.5 + i / 2), (-2.05, 4.5 + i / 2)) for i in range(count)]
+    for count, longer in ((0, False), (1, False), (4, True)):
+        drawn = [straight((-20.0, 4.3 + i * 0.45), (-2.05, 4.3 + i * 0.45)) for i in range(count)]
         found = detoured(edges, centres, routes, Obstacles(centres), walls, {}, drawn, 300)[0]
         assert (max(x for x, _ in sampled(found)) > 8) is longer
 
@@ -262,12 +262,22 @@ def test_a_detour_goes_the_longer_way_round_where_that_crosses_less() -> None:
 def test_nobody_counts_what_detours_cross_once_many_corners_were_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
     centres = [(0.0, 0.0), (0.0, 10.0), (3.0, 5.0)]
     walls = Walls([(frozenset({2}), (-2.0, 4.0, 8.0, 6.0))], 3)
-    lines = [straight((-20.0, 4.5 + i / 2), (-2.05, 4.5 + i / 2)) for i in range(3)]
+    lines = [straight((-20.0, 4.3 + i * 0.45), (-2.05, 4.3 + i * 0.45)) for i in range(4)]
     for most, longer in ((1000, True), (-1, False)):
         monkeypatch.setattr(detours, "_MOST_SEEN_FROM", most)
         found = Detours(walls, centres, lines).route(0, 1, True)
         assert found is not None
         assert (max(x for x, _ in sampled(found)) > 8) is longer
+
+
+def test_a_detour_goes_a_little_farther_where_it_turns_less(monkeypatch: pytest.MonkeyPatch) -> None:
+    centres = [(0.0, 0.0), (0.0, 10.0), (3.0, 4.3), (-5.0, 5.5)]
+    walls = Walls([(frozenset({2}), (-0.5, 4.0, 4.2, 4.6)), (frozenset({3}), (-8.0, 5.2, 1.5, 5.8))], 4)
+    for turning, farther in ((1.0, True), (0.0, False)):
+        monkeypatch.setattr(detours, "_TURNING", turning)
+        found = Detours(walls, centres, None).route(0, 1, True)
+        assert found is not None
+        assert (max(x for x, _ in sampled(found)) > 4.2) is farther
 
 
 def test_a_detour_does_not_turn_back_between_two_corners() -> None:
