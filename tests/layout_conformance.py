@@ -87,7 +87,7 @@ def problems(draw: st.DrawFn, pinned: bool = True) -> LayoutProblem:
 
 def extremes() -> list[LayoutProblem]:
     """Networks at the edge of what there is: very long, very deep, very loose, very centred, all in one place."""
-    many = members("N", 10_000)
+    many = members("N", 5000)
     places = {name: (float(i), 0.0) for i, name in enumerate(many)}
     chain = canonical("chain", many, [("N", many)], named(pairwise(many)), places=places)
     paths = [".".join(f"a{i}" for i in range(depth + 1)) for depth in range(40)]
