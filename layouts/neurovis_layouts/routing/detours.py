@@ -40,8 +40,8 @@ _CROSSING = 4.0
 #: What it costs to turn at a corner, by the chord of the turn: a right angle is a unit and a half of length (without:
 #: 3 % more crossings among 30 coupled instances, and kinks; with twice as much a sixth more work).
 _TURNING = 1.0
-#: The product of two lengths that is nothing.
-_NOTHING = 1e-9
+#: The product of two lengths, across and along, that is nothing: coordinates are multiples of 1/1024, about.
+_NOTHING = 1e-7
 #: With more lines than this, times those that go round something, nobody counts how often they cross.
 _MOST_CROSSED = 5000
 #: From more corners than this nobody counts either: where discs stand in rows, ways among them took 18 s.
