@@ -73,7 +73,8 @@ def test_axe_finds_nothing_whatever_is_open(theme: str, tmp_path: Path) -> None:
             await opened.until("document.querySelector('#turned').children.length")
             assert await violations(opened) == [], "turning"
             await opened.key("/")
-            await opened.until(f"{ROWS}.length > 3")
+            # names are written into the rows with the next frame
+            await opened.until(f"{ROWS}.length > 3 && {NAMES}.every(name => name)")
             assert await violations(opened) == [], "searching"
             await opened.key("Escape")
             await opened.key("?")
