@@ -37,6 +37,7 @@ _NARROW = 0.6
 _HASTE = 1.5
 #: What it costs to cross a line, in units of length (without: 10 % more crossings in drawings with frames).
 _CROSSING = 4.0
+_DENSE = 2.0
 #: What it costs to turn at a corner, by the chord of the turn: a right angle is a unit and a half of length (without:
 #: 3 % more crossings among 30 coupled instances, and kinks; with twice as much a sixth more work).
 _TURNING = 1.0
@@ -244,6 +245,13 @@ class Detours:
         which, _, _ = crossings(a, b, self._lines.a, self._lines.b)
         return bool(np.count_nonzero(which == 2) <= np.count_nonzero(which < 2))
 
+    def _price(self, ends: FloatArray) -> float:
+        """What it costs to cross a line: those that the straight way crosses cost no more than its length together."""
+        if self._lines is None:
+            return 0.0
+        many = len(crossings(ends[:1], ends[1:], self._lines.a, self._lines.b)[0])
+        return min(_CROSSING, _DENSE * float(lengths(ends[1:] - ends[:1])[0]) / max(many, 1))
+
     def _shortest(self, ends: FloatArray, around: _Around, alone: bool) -> list[Point] | None:
         """The shortest line from the first end to the second by way of corners, which enters none of the rectangles."""
         corners = _Corners(ends, around)
@@ -252,6 +260,7 @@ class Detours:
         ahead = _HASTE * lengths(points - points[1])
         best = np.full(len(points), np.inf)
         best[0] = 0.0
+        price = self._price(ends)
         before = np.zeros(len(points), dtype=np.int64)
         done = np.zeros(len(points), dtype=np.bool_)
         waiting = [(float(ahead[0]), 0)]
@@ -283,7 +292,7 @@ class Detours:
             if self._lines is not None:
                 start = np.repeat(points[None, at], len(to), axis=0)
                 which, _, _ = crossings(start, points[to], self._lines.a, self._lines.b)
-                cost += _CROSSING * np.bincount(which, minlength=len(to))
+                cost += price * np.bincount(which, minlength=len(to))
                 better = cost < best[to]
                 to, cost = to[better], cost[better]
             best[to] = cost

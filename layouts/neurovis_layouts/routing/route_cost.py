@@ -37,6 +37,8 @@ _GRAZING = 6.0
 _CROSSING = 1.2
 #: To cross one that leads from or to the same neuron, besides: both can be untangled at that disc (without: 444).
 _KIN = 2.4
+#: All crossings of a line together, at most.
+_CROWDED = 6.0
 #: To run on others for a unit: as bad as a crossing, since they are one line there (without: 1059 instead of 828 cells
 #: that several lines share, and 456 crossings).
 ALONG = 1.5
@@ -280,7 +282,7 @@ class RouteCost:
         self._far = max(distance(self.route[0], self.route[-1]), 1e-9)
         # what leads to its own level runs back whatever way it takes
         level = abs(self.route[0][1] - self.route[-1][1]) < _ONWARD
-        self._onward = not level and float(self._present.backward()[0]) < _ONWARD
+        self._onward = not level
         self._reflect = len(drawn.both(edge)) > 1
         #: which ends are on the axis, where the route and its image meet
         self._on_axis = [self._reflect and 2 * drawn.centres[neuron][0] == drawn.images.twice for neuron in self._own]
@@ -335,7 +337,7 @@ class RouteCost:
         chosen = np.flatnonzero(costs < limit)
         chosen = chosen[np.argsort(costs[chosen], kind="stable")][:most]
         costs, lines = costs[chosen], lines.some(chosen)
-        for add in (self._in_the_way, self._beside, self._across):
+        for add in (self._in_the_way, self._beside, self._among_others):
             near = costs < limit
             if not near.any():
                 return None
@@ -364,7 +366,7 @@ class RouteCost:
         return cost
 
     def _beside(self, lines: Polylines) -> FloatArray:
-        """(n,) what it costs to meet others at a disc and to run on them."""
+        """(n,) what it costs to meet others at a disc, and to run on those between the same ends."""
         cost = np.zeros(len(lines))
         both = lines.leave(_AT), lines.arrive(_AT)
         for (leaves, places, kinds), here, on_axis in zip(self._ends, both, self._on_axis, strict=True):
@@ -376,13 +378,13 @@ class RouteCost:
             cost += _together(np.sqrt((away * away).sum(axis=2)), kinds == leaves).sum(axis=1)
         if self._mates is not None:
             cost += _SAME * lines.on(self._mates) + self._drawn.astray(self.edge, lines)
-        cells, owner = lines.cells()
-        cost += ALONG * STEP * np.bincount(owner[_among(cells, self._cells)], minlength=len(lines))
         return cost
 
-    def _across(self, lines: Polylines) -> FloatArray:
-        """(n,) what it costs to cross others."""
-        cost = lines.crossed(self._a, self._b, self._weight)
+    def _among_others(self, lines: Polylines) -> FloatArray:
+        """(n,) what it costs to run on others and to cross them."""
+        cells, owner = lines.cells()
+        cost = ALONG * STEP * np.bincount(owner[_among(cells, self._cells)], minlength=len(lines))
+        cost += lines.crossed(self._a, self._b, self._weight)
         if self._reflect:
             (low, high), axis = lines.extents(), self._drawn.images.twice / 2
             flip, shift = np.array([-1.0, 1.0]), np.array([self._drawn.images.twice, 0.0])
@@ -390,7 +392,8 @@ class RouteCost:
             for k in np.flatnonzero((low[:, 0] <= axis) & (high[:, 0] >= axis)).tolist():
                 one = lines.some(np.array([k], dtype=np.int64))
                 cost[k] += _CROSSING * float(one.crossed(one.a * flip + shift, one.b * flip + shift)[0])
-        return cost
+        crowded: FloatArray = _CROWDED * cost / (_CROWDED + cost)
+        return crowded
 
 
 def _among(cells: IntArray, some: IntArray) -> BoolArray:
