@@ -90,6 +90,21 @@ def test_auto_keeps_boxes_whole_that_many_connections_run_between() -> None:
     assert choose_engine(replace(loose, boxes=(("one", tuple(range(100))),)))[0] == "organic"
 
 
+def test_auto_draws_mirror_images_as_it_draws_what_has_none() -> None:
+    names = [f"{side}{i}" for side in "LR" for i in range(150)]
+    pairs = sorted(
+        {(f"{a}{i}", f"{b}{(7 * i + 31 * k) % 150}") for i in range(150) for k in range(2) for a in "LR" for b in "LR"}
+    )
+    many = canonical("worm", names, edges=suite.named(pairs))
+    mirror = (LayoutMirror(-1, tuple((i, i + 150) for i in range(150))),)
+    assert choose_engine(many)[0] == choose_engine(replace(many, mirrors=mirror))[0] == "organic"
+    few = replace(many, edges=many.edges[:100])
+    assert choose_engine(few)[0] == choose_engine(replace(few, mirrors=mirror))[0] == "layered"
+    # what others show best has no mirror images there
+    placed = replace(few, places=tuple((float(i), 0.0) for i in range(300)))
+    assert (choose_engine(placed)[0], choose_engine(replace(placed, mirrors=mirror))[0]) == ("spatial", "layered")
+
+
 def grouped(groups: str, size: int, pairs: list[tuple[str, str]]) -> LayoutProblem:
     members = [(name, [f"{name}{i}" for i in range(size)]) for name in groups]
     return canonical("grouped", [neuron for _, of in members for neuron in of], members, suite.named(pairs))

@@ -68,14 +68,19 @@ def _takes(name: str, problem: LayoutProblem) -> bool:
 
 def _most_suitable(problem: LayoutProblem) -> tuple[Suits, str]:
     """What a drawing is to show, and why."""
-    edges = len(problem.edges)
     if problem.plan:
         return "flow", "it puts what the spec says into rows and columns of the page"
-    arranged = problem.arrange or problem.align or problem.pins or problem.modules
-    if problem.mirrors and not arranged and _tangled(problem):
-        return "clusters", _TANGLED
-    if problem.arrange or problem.mirrors or problem.align:
-        return "flow", "it can arrange, mirror and align as the spec says"
+    if problem.arrange or problem.align:
+        return "flow", "it can arrange and align as the spec says"
+    suits, why = _unasked(problem)
+    if problem.mirrors and suits not in ("flow", "clusters"):
+        return "flow", "it can mirror as the spec says"
+    return suits, why
+
+
+def _unasked(problem: LayoutProblem) -> tuple[Suits, str]:
+    """What a drawing shows best where nothing is asked of it but pins and instances, and why."""
+    edges = len(problem.edges)
     if problem.neurons and len(problem.pins) == len(problem.neurons):
         return "pins", "every neuron has a position"
     if problem.places and not problem.modules and all(math.isfinite(x + y) for x, y in problem.places):
@@ -90,7 +95,7 @@ def _most_suitable(problem: LayoutProblem) -> tuple[Suits, str]:
         ):
             return "tangle", _TANGLED
         return "clusters", _TANGLED
-    if not (problem.pins or problem.boxes or problem.modules) and _as_trees(problem):
+    if not (problem.pins or problem.boxes or problem.modules or problem.mirrors) and _as_trees(problem):
         return "clusters", f"its {edges} connections form trees, which it draws without a crossing"
     if edges > _MOST_IN_RANKS and _in_branches(problem):
         return "flow", f"its {edges} connections form chains or trees, whose flow ranks keep"
