@@ -322,12 +322,10 @@ def test_an_eased_route_crosses_less_even_if_it_is_longer() -> None:
 def test_a_line_that_runs_along_does_not_run_back_for_a_crossing() -> None:
     fence = [((1.6 + 0.3 * k, -0.8), (1.6 + 0.3 * k, 9.0)) for k in range(4)]
     winding = kink((0, 0), (3, 0.5), (0, 1), (3, 1.5), (4, 2))
-    route = improved(fenced([], *fence, first=winding), {0})[0]
-    assert polylines([route]).backward()[0] < 0.05
-    # what runs to and fro already may go round the fence
     wandering = kink((0, 0), (3, 1.5), (0, 1), (3, 0.5), (4, 2))
-    route = improved(fenced([], *fence, first=wandering), {0})[0]
-    assert polylines([route]).backward()[0] > 0.5
+    for first in (winding, wandering):
+        route = improved(fenced([], *fence, first=first), {0})[0]
+        assert polylines([route]).backward()[0] < 0.05
 
 
 def test_the_image_of_an_eased_route_is_its_reflection() -> None:
@@ -349,7 +347,7 @@ def test_a_route_that_meets_its_own_image_pays_for_it() -> None:
         known = {0: route, 1: image}
         alone = Drawn([edge(0, 1), edge(2, 3)], centres, {0: route, 1: straight((9, 9), (9, 12))})
         paired = Drawn([edge(0, 1), edge(2, 3)], centres, known, images=Images({0: 1}))
-        assert RouteCost(paired, 0).cost() - RouteCost(alone, 0).cost() == pytest.approx(1.2 * crossings, abs=1e-6)
+        assert RouteCost(paired, 0).cost() - RouteCost(alone, 0).cost() == pytest.approx(1.0 * crossings, abs=1e-6)
 
 
 #: the way of `r2.y -> l1.x` is only just clear of the frame of `l2`
@@ -501,3 +499,38 @@ def test_many_lines_are_smoothed_at_once_as_one_by_one(ways: list[tuple[list[Poi
     for k, way in enumerate(ways):
         own, route = pieces[owner == k].tolist(), smooth(*way)
         assert [tuple(own[0][0]), *(tuple(place) for piece in own for place in piece[1:])] == list(route)
+
+
+def layers(*sizes: int) -> str:
+    """Fully connected layers, each in a box."""
+    groups = "".join(f"  {chr(97 + k)}: {{count: {size}, box: layer {k}}}\n" for k, size in enumerate(sizes))
+    links = "".join(
+        f"  {chr(97 + k)} -> {chr(98 + k)}: {{weight: 1, pattern: all_to_all}}\n" for k in range(len(sizes) - 1)
+    )
+    return f"neurovis: 1\nname: layers\nneurons:\n{groups}connections:\n{links}"
+
+
+#: Two layers in one rank, one of which is driven by what it drives.
+ELMAN = """
+neurovis: 1
+name: elman
+neurons:
+  in: {count: 4, box: input}
+  context: {count: 5, box: context}
+  hidden: {count: 5, box: hidden}
+  out: {count: 3}
+connections:
+  in -> hidden: {weight: 1, pattern: all_to_all}
+  context -> hidden: {weight: 1, pattern: all_to_all}
+  hidden -> context: {weight: 1, pattern: one_to_one}
+  hidden -> out: {weight: 1, pattern: all_to_all}
+"""
+
+
+@pytest.mark.parametrize(
+    "text", [layers(6, 8, 3), layers(8, 12, 4, 8), f"{layers(6, 8, 3)}layout: {{direction: right}}\n", ELMAN]
+)
+def test_no_line_leaves_a_bundle_to_cross_fewer(text: str) -> None:
+    for route in nv.compile_text(text).layout().routes.values():
+        line = sampled(route, 0.05)
+        assert sum(distance(a, b) for a, b in pairwise(line)) < 1.4 * distance(route[0], route[-1])

@@ -37,11 +37,13 @@ _GRAZING = 6.0
 _CROSSING = 1.2
 #: To cross one that leads from or to the same neuron, besides: both can be untangled at that disc (without: 444).
 _KIN = 2.4
-#: All crossings of a line together, at most.
-_CROWDED = 6.0
 #: To run on others for a unit: as bad as a crossing, since they are one line there (without: 1059 instead of 828 cells
 #: that several lines share, and 456 crossings).
 ALONG = 1.5
+#: All that a line crosses and runs on costs no more than this together: one line of forty in a bundle is not followed
+#: by eye, and not worth a way round all of them (without: fully connected layers in boxes send lines round the whole
+#: picture, which a test holds that none goes; North graphs have 3 % fewer crossings).
+_CROWDED = 6.0
 #: To run on another between the same ends, times the share of the line that does: then one of the two is not seen at
 #: all (without: a sheaf of six between two neurons, which a test draws, is not told apart).
 _SAME = 12.0
@@ -59,8 +61,8 @@ _RATIO = 1.0
 BENDING = 0.5
 #: The same in a bend of radius 1, which is hard to follow where it is tight (without: 430, and 2 % more turning).
 _TIGHT = 0.25
-#: To run back a unit along the direction, where the route did not: more than two crossings, since the direction is what
-#: is read first (nothing that was measured became worse; a test holds that no line turns back for a crossing).
+#: To turn back for a unit along the direction: more than two crossings, since the direction is what is read first
+#: (nothing that was measured became worse; a test holds that no line turns back for a crossing).
 _BACK = 3.0
 #: To lead a unit beyond all that is drawn: two units are a crossing (without: 1 % more line, around everything).
 _OUTSIDE = 0.5
@@ -281,8 +283,7 @@ class RouteCost:
         self._own = drawn.edges[edge].source, drawn.edges[edge].target
         self._far = max(distance(self.route[0], self.route[-1]), 1e-9)
         # what leads to its own level runs back whatever way it takes
-        level = abs(self.route[0][1] - self.route[-1][1]) < _ONWARD
-        self._onward = not level
+        self._onward = abs(self.route[0][1] - self.route[-1][1]) >= _ONWARD
         self._reflect = len(drawn.both(edge)) > 1
         #: which ends are on the axis, where the route and its image meet
         self._on_axis = [self._reflect and 2 * drawn.centres[neuron][0] == drawn.images.twice for neuron in self._own]
