@@ -128,6 +128,32 @@ def test_copies_in_a_column_are_reflected_together() -> None:
     assert len({at[f"L{i}.A"][0] < at[f"L{i}.P"][0] for i in (1, 2, 3)}) == 1
 
 
+MIRRORED = """
+neurovis: 1
+name: trunk
+modules:
+  segment:
+    neurons: {L: {}, R: {}, I: {bias: 1}}
+    connections: {I -> L: 1, I -> R: 1}
+    layout: {mirror: [[L, R]], plan: [[L, I, R]]}
+  pair: {instances: {a: {module: segment}, b: {module: segment}}, connections: {a.L -> b.L: 1}}
+instances: {s: {module: KIND}}
+neurons: {A: {}}
+connections: {s.FIRST -> A: 1}
+layout: {plan: [[s, A]], direction: DIRECTION}
+"""
+
+
+@pytest.mark.parametrize(("kind", "first"), [("segment", "L"), ("pair", "a.L")])
+@pytest.mark.parametrize("direction", ["down", "up"])
+def test_a_plan_with_a_mirror_is_not_laid_on_its_side(kind: str, first: str, direction: str) -> None:
+    text = MIRRORED.replace("KIND", kind).replace("FIRST", first).replace("DIRECTION", direction)
+    at = nv.compile_text(text).layout().positions
+    inner = f"s.{first[:-1]}"
+    assert at[f"{inner}L"][1] == at[f"{inner}R"][1]
+    assert at[f"{inner}L"][0] + at[f"{inner}R"][0] == 2 * at[f"{inner}I"][0]
+
+
 def test_pins_are_kept_and_take_their_copies_place() -> None:
     text = BODY.replace("PLAN", ROWS).replace("DIRECTION", "down") + "  positions: {R1: [3, 20]}\n"
     at = nv.compile_text(text).layout().positions

@@ -31,6 +31,8 @@ class Drawing:
     axis: float | None = None
     #: its coordinates are given by pins, so that its origin means something
     fixed: bool = False
+    #: a plan in it has a mirror, whose axis is along the direction: it can be turned upside down, not on its side
+    upright: bool = False
     direction: Direction = "down"
     #: on which side the label of each neuron stands, None where its disc holds it, and what labels cover
     sides: tuple[Side | None, ...] = ()

@@ -345,12 +345,20 @@ class _Standing:
                 )
             )
         axis = self.rests.axis if pair else None
-        fixed = bool(problem.pins)
-        labels = tuple(self.labels.values())
+        upright = bool(problem.plan and pair) or any(piece.drawing.upright for piece, _ in self.rests.pieces)
         return Drawing(
-            tuple(places), routes, self.frames, self.boxes, axis, fixed, problem.direction, tuple(self.sides), labels,
+            tuple(places),
+            routes,
+            self.frames,
+            self.boxes,
+            axis,
+            bool(problem.pins),
+            upright,
+            problem.direction,
+            tuple(self.sides),
+            tuple(self.labels.values()),
             problem.title,
-        )  # fmt: skip
+        )
 
 
 def _box(

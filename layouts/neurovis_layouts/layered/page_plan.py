@@ -230,10 +230,11 @@ def _crossings(lines: FloatArray, one: IntArray, other: IntArray) -> int:
 
 def _directions(problem: LayoutProblem, part: Part, pair: Mapping[int, int], drawn: Drawn) -> tuple[Direction, ...]:
     """The directions in which a part may be drawn: one that holds mirror images of its own along the axis of the
-    whole, one whose module pins its neurons as they are pinned."""
-    if drawn(part, problem.direction).drawing.fixed:
+    whole, or that of its plan, one whose module pins its neurons as they are pinned."""
+    drawing = drawn(part, problem.direction).drawing
+    if drawing.fixed:
         return (problem.direction,)
-    if symmetric(part.members, pair):
+    if drawing.upright or symmetric(part.members, pair):
         return (problem.direction, _OPPOSITE[problem.direction])
     return ("down", "up", "right", "left")
 
