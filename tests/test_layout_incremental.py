@@ -330,6 +330,17 @@ def test_two_moved_on_to_each_other_by_hand_stay_and_are_warned_of(tmp_path: Pat
     assert line[warning.span.column - 1 : warning.span.end_column - 1] == file.name
 
 
+def test_a_route_goes_round_what_was_moved_on_to_it_by_hand() -> None:
+    text = "neurovis: 1\nname: fork\nneurons: {N: {count: 3, bias: 1}}\nconnections: {N3 -> N1: 1, N3 -> N2: 1}\n"
+    network = nv.compile_text(text)
+    before = network.layout("layered").value
+    (x, y), (a, b) = before.positions["N3"], before.positions["N2"]
+    edited = replace(before, positions={**before.positions, "N1": ((x + a) / 2, (y + b) / 2)})
+    now = network.layout("layered", earlier=edited).value
+    assert now.positions == edited.positions
+    assert metrics(now, problem_of(network.network))["edges_over_neurons"] == 0
+
+
 def test_an_instance_moved_on_to_its_own_image_finds_a_place_beside_it() -> None:
     network = hexapod(2)
     before = network.layout("layered").value

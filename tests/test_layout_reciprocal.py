@@ -111,6 +111,23 @@ def test_there_and_back_between_mirror_images_stay_two_lines_when_one_is_moved(m
                 assert one[across] == pytest.approx(axis - other[across])
 
 
+@pytest.mark.parametrize("direction", ["down", "right"])
+def test_there_and_back_between_all_of_two_sides_stay_two_lines_when_one_is_moved(direction: str) -> None:
+    text = (
+        "neurovis: 1\nname: sides\nneurons: {L: {count: 2, bias: 1}, R: {count: 2}}\nconnections:\n"
+        "  L -> R: {weight: -1, pattern: all_to_all}\n  R -> L: {weight: -1, pattern: all_to_all}\n"
+    )
+    network = nv.compile_text(text + f"layout: {{direction: {direction}, mirror: [[L, R]]}}")
+    earlier = network.layout().value
+    by = (-1.0, 2.0) if direction == "down" else (2.0, -1.0)
+    x, y = earlier.positions["L1"]
+    edited = replace(earlier, positions={**earlier.positions, "L1": (x + by[0], y + by[1])})
+    layout = network.layout(earlier=edited).value
+    assert layout.positions["L1"] != earlier.positions["L1"]
+    for one, other in pairs(layout.routes):
+        assert together(layout.routes[one], layout.routes[other], 0.08) <= 0.1, (one, other)
+
+
 def test_there_and_back_between_mirror_images_are_two_lines_in_new_instances() -> None:
     before = nv.compile_text(SWINGING.replace("COUNT", "2").replace("MORE", ""))
     after = nv.compile_text(SWINGING.replace("COUNT", "3").replace("MORE", ", a2.E -> a3.E: 1"))

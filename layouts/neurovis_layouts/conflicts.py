@@ -139,16 +139,21 @@ def carried(problem: LayoutProblem, layout: Layout, placed: Mapping[int, Point])
     return found
 
 
-def _by_hand(problem: LayoutProblem, now: Mapping[int, Point], outer: Iterable[frozenset[int]]) -> dict[int, Point]:
-    """The neurons that were moved, with where they were. Of the instances that are ``outer``, those of which only a
-    part was moved are not among them: they contradict their template, which a file cannot change."""
+def routed_from(problem: LayoutProblem) -> dict[int, Point]:
+    """Where the routes of an earlier layout begin and end: where their neurons stood before somebody moved them."""
     before: dict[int, Point] = {}
     for edge in problem.edges:
         route = problem.memory.routes.get(edge.name) if problem.memory else None
         if route is not None:
             before.setdefault(edge.source, route[0])
             before.setdefault(edge.target, route[-1])
-    before = {i: point for i, point in before.items() if i in now}
+    return before
+
+
+def _by_hand(problem: LayoutProblem, now: Mapping[int, Point], outer: Iterable[frozenset[int]]) -> dict[int, Point]:
+    """The neurons that were moved, with where they were. Of the instances that are ``outer``, those of which only a
+    part was moved are not among them: they contradict their template, which a file cannot change."""
+    before = {i: point for i, point in routed_from(problem).items() if i in now}
     moved = {i: point for i, point in before.items() if not same(point, now[i])}
     for own in outer:
         known = sorted(own & before.keys())

@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from neurovis_layouts.alike import Alike, Move
-from neurovis_layouts.conflicts import carried
+from neurovis_layouts.alike import Alike, Move, same
+from neurovis_layouts.conflicts import carried, routed_from
 from neurovis_layouts.frame import from_picture, to_picture, turned
 from neurovis_layouts.occupancy import overlapping
 from neurovis_layouts.pins import with_origins
@@ -155,9 +155,11 @@ def _found(problem: LayoutProblem, ways: _Ways, rest: Sequence[int], routes: Map
 
 
 def _old_routes(problem: LayoutProblem, memory: Layout, ways: _Ways) -> dict[int, Route]:
-    """Earlier routes, by edge, that can be kept: they still run from centre to centre, over no new neuron and through
-    no frame that is new or was drawn otherwise."""
+    """Earlier routes, by edge, that can be kept: they still run from centre to centre, over no neuron that is new or
+    was moved, and through no frame that is new or was drawn otherwise."""
     there = [memory.positions.get(name) == point for name, point in zip(problem.neurons, ways.centres, strict=True)]
+    for neuron, before in routed_from(problem).items():
+        there[neuron] &= same(before, ways.centres[neuron])
     routes: dict[int, Route] = {}
     for i, edge in enumerate(problem.edges):
         route = memory.routes.get(edge.name)
@@ -210,10 +212,11 @@ class _Twins:
 
     def copied(self, new: Sequence[int], routes: Mapping[int, Route]) -> dict[int, Route]:
         """Routes for new edges like those drawn alike: like an earlier one, such as within another instance of the
-        make, else like the first that has been found."""
+        make, else like the first that has been found. There and back are taken from the same side of a mirror, or both
+        would bow to one side."""
         fresh, waiting = set(new), set(new)
         found: dict[int, Route] = {}
-        for i in new:
+        for i in sorted(new, key=lambda i: (sorted(self._keys[i][:2]), self._keys[i])):
             if i not in waiting:
                 continue
             alike = self.of(i)
