@@ -79,7 +79,8 @@ def compact(problem: LayoutProblem, drawn: Drawn, most: Mapping[Fold, int]) -> S
     """The shape that costs least. ``most`` says, once it has been drawn, what can be folded, and how often at most."""
     shape = Shape(draft=True)
     drawing = drawn(problem, shape)
-    if _stretched(problem, drawing) < _STRETCHED or max(_size(drawing, problem.direction)) < _SHORT:
+    size = _size(drawing, problem.direction)
+    if stretched(problem, *size) < _STRETCHED or max(size) < _SHORT:
         return Shape()
     first = least = _cost(problem, drawing)
     for fold in sorted(most):
@@ -112,9 +113,8 @@ def _size(drawing: Drawing, direction: Direction) -> tuple[float, float]:
     return (x1 - x0, y1 - y0) if direction in ("down", "up") else (y1 - y0, x1 - x0)
 
 
-def _stretched(problem: LayoutProblem, drawing: Drawing) -> float:
-    """How much wider or higher than a page a drawing is."""
-    wide, high = _size(drawing, problem.direction)
+def stretched(problem: LayoutProblem, wide: float, high: float) -> float:
+    """How much wider or higher than a page something of this size is."""
     return max(wide / (problem.page * high), problem.page * high / wide)
 
 

@@ -174,7 +174,7 @@ class Composer:
             return self._piece(problem, part, direction, parts, known)
 
         parts, where = parts_by_cell(problem, pair)
-        pieces = facing(problem, parts, where, pair, drawn, kind == WHOLE, self._upright(kind))
+        pieces = facing(problem, parts, where, pair, drawn, self._upright(kind))
         plan = ComponentLayout()
         for piece, move in pieces:
             plan.places.update(zip(piece.part.members, map(move.point, piece.drawing.places), strict=True))

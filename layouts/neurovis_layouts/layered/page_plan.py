@@ -7,21 +7,25 @@ cell names is placed behind the cell that it has most connections with. Mirror i
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cache
 from typing import TypeAlias
 
 import numpy as np
 
 from neurovis_layouts.alike import Move, shifted_by
 from neurovis_layouts.frame import from_picture, to_picture
+from neurovis_layouts.layered.compact import stretched
 from neurovis_layouts.layered.drawing import Drawing, Piece
 from neurovis_layouts.layered.parts import Part, imaged, part_of_module, symmetric
 from neurovis_layouts.layered.plan_places import Slot, placed
+from neurovis_layouts.routing.obstacles import REACH
 from neurovis_spec.layout import FloatArray, IntArray
-from neurovis_spec.layout.geometry import Rect, crossing
+from neurovis_spec.layout.geometry import Rect, crossing, squared_distances, united
 from neurovis_spec.layout.model import Direction, LayoutProblem, LayoutRefusalError, Point, Seat
 
 #: A part drawn in a direction, with the frame around it.
@@ -30,8 +34,17 @@ Drawn = Callable[[Part, Direction], Piece]
 _Members: TypeAlias = tuple[int, ...]
 #: Rounds in which each part may turn to face the others; after the second hardly any does.
 _ROUNDS = 3
-#: What it costs to cross a line, in units of the layout; of more lines than this crossings are not counted.
-_CROSSING, _MOST = 4.0, 300
+#: What it costs, in units of the layout, that the side of the page is a unit longer (with 2: the hexapod takes twice
+#: the area where ranks are farther apart), and to cross a line or to run over a disc.
+_SIDE, _CROSSING = 10.0, 4.0
+#: What all crossings cost at most, by the length of all lines: layers that are fully connected face each other, though
+#: they cross less where one is turned away. Of more lines than so many neither crossings nor discs are counted.
+_CROSSED, _MOST = 2.0, 300
+#: What is no longer than this, in units of the layout, may have any proportions.
+_SMALL = 8.0
+_DIRECTIONS: tuple[Direction, ...] = ("down", "up", "right", "left")
+#: A difference that is rounding.
+_NOTHING = 1e-9
 _OPPOSITE: Mapping[Direction, Direction] = {"down": "up", "up": "down", "right": "left", "left": "right"}
 
 
@@ -131,7 +144,6 @@ def facing(
     where: Mapping[int, int],
     pair: Mapping[int, int],
     drawn: Drawn,
-    whole: bool,
     upright: bool,
 ) -> list[tuple[Piece, Move]]:
     """Each part in the direction, and as the mirror image, in which the connections between parts are short and the
@@ -147,71 +159,80 @@ def facing(
     for k, part in enumerate(parts):
         if part.image_of < 0:
             makes.setdefault((part.kind, -1 if part.kind >= 0 else k), []).append(k)
-    turns: list[Direction] = [problem.direction for _ in parts]
-    flips = [part.image_of >= 0 for part in parts]
+    directions = {own[0]: _directions(problem, parts[own[0]], pair, drawn) for own in makes.values()}
+    column = {k: slot.across for slot in slots for line in slot.lines for k in line}
 
-    def pieces() -> list[Piece]:
-        found = [drawn(part, turn) for part, turn in zip(parts, turns, strict=True)]
-        return [piece.titled_above(flip) for piece, flip in zip(found, flips, strict=True)] if upright else found
+    def stood(shape: _Shape) -> list[tuple[Piece, Move]]:
+        pieces = [drawn(part, turn) for part, turn in zip(parts, shape.turns, strict=True)]
+        if upright:
+            pieces = [piece.titled_above(flip) for piece, flip in zip(pieces, shape.flips, strict=True)]
+        return _placed(problem, slots, parts, pieces, shape.flips, bool(pair))
 
-    def cost() -> float:
-        """How long straight lines between the ends of connections from part to part would be together, how often they
-        would cross, and how far the whole page is from its proportions."""
-        moved = _placed(problem, slots, parts, pieces(), flips, bool(pair))
+    @cache
+    def cost(shape: _Shape) -> float:
+        """How large the page is, how long straight lines between the ends of connections from part to part are
+        together, how often they cross and run over discs, and how far the whole page is from its proportions."""
+        moved = stood(shape)
         at: dict[int, Point] = {}
         for piece, move in moved:
             at.update(zip(piece.part.members, map(move.point, piece.drawing.places), strict=True))
-        rects = [move.rect(piece.rect) for piece, move in moved]
-        wide = max(r[2] for r in rects) - min(r[0] for r in rects)
-        high = max(r[3] for r in rects) - min(r[1] for r in rects)
-        if problem.direction in ("right", "left"):
-            wide, high = high, wide
-        stretched = max(wide / (problem.page * high), problem.page * high / wide) if whole else 1.0
+        x0, y0, x1, y1 = united(move.rect(piece.rect) for piece, move in moved)
+        wide, high = (x1 - x0, y1 - y0) if problem.direction in ("down", "up") else (y1 - y0, x1 - x0)
         lines = np.array([(at[a], at[b]) for a, b in between], dtype=np.float64).reshape(-1, 2, 2)
         length = float(np.sqrt(((lines[:, 1] - lines[:, 0]) ** 2).sum(axis=1)).sum())
-        return (wide + high + length + _CROSSING * _crossings(lines, *apart)) * stretched
+        met = min(_CROSSING * _crossings(lines, *apart), _CROSSED * length)
+        met += _CROSSING * _over(lines, np.array([at[i] for i in range(len(at))]))
+        page = math.sqrt(stretched(problem, wide, high)) if max(wide, high) > _SMALL else 1.0
+        return (_SIDE * math.sqrt(wide * high) + length + met) * page
 
-    def turn(own: Sequence[int], direction: Direction) -> None:
-        for k, part in enumerate(parts):
-            if k in own or part.image_of in own:
-                turns[k] = direction
-
-    def flip(own: Sequence[int]) -> None:
-        for k, part in enumerate(parts):
-            if k in own or part.image_of in own:
-                flips[k] = not flips[k]
-
-    column = {k: slot.across for slot in slots for line in slot.lines for k in line}
-
-    def flipped(own: Sequence[int]) -> float:
-        """Draw these parts as their mirror images, all of one column, where that costs less; what all costs then."""
-        now = cost()
-        if drawn(parts[own[0]], turns[own[0]]).drawing.fixed or symmetric(parts[own[0]].members, pair):
-            return now
+    def flipped(shape: _Shape, own: Sequence[int]) -> _Shape:
+        """These parts drawn as their mirror images, all of one column, where that costs less."""
+        lead = parts[own[0]]
+        if drawn(lead, shape.turns[own[0]]).drawing.fixed or symmetric(lead.members, pair):
+            return shape
         for across in dict.fromkeys(column[k] for k in own):
-            mates = [k for k in own if column[k] == across]
-            flip(mates)
-            if (then := cost()) < now - 1e-9:
-                now = then
-            else:
-                flip(mates)
-        return now
+            other = shape.flipped(both([k for k in own if column[k] == across]))
+            shape = other if cost(other) < cost(shape) - _NOTHING else shape
+        return shape
 
-    best = cost()
-    for _ in range(_ROUNDS):
-        before = best
+    def both(own: Sequence[int]) -> set[int]:
+        """These parts and their mirror images."""
+        return {k for k, part in enumerate(parts) if k in own or part.image_of in own}
+
+    def settled(shape: _Shape) -> _Shape:
+        """The best that is found by turning one make of parts after the other."""
+        for _ in range(_ROUNDS):
+            before = shape
+            for own in makes.values():
+                for direction in directions[own[0]]:
+                    other = flipped(shape.turned(both(own), direction), own)
+                    shape = other if cost(other) < cost(shape) - _NOTHING else shape
+            if shape == before:
+                break
+        return shape
+
+    as_drawn = _Shape(tuple(problem.direction for _ in parts), tuple(part.image_of >= 0 for part in parts))
+    starts = [as_drawn]
+    for direction in _DIRECTIONS:
+        start = as_drawn
         for own in makes.values():
-            for direction in _directions(problem, parts[own[0]], pair, drawn):
-                kept, held = list(turns), list(flips)
-                turn(own, direction)
-                now = flipped(own)
-                if now < best - 1e-9:
-                    best = now
-                else:
-                    turns[:], flips[:] = kept, held
-        if best == before:
-            break
-    return _placed(problem, slots, parts, pieces(), flips, bool(pair))
+            start = start.turned(both(own), direction) if direction in directions[own[0]] else start
+        starts.append(start)
+    return stood(min(map(settled, dict.fromkeys(starts)), key=cost))
+
+
+@dataclass(frozen=True, slots=True)
+class _Shape:
+    """In which direction each part is drawn, and whether as its mirror image."""
+
+    turns: tuple[Direction, ...]
+    flips: tuple[bool, ...]
+
+    def turned(self, own: AbstractSet[int], direction: Direction) -> _Shape:
+        return replace(self, turns=tuple(direction if k in own else turn for k, turn in enumerate(self.turns)))
+
+    def flipped(self, own: AbstractSet[int]) -> _Shape:
+        return replace(self, flips=tuple(flip != (k in own) for k, flip in enumerate(self.flips)))
 
 
 def _apart(lines: Sequence[tuple[int, int]]) -> tuple[IntArray, IntArray]:
@@ -228,6 +249,16 @@ def _crossings(lines: FloatArray, one: IntArray, other: IntArray) -> int:
     return int(crossing(*a, *(b - a), *c, *(d - c))[1].sum())
 
 
+def _over(lines: FloatArray, places: FloatArray) -> int:
+    """How many discs straight lines (n, 2, 2) run over, but for those at their ends."""
+    if len(lines) > _MOST:
+        return 0
+    x, y = (places[None] - lines[:, None, 0]).transpose(2, 0, 1)
+    dx, dy = (lines[:, 1] - lines[:, 0]).T[:, :, None]
+    over = squared_distances(x, y, dx, dy) < REACH * REACH
+    return int(over.sum()) - 2 * len(lines)
+
+
 def _directions(problem: LayoutProblem, part: Part, pair: Mapping[int, int], drawn: Drawn) -> tuple[Direction, ...]:
     """The directions in which a part may be drawn: one that holds mirror images of its own along the axis of the
     whole, or that of its plan, one whose module pins its neurons as they are pinned."""
@@ -236,7 +267,7 @@ def _directions(problem: LayoutProblem, part: Part, pair: Mapping[int, int], dra
         return (problem.direction,)
     if drawing.upright or symmetric(part.members, pair):
         return (problem.direction, _OPPOSITE[problem.direction])
-    return ("down", "up", "right", "left")
+    return _DIRECTIONS
 
 
 def in_direction(drawing: Drawing, of: Direction, frame: Direction) -> Drawing:

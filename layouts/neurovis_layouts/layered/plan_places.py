@@ -7,6 +7,7 @@ and below it: the rows beside a high one are no farther apart. What has room to 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -73,15 +74,24 @@ def placed(
 def _streets(
     problem: LayoutProblem, slots: Sequence[Slot], pieces: Sequence[Piece], street: float
 ) -> list[list[float]]:
-    """How far apart every two cells are at least: as neurons in a rank, but where neither is a frame and something
-    leads from the one to the other as ranks, so that its arrow is seen."""
+    """How far apart every two cells are at least: as neurons in a rank, but as ranks where neither is a frame and one
+    holds several neurons, so that it is seen what they hold, or something leads from the one to the other, so that its
+    arrow is seen."""
     slot_of = {k: number for number, slot in enumerate(slots) for line in slot.lines for k in line}
     owner = {m: slot_of[k] for k, piece in enumerate(pieces) for m in piece.part.members if not piece.framed}
-    streets = [[street] * len(slots) for _ in slots]
+    wide = max(street, problem.rank_spacing)
+    held = Counter(owner.values())
+    streets = [
+        [
+            wide if one in held and other in held and held[one] + held[other] > 2 else street
+            for other in range(len(slots))
+        ]
+        for one in range(len(slots))
+    ]
     for edge in problem.edges:
         one, other = owner.get(edge.source, -1), owner.get(edge.target, -1)
         if min(one, other) >= 0 and one != other:
-            streets[one][other] = streets[other][one] = max(street, problem.rank_spacing)
+            streets[one][other] = streets[other][one] = wide
     return streets
 
 
