@@ -64,3 +64,29 @@ def test_a_draft_is_no_drawing(problem: LayoutProblem) -> None:
     draft, drawing = Shape({(WHOLE, 0): 2}, draft=True), Shape({(WHOLE, 0): 2})
     assert draft.of(WHOLE, whole) != drawing.of(WHOLE, whole)
     assert draft.changed((WHOLE, RANKS), 2) == Shape({(WHOLE, 0): 2, (WHOLE, RANKS): 2}, draft=True)
+
+
+FAN = (
+    "neurovis: 1\nname: fan\n"
+    "modules: {m: {neurons: {A: {}, B: {count: 2}, C: {}}, connections: {A -> B: 1, B -> C: 1}}}\n"
+    "instances: {u: {module: m, count: COUNT}}\nneurons: {R: {bias: 1}}\nconnections: {R -> u.A: 1}\n"
+    "render: {size: [WIDE, HIGH]}\n"
+)
+
+
+@pytest.mark.parametrize("count", [6, 12])
+@pytest.mark.parametrize(("wide", "high"), [(500, 1200), (1000, 1000), (1600, 800)])
+def test_instances_stand_as_the_page_that_is_asked_for(count: int, wide: int, high: int) -> None:
+    text = FAN.replace("COUNT", f"{count}").replace("WIDE", f"{wide}").replace("HIGH", f"{high}")
+    layout = nv.compile_text(text).layout()
+    xs, ys = zip(*layout.positions.values(), strict=True)
+    proportions = (max(xs) - min(xs) + 1) / (max(ys) - min(ys) + 1)
+    assert 1 / 1.7 < proportions / (wide / high) < 1.7
+
+
+def test_a_ring_of_instances_comes_near_to_a_page() -> None:
+    ring = ", ".join(f"u{k}.C -> u{k % 8 + 1}.A: 1" for k in range(1, 9))
+    text = FAN.replace("COUNT", "8").replace("R -> u.A: 1", ring).replace("neurons: {R: {bias: 1}}\n", "")
+    layout = nv.compile_text(text.partition("render")[0]).layout()
+    xs, ys = zip(*layout.positions.values(), strict=True)
+    assert (max(xs) - min(xs) + 1) / (max(ys) - min(ys) + 1) < 2

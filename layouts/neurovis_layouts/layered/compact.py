@@ -21,12 +21,11 @@ from neurovis_spec.layout.model import Direction, LayoutProblem
 WHOLE, NONE = -1, -2
 #: What is folded where ranks are.
 RANKS = -1
-#: What is longer than a page by this is folded, if that is worth so much of what it costs as it is.
-_STRETCHED, _WORTH = 2.0, 0.5
+#: What is longer than a page by this is folded, unless it is no longer than so many units, which can be read as it is,
+#: or that is not worth so much of what it costs as it is: instances on a page that is asked for, and all else.
+_STRETCHED, _SHORT, _WORTH = (1.25, 2.0), (12.0, 24.0), (0.9, 0.6)
 #: Each single fold has to be worth this.
 _EACH = 0.9
-#: What is no longer than this, in units of the layout, can be read as it is.
-_SHORT = 24.0
 #: What it costs if all connections run back: one in ten is worth twice the page.
 _BACK = 10.0
 #: So many numbers of bands one after the other are tried in vain.
@@ -80,12 +79,13 @@ def compact(problem: LayoutProblem, drawn: Drawn, most: Mapping[Fold, int]) -> S
     shape = Shape(draft=True)
     drawing = drawn(problem, shape)
     size = _size(drawing, problem.direction)
-    if stretched(problem, *size) < _STRETCHED or max(size) < _SHORT:
+    free = int(problem.aspect is None or not problem.modules)
+    if stretched(problem, *size) < _STRETCHED[free] or max(size) < _SHORT[free]:
         return Shape()
     first = least = _cost(problem, drawing)
     for fold in sorted(most):
         least, shape = _folded(problem, drawn, fold, most[fold], least, shape)
-    return replace(shape, draft=False) if least < _WORTH * first else Shape()
+    return replace(shape, draft=False) if least < _WORTH[free] * first else Shape()
 
 
 def _folded(

@@ -21,10 +21,9 @@ from neurovis_layouts.layered.parts import symmetric
 from neurovis_layouts.layered.units import Unit
 from neurovis_spec.layout.model import LayoutProblem
 
-#: What is wider than this by its height gets room for what fans out, and what is wider than the second is folded.
-_WIDE, _TOO_WIDE = 1.5, 3.0
-#: What rows bring it near to, where ranks are level in the picture, and where they stand upright.
-_AIM, _AIM_ASIDE = 1.6, 0.8
+#: What is wider than a page by this gets room for what fans out, what is wider by the second is folded, and by the last
+#: is how wide rows are to be.
+_WIDE, _TOO_WIDE, _AIM = 1.1, 2.2, 1.15
 #: Fewer frames than this stay in one row.
 _FEWEST = 8
 #: How much wider a rank gets by a connection that runs through it, and a gap between frames by the first one in it.
@@ -153,7 +152,7 @@ class _Sheet:
     ) -> None:
         self._spacing, self._gap = max(problem.neuron_spacing, 0.65), max(problem.rank_spacing, 0.75)
         self._units = units
-        self._aim = _AIM if problem.direction in ("down", "up") else _AIM_ASIDE
+        self._page = problem.page if problem.direction in ("down", "up") else 1 / problem.page
         count = max(rank, default=-1) + 1
         self._fixed, self._high = [0.0] * count, [0.0] * count
         for u, r in enumerate(rank):
@@ -182,8 +181,8 @@ class _Sheet:
         free = math.fsum(strand.wide for strand in block)
         beside, most = max(self._fixed[first : last + 1]), max(self._fixed)
         high, each = math.fsum(self._high), math.fsum(self._high[first : last + 1])
-        if free + beside <= max(_TOO_WIDE * high, most):
-            return int(free + beside > _WIDE * high)
+        if free + beside <= max(_TOO_WIDE * self._page * high, most):
+            return int(free + beside > _WIDE * self._page * high)
         area = (free + beside) * high
         best = (math.inf, 1)
         for rows in range(1, min(count, 1 + _MOST // max(through, 1)) + 1):
@@ -193,7 +192,7 @@ class _Sheet:
             lines = through * (rows - 1) / rows * _LINE + columns * sides * _FIRST_LINE if rows > 1 else 0.0
             wide, tall = max(free * columns / count + lines + beside, most), high + (rows - 1) * each
             # rounded, since the last bits of a logarithm are the machine's
-            worse = round(abs(math.log(wide / tall / self._aim)) + max(0.0, math.log(wide * tall / area)), 6)
+            worse = round(abs(math.log(wide / tall / (_AIM * self._page))) + max(0.0, math.log(wide * tall / area)), 6)
             best = min(best, (worse + _RAGGED * (rows * columns - count) / columns, rows))
         return best[1]
 
