@@ -6,7 +6,7 @@ the direction, what is remembered kept.
 
 from __future__ import annotations
 
-import math
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
@@ -22,7 +22,7 @@ from neurovis_layouts.routing import route_all
 from neurovis_layouts.routing.images import Images
 from neurovis_layouts.symmetry import Symmetry, exact, routed_alike
 from neurovis_spec.layout import FloatArray, IntArray
-from neurovis_spec.layout.geometry import near_pairs, snap, straight
+from neurovis_spec.layout.geometry import Rect, near_pairs, snap, straight
 from neurovis_spec.layout.label_overlaps import label_overlaps
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point, Side
 
@@ -38,14 +38,14 @@ def drawn(
     places: FloatArray,
     frames: bool = True,
     clear: Iterable[int] = (),
-    highest: float = math.inf,
+    within: Rect | None = None,
     symmetry: Symmetry | None = None,
     sides: Mapping[str, Side] = MappingProxyType({}),
 ) -> Layout:
     """The layout with the neurons at ``places`` (n, 2; there may be more rows than neurons), where no pin says
     otherwise. Instances without a pin are kept off the ``frames`` of those that have one. The edges ``clear``, by
-    index, run straight, as the caller knows that nothing is in their way. The others bow at most ``highest`` times as
-    high as they are long. With a ``symmetry`` images, and routes between them, are exact reflections. On these
+    index, run straight, as the caller knows that nothing is in their way. The others go round what is in theirs
+    ``within`` this rectangle. With a ``symmetry`` images, and routes between them, are exact reflections. On these
     ``sides`` labels have room."""
     flat: list[Point] = [(snap(x), snap(y)) for x, y in places[: len(problem.neurons)].tolist()]
     for i, point in problem.pins.items():
@@ -56,9 +56,7 @@ def drawn(
         centres = exact(problem, symmetry, centres)
         images, ghosts = routed_alike(problem, symmetry, centres)
     there = {i: straight(centres[problem.edges[i].source], centres[problem.edges[i].target]) for i in clear}
-    routes = route_all(
-        problem.edges, [*centres, *ghosts], careful=_CAREFUL, there=there, highest=highest, images=images
-    )
+    routes = route_all(problem.edges, [*centres, *ghosts], careful=_CAREFUL, there=there, within=within, images=images)
     turned = problem.direction
     fresh = Layout(
         problem.network,
@@ -93,6 +91,13 @@ def drawn_apart(problem: LayoutProblem, engine: str, places: FloatArray, spacing
             break
         places = _GROWTH * places  # such as where routes bow farther out of their frame than expected
     return layout
+
+
+def alone(problem: LayoutProblem, chosen: Iterable[int]) -> list[int]:
+    """Of these edges those that are alone between their ends."""
+    ends = [frozenset((edge.source, edge.target)) for edge in problem.edges]
+    times = Counter(ends)
+    return [i for i in chosen if times[ends[i]] == 1]
 
 
 def pinned_places(problem: LayoutProblem) -> tuple[IntArray, FloatArray]:

@@ -12,16 +12,21 @@ import math
 import numpy as np
 
 from neurovis_layouts.apart import apart, jitter
-from neurovis_layouts.finish import drawn, nearest, pinned_places
+from neurovis_layouts.finish import alone, drawn, nearest, pinned_places
 from neurovis_layouts.frame import from_picture
+from neurovis_layouts.routing.obstacles import REACH, Obstacles
 from neurovis_spec.layout import FloatArray
-from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem
+from neurovis_spec.layout.geometry import straight
+from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem, Point
 
 #: In spacings: how far half of the discs are from their next, how far nine tenths of them (the picture may grow by this
 #: factor for it), and how far any two are kept apart.
 _HALF, _NINE_TENTHS, _GROWTH, _APART = 1.0, 0.7, 2.0, 0.7
-#: How high routes bow, by the length of their way: what leads far out would make the picture larger than what it shows.
-_HIGHEST = 0.5
+#: How far beyond all neurons routes may lead, by how wide or high these are, whichever is less: what leads far out
+#: would make the picture larger than what it shows.
+_BEYOND = 0.35
+#: What distances may differ by from what they are.
+_ROUNDED = 1e-9
 #: Closer than this share of what they had in a row is as good as in one place.
 _CLOSEST = 0.05
 #: Room for each of those that stand in one place.
@@ -64,7 +69,18 @@ class SpatialEngine:
             free = np.flatnonzero(~known)
             places[free] = _fanned(_beside(places, problem), _CROWD * spacing)[free]
             places = apart(places, _APART * spacing, held)
-        return drawn(problem, self.name, places, frames=False, highest=_HIGHEST)
+        low, high = places.min(axis=0), places.max(axis=0)
+        beyond = max(1.0, _BEYOND * float((high - low).min()))
+        within = (*(low - beyond).tolist(), *(high + beyond).tolist())
+        return drawn(problem, self.name, places, frames=False, clear=_clear(problem, places), within=within)
+
+
+def _clear(problem: LayoutProblem, places: FloatArray) -> list[int]:
+    """The edges between which and whose ends nothing is in the way."""
+    ends = [(edge.source, edge.target) for edge in problem.edges]
+    centres: list[Point] = [(x, y) for x, y in places.tolist()]
+    far = Obstacles(centres).clearances([straight(centres[a], centres[b]) for a, b in ends], ends)
+    return alone(problem, [i for i, (a, b) in enumerate(ends) if a != b and far[i] >= REACH - _ROUNDED])
 
 
 def _data(problem: LayoutProblem) -> FloatArray:

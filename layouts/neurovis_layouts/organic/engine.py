@@ -8,14 +8,13 @@ Mirror images are such from the start.
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from neurovis_layouts.apart import apart
-from neurovis_layouts.finish import drawn, drawn_apart, nearest
+from neurovis_layouts.finish import alone, drawn, drawn_apart, nearest
 from neurovis_layouts.organic.field import GridField
 from neurovis_layouts.organic.flow import in_flow
 from neurovis_layouts.organic.levels import COARSEST
@@ -71,7 +70,7 @@ class OrganicEngine:
             real = places[: len(problem.neurons)]
             return drawn_apart(problem, self.name, real, _APART * problem.neuron_spacing, symmetry)
         clear = [i for i, edge in enumerate(problem.edges) if planar[edge.source] and edge.source != edge.target]
-        return drawn(problem, self.name, places, clear=_once(problem, clear))
+        return drawn(problem, self.name, places, clear=alone(problem, clear))
 
     def check(self, problem: LayoutProblem) -> None:
         """Raises LayoutRefusalError for mirror images that it cannot draw."""
@@ -85,13 +84,6 @@ class LargeEngine(OrganicEngine):
 
     name = "large"
     capabilities = replace(OrganicEngine.capabilities, suits=None)
-
-
-def _once(problem: LayoutProblem, chosen: list[int]) -> list[int]:
-    """Of these edges those that are alone between their ends."""
-    ends = [frozenset((problem.edges[i].source, problem.edges[i].target)) for i in chosen]
-    times = Counter(ends)
-    return [i for i, pair in zip(chosen, ends, strict=True) if times[pair] == 1]
 
 
 def _free(problem: LayoutProblem, wiring: Wiring, progress: Progress | None) -> tuple[FloatArray, BoolArray]:

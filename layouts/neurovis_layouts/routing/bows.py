@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import islice
 
 from neurovis_layouts.routing.obstacles import REACH, Obstacles
-from neurovis_spec.layout.geometry import distance, straight
+from neurovis_spec.layout.geometry import Rect, bounds, distance, straight, united
 from neurovis_spec.layout.model import Point, Route
 
 #: Heights tried where every connection can be followed, and where they are many.
@@ -47,12 +47,12 @@ class BowSought:
 
 
 def clear_bows(
-    wishes: Sequence[BowSought], obstacles: Obstacles, tries: int, highest: float
+    wishes: Sequence[BowSought], obstacles: Obstacles, tries: int, within: Rect | None
 ) -> list[tuple[Route, float, float]]:
     """For each wish the flattest bow clear of foreign discs, else the clearest; its clearance and height. ``tries`` is
-    how many heights are tried on a side, up to ``highest`` times the way."""
+    how many heights are tried on a side; bows that lead out of ``within`` are not."""
     found: list[tuple[Route, float, float] | None] = [None] * len(wishes)
-    ways = [_candidates(w.least, distance(w.start, w.end), w.sided, tries, highest) for w in wishes]
+    ways = [_candidates(w, tries, within) for w in wishes]
     waiting = list(range(len(wishes)))
     many = 1
     while waiting:
@@ -74,14 +74,14 @@ def clear_bows(
     return [best for best in found if best is not None]
 
 
-def _candidates(least: float, length: float, sided: bool, tries: int, highest: float) -> Iterator[tuple[float, float]]:
+def _candidates(wish: BowSought, tries: int, within: Rect | None) -> Iterator[tuple[float, float]]:
+    """Heights, the flattest first, and how far from the ends control points stand."""
+    least, length = wish.least, distance(wish.start, wish.end)
     yield least, 0.3
     side = -1.0 if least < 0 else 1.0
     for step in range(1, tries + 1):
         more = step * (0.25 + 0.05 * length)
-        if more > highest * length:
-            return
         for hold in (0.3, 0.05):
-            yield least + side * more, hold
-            if not sided:
-                yield least - side * more, hold
+            for height in (least + side * more, *(() if wish.sided else (least - side * more,))):
+                if within is None or united([bounds(bow(wish.start, wish.end, height, hold)), within]) == within:
+                    yield height, hold

@@ -21,7 +21,7 @@ from neurovis_layouts.routing.obstacles import Obstacles
 from neurovis_layouts.routing.ports import Port, leanings
 from neurovis_layouts.routing.route_cost import Drawn
 from neurovis_layouts.routing.walls import Frame, Walls
-from neurovis_spec.layout.geometry import Cells, distance
+from neurovis_spec.layout.geometry import Cells, Rect, bounds, distance, united
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
 __all__ = ["Waypoint", "route_all"]
@@ -51,7 +51,7 @@ def route_all(
     drawn: Sequence[Route] = (),
     there: Mapping[int, Route] | None = None,
     images: Images | None = None,
-    highest: float = math.inf,
+    within: Rect | None = None,
     begun: Mapping[int, Route] | None = None,
     planned: AbstractSet[int] = frozenset(),
 ) -> list[Route]:
@@ -60,10 +60,10 @@ def route_all(
     Without ``waypoints`` every edge runs from anywhere to anywhere; with them, edges not in ``bowed`` run along the
     direction (through their waypoints, if they have any). With more than ``careful`` edges, discs in the way are not
     gone round. No route enters one of the ``frames`` that holds neither of its ends, if there is a way round. ``drawn``
-    are other routes, which are there, as are those of these edges that are ``there``. A bow is at most ``highest``
-    times as high as its way is long; what it cannot get over it goes round from disc to disc. ``begun`` are routes to
-    begin with, not curves; of those with ``images`` one is the other's reflection. Where some are ``planned``, which
-    cross nothing, what would be drawn anew beside them might: only arcs between images are.
+    are other routes, which are there, as are those of these edges that are ``there``. Nothing that is in the way is
+    gone round outside of ``within``. ``begun`` are routes to begin with, not curves; of those with ``images`` one is
+    the other's reflection. Where some are ``planned``, which cross nothing, what would be drawn anew beside them might:
+    only arcs between images are.
     """
     near = Obstacles(centres)
     obstacles = near if len(edges) <= careful else Obstacles(())
@@ -73,11 +73,12 @@ def route_all(
         along = [i for i, edge in enumerate(edges) if i not in chosen and _runs_along(edge, centres)]
         routes.update(_curves(edges, centres, along, waypoints))
     rest = [i for i, edge in enumerate(edges) if i not in routes and edge.source != edge.target]
-    routes.update(_bows(edges, centres, rest, obstacles, highest))
+    routes.update(_bows(edges, centres, rest, obstacles, within))
     walls = Walls(frames, len(centres))
     ways = {i: [(way.x, way.y) for way in line] for i, line in (waypoints or {}).items()}
     most = _MOST_AROUND if waypoints is None else _MOST_AROUND_PLANNED
-    routes.update(detoured(edges, centres, routes, obstacles, walls, ways, drawn, most))
+    detours = detoured(edges, centres, routes, obstacles, walls, ways, drawn, most)
+    routes.update((i, way) for i, way in detours.items() if within is None or united([bounds(way), within]) == within)
     images = images or Images()
     routes.update(images.kept(routes, edges, centres))
     routes.update((i, route) for i, route in (there or {}).items() if i in routes)
@@ -133,7 +134,11 @@ def _curves(
 
 
 def _bows(
-    edges: Sequence[LayoutEdge], centres: Sequence[Point], chosen: Sequence[int], obstacles: Obstacles, highest: float
+    edges: Sequence[LayoutEdge],
+    centres: Sequence[Point],
+    chosen: Sequence[int],
+    obstacles: Obstacles,
+    within: Rect | None,
 ) -> dict[int, Route]:
     """Straight where alone and clear; both of a reciprocal pair bow to their own left; equal edges fan out."""
     between: dict[tuple[int, int], list[int]] = {}
@@ -159,7 +164,7 @@ def _bows(
             if place < len(equal)
         }
         for ends, (route, _, height) in zip(
-            wishes, clear_bows(list(wishes.values()), obstacles, tries, highest), strict=True
+            wishes, clear_bows(list(wishes.values()), obstacles, tries, within), strict=True
         ):
             routes[between[ends][place]] = route
             reach[ends] = min(reach[ends][0], height), max(reach[ends][1], height)
