@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 
 import pytest
 from hypothesis import given, settings
@@ -63,12 +62,12 @@ def test_bows_found_together_are_those_found_one_by_one(centres: list[Point], da
             st.lists(st.tuples(ends, st.sampled_from([0.0, 0.2, -0.4]), st.booleans()), min_size=1, max_size=6)
         )
     ]
-    together = clear_bows(wishes, obstacles, MANY_TRIES, math.inf)
-    assert together == [clear_bows([wish], obstacles, MANY_TRIES, math.inf)[0] for wish in wishes]
+    together = clear_bows(wishes, obstacles, MANY_TRIES, None)
+    assert together == [clear_bows([wish], obstacles, MANY_TRIES, None)[0] for wish in wishes]
     for wish, (route, clearance, height) in zip(wishes, together, strict=True):
         assert (route[0], route[-1]) == (wish.start, wish.end)
         assert clearance == obstacles.clearance(route, wish.own)
         assert not wish.sided or height * wish.least >= 0
         if clearance < REACH - 0.03:  # then the flattest, among others, is no better
-            flat, _, _ = clear_bows([wish], Obstacles(()), MANY_TRIES, math.inf)[0]
+            flat, _, _ = clear_bows([wish], Obstacles(()), MANY_TRIES, None)[0]
             assert obstacles.clearance(flat, wish.own) <= clearance
