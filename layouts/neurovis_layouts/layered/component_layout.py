@@ -368,7 +368,7 @@ def _draw_in(
 
 def _unconnected(problem: LayoutProblem, units: Sequence[Unit]) -> ComponentLayout:
     """Neurons that nothing connects: in a row, or a grid where they are many."""
-    members = sorted(m for unit in units for m in unit.members)
+    members = sorted((m for unit in units for m in unit.members), key=problem.reading().__getitem__)
     width = len(members) if len(members) <= 12 else columns(len(members))
     wide, high = (max(more) for more in zip(*(excess(problem, m) for m in members), strict=True))
     points = grid(len(members), width, max(problem.neuron_spacing, 0.65))
