@@ -144,7 +144,7 @@ def test_what_reflecting_a_frame_costs_grows_with_its_connections() -> None:
             for rank in (0, 1)
         ]
         segments = [Segment(0, x, 1, -x, 1.0) for x in across]
-        return flips.reflected(Levels(nodes, [[0], [1]], [segments]), [[0], [1]], {0})[1]
+        return flips.reflected(Levels(nodes, [[0], [1]], [segments]), [[0], [1]], {0})[2]
 
     assert reflected(20) == {0}
     assert lines_run(lambda: reflected(400), flips) < 3 * lines_run(lambda: reflected(200), flips)

@@ -250,3 +250,16 @@ def test_instances_without_a_pin_keep_off_the_frames_of_those_that_have_one(engi
     layout = suite.check(problem, engine)
     assert layout is not None
     assert not clashes(problem, layout)
+
+
+@pytest.mark.parametrize("inner", [False, True])
+def test_a_module_with_pins_is_not_reflected_for_its_connections(inner: bool) -> None:
+    pinned = "pinned: {neurons: {A: {}, B: {}}, layout: {positions: {A: [0, 0], B: [3, 0]}}}"
+    around = "around: {neurons: {C: {}}, instances: {m: {module: pinned}}, connections: {m.A -> C: 1}}"
+    module, one = ("around", "one.m") if inner else ("pinned", "one")
+    layout = nv.compile_text(
+        f"neurovis: 1\nname: x\nmodules: {{{pinned}, {around}}}\n"
+        f"neurons: {{R: {{bias: 1}}, p: {{}}, q: {{}}, p1: {{}}, q1: {{}}}}\ninstances: {{one: {{module: {module}}}}}\n"
+        f"connections: {{R -> p + q: 1, p -> p1: 1, q -> q1: 1, p1 -> {one}.B: 1, q1 -> {one}.A: 1}}"
+    ).layout("layered")
+    assert layout.positions[f"{one}.B"][0] - layout.positions[f"{one}.A"][0] == 3

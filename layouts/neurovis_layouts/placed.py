@@ -1,5 +1,5 @@
-"""The engines whose neurons stand in a fixed formation, in natural order: circular, a ring wide enough that neighbours
-keep their spacing, clockwise from where the direction begins; and grid, rows, nearly square.
+"""The engines whose neurons stand in a fixed formation, in the order in which they are read: circular, a ring wide
+enough that neighbours keep their spacing, clockwise from where the direction begins; and grid, rows, nearly square.
 
 In: a problem. Out: a Layout: members of a box side by side, instances as frames with a formation of their own, pins
 kept, direction turned; edges go round the discs between their ends where they can.
@@ -52,15 +52,16 @@ class CircularEngine:
 
 
 def _boxes_together(problem: LayoutProblem) -> list[int]:
-    """Neurons in natural order, but the members of a box follow its first member."""
+    """Neurons in the order in which they are read, but the members of a box follow its first member."""
     box_of: dict[int, int] = {}
     for number, (_, members) in enumerate(problem.boxes):
         for member in members:
             box_of.setdefault(member, number)
+    reading = problem.reading()
     first: dict[int, int] = {}
-    for neuron in sorted(box_of):
-        first.setdefault(box_of[neuron], neuron)
-    return sorted(range(len(problem.neurons)), key=lambda i: (first[box_of[i]] if i in box_of else i, i))
+    for neuron in sorted(box_of, key=reading.__getitem__):
+        first.setdefault(box_of[neuron], reading[neuron])
+    return sorted(range(len(reading)), key=lambda i: (first[box_of[i]] if i in box_of else reading[i], reading[i]))
 
 
 def _placed(problem: LayoutProblem, engine: str, how: Arrangement, spacing: float) -> Layout:

@@ -51,7 +51,7 @@ class LayoutEdge:
 
 @dataclass(frozen=True, slots=True)
 class LayoutGroup:
-    """Neurons declared together, in the order of their numbers."""
+    """Neurons declared together, in the order of their numbers or, where these are listed, of their names."""
 
     name: str
     members: tuple[int, ...]
@@ -109,7 +109,7 @@ class LayoutProblem:
     #: pinned neurons: index to exact position, those that an instance's origin pins among them
     pins: Mapping[int, Point] = field(default_factory=dict)
     direction: Direction = "down"
-    #: members and how they are to be arranged
+    #: members, in the order in which the author lists them, and how they are to be arranged
     arrange: tuple[tuple[tuple[int, ...], Arrangement], ...] = ()
     #: named frames and their members
     boxes: tuple[tuple[str, tuple[int, ...]], ...] = ()
@@ -137,6 +137,15 @@ class LayoutProblem:
     #: an earlier layout of the same network: memory, not pins
     memory: Layout | None = None
     effort: Effort = "normal"
+
+    def reading(self) -> tuple[int, ...]:
+        """The place of each neuron in the order in which they are read: that of their names, but the neurons of a group
+        have their places in the order of the group."""
+        place = list(range(len(self.neurons)))
+        for group in self.groups:
+            for member, at in zip(group.members, sorted(group.members), strict=True):
+                place[member] = at
+        return tuple(place)
 
     @property
     def page(self) -> float:

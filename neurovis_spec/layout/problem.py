@@ -1,7 +1,8 @@
 """The layout problem of a network, in canonical order.
 
 In: a Network. Out: a LayoutProblem: neurons in the natural order of their names, edges in the natural order of
-theirs. Whatever order the spec was written in, an engine sees the same problem, and so gives the same layout.
+theirs. Whatever order the keys of the spec were written in, an engine sees the same problem, and so gives the same
+layout; what the author lists, such as the names of a group, is in the order of the list.
 """
 
 from __future__ import annotations
@@ -59,14 +60,13 @@ def canonical(
     """The problem made of these parts, in canonical order.
 
     ``edges`` are (name, source, target, delay); ``spacing`` is that of neurons, then that of ranks. Equal parts in
-    any order give an equal problem. The members of a group keep the order in which they are given (that of their
-    numbers). ``modules`` are the paths of instances and the names of their modules (their neurons are those whose names
-    begin with the path), ``relative`` the pins within instances, ``origins`` the places of
-    these, ``mirrors`` the scope's path, the
-    pairs of neurons and the pairs of instances; ``plan`` the path of the instance that is divided, what
-    stands in which row and column of it, and how many of them that spans; ``places`` where neurons are as data;
-    ``labels`` how wide and high are those that discs cannot hold; ``aspect`` the width of the page by its height,
-    where one is asked for.
+    any order give an equal problem. The members of a group and of an arrangement keep the order in which they are given
+    (that of their numbers, or as the author lists them). ``modules`` are the paths of instances and the names of their
+    modules (their neurons are those whose names begin with the path), ``relative`` the pins within instances,
+    ``origins`` the places of these, ``mirrors`` the scope's path, the pairs of neurons and the pairs of instances;
+    ``plan`` the path of the instance that is divided, what stands in which row and column of it, and how many of them
+    that spans; ``places`` where neurons are as data; ``labels`` how wide and high are those that discs cannot hold;
+    ``aspect`` the width of the page by its height, where one is asked for.
     """
     names = tuple(sorted(neurons, key=natural_key))
     index = {name: i for i, name in enumerate(names)}
@@ -82,7 +82,7 @@ def canonical(
         LayoutGroup(name, tuple(index[member] for member in of))
         for name, of in sorted(groups, key=lambda group: natural_key(group[0]))
     )
-    arranged = tuple(sorted((members(of), how) for of, how in arrange))
+    arranged = tuple(sorted((tuple(index[member] for member in of), how) for of, how in arrange))
     framed = tuple(sorted(_merged((name, members(of)) for name, of in boxes), key=lambda box: natural_key(box[0])))
     instances = modules_of(
         names, tuple(modules), ordered_edges, ordered_groups, arranged, framed, relative or {}, origins or {}

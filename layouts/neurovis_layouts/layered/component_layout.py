@@ -16,11 +16,12 @@ import networkx as nx
 import numpy as np
 
 from neurovis_layouts.formations import columns, grid
+from neurovis_layouts.frame import from_picture
 from neurovis_layouts.label_room import at_ends, covered, excess, sides_of
 from neurovis_layouts.layered.bands import UNCUT, Bands, Wanted, banded
 from neurovis_layouts.layered.box_columns import straightened, tied, with_spines
 from neurovis_layouts.layered.components import components_of
-from neurovis_layouts.layered.flips import reflected
+from neurovis_layouts.layered.flips import Reading, reflected
 from neurovis_layouts.layered.fold_ports import with_exits
 from neurovis_layouts.layered.folds import folded, interleaved, stacked
 from neurovis_layouts.layered.levels import Levels, levels_of
@@ -223,7 +224,8 @@ def _component(
         else:
             levels, order = tied(levels, straight, columns)
     may = {min(unit.members) for unit in units if unit.turns and not draft}
-    levels, flipped = reflected(levels, order, may)
+    reading = None if pair or draft else _reading(problem, here, edges, {m for unit in guests for m in unit.members})
+    levels, order, flipped = reflected(levels, order, may, reading)
     plan = ComponentLayout(reflected=flipped)
     plan.sides = at_ends(problem, _singles(levels, 0), _singles(levels, -1))
     for n, node in enumerate(levels.nodes):
@@ -255,6 +257,20 @@ def _component(
     sides = {**dict(enumerate(sides_of(problem))), **plan.sides}
     plan.rects += covered(problem, plan.places, sides, sorted(plan.places)).values()
     return plan
+
+
+def _reading(
+    problem: LayoutProblem, connected: AbstractSet[int], edges: Sequence[int], loose: AbstractSet[int]
+) -> Reading:
+    """What these neurons and edges are read by."""
+    place, here = problem.reading(), sorted(connected | loose)
+    before = problem.memory.positions if problem.memory else {}
+    there = {
+        m: from_picture(before[problem.neurons[m]], problem.direction) for m in here if problem.neurons[m] in before
+    }
+    there.update({m: problem.pins[m] for m in here if m in problem.pins})
+    flow = [(problem.edges[i].source, problem.edges[i].target) for i in edges]
+    return Reading({m: place[m] for m in here}, {m: across for m, (across, _) in there.items()}, flow, loose)
 
 
 def _singles(levels: Levels, rank: int) -> list[int]:
@@ -368,7 +384,7 @@ def _draw_in(
 
 def _unconnected(problem: LayoutProblem, units: Sequence[Unit]) -> ComponentLayout:
     """Neurons that nothing connects: in a row, or a grid where they are many."""
-    members = sorted(m for unit in units for m in unit.members)
+    members = sorted((m for unit in units for m in unit.members), key=problem.reading().__getitem__)
     width = len(members) if len(members) <= 12 else columns(len(members))
     wide, high = (max(more) for more in zip(*(excess(problem, m) for m in members), strict=True))
     points = grid(len(members), width, max(problem.neuron_spacing, 0.65))

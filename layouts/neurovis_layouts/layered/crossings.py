@@ -67,7 +67,7 @@ def _ports(nodes: Ints, offsets: Sequence[float]) -> Ints:
     return np.array([port[node][offset] for node, offset in zip(nodes.tolist(), offsets, strict=True)], dtype=np.int64)
 
 
-def inversions(values: Ints) -> int:
+def inversions(values: Ints | Floats) -> int:
     """Pairs of which the first is greater, counted bit by bit, from the highest on: ones before zeros, among values
     that agree in all higher bits.
 

@@ -136,7 +136,8 @@ class Composer:
             if piece.part.family:
                 kin.setdefault(piece.part.family, number)
                 families.setdefault((piece.part.family, piece.part.kind), []).append(min(piece.part.members))
-        frames = [_unit(piece, kin.get(piece.part.family, -1), pair) for piece in pieces]
+        bound = {m for module in problem.modules for m in module.pins}
+        frames = [_unit(piece, kin.get(piece.part.family, -1), pair, bound) for piece in pieces]
         units = symmetric_units(problem, frames, pair)
         rows: list[list[int]] = []
         behind: list[tuple[int, int]] = []
@@ -207,12 +208,13 @@ class Composer:
         return replace(known[key], part=part)
 
 
-def _unit(piece: Piece, kin: int, pair: Mapping[int, int]) -> Unit:
+def _unit(piece: Piece, kin: int, pair: Mapping[int, int], bound: AbstractSet[int]) -> Unit:
+    """The unit that a piece is; it may turn if it is in no mirror, and none of its neurons is ``bound`` to a place."""
     part, (x, y), rect = piece.part, piece.middle, piece.rect
     flip = part.image_of >= 0
     places = tuple((-(px - x) + 0.0 if flip else px - x, py - y) for px, py in piece.drawing.places)
     reach = max(rect[2] - x, x - rect[0]), rect[3] - y
-    alone = not images_in(part, pair) and piece.drawing.axis is None
+    alone = not images_in(part, pair) and piece.drawing.axis is None and bound.isdisjoint(part.members)
     return Unit(part.members, places, reach, kin, alone)
 
 

@@ -86,7 +86,8 @@ def levels_of(
     sides = sides_of(problem)
     paired = {m for mirror in problem.mirrors for pair in mirror.pairs for m in pair}
     on_axis = {m for m in range(len(problem.neurons)) if problem.labels and problem.mirrors and m not in paired}
-    for unit, level in sorted(zip(units, rank, strict=True), key=lambda pair: min(pair[0].members)):
+    reading = problem.reading()
+    for unit, level in sorted(zip(units, rank, strict=True), key=lambda pair: min(reading[m] for m in pair[0].members)):
         for node in _nodes(problem, unit, level, boxes, groups):
             if len(node.members) == 1 and node.reach[0] and not node.framed and node.members[0][0] not in on_axis:
                 node = _aside(node, sides[node.members[0][0]])

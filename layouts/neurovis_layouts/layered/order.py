@@ -2,8 +2,7 @@
 
 In: Levels. Out: node indices by rank, in order, and Levels in which what may has moved to other ranks. Sweeps by
 barycentres, exchanges of neighbours (``exchange``); then, unless the levels are large, nodes are taken out and put back
-(``reinsertion``). Members of a box stay together; neurons of a group keep the order of their numbers unless crossings
-gain clearly.
+(``reinsertion``). Members of a box stay together; neurons of a group keep its order unless crossings gain clearly.
 """
 
 from __future__ import annotations
@@ -90,7 +89,7 @@ def _swept(levels: Levels, segments: Segments, start: Order, strict: bool) -> tu
 
 
 def _settled(rank: Ints, value: Ints | Floats, boxes: Ints, kin: Sequence[Ints]) -> Ints:
-    """Sorted by value, boxes as a whole; neurons of a group take the places that they got in natural order."""
+    """Sorted by value, boxes as a whole; neurons of a group take the places that they got in its order."""
     box = boxes[rank]
     inside = box >= 0
     count = np.maximum(np.bincount(box[inside], minlength=1), 1)

@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
+from functools import partial
 
 import networkx as nx
 
@@ -142,7 +143,8 @@ def _returns(graph: nx.DiGraph[int], members: Sequence[int]) -> bool:
 
 def _block(problem: LayoutProblem, members: Sequence[int]) -> Unit:
     """A row where the connections are a line of neighbours, a column beside that of its mirror image where the two are
-    connected neuron by neuron, else a ring; along a line or circle in its own order."""
+    connected neuron by neuron, else a ring; along a line or circle in its own order, from the first of ``members`` on
+    that can be."""
     spacing = max(problem.neuron_spacing, 0.65)
     graph = _graph(problem, members).to_undirected()
     degrees = [degree for _, degree in graph.degree()]
@@ -150,7 +152,8 @@ def _block(problem: LayoutProblem, members: Sequence[int]) -> Unit:
     order, wide = list(members), _RING
     ends = [node for node in graph if graph.degree(node) == 1]
     if max(degrees) <= 2 and nx.is_connected(graph):
-        order = list(nx.dfs_preorder_nodes(graph, min(ends) if ends else min(members), sort_neighbors=sorted))
+        near = partial(sorted, key=members.index)
+        order = list(nx.dfs_preorder_nodes(graph, near(ends or members)[0], sort_neighbors=near))
         if ends:
             how, wide = "row", _PAIR if len(members) == 2 else _LINE
             if len(members) > 2 and _beside_its_image(problem, members):
@@ -227,10 +230,11 @@ def _on_lines(
     line is a row. Of others, and of a group of which only a part is on a line with others, those on one line share a
     rank, and the rest find their own: a line binds those that it names."""
     wired = {end for edge in problem.edges if edge.source != edge.target for end in (edge.source, edge.target)}
+    reading = problem.reading()
 
     def apart(unit: Unit) -> list[Unit]:
         together: dict[int, list[int]] = {}
-        for member in sorted(unit.members):
+        for member in sorted(unit.members, key=reading.__getitem__):
             # what nothing is connected to has no rank to find, and stays together
             key = lines.get(member, -2 - member if member in wired else -1)
             together.setdefault(key, []).append(member)
