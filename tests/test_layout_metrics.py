@@ -157,7 +157,7 @@ def test_images_in_an_instance_that_a_plan_turns_are_images() -> None:
     layout = nv.compile_text(
         "neurovis: 1\nname: x\nneurons: {A: {count: 2}}\nmodules: {m: {neurons: {L: {bias: 1}, R: {bias: 1}, O: {}}, "
         "connections: {L -> O: 1, R -> O: 1}, layout: {mirror: [[L, R]]}}}\ninstances: {x: {module: m}}\n"
-        "connections: {x.O -> A1: 1, x.O -> A2: 1}\nlayout: {plan: [[A], [x]]}\n"
+        "connections: {x.O -> A1: 1, x.O -> A2: 1}\nlayout: {plan: [[A, x]]}\n"
     ).layout()
     assert layout.positions["x.L"][0] == layout.positions["x.R"][0]
     assert layout.metrics()["symmetry"] == 1

@@ -141,3 +141,41 @@ def test_a_rank_much_wider_than_a_page_stands_in_two_rows_with_lines_in_the_gaps
 def test_a_rank_that_fits_or_is_a_line_stays_level(hidden: int, layout: str) -> None:
     at = fan(hidden, layout).layout().positions
     assert len({at[f"H{i}"][1] for i in range(1, hidden + 1)}) == 1
+
+
+def test_what_is_driven_from_outside_comes_first_in_a_loop() -> None:
+    # the loop 0 → 1 → 2 → 0 may be cut anywhere; 3 drives 1, and 0 drives 4
+    arcs = {(0, 1): 1.0, (1, 2): 1.0, (2, 0): 1.0, (3, 1): 1.0, (0, 4): 1.0}
+    assert ranks_of(5, arcs, frozenset(), frozenset(), entered=0.25) == [3, 1, 2, 0, 4]
+    # what leads back is one arc whatever counts
+    for entered in (0.0, -0.25):
+        ranks = ranks_of(5, arcs, frozenset(), frozenset(), entered=entered)
+        assert sum(ranks[a] > ranks[b] for a, b in arcs) == 1
+
+
+COLUMN = """
+neurovis: 1
+name: column
+neurons:
+  Th: {bias: 1}
+  E4: {box: L4}
+  I4: {box: L4}
+  E2: {box: L2}
+  I2: {box: L2}
+  E5: {box: L5}
+connections:
+  Th -> E4 + I4: 1
+  E4 -> I4 + E2: 1
+  I4 -> E4: -1
+  E2 -> I2 + E5 + I4: 1
+  I2 -> E2: -1
+"""
+
+
+def test_a_few_that_drive_each_other_in_a_box_share_a_rank() -> None:
+    layout = nv.compile_text(COLUMN).layout()
+    heights = {name: y for name, (_, y) in layout.positions.items()}
+    assert heights["Th"] < heights["E4"] == heights["I4"] < heights["E2"] == heights["I2"] < heights["E5"]
+    # without boxes the one that comes first stands first
+    plain = nv.compile_text(COLUMN.replace("{box: L4}", "{}").replace("{box: L2}", "{}")).layout().positions
+    assert plain["E4"][1] < plain["I4"][1]

@@ -50,6 +50,8 @@ class SpatialEngine:
 
     def lay_out(self, problem: LayoutProblem) -> Layout:
         """Scale the positions, keep discs apart, route the edges."""
+        if not problem.neurons:
+            return Layout(problem.network, self.name, {}, {})
         data = _data(problem)
         exponent = np.frexp(np.abs(data[np.isfinite(data)]).max(initial=0.0))[1]
         data = np.ldexp(data, -exponent)  # their unit is free, and near 1 no distance is too small or too large

@@ -21,9 +21,12 @@ from neurovis_spec.layout.model import Direction, LayoutProblem
 WHOLE, NONE = -1, -2
 #: What is folded where ranks are.
 RANKS = -1
-#: What is longer than a page by this is folded, unless it is no longer than so many units, which can be read as it is,
-#: or that is not worth so much of what it costs as it is: instances on a page that is asked for, and all else.
-_STRETCHED, _SHORT, _WORTH = (1.25, 2.0), (12.0, 24.0), (0.9, 0.6)
+#: What is longer than a page by this is folded, unless it is no longer than so many units, which can be read as it is:
+#: instances on a page that is asked for, and all else.
+_STRETCHED, _SHORT = (1.25, 2.0), (12.0, 24.0)
+#: What that has to be worth of what it costs as it is: on a page that is asked for, in rows, and in bands, from which
+#: lines run back.
+_ASKED, _ROWS, _BANDS = 0.9, 0.6, 0.5
 #: Each single fold has to be worth this.
 _EACH = 0.9
 #: What it costs if all connections run back: one in ten is worth twice the page.
@@ -85,7 +88,9 @@ def compact(problem: LayoutProblem, drawn: Drawn, most: Mapping[Fold, int]) -> S
     first = least = _cost(problem, drawing)
     for fold in sorted(most):
         least, shape = _folded(problem, drawn, fold, most[fold], least, shape)
-    return replace(shape, draft=False) if least < _WORTH[free] * first else Shape()
+    bands = any(what == RANKS and count > 1 for (_, what), count in shape.counts.items())
+    worth = (_BANDS if bands else _ROWS) if free else _ASKED
+    return replace(shape, draft=False) if least < worth * first else Shape()
 
 
 def _folded(

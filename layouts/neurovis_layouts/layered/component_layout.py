@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 
 import networkx as nx
@@ -23,10 +24,10 @@ from neurovis_layouts.layered.box_columns import straightened, tied, with_spines
 from neurovis_layouts.layered.components import components_of
 from neurovis_layouts.layered.flips import Reading, reflected
 from neurovis_layouts.layered.fold_ports import with_exits
-from neurovis_layouts.layered.folds import folded, interleaved, stacked
+from neurovis_layouts.layered.folds import Folds, folded, interleaved, stacked
 from neurovis_layouts.layered.levels import Levels, levels_of
 from neurovis_layouts.layered.mirror import mirrored
-from neurovis_layouts.layered.order import crossings, ordered
+from neurovis_layouts.layered.order import Order, crossings, ordered
 from neurovis_layouts.layered.parts import symmetric
 from neurovis_layouts.layered.place import placed, reaches
 from neurovis_layouts.layered.ranks import INSTANT, levelled, ranks_of
@@ -44,6 +45,11 @@ _APART = 1.5
 _MOST_PARTS = 50
 #: How far apart points on connections are that gaps keep off, about.
 _STEP = 0.5
+#: How much it counts where a loop is cut that a unit is driven from outside of it, or drives something there: whichever
+#: leaves fewer crossings.
+_ENTERED = (0.25, 0.0, -0.25)
+#: How many segments are crossed in a rank on the way into a frame.
+_PASSED = 0.125
 #: That a row stands behind another outweighs any connection.
 _ROW = 1000 * INSTANT
 
@@ -200,29 +206,16 @@ def _component(
     behind: Sequence[tuple[int, int]],
     draft: bool,
 ) -> ComponentLayout:
-    everyone = [*units, *guests]
     here = {m for unit in units for m in unit.members}
     columns = {box for box in columns if here.issuperset(problem.boxes[box][1])}
-    rank = _ranks(problem, units, bonds, edges, behind)
-    if pair:
-        rank = _one_on_axis(units, bonds, rank, pair)
-    folds = folded(problem, units, bonds, rank, edges, pair)
-    rank = folds.rank
-    rank += [max(rank)] * len(guests)
-    levels = levels_of(problem, everyone, rank, edges, columns)
-    interleaved(levels, problem, folds)
-    with_spines(problem, levels, columns)
-    partner: list[int] | None = None
-    if pair:
-        order, partner = mirrored(problem, levels, pair, draft)
-    else:
-        free = frozenset[int]() if columns or folds.ranks else _free(levels, units, bonds)
-        levels, order = ordered(levels, free, problem.effort, draft)
-        straight = straightened(levels, order, columns) if columns else None
-        if straight is None:
-            columns = frozenset()
-        else:
-            levels, order = tied(levels, straight, columns)
+    found = [
+        _one_on_axis(units, bonds, rank, pair) if pair else rank
+        for rank in _ranks(problem, units, bonds, edges, behind)
+    ]
+    tried = partial(_in_order, problem, units, guests, bonds, edges, pair, columns)
+    rank = found[0] if len(found) == 1 else min(found, key=lambda rank: tried(rank, True).cost(problem))
+    best = tried(rank, draft)
+    levels, order, partner, columns, folds = best.levels, best.order, best.partner, best.columns, best.folds
     may = {min(unit.members) for unit in units if unit.turns and not draft}
     reading = None if pair or draft else _reading(problem, here, edges, {m for unit in guests for m in unit.members})
     levels, order, flipped = reflected(levels, order, may, reading)
@@ -248,15 +241,66 @@ def _component(
     for i, passages in levels.passages.items():
         plan.ways[i] = [_passage(places[n], *spans[levels.nodes[n].rank]) for n in passages]
     plan.ways, whole = with_exits(problem, edges, levels, places, spans, folds, uneven, plan.ways)
-    if whole and not crossings(levels, order):
+    if whole and not best.crossed:
         plan.firm |= whole
     if not pair:
-        plan.cuts, found = banded(problem, levels, places, folds.ranks, wanted)
+        plan.cuts, bands = banded(problem, levels, places, folds.ranks, wanted)
         if wanted.bands > 1:
-            _in_bands(problem, plan, levels, found)
+            _in_bands(problem, plan, levels, bands)
     sides = {**dict(enumerate(sides_of(problem))), **plan.sides}
     plan.rects += covered(problem, plan.places, sides, sorted(plan.places)).values()
     return plan
+
+
+@dataclass(frozen=True, slots=True)
+class _InOrder:
+    """Levels with the order of each rank, how many segments cross, the mirror image of each node, the boxes that are
+    columns, and what is folded."""
+
+    levels: Levels
+    order: Order
+    crossed: int
+    partner: Sequence[int] | None
+    columns: AbstractSet[int]
+    folds: Folds
+
+    def cost(self, problem: LayoutProblem) -> float:
+        """How many segments cross, and about how many will be crossed by connections that lead from outside of a frame
+        into it, which come from above, and by those that lead out of it."""
+        rank = {m: node.rank for node in self.levels.nodes for m, _, _ in node.members}
+        last = len(self.order) - 1
+        ways = [rank[m] for m in problem.inward if m in rank] + [last - rank[m] for m in problem.outward if m in rank]
+        return self.crossed + _PASSED * sum(ways)
+
+
+def _in_order(
+    problem: LayoutProblem,
+    units: Sequence[Unit],
+    guests: Sequence[Unit],
+    bonds: Sequence[int],
+    edges: Sequence[int],
+    pair: Mapping[int, int],
+    columns: AbstractSet[int],
+    rank: Sequence[int],
+    draft: bool,
+) -> _InOrder:
+    """Units that have their ranks, in order."""
+    folds = folded(problem, units, bonds, rank, edges, pair)
+    levels = levels_of(problem, [*units, *guests], [*folds.rank, *([max(folds.rank)] * len(guests))], edges, columns)
+    interleaved(levels, problem, folds)
+    with_spines(problem, levels, columns)
+    partner: Sequence[int] | None = None
+    if pair:
+        order, partner = mirrored(problem, levels, pair, draft)
+    else:
+        free = frozenset[int]() if columns or folds.ranks else _free(levels, units, bonds)
+        levels, order = ordered(levels, free, problem.effort, draft)
+    straight = straightened(levels, order, columns) if columns else None
+    columns, order = (columns, straight) if straight else (frozenset(), order)
+    crossed = crossings(levels, order)
+    if columns:
+        levels, order = tied(levels, order, columns)
+    return _InOrder(levels, order, crossed, partner, columns, folds)
 
 
 def _reading(
@@ -309,7 +353,8 @@ def _ranks(
     bonds: Sequence[int],
     edges: Sequence[int],
     behind: Sequence[tuple[int, int]],
-) -> list[int]:
+) -> list[list[int]]:
+    """Ranks of these units, one for each way of cutting loops that makes a difference."""
     numbers = {bond: number for number, bond in enumerate(dict.fromkeys(bonds))}
     owner = {m: numbers[bond] for unit, bond in zip(units, bonds, strict=True) for m in unit.members}
     wired: nx.DiGraph[int] = nx.DiGraph((problem.edges[i].source, problem.edges[i].target) for i in edges)
@@ -332,8 +377,11 @@ def _ranks(
         for unit, bond in zip(units, bonds, strict=True)
         if unit.members in templates
     }
-    ranks = levelled(ranks_of(len(numbers), arcs, first, last, along), arcs, kinds)
-    return [ranks[numbers[bond]] for bond in bonds]
+    found: dict[tuple[int, ...], None] = {}
+    for entered in _ENTERED:
+        ranks = levelled(ranks_of(len(numbers), arcs, first, last, along, entered), arcs, kinds)
+        found[tuple(ranks[numbers[bond]] for bond in bonds)] = None
+    return [list(rank) for rank in found]
 
 
 def _free(levels: Levels, units: Sequence[Unit], bonds: Sequence[int]) -> frozenset[int]:

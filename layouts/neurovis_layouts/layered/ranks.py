@@ -30,17 +30,19 @@ def ranks_of(
     first: AbstractSet[int],
     last: AbstractSet[int],
     along: AbstractSet[tuple[int, int]] = frozenset(),
+    entered: float = 0.0,
 ) -> list[int]:
     """A rank for each of ``count`` units; ``arcs`` are (from, to): weight. ``first`` and ``last`` are where signals
     enter and leave: they decide where a loop is cut, if it can be at none of the arcs that are to run ``along``, as
-    their neurons are in no loop."""
+    their neurons are in no loop. ``entered`` is how much more what is driven from outside of a loop is to come first
+    in it, and what drives something there last; less than half an arc."""
     graph: nx.DiGraph[int] = nx.DiGraph()
     graph.add_nodes_from(range(count))
     graph.add_edges_from(arcs)
     kept = {arc: weight * (_ALONG if arc in along else 1.0) for arc, weight in arcs.items()}
     loop_of, place = [0] * count, [0] * count
     for k, loop in enumerate(nx.strongly_connected_components(graph)):
-        units = _improved(_cut(sorted(loop), kept, graph, first, last), kept) if len(loop) > 1 else loop
+        units = _improved(_cut(sorted(loop), kept, graph, first, last, entered), kept) if len(loop) > 1 else loop
         for position, unit in enumerate(units):
             loop_of[unit], place[unit] = k, position
     forward: dict[tuple[int, int], float] = {}
@@ -89,11 +91,19 @@ def levelled(ranks: Sequence[int], arcs: Collection[tuple[int, int]], kinds: Map
 
 
 def _cut(
-    loop: Sequence[int], arcs: Arcs, graph: nx.DiGraph[int], first: AbstractSet[int], last: AbstractSet[int]
+    loop: Sequence[int],
+    arcs: Arcs,
+    graph: nx.DiGraph[int],
+    first: AbstractSet[int],
+    last: AbstractSet[int],
+    entered: float,
 ) -> list[int]:
     """An order of a loop's units that few arcs run against (Eades, Lin and Smyth 1993), ties by number."""
     inside = set(loop)
     surplus = {unit: (0.5 if unit in first else 0.0) - (0.5 if unit in last else 0.0) for unit in loop}
+    for unit in loop:
+        surplus[unit] += entered * any(other not in inside for other in graph.predecessors(unit))
+        surplus[unit] -= entered * any(other not in inside for other in graph.successors(unit))
     came, went = dict.fromkeys(loop, 0), dict.fromkeys(loop, 0)
     for unit in loop:
         for other in graph.successors(unit):

@@ -216,6 +216,8 @@ def restricted(problem: LayoutProblem, copies: Sequence[Sequence[int]], within: 
         rank_spacing=problem.rank_spacing,
         entries=tuple(sorted(entries - exits)),
         exits=tuple(sorted(exits - entries)),
+        inward=tuple(sorted(entries)),
+        outward=tuple(sorted(exits)),
         modules=modules,
         effort=problem.effort,
         labels=tuple(problem.labels[n] for n in members) if problem.labels else (),

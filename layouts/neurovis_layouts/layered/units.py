@@ -25,6 +25,8 @@ from neurovis_spec.layout.model import Arrangement, LayoutProblem, Point
 
 #: Loops of more neurons than this are unrolled along the direction instead of drawn as a ring.
 _MOST_IN_A_RING = 32
+#: Of no more neurons in one box than this, which drive each other, none comes first: they are one population.
+_FEW = 4
 _PAIR = 2.0
 _LINE = 1.6
 _RING = 1.2
@@ -107,7 +109,8 @@ def _of_group(problem: LayoutProblem, members: Sequence[int]) -> Unit | None:
 
 
 def _of_lone(problem: LayoutProblem, lone: Sequence[int]) -> list[Unit]:
-    """Neurons declared singly: those that drive each other both ways, by delays of the same kind, are one block."""
+    """Neurons declared singly: those that drive each other both ways, by delays of the same kind, are one block, unless
+    one of them comes first, as what leaves them comes back through others; few in one box are one all the same."""
     kinds: dict[tuple[int, int], set[bool]] = {}
     inside = set(lone)
     for edge in problem.edges:
@@ -118,8 +121,10 @@ def _of_lone(problem: LayoutProblem, lone: Sequence[int]) -> list[Unit]:
     pairs.add_edges_from((a, b) for (a, b), kind in kinds.items() if a < b and kinds.get((b, a)) == kind)
     found: list[Unit] = []
     whole = _graph(problem, range(len(problem.neurons)))
+    boxes = [set(members) for _, members in problem.boxes]
     for component in sorted(sorted(part) for part in nx.connected_components(pairs)):
-        if 1 < len(component) <= _MOST_IN_A_RING and not _returns(whole, component):
+        boxed = len(component) <= _FEW and any(box.issuperset(component) for box in boxes)
+        if 1 < len(component) <= _MOST_IN_A_RING and (boxed or not _returns(whole, component)):
             found.append(_block(problem, component))
         else:
             found += [Unit((member,)) for member in component]

@@ -43,7 +43,7 @@ ALONG = 1.5
 #: All that a line crosses and runs on costs no more than this together: one line of forty in a bundle is not followed
 #: by eye, and not worth a way round all of them (without: fully connected layers in boxes send lines round the whole
 #: picture, which a test holds that none goes; North graphs have 3 % fewer crossings).
-_CROWDED = 4.0
+_CROWDED = 6.0
 #: To run on another between the same ends, times the share of the line that does: then one of the two is not seen at
 #: all (without: a sheaf of six between two neurons, which a test draws, is not told apart).
 _SAME = 12.0
