@@ -121,6 +121,14 @@ def test_a_dash_is_no_file(folder: Path, command: str) -> None:
     assert not Path("-").exists()
 
 
+@pytest.mark.parametrize("command", ["export small.yaml --to c", "ros export small.yaml"])
+def test_a_dash_is_no_folder(folder: Path, command: str) -> None:
+    result = call(f"{command} -o -")
+    assert result.exit_code == 2
+    assert "-o takes a folder: what is written does not go to standard output ('-')" in result.output
+    assert not Path("-").exists()
+
+
 def test_a_dash_for_a_layout_is_standard_output(folder: Path) -> None:
     assert call("layout small.yaml -o -").output == call("layout small.yaml").output
     assert call("layout small.yaml --update -").exit_code == 2

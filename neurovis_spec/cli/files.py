@@ -182,8 +182,10 @@ folder_option = click.option(
 
 def write_folder(folder: Path, write: Callable[[], tuple[list[Path], list[Path]]]) -> None:
     """Write files, and say which were written; on standard error, which were there and stay. Raises Failure."""
+    from neurovis_spec.cli.targets import refuse_dash
     from neurovis_spec.runtime.c_settable import ExportError
 
+    refuse_dash(folder, "folder")
     with writing(folder):
         try:
             written, kept = write()

@@ -22,8 +22,7 @@ def check_target(path: Path | None, inputs: Iterable[tuple[str, str | None]] = (
     """Refuse a path that cannot be written, or is one of the ``inputs``: what each is, in words, and its path."""
     if path is None:
         return
-    if str(path) == "-":
-        raise click.UsageError(f"{option} takes a file: what is written does not go to standard output ('-')")
+    refuse_dash(path, "file", option)
     for what, read in inputs:
         if read is not None and read != "-" and (_same(path, Path(read)) or _is_part_of(Path(read), path)):
             raise _refused(path, what, option)
@@ -35,12 +34,17 @@ def check_target(path: Path | None, inputs: Iterable[tuple[str, str | None]] = (
 
 def check_folder(path: Path, option: str = "-o") -> None:
     """Refuse a folder that is something else, or that could not be made."""
-    if str(path) == "-":
-        raise click.UsageError(f"{option} takes a folder: what is written does not go to standard output ('-')")
+    refuse_dash(path, "folder", option)
     if path.exists() and not path.is_dir():
         raise fault(f"{path} is a file, not a folder", "name a folder; it is made if it is not there")
     if not path.parent.is_dir():
         raise fault(f"{path}: there is no folder '{path.parent}'", f"make it: mkdir -p {path.parent}")
+
+
+def refuse_dash(path: Path, kind: str, option: str = "-o") -> None:
+    """Refuse what means standard output elsewhere, where a file or a folder is asked for."""
+    if str(path) == "-":
+        raise click.UsageError(f"{option} takes a {kind}: what is written does not go to standard output ('-')")
 
 
 def files_of(inputs: Mapping[str, str]) -> list[tuple[str, str | None]]:
