@@ -120,7 +120,7 @@ class LayoutProblem:
     #: where signals enter and leave the network: a hint on what comes first in a loop
     entries: tuple[int, ...] = ()
     exits: tuple[int, ...] = ()
-    #: of what is drawn as a frame: the neurons that something outside of it drives, and those that drive something there
+    #: of what is drawn as a frame: the neurons that something outside of it drives, and those that drive such
     inward: tuple[int, ...] = ()
     outward: tuple[int, ...] = ()
     #: instances of modules, in the natural order of their paths: an instance before those within it
