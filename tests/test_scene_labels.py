@@ -71,7 +71,7 @@ def test_labels_on_discs_are_of_much_the_same_size() -> None:
 def test_where_signals_run_across_names_stand_at_the_ends() -> None:
     spec = "neurons: {right_wheel: {}, proximity: {count: 3}}\nconnections: {proximity -> right_wheel: 1}\n"
     found = labels(spec + "layout: {direction: right}\n")
-    assert {name: text.text for name, text in found.items()} == {name: name for name in found}
+    assert {name: text.text + text.subscript for name, text in found.items()} == {name: name for name in found}
     assert found["right_wheel"].anchor == "start"
     assert {found[f"proximity{i}"].anchor for i in (1, 2, 3)} == {"end"}
 
@@ -198,7 +198,7 @@ def texts_outside(spec: str) -> tuple[list[str], list[str]]:
         left = text.point[0] - {"start": 0.0, "middle": wide / 2, "end": wide}[text.anchor]
         if left < 0 or left + wide > scene.width:
             found.append(text.text)
-    return [text.text for text in texts], found
+    return [text.text + text.subscript for text in texts], found
 
 
 def test_names_of_numbered_neurons_at_the_rim_stay_in_the_picture() -> None:

@@ -113,7 +113,7 @@ def labels_of(
     """A label for every neuron, or None where there is no room for any of it, or it is ``hidden``. The discs of those
     that are ``numbered`` bear a number as well. On the ``sides`` given there is room kept for labels."""
     neurons = network.neurons
-    parts = [parts_of(label, name) for label, name in zip(neurons.labels, neurons.names, strict=True)]
+    parts = parts_of(neurons)
     chosen = [index for index in range(len(neurons)) if not (hidden and hidden[index])]
     partners = {a: b for a, b in partners_of(network).items() if not (hidden and (hidden[a] or hidden[b]))}
     smallest = float(ground.radii[chosen].min(initial=np.inf)) * ground.scale
@@ -188,22 +188,23 @@ def _beside(
 ) -> dict[int, Label]:
     """Labels beside discs, by neuron, as far as there is room for them at this scale or a smaller one, on the ``sides``
     with room for them if that is enough; from the scale ``until`` on a label stands on its disc."""
-    labels, cut, among = network.neurons.labels, Cut(network.neurons.labels), set(chosen)
-    said: dict[int, str] = {}
+    among, words = set(chosen), _whole(network)
+    cut = Cut(network.neurons.labels)
+    said: dict[int, tuple[str, str]] = {}
     wanted: list[Wanted] = []
 
     def kept(*members: int) -> tuple[Slot, ...]:
         return tuple(Slot(*STEPS[sides[one]]) for one in members) if all(one in sides for one in members) else ()
 
     for index in [index for index in rank_of(network) if index in among][:MOST]:
-        said[index] = cut.shorten(labels[index], 1.0, WIDEST)
+        said[index] = cut.parts(*words[index], 1.0, WIDEST)
         partner = partners.get(index)
         if partner is None or partner not in among:
-            wanted.append(Wanted((index,), (texts.width(said[index], 1.0, WEIGHT),), until[index], kept(index)))
+            wanted.append(Wanted((index,), (_wide(said[index]),), until[index], kept(index)))
         elif partner not in said:
-            said[partner] = cut.shorten(labels[partner], 1.0, WIDEST)
+            said[partner] = cut.parts(*words[partner], 1.0, WIDEST)
             both = (index, partner)
-            widths = tuple(texts.width(said[one], 1.0, WEIGHT) for one in both)
+            widths = tuple(_wide(said[one]) for one in both)
             wanted.append(Wanted(both, widths, max(until[index], until[partner]), kept(*both)))
     level, taken = _level(network), (ground.taken - np.tile(ground.shift, 2)) / ground.scale
     field = Field(ground.places, ground.radii, ground.dots, ground.borders, ground.extent, ground.reach, level, taken)
@@ -211,14 +212,24 @@ def _beside(
     result: dict[int, Label] = {}
     for index, slot in found.items():
         size = size_beside(ground.radius(index))
-        width = texts.width(said[index], size, WEIGHT)
+        width = _wide(said[index], size)
         x0, y0, _, _ = slot.text(ground.radius(index), width, size)
         x, y = ground.centre(index)
         anchor: Literal["start", "middle", "end"] = ("end", "middle", "start")[slot.across + 1]
         start = x + x0 + width * (1 - slot.across) / 2
-        label = Label(said[index], "", size, (start, y + y0 + RISE * size), anchor, False)
+        label = Label(*said[index], size, (start, y + y0 + RISE * size), anchor, False)
         result[index] = replace(label, crosses=obstacles.crossed(_rect(label)))
     return result
+
+
+def _whole(network: Network) -> list[tuple[str, str]]:
+    """What is said of each neuron beside its disc, and a subscript: a name that keeps all of its letters."""
+    labelled = zip(network.neurons.labels, parts_of(network.neurons), strict=True)
+    return [parts if label == "".join(parts) else (label, "") for label, parts in labelled]
+
+
+def _wide(said: tuple[str, str], size: float = 1.0) -> float:
+    return texts.width(said[0], size, WEIGHT, said[1])
 
 
 def _rect(label: Label) -> Rect:
@@ -231,19 +242,19 @@ def _rect(label: Label) -> Rect:
 def margin_beside(network: Network, radius: float, rooms: Collection[int] = ()) -> float:
     """How far labels may reach beyond the discs at the rim: 0 where all fit on discs of this radius, or have ``rooms``
     kept for them in a picture that is not reduced."""
-    neurons, cut = network.neurons, Cut(network.neurons.labels)
+    cut = Cut(network.neurons.labels)
     kept = rooms if radius >= _BESIDE_SMALLEST / _BESIDE_SHARE else ()
     named = [
-        (label, name)
-        for index, (label, name) in enumerate(zip(neurons.labels, neurons.names, strict=True))
+        both
+        for index, both in enumerate(zip(_whole(network), parts_of(network.neurons), strict=True))
         if index not in kept
     ]
     if radius >= _SMALLEST_DISC and all(
-        _on_disc(*parts_of(label, name), (0.0, 0.0), radius, _READABLE) is not None for label, name in named
+        _on_disc(*parts, (0.0, 0.0), radius, _READABLE) is not None for _, parts in named
     ):
         return 0.0
-    said = [cut.shorten(label, 1.0, WIDEST) for label, _ in named]
-    return max((texts.width(text, size_beside(radius), WEIGHT) for text in said), default=0.0) + ASIDE + 3
+    said = [cut.parts(*words, 1.0, WIDEST) for words, _ in named]
+    return max((_wide(words, size_beside(radius)) for words in said), default=0.0) + ASIDE + 3
 
 
 def room_beside(network: Network, radius: float) -> list[tuple[int, Point]]:
@@ -251,8 +262,8 @@ def room_beside(network: Network, radius: float) -> list[tuple[int, Point]]:
     down, or to either side where signals run across."""
     neurons, level = network.neurons, _level(network)
     result: list[tuple[int, Point]] = []
-    for index, (label, name) in enumerate(zip(neurons.labels, neurons.names, strict=True)):
-        if _on_disc(*parts_of(label, name), (0.0, 0.0), radius, _READABLE) is None:
+    for index, (label, parts) in enumerate(zip(neurons.labels, parts_of(neurons), strict=True)):
+        if _on_disc(*parts, (0.0, 0.0), radius, _READABLE) is None:
             width = min(texts.width(label, BESIDE, WEIGHT), 5 * radius)
             result.append((index, (radius + 8 + width, 0.0) if level else (0.0, radius + 17)))
     return result
