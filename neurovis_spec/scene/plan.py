@@ -175,7 +175,8 @@ def plan(
         labels = labels_of(network, ground, obstacles, (~seen.focus).tolist(), sizes, sides)
     named = line_labels(network, lines, obstacles, theme, picture) if settings.labels else {}
     left = [index for index in range(len(boxes)) if index not in titles]
-    others = elsewhere([titled[index] for index in left], obstacles, theme)
+    unsaid = {titled[index].computes for index, text in titles.items() if text.text != boxes[index].title}
+    others = elsewhere([titled[index] for index in left], obstacles, theme, unsaid)
     titles |= {index: text for index, text in zip(left, others, strict=True) if text is not None}
     front = [
         *(Group((text,), id=f"label:{entry}") for entry, text in named.items()),
