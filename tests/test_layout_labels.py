@@ -195,6 +195,21 @@ def test_short_names_and_numbers_take_no_room() -> None:
     assert network.layout().value.labels == {}
 
 
+def test_a_long_name_that_ends_in_a_number_takes_room_where_the_number_alone_says_nothing() -> None:
+    network = nv.compile_text("""
+neurovis: 1
+name: x
+neurons: {bitter_receptor: {}, extension_motor_neuron_9: {}, extension_motor_neuron_11: {}, K: {count: 2}, Int1: {}}
+connections: {bitter_receptor -> extension_motor_neuron_9 + extension_motor_neuron_11 + K + Int1: 1}
+""")
+    problem = problem_of(network.network)
+    beside = {name for name, (wide, _) in zip(problem.neurons, problem.labels, strict=True) if wide}
+    assert beside == {"bitter_receptor", "extension_motor_neuron_9", "extension_motor_neuron_11"}
+    assert overlaps(network, network.layout().value) == 0
+    labels, *_ = shown(network)
+    assert {labels[name].text for name in beside} == beside
+
+
 def test_no_room_is_kept_where_labels_are_left_out() -> None:
     assert problem_of(nv.compile_text(LEGS + "render: {labels: false}\n").network).labels == ()
 

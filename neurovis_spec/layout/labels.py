@@ -62,6 +62,16 @@ def parts_of(neurons: Neurons) -> list[tuple[str, str]]:
     ]
 
 
+def told_by_number(neurons: Neurons) -> list[bool]:
+    """Whether a number alone says which neuron of its group each is: of several that are called alike but for it."""
+    found, parts = [False] * len(neurons), parts_of(neurons)
+    for group in neurons.groups:
+        alike = len({parts[index][0] for index in group.indices}) == 1 and group.count > 1
+        for index in group.indices if alike else ():
+            found[index] = bool(parts[index][1])
+    return found
+
+
 def least_on_disc(subscript: str, radius: float) -> float:
     """The smallest size on a disc: it grows no faster than the disc, so that what fits on one fits on a larger one."""
     return max(TINY, min(NUMBERED if subscript else SMALLEST, 0.5 * radius))
@@ -79,13 +89,16 @@ def fits(parts: tuple[str, str], size: float, radius: float) -> bool:
 
 
 def label_room(network: Network) -> tuple[Point, ...]:
-    """How wide and high each neuron's label is beside its disc; (0, 0) where the disc holds it, or at least its number.
-    Mirror images, and neurons of one name in instances of one module, take the same room, that of the longest label.
-    None at all where labels are left out, or are so long together that a picture of them all is too small for them."""
+    """How wide and high each neuron's label is beside its disc; (0, 0) where the disc holds it, or at least the number
+    that says which of its group it is. Mirror images, and neurons of one name in instances of one module, take the same
+    room, that of the longest label. None at all where labels are left out, or are so long together that a picture of
+    them all is too small for them."""
     neurons, none = network.neurons, (0.0, 0.0)
-    parts = parts_of(neurons)
     radius = RADIUS * UNIT
-    beside = [not both[1] and not fits(both, SMALLEST, radius) for both in parts]
+    beside = [
+        not told and not fits(both, least_on_disc(both[1], radius), radius)
+        for both, told in zip(parts_of(neurons), told_by_number(neurons), strict=True)
+    ]
     if not network.render.labels or not any(beside):
         return ()
     wide = [

@@ -34,6 +34,7 @@ from neurovis_spec.layout.labels import (
     fits,
     least_on_disc,
     parts_of,
+    told_by_number,
 )
 from neurovis_spec.layout.model import RADIUS, Point, Side
 from neurovis_spec.scene import texts
@@ -141,10 +142,11 @@ def labels_of(
     for index, label in beside.items():
         if result[index] is label:
             obstacles.add_text(_rect(label))
-    cut = Cut(neurons.labels)
+    cut, told = Cut(neurons.labels), told_by_number(neurons)
     for index in chosen:
         if result[index] is None and index not in numbered and ground.radius(index) >= _SMALLEST_DISC:
-            result[index] = _shortened(*parts[index], ground.centre(index), ground.radius(index), cut)
+            both = parts[index] if told[index] else (neurons.labels[index], "")
+            result[index] = _shortened(*both, ground.centre(index), ground.radius(index), cut)
     for one, other in partners.items():
         if result[other] is None:
             result[one] = None
