@@ -144,7 +144,7 @@ class Heat:
             shapes.append(Polyline(((span.left - 4, y), (span.right, y)), theme.background, 1.2))
         if self._named(plot):
             size = min(SMALL, 0.9 * each)
-            cut = Cut(base + subscript for base, subscript in self.names)
+            cut = Cut(base for base, _ in self.names)
             for row, words in enumerate(self.names):
                 parts = cut.parts(*words, size, _LABEL, 400)
                 shapes.append(_beside(*parts, span.left - 6, top + (row + 0.5) * each, size, theme))

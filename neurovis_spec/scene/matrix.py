@@ -247,7 +247,7 @@ def _names(
     """Names before rows, or above columns (``upright``), reading upward."""
     shapes: list[Shape] = []
     leaves = _leaf_names(network, order) if _small(order) else []
-    cut = Cut([base + subscript for base, subscript in leaves] or [band.name for band in _titled(order)])
+    cut = Cut([base for base, _ in leaves] or [band.name for band in _titled(order)])
 
     def put(base: str, subscript: str, middle: float, away: float, size: float) -> None:
         base, subscript = cut.parts(base, subscript, size, _LABEL, 400)

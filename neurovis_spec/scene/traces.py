@@ -75,7 +75,7 @@ class Traces:
 
     @property
     def _cut(self) -> Cut:
-        return Cut(trace.name + trace.subscript for trace in self.traces)
+        return Cut(trace.name for trace in self.traces)
 
     @property
     def range(self) -> tuple[float, float]:
