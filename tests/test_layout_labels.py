@@ -107,7 +107,7 @@ def test_labels_and_titles_are_drawn_where_they_have_room(seed: int) -> None:
     network = nv.compile_text(text)
     labels, discs, titles, frames = shown(network)
     for name, words in zip(network.network.neurons.names, network.network.neurons.labels, strict=True):
-        assert labels[name].text == words if width(words, 1.0, 600) <= WIDEST else "…" in labels[name].text
+        assert labels[name].text == words or (width(words, 1.0, 600) > WIDEST and "…" in labels[name].text)
     texts = [*labels.values(), *titles.values()]
     assert not [(a.text, b.text) for a, b in combinations(texts, 2) if meet(covers(a), covers(b))]
     for label in [label for label in labels.values() if not label.on_disc] + [*titles.values()]:
@@ -193,6 +193,21 @@ def test_short_names_and_numbers_take_no_room() -> None:
     )
     assert problem_of(network.network).labels == ()
     assert network.layout().value.labels == {}
+
+
+def test_a_long_name_that_ends_in_a_number_takes_room_where_the_number_alone_says_nothing() -> None:
+    network = nv.compile_text("""
+neurovis: 1
+name: x
+neurons: {bitter_receptor: {}, extension_motor_neuron_9: {}, extension_motor_neuron_11: {}, K: {count: 2}, Int1: {}}
+connections: {bitter_receptor -> extension_motor_neuron_9 + extension_motor_neuron_11 + K + Int1: 1}
+""")
+    problem = problem_of(network.network)
+    beside = {name for name, (wide, _) in zip(problem.neurons, problem.labels, strict=True) if wide}
+    assert beside == {"bitter_receptor", "extension_motor_neuron_9", "extension_motor_neuron_11"}
+    assert overlaps(network, network.layout().value) == 0
+    labels, *_ = shown(network)
+    assert {labels[name].text for name in beside} == beside
 
 
 def test_no_room_is_kept_where_labels_are_left_out() -> None:
@@ -290,6 +305,20 @@ connections: {A -> B: 1, A -> C: 1, A -> D: 1}
 layout: {engine: manual, positions: {A: [0, 0], B: [5, 0], C: [0, 5], D: [0, -5]}}
 """)
     assert network.layout().value.labels == {"A": "left"}
+
+
+def test_of_equal_sides_a_label_takes_the_one_of_its_group_in_the_rank() -> None:
+    network = nv.compile_text("""
+neurovis: 1
+name: aside
+neurons: {A: {names: [a_rather_long_name, another_long_name]}, B: {}, a_name_of_no_group: {}}
+connections: {another_long_name -> B: 1}
+layout:
+  engine: manual
+  positions: {a_rather_long_name: [0, 0], another_long_name: [8, 0], B: [13, 0], a_name_of_no_group: [-6, 0]}
+""")
+    sides = network.layout().value.labels
+    assert sides == {"a_rather_long_name": "left", "another_long_name": "left", "a_name_of_no_group": "right"}
 
 
 def test_labels_of_mirror_images_stand_on_mirrored_sides_in_organic_layouts() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ from hypothesis import strategies as st
 
 import neurovis_spec as nv
 from neurovis_spec import pipeline
-from neurovis_spec.scene import Disc, Text, beside
+from neurovis_spec.scene import Disc, Text
+from neurovis_spec.scene.beside import placed
+from neurovis_spec.scene.spots import Field, Slot, Wanted
 from neurovis_spec.scene.texts import shorten, width
 
 LONG = "a very long label that goes on for forty"
@@ -23,16 +26,16 @@ connections: {{A -> B: {{pattern: all_to_all}}}}
 """
 
 
-def test_every_neuron_of_a_row_has_a_shortened_label() -> None:
+def test_every_neuron_of_a_row_has_a_label_shortened_where_there_is_no_room_for_all_of_it() -> None:
     network = nv.compile_text(SPEC)
     snapshot = network.run(3).snapshot(2)
     layout = network.layout().value
     scene = pipeline.picture(network.network, layout, snapshot, network.gains, network.network.render)
     texts = {group.data.get("neuron"): [s.text for s in group.shapes if isinstance(s, Text)] for group in scene.groups}
-    for name in ("A1", "A2", "A3"):
-        (text,) = texts[name]
-        assert text.endswith("…")
-        assert LONG.startswith(text[:-1].rstrip())
+    said = [text for name in ("A1", "A2", "A3") for text in texts[name]]
+    assert len(said) == 3
+    for text in said:
+        assert text == LONG or (text.endswith("…") and LONG.startswith(text[:-1].rstrip()))
         assert len(text) >= 8
     assert all(LONG in group.title for group in scene.groups if group.data.get("neuron") in ("A1", "A2", "A3"))
 
@@ -71,7 +74,7 @@ def test_labels_on_discs_are_of_much_the_same_size() -> None:
 def test_where_signals_run_across_names_stand_at_the_ends() -> None:
     spec = "neurons: {right_wheel: {}, proximity: {count: 3}}\nconnections: {proximity -> right_wheel: 1}\n"
     found = labels(spec + "layout: {direction: right}\n")
-    assert {name: text.text for name, text in found.items()} == {name: name for name in found}
+    assert {name: text.text + text.subscript for name, text in found.items()} == {name: name for name in found}
     assert found["right_wheel"].anchor == "start"
     assert {found[f"proximity{i}"].anchor for i in (1, 2, 3)} == {"end"}
 
@@ -116,12 +119,126 @@ def test_a_label_beside_a_disc_keeps_off_the_line_of_a_box_where_it_can() -> Non
 def test_a_label_lies_on_lines_rather_than_on_the_border_of_a_frame(border: list[list[float]], right: bool) -> None:
     around = [(x, y) for x, y in np.stack(np.meshgrid(*2 * [np.arange(-2, 2, 0.1)]), -1).reshape(-1, 2).tolist()]
     lines = np.array([(x, y) for x, y in around if x < 0.4 or abs(y) > 0.3])  # to the right there is none
-    field = beside.Field(
+    field = Field(
         np.zeros((1, 2)), np.full(1, 0.35), lines, np.array(border).reshape(-1, 2), (-3, -3, 3, 3), 50.0, False,
         np.zeros((0, 4)),
     )  # fmt: skip
-    found = beside.placed([beside.Wanted((0,), (4.0,))], field, lambda _: 10.0, 66.0)
-    assert (found[0] == beside.Slot(1, 0)) is right
+    found = placed([Wanted((0,), ((4.0,),))], field, lambda _: 10.0, 66.0)
+    assert (found[0] == (Slot(1, 0), 0)) is right
+
+
+def field(places: list[tuple[float, float]], lines: list[tuple[float, float]] | None = None, far: float = 3) -> Field:
+    """Discs of radius 0.3, sample points of lines; as wide and high as ``far`` around all of it."""
+    at, none = np.array(places, float).reshape(-1, 2), np.zeros((0, 2))
+    low, high = at.min(axis=0, initial=0) - far, at.max(axis=0, initial=0) + far
+    around = (*low.tolist(), *high.tolist())
+    dots = none if lines is None else np.array(lines, float).reshape(-1, 2)
+    return Field(at, np.full(len(at), 0.3), dots, none, around, 0.0, False, np.zeros((0, 4)))
+
+
+def sides_of(wanted: list[Wanted], ground: Field, scale: float = 66.0) -> dict[int, tuple[Slot, int]]:
+    return placed(wanted, ground, lambda _: 10.0, scale)
+
+
+BELOW, ABOVE, RIGHT, LEFT = Slot(0, 1), Slot(0, -1), Slot(1, 0), Slot(-1, 0)
+#: Discs all round one at (0, 0), as near as labels, but for the side beneath.
+WALL = [(0.0, -1.0), (1.0, -0.7), (-1.0, -0.7), (1.0, 0.3), (-1.0, 0.3), (1.0, -0.2), (-1.0, -0.2)]
+
+
+def test_a_label_makes_way_for_one_that_has_no_room_elsewhere() -> None:
+    ground = field([(0.0, 0.0), (0.0, 0.95), *WALL])
+    (alone,) = {slot for slot, _ in sides_of([Wanted((0,), ((5.0,),))], ground).values()}
+    assert alone == BELOW
+    # the other is more important, and would rather stand above
+    up = Wanted((1,), ((5.0,),), kept=(ABOVE,))
+    assert sides_of([up], ground) == {1: (ABOVE, 0)}
+    both = sides_of([up, Wanted((0,), ((5.0,),))], ground)
+    assert both[0] == (BELOW, 0)
+    assert both[1][0] != ABOVE
+
+
+def test_a_name_is_cut_before_it_is_left_out_and_said_in_full_where_there_is_room() -> None:
+    narrow = field([(0.0, 0.0), (0.0, 1.0), *WALL])  # beneath there is room for half of it
+    wordings = ((30.0,), (20.0,), (4.0,))
+    one = Wanted((0,), wordings, usual=1)
+    assert sides_of([one], narrow) == {0: (BELOW, 2)}
+    free = field([(0.0, 0.0)])
+    assert sides_of([one], free) == {0: (BELOW, 0)}  # more than usual, as nothing is in the way
+    beside = Wanted((1,), ((8.0,),))
+    (_, first), (_, second) = sides_of([one, beside], field([(0.0, 0.0), (2.4, 0.4)], far=2.0)).values()
+    assert (first, second) == (1, 0)  # but not where that is another's room
+
+
+def test_names_of_one_line_stand_on_one_side() -> None:
+    column = [(0.0, 2.0 * row) for row in range(6)]
+    lines = [(0.0, 2.0 * row + (0.45 if row % 2 else -0.45)) for row in range(6)]  # beneath some, above the others
+    names = [Wanted((row,), ((3.0,),)) for row in range(6)]
+    assert {slot for slot, _ in sides_of(names, field(column, lines)).values()} == {BELOW, ABOVE}
+    lined = [replace(one, line=0) for one in names]
+    assert len({slot for slot, _ in sides_of(lined, field(column, lines)).values()}) == 1
+
+
+def test_names_of_a_close_row_stand_on_one_side_and_the_other_by_turns() -> None:
+    """Where each finds its own side first those that come last find none."""
+    row = field([(0.55 * place, 0.0) for place in range(8)])
+    names = [Wanted((place,), ((6.0,),), line=0) for place in (0, 3, 6, 1, 4, 7, 2, 5)]
+    found = sides_of(names, row)
+    assert {found[place][0] for place in range(8)} == {BELOW, ABOVE}
+    assert all(found[place][0] != found[place + 1][0] for place in range(7))
+
+
+def test_no_name_is_nearer_to_another_disc_than_to_its_own_where_another_side_is_free() -> None:
+    """Beneath a disc of a close column it could be the name of the next."""
+    names = [Wanted((row,), ((3.0,),)) for row in range(5)]
+    close, wide = (field([(0.0, apart * row) for row in range(5)], far=2.0) for apart in (0.85, 2.0))
+    assert all(slot.across for row, (slot, _) in sides_of(names, close).items() if 0 < row < 4)
+    assert {slot for slot, _ in sides_of(names, wide).values()} == {BELOW}
+
+
+@pytest.mark.parametrize("mixed", [True, False])
+def test_a_number_stands_alone_only_among_its_own(mixed: bool) -> None:
+    order = [(group, number) for number in range(1, 7) for group in ("Basketcell", "Stellatecell")]
+    order = order if mixed else sorted(order)
+    places = ", ".join(f"{group}{number}: [{0.61 * place:.2f}, 0]" for place, (group, number) in enumerate(order))
+    found = labels(
+        "neurons: {Basketcell: {count: 6, bias: 1}, Stellatecell: {count: 6}}\n"
+        "connections: {Basketcell -> Stellatecell: {pattern: one_to_one}}\n"
+        f"layout: {{positions: {{{places}}}}}\nrender: {{size: [380, 150], legend: false, title: false}}\n"
+    )
+    alone = [name for name, text in found.items() if text.text.isdecimal()]
+    assert bool(alone) is not mixed
+    assert "Basketcell1" not in alone  # at the end of the row there is room
+
+
+def test_names_that_find_no_room_in_a_reduced_picture_are_cut() -> None:
+    """There is room in the layout, but letters get no smaller with it."""
+    found = labels("""
+neurons:
+  canal: {names: [left_canal, right_canal], bias: 0.2}
+  VN: {names: [left_vestibular, right_vestibular]}
+  N: {count: 6, label: "NI L{i+1}"}
+  M: {count: 6, label: "NI R{i+1}"}
+  ABD: {names: [left_abducens, right_abducens]}
+  OMN: {names: [left_oculomotor, right_oculomotor]}
+  LR: {names: [left_lateral_rectus, right_lateral_rectus]}
+  MR: {names: [left_medial_rectus, right_medial_rectus]}
+connections:
+  - {canal -> VN: {pattern: one_to_one}, left_vestibular -> right_abducens: 1, right_vestibular -> left_abducens: 1}
+  - {left_vestibular -> left_abducens: -1, right_vestibular -> right_abducens: -1}
+  - {left_vestibular -> right_vestibular: -0.4, right_vestibular -> left_vestibular: -0.4}
+  - {right_vestibular -> N: 0.3, left_vestibular -> M: 0.3, N -> N: {pattern: chain}, M -> M: {pattern: chain}}
+  - {N -> M: {pattern: one_to_one}, M -> N: {pattern: one_to_one}, N -> left_abducens: 1, M -> right_abducens: 1}
+  - {left_abducens -> right_oculomotor: 1, right_abducens -> left_oculomotor: 1}
+  - {ABD -> LR: {pattern: one_to_one}, OMN -> MR: {pattern: one_to_one}}
+layout:
+  mirror: [[N, M], [left_canal, right_canal], [left_vestibular, right_vestibular], [left_abducens, right_abducens],
+    [left_oculomotor, right_oculomotor], [left_lateral_rectus, right_lateral_rectus],
+    [left_medial_rectus, right_medial_rectus]]
+""")
+    assert len(found) == 24
+    for name in ("left_oculomotor", "right_oculomotor"):
+        said = found[name].text
+        assert said == name or (said.endswith("…") and name.startswith(said[:-1]) and len(said) > 8)
 
 
 NAMED = """neurovis: 1
@@ -198,7 +315,7 @@ def texts_outside(spec: str) -> tuple[list[str], list[str]]:
         left = text.point[0] - {"start": 0.0, "middle": wide / 2, "end": wide}[text.anchor]
         if left < 0 or left + wide > scene.width:
             found.append(text.text)
-    return [text.text for text in texts], found
+    return [text.text + text.subscript for text in texts], found
 
 
 def test_names_of_numbered_neurons_at_the_rim_stay_in_the_picture() -> None:

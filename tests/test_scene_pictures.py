@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import math
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +23,7 @@ from neurovis_spec.scene.boxes import Box
 from neurovis_spec.scene.geometry import sample
 from neurovis_spec.scene.obstacles import Obstacles
 from neurovis_spec.scene.themes import THEMES
-from neurovis_spec.scene.titles import Titled, in_one_place, outline
+from neurovis_spec.scene.titles import Titled, elsewhere, in_one_place, outline
 
 SPECS = Path(__file__).parent.parent / "specs"
 EXAMPLES = [*sorted(SPECS.glob("*.yaml")), SPECS / "hexapod" / "hexapod.yaml"]
@@ -280,6 +280,27 @@ def test_a_title_that_has_no_room_in_the_place_of_the_others_stands_in_its_mirro
     assert right.point[0] + texts.width("b", right.size, right.weight) == pytest.approx(320 - 10)
     # where both have room in the same place they stand there
     assert [title.point[0] - rect[0] for rect, title in zip(frames, placed(kept[1::2]), strict=True)] == [10.0, 10.0]
+
+
+def test_boxes_that_compute_the_same_all_say_it_or_none_does() -> None:
+    """Where one of them has no room for it, the others of them do not say it either; what else others compute stays."""
+    wide, narrow, long = (0.0, 0.0, 200.0, 60.0), (250.0, 0.0, 300.0, 60.0), (350.0, 0.0, 550.0, 60.0)
+    left, right = Box("left · relu", "left", (0,), wide), Box("right · relu", "right", (1,), narrow)
+    other = Box("out · tanh", "out", (2,), long)
+
+    def free() -> Obstacles:
+        return Obstacles([], [], np.zeros((0, 2)), np.zeros(0))
+
+    boxes = [Titled(left, wide, wide), Titled(right, narrow, narrow), Titled(other, long, long)]
+    for said in (in_one_place(boxes, free(), THEMES["default"]), elsewhere(boxes, free(), THEMES["default"])):
+        assert [text and text.text for text in (said[0], said[1], said[2])] == ["left", "right", "out · tanh"]
+    boxes[1] = Titled(replace(right, rect=wide), wide, wide)
+    assert {in_one_place([box], free(), THEMES["default"])[0].text for box in boxes} == {
+        "left · relu", "right · relu", "out · tanh"
+    }  # fmt: skip
+    (alone,) = elsewhere([boxes[0]], free(), THEMES["default"], {" · relu"})  # in one place others do not say it
+    assert alone
+    assert alone.text == "left"
 
 
 def test_a_title_close_to_its_frame_does_not_cover_it() -> None:

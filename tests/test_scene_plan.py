@@ -17,8 +17,10 @@ from neurovis_spec import pipeline
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.geometry import Rect, meet
+from neurovis_spec.layout.labels import parts_of
 from neurovis_spec.layout.model import Layout, Point
 from neurovis_spec.scene import Arrowhead, Disc, Group, Rectangle, Scene, Spline, Text, legend, still, texts
+from neurovis_spec.scene.called import names_of
 from neurovis_spec.scene.encode import encode
 from neurovis_spec.scene.film import film
 from neurovis_spec.scene.gains import choose_gains
@@ -381,6 +383,24 @@ def test_numbered_neurons_have_subscripts() -> None:
     label = with_data(picture(), "neuron")["K3"].shapes[1]
     assert isinstance(label, Text)
     assert (label.text, label.subscript) == ("K", "3")
+
+
+def test_the_subscript_is_the_number_in_the_group_alone() -> None:
+    """Whatever the group's own name ends in; so the legend speaks of the whole group."""
+    network = nv.compile_text("""
+neurovis: 1
+name: digits
+modules: {leg: {neurons: {CA3: {count: 2, bias: 1}, Ia1: {}}, connections: {CA3 -> Ia1: 1}}}
+instances: {left: {module: leg}}
+neurons: {StrD2: {count: 12, bias: 1}, K_: {count: 2}, Delta7: {}, D: {count: 2, label: "d{i}"}}
+connections: {StrD2 -> Delta7: 1, StrD2 -> K_: {pattern: all_to_all}, Delta7 -> D: 1}
+""").network
+    said = dict(zip(network.neurons.names, parts_of(network.neurons), strict=True))
+    assert (said["StrD21"], said["StrD212"]) == (("StrD2", "1"), ("StrD2", "12"))
+    assert (said["K_2"], said["left.CA31"], said["D1"]) == (("K", "2"), ("CA3", "1"), ("d", "0"))
+    assert (said["Delta7"], said["left.Ia1"]) == (("Delta", "7"), ("Ia", "1"))  # as the paper's C₀ and C₁
+    groups = {"StrD2": "StrD2", "K_": "K", "Delta7": "Delta7", "D": "d", "leg.CA3": "leg.CA3", "leg.Ia1": "leg.Ia1"}
+    assert groups.items() <= names_of(network).called.items()
 
 
 def test_connections_that_share_both_ends_have_an_index() -> None:

@@ -242,6 +242,18 @@ def test_names_at_the_ends_do_not_overlap_and_lie_within_the_page() -> None:
     assert all(s.point[0] + width(s.text, s.size, s.weight, s.subscript) <= scene.width for s in labels)
 
 
+def test_every_view_lowers_the_number_in_the_group_alone() -> None:
+    network = nv.compile_text(
+        "neurovis: 1\nname: x\ntime: {steps: 9}\nmodules: {leg: {neurons: {Tm3: {count: 2, bias: 1}}}}\n"
+        "instances: {left: {module: leg}}\nneurons: {CA3: {count: 2, bias: 1}, O: {}}\n"
+        "connections: {CA3 -> O: 1, left.Tm31 -> O: 1}\n"
+    )
+    for view, paths in (("traces: CA3, left.Tm3", "left."), ("raster: CA3, left.Tm3", "left."), ("matrix", "")):
+        scene = film(view, network=network).scene
+        said = {(s.text, s.subscript) for s in scene.shapes() if isinstance(s, Text) and s.subscript}
+        assert {("CA3", "1"), ("CA3", "2"), (f"{paths}Tm3", "1")} <= said
+
+
 def test_more_curves_than_colours_stand_in_several_strips_with_one_scale() -> None:
     many = "neurovis: 1\nname: many\ntime: {steps: 20}\nneurons: {N: {count: 8, bias: i}}\n"
     scene = film("traces: N", network=nv.compile_text(many)).scene

@@ -1,8 +1,9 @@
 """Label sides: on which side of its disc each label stands, now that all else has its place.
 
 In: a problem and its layout, with the sides for which an engine kept room. Out: the sides on which labels lie on
-nothing and on the fewest lines; of equals the one kept room for, then the usual one. What is drawn alike has its labels
-alike, mirror images reflected, and what stood there in an earlier layout keeps its side.
+nothing and on the fewest lines; of equals the one on which others of the group stand in the same rank, then the one
+that room was kept for, then the usual one. What is drawn alike has its labels alike, mirror images reflected, and what
+stood there in an earlier layout keeps its side.
 """
 
 from __future__ import annotations
@@ -13,16 +14,19 @@ from dataclasses import replace
 import numpy as np
 
 from neurovis_layouts.alike import Alike, Move
-from neurovis_layouts.label_room import AIR, best_first, flipped
+from neurovis_layouts.frame import across_of
+from neurovis_layouts.label_room import best_first, flipped
 from neurovis_spec.layout import FloatArray
 from neurovis_spec.layout.frames import TITLE
 from neurovis_spec.layout.geometry import Cells, Rect, meet, pieces_of, points_in_turn
 from neurovis_spec.layout.label_overlaps import Ground
-from neurovis_spec.layout.labels import label_rect
+from neurovis_spec.layout.labels import ASIDE, UNIT, label_rect
 from neurovis_spec.layout.model import Direction, Layout, LayoutProblem, Side
 
 #: How far apart points on lines are, at most, and how near to a label a line may be.
 _STEP, _LINE = 0.1, 0.04
+#: How near a label may be to another disc, at least as far as to its own.
+_AIR = ASIDE / UNIT
 #: So often labels are tried: one that moves makes room for others.
 _ROUNDS = 3
 
@@ -44,13 +48,15 @@ def best_sides(problem: LayoutProblem, layout: Layout, freely: bool = False) -> 
     classes = [mates for mates in _alike(problem, layout, trial.beside) if not any(i in chosen for i, _ in mates)]
     given = {i: layout.labels[name] for i in trial.beside if (name := problem.neurons[i]) in layout.labels}
     chosen = {**given, **chosen}
+    beside = _beside(problem, layout, trial.beside)
     for _ in range(_ROUNDS):
         settled = dict(chosen)
         for mates in classes:
-            best: tuple[tuple[int, int, int], dict[int, Side]] | None = None
+            best: tuple[tuple[int, ...], dict[int, Side]] | None = None
             for rank, sides in enumerate(_candidates(mates, given, problem.direction)):
                 blocked, lines = trial.cost(sides, chosen)
-                cost = blocked, lines, rank
+                apart = sum(chosen.get(k, side) != side for i, side in sides.items() for k in beside[i] - sides.keys())
+                cost = blocked, lines, apart, rank
                 if (freely or not blocked) and (best is None or cost < best[0]):
                     best = cost, sides
             if best is not None:
@@ -72,6 +78,16 @@ def _alike(problem: LayoutProblem, layout: Layout, beside: Sequence[int]) -> lis
             found.append([(mate, move) for mate, move in alike.of(neuron) if mate in left])
             left.difference_update(mate for mate, _ in found[-1])
     return found
+
+
+def _beside(problem: LayoutProblem, layout: Layout, labelled: Sequence[int]) -> dict[int, frozenset[int]]:
+    """The neurons with labels that stand in one rank with others of their group, by each of them."""
+    along = 1 - across_of(problem.direction)
+    own = {i: number for number, group in enumerate(problem.groups) for i in group.members}
+    rows: dict[tuple[int, float], set[int]] = {}
+    for i in labelled:
+        rows.setdefault((own.get(i, -1), layout.positions[problem.neurons[i]][along]), set()).add(i)
+    return {i: frozenset(row) for row in rows.values() for i in row}
 
 
 def _candidates(
@@ -103,7 +119,7 @@ class _Trial:
         for i, place in zip(self.beside, places, strict=True):
             for side in self._sides:
                 rect = self._rects[i, side] = label_rect(place, problem.labels[i], side)
-                air, title = (0.0, 0.0) if layout.labels.get(problem.neurons[i]) == side else (AIR / 4, TITLE)
+                air, title = (0.0, 0.0) if layout.labels.get(problem.neurons[i]) == side else (_AIR, TITLE)
                 self._free[i, side] = ground.free(i, rect, air, title)
         self._lines = _lines(layout, places, np.array([[self._rects[i, s] for s in self._sides] for i in self.beside]))
         self._row = {i: row for row, i in enumerate(self.beside)}

@@ -163,9 +163,8 @@ def curves(
     names: Sequence[str], values: FloatArray, steps: IntArray, dt: float | None, title: str, what: str, theme: Theme
 ) -> Scene:
     """Curves over time, (steps, names), a few to a strip."""
-    lines = tuple(
-        Trace(name.replace("->", "→"), values[:, place], values[-1:, place], name) for place, name in enumerate(names)
-    )
+    parts = [(name.replace("->", "→"), "") if "->" in name else texts.with_subscript(name) for name in names]
+    lines = tuple(Trace(*parts[place], values[:, place], values[-1:, place], name) for place, name in enumerate(names))
     plots = Traces("traces", what, lines)
     span = Span(steps, steps[-1:], MARGIN + plots.left, WIDTH - MARGIN - plots.right, dt)
     part = plots.part(span, _PLOT, True, theme, "p")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.network import Network, Neurons
 from neurovis_spec.layout.geometry import Rect, shifted
 from neurovis_spec.layout.model import RADIUS, Point, Side
 from neurovis_spec.text_width import width, with_subscript
@@ -39,9 +39,37 @@ _MOST_ROOM = 100.0
 _FREE, _MOST_FREE = 0.252, 5.0
 
 
-def parts_of(label: str, name: str) -> tuple[str, str]:
-    """The label and its subscript: a numbered neuron has one, and a label of its own that is such a name."""
-    return with_subscript(label) if label == name.rsplit(".", 1)[-1] or label.isidentifier() else (label, "")
+def names_in_parts(neurons: Neurons) -> list[tuple[str, str]]:
+    """The name of each neuron within its instance, and its subscript: its number in its group, whatever the group's own
+    name ends in; of a neuron that has none, what the name ends in."""
+    found = [("", "")] * len(neurons)
+    for group in neurons.groups:
+        own = group.name.rpartition(".")[2]
+        for index in group.indices:
+            name = neurons.names[index].rpartition(".")[2]
+            number = name.removeprefix(own)
+            counted = number.isdecimal() and number != name
+            found[index] = (own.removesuffix("_") or own, number) if counted else with_subscript(name)
+    return found
+
+
+def parts_of(neurons: Neurons) -> list[tuple[str, str]]:
+    """The label of each neuron and its subscript: that of the name, and of a label of its own that is such a name."""
+    labelled = zip(neurons.labels, neurons.names, names_in_parts(neurons), strict=True)
+    return [
+        parts if label == name.rpartition(".")[2] else with_subscript(label) if label.isidentifier() else (label, "")
+        for label, name, parts in labelled
+    ]
+
+
+def told_by_number(neurons: Neurons) -> list[bool]:
+    """Whether a number alone says which neuron of its group each is: of several that are called alike but for it."""
+    found, parts = [False] * len(neurons), parts_of(neurons)
+    for group in neurons.groups:
+        alike = len({parts[index][0] for index in group.indices}) == 1 and group.count > 1
+        for index in group.indices if alike else ():
+            found[index] = bool(parts[index][1])
+    return found
 
 
 def least_on_disc(subscript: str, radius: float) -> float:
@@ -61,13 +89,16 @@ def fits(parts: tuple[str, str], size: float, radius: float) -> bool:
 
 
 def label_room(network: Network) -> tuple[Point, ...]:
-    """How wide and high each neuron's label is beside its disc; (0, 0) where the disc holds it, or at least its number.
-    Mirror images, and neurons of one name in instances of one module, take the same room, that of the longest label.
-    None at all where labels are left out, or are so long together that a picture of them all is too small for them."""
+    """How wide and high each neuron's label is beside its disc; (0, 0) where the disc holds it, or at least the number
+    that says which of its group it is. Mirror images, and neurons of one name in instances of one module, take the same
+    room, that of the longest label. None at all where labels are left out, or are so long together that a picture of
+    them all is too small for them."""
     neurons, none = network.neurons, (0.0, 0.0)
-    parts = [parts_of(label, name) for label, name in zip(neurons.labels, neurons.names, strict=True)]
     radius = RADIUS * UNIT
-    beside = [not both[1] and not fits(both, SMALLEST, radius) for both in parts]
+    beside = [
+        not told and not fits(both, least_on_disc(both[1], radius), radius)
+        for both, told in zip(parts_of(neurons), told_by_number(neurons), strict=True)
+    ]
     if not network.render.labels or not any(beside):
         return ()
     wide = [

@@ -1,234 +1,210 @@
-"""Beside: which labels stand beside their discs, and on which side.
+"""Beside: which labels stand beside their discs, on which side, and in which wording.
 
-In: labels by importance, discs and lines in layout units, the scale. Out: a Slot for each label that has room. A
-label that is shown at a scale is shown at every larger one, on the same side, unless a title takes its place there:
-the scales from the smallest on are gone through in fixed steps, and at each of them labels find room among those that
-are there already. What a label claims, from its disc on, gets smaller in layout units from step to step, so that
-those that are there stay free of each other (active ranges: Been, Daiches and Yap 2006).
+In: labels by importance, the spots of each, the scale. Out: a Slot and a wording for each label that has room. A label
+that is shown at a scale is shown at every larger one, and no shorter, unless a title takes its place there: the scales
+from the smallest on are gone through in fixed steps, and at each of them labels find room among those that are there
+already, which make way, or are cut. What a label claims, from its disc on, gets smaller in layout units from step to
+step, so that those that are there stay free of each other (active ranges: Been, Daiches and Yap 2006). In the end names
+that stand in one line take one side, and long ones the room that is left.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray
-from neurovis_spec.layout.geometry import Rect, meet
-from neurovis_spec.layout.labels import beside
+from neurovis_spec.scene.spots import Field, Slot, Spot, Spots, Wanted, met
 
 #: The smallest scale (page units for a layout unit) at which there are labels, and the steps from it on.
 _FIRST, _STEP = 6.0, 1.25
-#: Between a label and the middle of a line that does not touch it, in page units.
-_LINE = 2.5
-#: How far labels may reach beyond the discs at the rim, in page units; where more is asked for, so much and a share of
-#: the width.
-BEYOND, _ALWAYS, _SHARE = 20.0, 50.0, 0.3
+#: To stand on another side than the others of a line is as bad as to lie across the border of a frame.
+_ASTRAY = 2
+#: The first sides, those that are no corners: on these names of one line stand.
+_STRAIGHT = 4
+#: So many labels make way for another.
+_MOST_MOVED = 2
 
 
-@dataclass(frozen=True, slots=True)
-class Slot:
-    """A side of a disc: −1, 0 or 1 ``across`` (left, middle, right) and ``down`` (above, level, below)."""
-
-    across: int
-    down: int
-
-    def text(self, radius: float, width: float, size: float) -> Rect:
-        """What the letters cover, from the centre of the disc."""
-        return beside(self.across, self.down, radius, width, size)
-
-    def claim(self, radius: float, width: float, size: float) -> Rect:
-        """The same with a little air, and all between it and the disc."""
-        x0, y0, x1, y1 = self.text(radius, width, size)
-        x0, y0, x1, y1 = x0 - 2, y0 - 1, x1 + 2, y1 + 1
-        inner = radius if not (self.across and self.down) else 0.75 * radius
-        if self.across:
-            x0, x1 = (inner, x1) if self.across > 0 else (x0, -inner)
-        if self.down:
-            y0, y1 = (inner, y1) if self.down > 0 else (y0, -inner)
-        return x0, y0, x1, y1
-
-    def mirrored(self, level: bool) -> Slot:
-        """The side on the mirror image of the disc: top and bottom change places where signals run across."""
-        return Slot(self.across, -self.down) if level else Slot(-self.across, self.down)
-
-
-#: Where labels stand, the best side first; signals run down, or across.
-_SIDES = tuple(Slot(*side) for side in ((0, 1), (0, -1), (1, 0), (-1, 0), (1, -1), (-1, -1), (1, 1), (-1, 1)))
-_LEVEL = (*_SIDES[2:4], *_SIDES[:2], *_SIDES[4:])
-
-
-@dataclass(frozen=True, slots=True)
-class Wanted:
-    """Neurons that have a label all or none, with mirrored sides; ``widths`` of the labels, in sizes; the scale from
-    which these stand on their discs."""
-
-    members: tuple[int, ...]
-    widths: tuple[float, ...]
-    until: float = np.inf
-    #: where the layout kept room for them
-    kept: tuple[Slot, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Field:
-    """Discs, sample points of lines and of the ``borders`` of frames, and the extent, in layout units; how far labels
-    are to reach beyond it, to either side, in page units; whether signals run across; what is ``taken`` (k, 4), in
-    layout units."""
-
-    places: FloatArray
-    radii: FloatArray
-    dots: FloatArray
-    borders: FloatArray
-    extent: Rect
-    reach: float
-    level: bool
-    taken: FloatArray
-
-
-def beyond(extent: Rect, scale: float, wanted: float) -> float:
-    """How far labels may reach beyond the extent on either side, at a scale: as far as wanted, but most of the picture
-    is for the network."""
-    return max(BEYOND, min(wanted, _ALWAYS + _SHARE * scale * (extent[2] - extent[0])))
-
-
-def placed(wanted: Sequence[Wanted], field: Field, size_of: Callable[[float], float], scale: float) -> dict[int, Slot]:
-    """The sides on which labels stand at this scale, by neuron. ``wanted`` are in the order of their importance;
-    ``size_of`` gives the size of a label beside a disc of this radius, both in page units: it grows no faster than
-    the radius."""
-    ground = _Ground(field)
-    found: dict[int, tuple[Slot, float]] = {}
+def placed(
+    wanted: Sequence[Wanted], field: Field, size_of: Callable[[float], float], scale: float
+) -> dict[int, tuple[Slot, int]]:
+    """The sides on which labels stand at this scale, and their wordings, by neuron. ``wanted`` are in the order of
+    their importance; ``size_of`` gives the size of a label beside a disc of this radius, both in page units: it grows
+    no faster than the radius."""
+    search = _Search(wanted, field, size_of)
     at = _FIRST
     while at <= scale:
-        ground.begin(at, size_of, _without(found, wanted, at))
-        for one in wanted:
-            if one.until > at and one.members[0] not in found:
-                ground.choose(one, found)
+        search.begin(at)
+        search.fill()
         at *= _STEP
-    ground.begin(scale, size_of, _without(found, wanted, scale))
-    for one in wanted:  # what stands in the room of others leaves it
-        if one.kept and one.until > scale:
-            ground.choose(one, found)
-    for one in wanted:  # now that all are there, each may find a better side
-        if one.members[0] in found:
-            ground.choose(one, found)
-    return {index: slot for index, (slot, _) in found.items()}
+    search.begin(scale)
+    search.settle()
+    return {
+        index: (side, wording)
+        for number, (wording, spot) in search.found.items()
+        for index, side in zip(wanted[number].members, spot.sides, strict=True)
+    }
 
 
-def _without(
-    found: dict[int, tuple[Slot, float]], wanted: Sequence[Wanted], scale: float
-) -> dict[int, tuple[Slot, float]]:
-    """Those found, without those that stand on their discs from this scale on."""
-    for one in wanted:
-        if one.until <= scale:
-            for index in one.members:
-                found.pop(index, None)
-    return found
+class _Search:
+    """Labels at one scale after the other; ``found`` are those that stand somewhere, by their numbers among those
+    wanted: in which wording, and where."""
 
+    def __init__(self, wanted: Sequence[Wanted], field: Field, size_of: Callable[[float], float]) -> None:
+        self._wanted, self._field, self._spots = wanted, field, Spots(wanted, field, size_of)
+        self._waiting: list[int] = []
+        self.found: dict[int, tuple[int, Spot]] = {}
+        #: what labels claim, two rows for each that is wanted; what is not claimed is beyond everything
+        self._claims = np.full((2 * len(wanted), 4), np.inf)
 
-class _Ground:
-    """Discs, lines and claims at one scale after the other; all in layout units."""
+    def begin(self, scale: float) -> None:
+        """Go on to a larger scale, without the labels that stand on their discs from there on."""
+        self._spots.begin(scale)
+        self._waiting = [number for number, one in enumerate(self._wanted) if one.until > scale]
+        for number in self.found.keys() - set(self._waiting):
+            self._leave(number)
+        for number, (wording, spot) in list(self.found.items()):
+            self._put(number, wording, replace(spot, claims=self._spots.claims(number, wording, spot.sides)))
 
-    def __init__(self, field: Field) -> None:
-        self._field = field
-        self._order = np.argsort(field.places[:, 0], kind="stable")
-        self._places, self._radii = field.places[self._order], field.radii[self._order]
-        self._largest = float(field.radii.max(initial=0.0))
-        #: (2, n) across and down, from left to right
-        self._dots, self._borders = (
-            np.ascontiguousarray(dots[np.argsort(dots[:, 0], kind="stable")].T) for dots in (field.dots, field.borders)
-        )
-        self._xs = self._places[:, 0].copy()
-        self._where, self._each = field.places.tolist(), field.radii.tolist()
-        self._scale = 1.0
-        self._size_of: Callable[[float], float] = float
-        self._across = BEYOND
-        #: what labels claim, a row a neuron; what is not claimed is beyond everything
-        self._claims = np.full((len(field.places), 4), np.inf)
+    def fill(self) -> None:
+        """Find room for labels that have none, or are cut: among the others, else where one or two others make way,
+        else for a part of the name."""
+        for number in self._waiting:
+            if self._missing(number):
+                self._choose(number, self._wanted[number].usual)
+        for number in self._waiting:
+            any(self._choose(number, wording) or self._make_room(number, wording) for wording in self._missing(number))
 
-    def begin(self, scale: float, size_of: Callable[[float], float], found: dict[int, tuple[Slot, float]]) -> None:
-        """Go on to a larger scale, at which these labels are there."""
-        self._scale, self._size_of = scale, size_of
-        self._across = beyond(self._field.extent, scale, self._field.reach)
-        self._claims[:] = np.inf
-        for index, (slot, width) in found.items():
-            self._claims[index] = self.claim(index, width, slot)
+    def settle(self) -> None:
+        """Now that all are there: what stands in the room of others leaves it, each finds its best side, those of a
+        line one side, and the rest of long names room."""
+        for number, wording, spot in [self._stand(number) for number in sorted(self.found)]:
+            same = self._same(number, wording, spot)
+            if same is None:  # it reaches too far beyond the rim
+                self._leave(number)
+            else:
+                self._put(number, wording, same)
+        for number in self._waiting:
+            one = self._wanted[number]
+            if one.kept:
+                self._choose(number, self.found[number][0] if number in self.found else one.usual)
+        for number in sorted(self.found):
+            self._choose(number, self.found[number][0])
+        lines: dict[int, list[int]] = {}
+        where = self._field.places.tolist()
+        for number in sorted(self._waiting, key=lambda number: where[self._wanted[number].members[0]]):
+            lines.setdefault(self._wanted[number].line, []).append(number)
+        for line, numbers in lines.items():
+            if line >= 0 and len(numbers) > 1:
+                self._line_up(numbers)
+        self.fill()
+        for number in sorted(self.found):
+            self._lengthen(number)
 
-    def choose(self, one: Wanted, found: dict[int, tuple[Slot, float]]) -> None:
-        """Put the labels of these neurons on their best free side, if there is one."""
-        members = list(one.members)
-        before = self._claims[members].copy()
-        self._claims[members] = np.inf
-        sides = self._best(one)
-        if sides is None:
-            self._claims[members] = before
-            return
-        for index, width, side in zip(one.members, one.widths, sides, strict=False):
-            found[index] = side, width
-            self._claims[index] = self.claim(index, width, side)
+    def _missing(self, number: int) -> range:
+        """The wordings in which a label would say more than it does, up to as much as is usual."""
+        one = self._wanted[number]
+        return range(one.usual, self.found[number][0] if number in self.found else len(one.wordings))
 
-    def claim(self, index: int, width: float, slot: Slot) -> Rect:
-        """What a label claims of the plane."""
-        radius = self._each[index] * self._scale
-        size, (x, y) = self._size_of(radius), self._where[index]
-        x0, y0, x1, y1 = (side / self._scale for side in slot.claim(radius, width * size, size))
-        return x + x0, y + y0, x + x1, y + y1
+    def _same(self, number: int, wording: int, spot: Spot) -> Spot | None:
+        """The spot on the same sides in another wording, or at another scale."""
+        return next((one for one in self._spots.of(number, wording) if one.sides == spot.sides), None)
 
-    def _best(self, one: Wanted) -> tuple[Slot, ...] | None:
-        """The free sides on which labels cross the fewest borders of frames, of these those on the fewest lines, of
-        these that for which the layout kept room, or the best; None where none are free."""
-        best: tuple[tuple[int, int], tuple[Slot, ...]] | None = None
-        usual = _LEVEL if self._field.level else _SIDES
-        mirrored = ((slot, slot.mirrored(self._field.level)) for slot in usual)
-        for sides in (*((one.kept,) if one.kept else ()), *mirrored):
-            if not self._may(one, sides):
+    def _free(self, spot: Spot) -> bool:
+        """Whether no other label is there."""
+        return not met(self._claims, spot.claims).any()
+
+    def _put(self, number: int, wording: int, spot: Spot) -> None:
+        self.found[number] = wording, spot
+        self._claims[2 * number : 2 * number + len(spot.claims)] = spot.claims
+
+    def _leave(self, number: int) -> None:
+        self._claims[2 * number : 2 * number + 2] = np.inf
+        self.found.pop(number, None)
+
+    def _stand(self, number: int) -> tuple[int, int, Spot]:
+        """A label, its wording and its spot, as ``_put`` takes them."""
+        return number, *self.found[number]
+
+    def _choose(self, number: int, wording: int) -> bool:
+        """Put a label, in this wording, on its best free side, if there is one; else it stays as it is."""
+        before = self._stand(number) if number in self.found else None
+        self._leave(number)
+        best = next((spot for spot in self._spots.of(number, wording) if self._free(spot)), None)
+        if best is not None:
+            self._put(number, wording, best)
+        elif before is not None:
+            self._put(*before)
+        return best is not None
+
+    def _make_room(self, number: int, wording: int) -> bool:
+        """Put a label, in this wording, where it has room if others find another place, and these there."""
+        for spot in self._spots.of(number, wording):
+            others = set((np.flatnonzero(met(self._claims, spot.claims).any(axis=0)) // 2).tolist()) - {number}
+            if len(others) > _MOST_MOVED:
                 continue
-            claims = self._all(one, sides)
-            cost = (
-                sum(self._on(self._borders, claim) > 0 for claim in claims),
-                sum(self._on(self._dots, claim) for claim in claims),
-            )
-            if best is None or cost < best[0]:
-                best = cost, sides
-            if cost == (0, 0):
+            before = [self._stand(one) for one in sorted(others | ({number} & self.found.keys()))]
+            for one, _, _ in before:
+                self._leave(one)
+            self._put(number, wording, spot)
+            if all(self._choose(one, said) for one, said, _ in before if one != number):
+                return True
+            for one in (number, *others):
+                self._leave(one)
+            for stood in before:
+                self._put(*stood)
+        return False
+
+    def _line_up(self, numbers: Sequence[int]) -> None:
+        """Have names of one line stand on one side, or on one and the other by turns, those that find no room there
+        where they can, if more of them find room then or they are easier to read than where they stand now."""
+        before = {number: self.found[number] for number in numbers if number in self.found}
+        best = self._together(numbers), before
+        beside = self._field.sides[:_STRAIGHT]
+        for turns in (*((side, side) for side in beside), beside[:2], beside[1::-1]):
+            for number in numbers:
+                self._leave(number)
+            left = []
+            for place, number in enumerate(numbers):
+                wording = before[number][0] if number in before else self._wanted[number].usual
+                side = turns[place % 2]
+                spot = next((spot for spot in self._spots.of(number, wording) if spot.sides[0] == side), None)
+                if spot is not None and self._free(spot):
+                    self._put(number, wording, spot)
+                else:
+                    left.append((number, wording))
+            for number, wording in left:
+                self._choose(number, wording)
+            if before.keys() <= self.found.keys():
+                worth = self._together(numbers)
+                if worth < best[0]:
+                    best = worth, {number: self.found[number] for number in numbers if number in self.found}
+        for number in numbers:
+            self._leave(number)
+        for number, stands in best[1].items():
+            self._put(number, *stands)
+
+    def _together(self, numbers: Sequence[int]) -> tuple[int, int, int, int, int]:
+        """What is bad about where the names of a line stand: how many nowhere; how hard to read they are, also as they
+        are not on the side on which most are; then how many are not, how much of lines they cover, and how many are not
+        where the layout kept room for them."""
+        spots = [self.found[number][1] for number in numbers if number in self.found]
+        sides = Counter(spot.sides[0] for spot in spots for _ in spot.sides)
+        astray = sides.total() - max(sides.values(), default=0)
+        weight = sum(spot.weight for spot in spots) + _ASTRAY * astray
+        covered, moved = sum(spot.dots for spot in spots), sum(spot.elsewhere for spot in spots)
+        return len(numbers) - len(spots), weight, astray, covered, moved
+
+    def _lengthen(self, number: int) -> None:
+        """Say more of a name that is cut, on the side where it stands, if it lies on no more there."""
+        _, wording, spot = stands = self._stand(number)
+        self._leave(number)
+        for longer in range(wording):
+            same = self._same(number, longer, spot)
+            if same is not None and same.worth <= spot.worth and self._free(same):
+                stands = number, longer, same
                 break
-        return None if best is None else best[1]
-
-    def _all(self, one: Wanted, sides: Sequence[Slot]) -> list[Rect]:
-        return [self.claim(*own) for own in zip(one.members, one.widths, sides, strict=False)]
-
-    def _may(self, one: Wanted, sides: Sequence[Slot]) -> bool:
-        """Whether labels may stand on these sides of their discs."""
-        claims = self._all(one, sides)
-        if not all(self._free(claim, index) for claim, index in zip(claims, one.members, strict=True)):
-            return False
-        return len(claims) < 2 or not meet(claims[0], claims[1])
-
-    def _free(self, claim: Rect, index: int) -> bool:
-        (x0, y0, x1, y1), (left, top, right, bottom) = claim, self._field.extent
-        across, down = (reach / self._scale for reach in (self._across, BEYOND))
-        if x0 < left - across or x1 > right + across or y0 < top - down or y1 > bottom + down:
-            return False
-        if _meeting(self._claims, claim) or _meeting(self._field.taken, claim):
-            return False
-        first, last = np.searchsorted(self._xs, (x0 - self._largest, x1 + self._largest))
-        near = slice(int(first), int(last))
-        x, y = self._places[near].T
-        away = np.hypot(np.maximum(np.maximum(x0 - x, x - x1), 0), np.maximum(np.maximum(y0 - y, y - y1), 0))
-        hit = (away < self._radii[near] - 1e-9) & (self._order[near] != index)
-        return not hit.any()
-
-    def _on(self, dots: FloatArray, claim: Rect) -> int:
-        """How many of these points (2, n), which are sorted, a label touches."""
-        air = _LINE / self._scale
-        x0, y0, x1, y1 = claim[0] - air, claim[1] - air, claim[2] + air, claim[3] + air
-        first, last = np.searchsorted(dots[0], (x0, x1))
-        heights = dots[1, int(first) : int(last)]
-        return int(np.count_nonzero((heights > y0) & (heights < y1)))
-
-
-def _meeting(claims: FloatArray, claim: Rect) -> bool:
-    """Whether any of the claims (k, 4) meets another."""
-    left, top, right, bottom = claims.T
-    return bool(((left < claim[2]) & (right > claim[0]) & (top < claim[3]) & (bottom > claim[1])).any())
+        self._put(*stands)

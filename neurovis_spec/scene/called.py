@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from neurovis_spec.compiler.network import Group, Network
+from neurovis_spec.layout.labels import parts_of
 
 _NAME = re.compile(r"[A-Za-z_]\w*(?:\.(?!\.)[A-Za-z_]\w*)*", re.ASCII)
 _NUMBER = re.compile(r"_?\d+$")
@@ -55,17 +56,21 @@ def unit_of(group: Group) -> str:
 
 def names_of(network: Network) -> Names:
     """What a picture of a network calls what is in it."""
-    neurons = network.neurons
-    labels: dict[str, list[str]] = {}
+    neurons, parts = network.neurons, parts_of(network.neurons)
+    labels: dict[str, list[tuple[str, str]]] = {}
     called: dict[str, str] = {}
     for group in neurons.groups:
-        labels.setdefault(unit_of(group), []).extend(neurons.labels[index] for index in group.indices)
+        for index in group.indices:
+            (base, number), label = parts[index], neurons.labels[index]
+            stem = base if number else _NUMBER.sub("", label)
+            labels.setdefault(unit_of(group), []).append((label, stem))
         if group.module is None and group.count > 1:
             called |= {neurons.names[index]: neurons.labels[index] for index in group.indices}
     for name, some in labels.items():
-        stems = {_NUMBER.sub("", label) for label in some} if len(some) > 1 else set(some)
+        whole, stems = {label for label, _ in some}, {stem for _, stem in some}
+        words = whole if len(whole) == 1 else stems
         path, dot, own = name.rpartition(".")
-        called[name] = f"{path}{dot}{stems.pop() if len(stems) == 1 and all(stems) else own}"
+        called[name] = f"{path}{dot}{words.pop() if len(words) == 1 and all(words) else own}"
     often = Counter(called.values())
     called = {name: word if often[word] == 1 else name for name, word in called.items()}
     modules = {instance.path: instance.module for instance in network.instances}

@@ -58,13 +58,13 @@ def bands_of(names: Sequence[str]) -> tuple[Band, ...]:
 @dataclass(frozen=True)
 class Heat:
     """``count`` rows: their activities, and their colour values in −1…1, for any of them by number (steps, rows); which
-    ``may_spike``; their names, and their groups."""
+    ``may_spike``; their names, with subscripts, and their groups."""
 
     title: str
     activity: Callable[[IntArray], FloatArray]
     colour: Callable[[IntArray], FloatArray]
     may_spike: npt.NDArray[np.bool_]
-    names: tuple[str, ...]
+    names: tuple[tuple[str, str], ...]
     #: the groups, and what they are in: the instance, if they are in one
     groups: tuple[Band, ...]
     outer: tuple[Band, ...]
@@ -78,7 +78,7 @@ class Heat:
     @property
     def left(self) -> float:
         """How wide the names beside the rows are."""
-        named = [_parts(name) for name in self.names]
+        named = list(self.names)
         if not self._named(self.natural):
             named = [(band.name, "") for band in self._bands(self.natural)]
         return min(_LABEL, max((texts.width(base, SMALL, 400, sub) for base, sub in named), default=0.0)) + 8
@@ -144,9 +144,9 @@ class Heat:
             shapes.append(Polyline(((span.left - 4, y), (span.right, y)), theme.background, 1.2))
         if self._named(plot):
             size = min(SMALL, 0.9 * each)
-            cut = Cut(self.names)
-            for row, name in enumerate(self.names):
-                parts = cut.parts(*_parts(name), size, _LABEL, 400)
+            cut = Cut(base for base, _ in self.names)
+            for row, words in enumerate(self.names):
+                parts = cut.parts(*words, size, _LABEL, 400)
                 shapes.append(_beside(*parts, span.left - 6, top + (row + 0.5) * each, size, theme))
             return shapes
         free, cut = top, Cut(band.name for band in bands)
@@ -172,11 +172,6 @@ def strongest(values: FloatArray, cuts: IntArray, axis: int) -> FloatArray:
     low = np.minimum.reduceat(known, cuts[:-1], axis=axis)
     result: FloatArray = np.where(high >= -low, high, low)
     return result
-
-
-def _parts(name: str) -> tuple[str, str]:
-    """The name of a neuron and its subscript."""
-    return texts.with_subscript(name) if "." not in name else (name, "")
 
 
 def _beside(base: str, subscript: str, right: float, middle: float, size: float, theme: Theme) -> Text:

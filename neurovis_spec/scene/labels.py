@@ -34,13 +34,15 @@ from neurovis_spec.layout.labels import (
     fits,
     least_on_disc,
     parts_of,
+    told_by_number,
 )
 from neurovis_spec.layout.model import RADIUS, Point, Side
 from neurovis_spec.scene import texts
-from neurovis_spec.scene.beside import Field, Slot, Wanted, placed
+from neurovis_spec.scene.beside import placed
 from neurovis_spec.scene.cut import Cut
 from neurovis_spec.scene.model import Text
 from neurovis_spec.scene.obstacles import Obstacles
+from neurovis_spec.scene.spots import Field, Slot, Wanted
 
 #: on the disc: not smaller than the first for the sake of others, never larger than the second
 _READABLE, _LARGEST = 10.5, 14.0
@@ -54,6 +56,8 @@ _LEGIBLE = 8.0
 _SMALLEST_DISC = 7.0
 #: and one smaller than this no label beside a number
 _SMALLEST_NUMBERED = 16.0
+#: to how much of its width a name is cut beside its disc, if there is no room for it, and how many letters it keeps
+_CUT, _LETTERS = (0.75, 0.5), 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +95,8 @@ class Ground:
     extent: Rect
     reach: float
     taken: FloatArray
+    #: who is in each frame, the largest first
+    frames: Sequence[Collection[int]] = ()
 
     def centre(self, index: int) -> Point:
         """The centre of a disc in the picture."""
@@ -113,7 +119,7 @@ def labels_of(
     """A label for every neuron, or None where there is no room for any of it, or it is ``hidden``. The discs of those
     that are ``numbered`` bear a number as well. On the ``sides`` given there is room kept for labels."""
     neurons = network.neurons
-    parts = [parts_of(label, name) for label, name in zip(neurons.labels, neurons.names, strict=True)]
+    parts = parts_of(neurons)
     chosen = [index for index in range(len(neurons)) if not (hidden and hidden[index])]
     partners = {a: b for a, b in partners_of(network).items() if not (hidden and (hidden[a] or hidden[b]))}
     smallest = float(ground.radii[chosen].min(initial=np.inf)) * ground.scale
@@ -135,16 +141,18 @@ def labels_of(
         latest = max((until[index] for index in counted), default=0.0)
         for index in counted:
             until[index] = latest
-    beside = _beside(network, ground, obstacles, chosen, partners, until, sides)
+    alone = _told_alone(network, ground, chosen)
+    beside = _beside(network, ground, obstacles, chosen, partners, until, sides, alone)
     for index in chosen:  # it is easier to read beside a disc than where it has to be very small
         result[index] = beside.get(index) or result[index]
     for index, label in beside.items():
         if result[index] is label:
             obstacles.add_text(_rect(label))
-    cut = Cut(neurons.labels)
+    cut, told = Cut(neurons.labels), told_by_number(neurons)
     for index in chosen:
         if result[index] is None and index not in numbered and ground.radius(index) >= _SMALLEST_DISC:
-            result[index] = _shortened(*parts[index], ground.centre(index), ground.radius(index), cut)
+            both = parts[index] if told[index] else (neurons.labels[index], "")
+            result[index] = _shortened(*both, ground.centre(index), ground.radius(index), cut, index in alone)
     for one, other in partners.items():
         if result[other] is None:
             result[one] = None
@@ -185,40 +193,105 @@ def _beside(
     partners: Mapping[int, int],
     until: Sequence[float],
     sides: Mapping[int, Side],
+    alone: frozenset[int],
 ) -> dict[int, Label]:
     """Labels beside discs, by neuron, as far as there is room for them at this scale or a smaller one, on the ``sides``
-    with room for them if that is enough; from the scale ``until`` on a label stands on its disc."""
-    labels, cut, among = network.neurons.labels, Cut(network.neurons.labels), set(chosen)
-    said: dict[int, str] = {}
+    with room for them if that is enough; from the scale ``until`` on a label stands on its disc. Those whose number
+    ``alone`` says who they are are not cut."""
+    among, words = set(chosen), _whole(network)
+    cut = Cut(base for base, _ in words)
+    lines = _lines(network, ground, chosen)
+    said: dict[int, list[tuple[str, str]]] = {}
     wanted: list[Wanted] = []
-
-    def kept(*members: int) -> tuple[Slot, ...]:
-        return tuple(Slot(*STEPS[sides[one]]) for one in members) if all(one in sides for one in members) else ()
-
     for index in [index for index in rank_of(network) if index in among][:MOST]:
-        said[index] = cut.shorten(labels[index], 1.0, WIDEST)
-        partner = partners.get(index)
-        if partner is None or partner not in among:
-            wanted.append(Wanted((index,), (texts.width(said[index], 1.0, WEIGHT),), until[index], kept(index)))
-        elif partner not in said:
-            said[partner] = cut.shorten(labels[partner], 1.0, WIDEST)
-            both = (index, partner)
-            widths = tuple(texts.width(said[one], 1.0, WEIGHT) for one in both)
-            wanted.append(Wanted(both, widths, max(until[index], until[partner]), kept(*both)))
+        if index in said:
+            continue
+        partner = partners.get(index, index)
+        members = (index, partner) if partner != index and partner in among else (index,)
+        wordings, usual = _wordings([words[one] for one in members], cut, not alone.issuperset(members))
+        said |= {one: [wording[place] for wording in wordings] for place, one in enumerate(members)}
+        kept = [Slot(*STEPS[sides[one]]) for one in members if one in sides]
+        wanted.append(
+            Wanted(
+                members,
+                tuple(tuple(_wide(one) for one in wording) for wording in wordings),
+                usual,
+                max(until[one] for one in members),
+                tuple(kept) if len(kept) == len(members) else (),
+                lines.get(index, -1),
+            )
+        )
     level, taken = _level(network), (ground.taken - np.tile(ground.shift, 2)) / ground.scale
     field = Field(ground.places, ground.radii, ground.dots, ground.borders, ground.extent, ground.reach, level, taken)
     found = placed(wanted, field, size_beside, ground.scale)
     result: dict[int, Label] = {}
-    for index, slot in found.items():
-        size = size_beside(ground.radius(index))
-        width = texts.width(said[index], size, WEIGHT)
+    for index, (slot, wording) in found.items():
+        own, size = said[index][wording], size_beside(ground.radius(index))
+        width = _wide(own, size)
         x0, y0, _, _ = slot.text(ground.radius(index), width, size)
         x, y = ground.centre(index)
         anchor: Literal["start", "middle", "end"] = ("end", "middle", "start")[slot.across + 1]
         start = x + x0 + width * (1 - slot.across) / 2
-        label = Label(said[index], "", size, (start, y + y0 + RISE * size), anchor, False)
+        label = Label(*own, size, (start, y + y0 + RISE * size), anchor, False)
         result[index] = replace(label, crosses=obstacles.crossed(_rect(label)))
     return result
+
+
+def _told_alone(network: Network, ground: Ground, chosen: Sequence[int]) -> frozenset[int]:
+    """Whose number alone says who they are: those of the neurons with one in their group that have two of their group
+    next to them."""
+    group = np.zeros(len(network.neurons), np.int64)
+    for number, own in enumerate(network.neurons.groups):
+        group[own.start : own.start + own.count] = number
+    told, shown = told_by_number(network.neurons), np.array(chosen, np.int64)
+    found = []
+    for index in chosen:
+        if told[index] and ground.radius(index) >= _SMALLEST_DISC:
+            away = np.hypot(*(ground.places[shown] - ground.places[index]).T).round(6)
+            own = group[shown] == group[index]
+            nearest = np.lexsort((~own, away))[1:3]  # itself is the first
+            if len(nearest) == 2 and own[nearest].all():
+                found.append(index)
+    return frozenset(found)
+
+
+def _lines(network: Network, ground: Ground, chosen: Sequence[int]) -> dict[int, int]:
+    """Whose names are to stand on one side, by the number of their line: of neurons of one rank those in the same
+    frame, or in no frame of the same group; of a group also those that are alone in their rank."""
+    frame = {index: number for number, members in enumerate(ground.frames) for index in members}
+    group = {index: number for number, own in enumerate(network.neurons.groups) for index in own.indices}
+    along = 0 if _level(network) else 1
+    ranks: dict[tuple[int, int, float], list[int]] = {}
+    for index in chosen:
+        rank = round(float(ground.places[index, along]), 6)
+        ranks.setdefault((frame.get(index, -1), -1 if index in frame else group[index], rank), []).append(index)
+    lines = [members for members in ranks.values() if len(members) > 1]
+    alone: dict[int, list[int]] = {}
+    for index in [members[0] for members in ranks.values() if len(members) == 1]:
+        alone.setdefault(group[index], []).append(index)
+    return {index: number for number, members in enumerate([*lines, *alone.values()]) for index in members}
+
+
+def _wordings(words: Sequence[tuple[str, str]], cut: Cut, shorter: bool) -> tuple[list[list[tuple[str, str]]], int]:
+    """What can be said of neurons that are labelled alike, from all of their names on; and which of these is usual: so
+    much of a name that it does not look like a title of those around. It may be ``shorter``, too."""
+    usual = [min(_wide(both), WIDEST) for both in words]
+    found = [list(words)]
+    for share in (1.0, *_CUT) if shorter else (1.0,):
+        said = [cut.parts(*both, 1.0, share * wide) for both, wide in zip(words, usual, strict=True)]
+        if said != found[-1] and all(len(text) > _LETTERS or (text, sub) in words for text, sub in said):
+            found.append(said)
+    return found, int(max(_wide(both) for both in words) > WIDEST)
+
+
+def _whole(network: Network) -> list[tuple[str, str]]:
+    """What is said of each neuron beside its disc, and a subscript: a name that keeps all of its letters."""
+    labelled = zip(network.neurons.labels, parts_of(network.neurons), strict=True)
+    return [parts if label == "".join(parts) else (label, "") for label, parts in labelled]
+
+
+def _wide(said: tuple[str, str], size: float = 1.0) -> float:
+    return texts.width(said[0], size, WEIGHT, said[1])
 
 
 def _rect(label: Label) -> Rect:
@@ -231,19 +304,16 @@ def _rect(label: Label) -> Rect:
 def margin_beside(network: Network, radius: float, rooms: Collection[int] = ()) -> float:
     """How far labels may reach beyond the discs at the rim: 0 where all fit on discs of this radius, or have ``rooms``
     kept for them in a picture that is not reduced."""
-    neurons, cut = network.neurons, Cut(network.neurons.labels)
+    words = _whole(network)
+    cut = Cut(base for base, _ in words)
     kept = rooms if radius >= _BESIDE_SMALLEST / _BESIDE_SHARE else ()
-    named = [
-        (label, name)
-        for index, (label, name) in enumerate(zip(neurons.labels, neurons.names, strict=True))
-        if index not in kept
-    ]
+    named = [both for index, both in enumerate(zip(words, parts_of(network.neurons), strict=True)) if index not in kept]
     if radius >= _SMALLEST_DISC and all(
-        _on_disc(*parts_of(label, name), (0.0, 0.0), radius, _READABLE) is not None for label, name in named
+        _on_disc(*parts, (0.0, 0.0), radius, _READABLE) is not None for _, parts in named
     ):
         return 0.0
-    said = [cut.shorten(label, 1.0, WIDEST) for label, _ in named]
-    return max((texts.width(text, size_beside(radius), WEIGHT) for text in said), default=0.0) + ASIDE + 3
+    said = [cut.parts(*own, 1.0, WIDEST) for own, _ in named]
+    return max((_wide(own, size_beside(radius)) for own in said), default=0.0) + ASIDE + 3
 
 
 def room_beside(network: Network, radius: float) -> list[tuple[int, Point]]:
@@ -251,8 +321,8 @@ def room_beside(network: Network, radius: float) -> list[tuple[int, Point]]:
     down, or to either side where signals run across."""
     neurons, level = network.neurons, _level(network)
     result: list[tuple[int, Point]] = []
-    for index, (label, name) in enumerate(zip(neurons.labels, neurons.names, strict=True)):
-        if _on_disc(*parts_of(label, name), (0.0, 0.0), radius, _READABLE) is None:
+    for index, (label, parts) in enumerate(zip(neurons.labels, parts_of(neurons), strict=True)):
+        if _on_disc(*parts, (0.0, 0.0), radius, _READABLE) is None:
             width = min(texts.width(label, BESIDE, WEIGHT), 5 * radius)
             result.append((index, (radius + 8 + width, 0.0) if level else (0.0, radius + 17)))
     return result
@@ -303,14 +373,15 @@ def _on_disc(
     return Label(base, subscript, size, (centre[0], centre[1] + drop * size), "middle", True)
 
 
-def _shortened(base: str, subscript: str, centre: Point, radius: float, cut: Cut) -> Label | None:
-    """What fits on the disc: part of a name; of a numbered one its number, if need be alone."""
+def _shortened(base: str, subscript: str, centre: Point, radius: float, cut: Cut, alone: bool) -> Label | None:
+    """What fits on the disc: part of a name; of a numbered one its number, ``alone`` if need be and if that says who it
+    is."""
     if subscript:
         for end in range(min(len(base) - 1, 3), 0, -1):
             found = _on_disc(base[:end] + "…", subscript, centre, radius, SMALLEST, _LEGIBLE)
             if found is not None:
                 return found
-        return _on_disc(subscript, "", centre, radius, min(SMALLEST, 0.76 * radius), TINY)
+        return _on_disc(subscript, "", centre, radius, min(SMALLEST, 0.76 * radius), TINY) if alone else None
     size = min(max(SMALLEST, min(10.0, 0.5 * radius)), 0.76 * radius)
     text = cut.shorten(base, size, chord(radius, size))
     if len(text) < 3:  # a single letter says nothing

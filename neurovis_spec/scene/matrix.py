@@ -14,6 +14,7 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.layout.labels import parts_of
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.cut import Cut
@@ -215,12 +216,8 @@ class MatrixCells:
 
 
 def _leaf_names(network: Network, order: Order) -> list[tuple[str, str]]:
-    labels, names = network.neurons.labels, network.neurons.names
-    result = []
-    for index in order.neurons.tolist():
-        label, own = labels[index], names[index].rsplit(".", 1)[-1]
-        result.append(texts.with_subscript(label) if label == own else (label, ""))
-    return result
+    parts = parts_of(network.neurons)
+    return [parts[index] for index in order.neurons.tolist()]
 
 
 def _small(order: Order) -> bool:
@@ -250,7 +247,7 @@ def _names(
     """Names before rows, or above columns (``upright``), reading upward."""
     shapes: list[Shape] = []
     leaves = _leaf_names(network, order) if _small(order) else []
-    cut = Cut([base + subscript for base, subscript in leaves] or [band.name for band in _titled(order)])
+    cut = Cut([base for base, _ in leaves] or [band.name for band in _titled(order)])
 
     def put(base: str, subscript: str, middle: float, away: float, size: float) -> None:
         base, subscript = cut.parts(base, subscript, size, _LABEL, 400)

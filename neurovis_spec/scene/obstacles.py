@@ -34,6 +34,10 @@ class Obstacles:
         """Room that a text has taken."""
         self._texts.append(rect)
 
+    def keep_texts(self, count: int) -> None:
+        """Forget all texts but the first ones."""
+        del self._texts[count:]
+
     def texts(self) -> FloatArray:
         """(k, 4) the room that texts have taken."""
         return np.array(self._texts, float).reshape(-1, 4)

@@ -21,7 +21,6 @@ from neurovis_spec.layout.labels import BESIDE, UNIT, label_rects, label_room
 from neurovis_spec.layout.model import RADIUS, Layout, Point
 from neurovis_spec.layout.naming import natural_key
 from neurovis_spec.scene import delays, encoding, legend, texts
-from neurovis_spec.scene.beside import beyond
 from neurovis_spec.scene.boxes import Box, boxes_of, entitled
 from neurovis_spec.scene.collapse import Gathered
 from neurovis_spec.scene.fading import seconds_of
@@ -40,6 +39,7 @@ from neurovis_spec.scene.model import Arrowhead, Group, Rectangle, Shape, Spline
 from neurovis_spec.scene.obstacles import Obstacles
 from neurovis_spec.scene.scaling import at, scaled_group, scaled_label, scaled_line, scaled_rectangle, scaled_text
 from neurovis_spec.scene.shown import shown
+from neurovis_spec.scene.spots import beyond
 from neurovis_spec.scene.teachers import Teacher, dash, dotted, label_of, room_of, teachers_of
 from neurovis_spec.scene.themes import theme_of
 from neurovis_spec.scene.tints import tints_of
@@ -170,12 +170,14 @@ def plan(
             extent,
             reach,
             obstacles.texts(),
+            [box.members for box in boxes],
         )
         sides = {index: layout.labels[network.neurons.names[index]] for index in rooms}
         labels = labels_of(network, ground, obstacles, (~seen.focus).tolist(), sizes, sides)
     named = line_labels(network, lines, obstacles, theme, picture) if settings.labels else {}
     left = [index for index in range(len(boxes)) if index not in titles]
-    others = elsewhere([titled[index] for index in left], obstacles, theme)
+    unsaid = {titled[index].computes for index, text in titles.items() if text.text != boxes[index].title}
+    others = elsewhere([titled[index] for index in left], obstacles, theme, unsaid)
     titles |= {index: text for index, text in zip(left, others, strict=True) if text is not None}
     front = [
         *(Group((text,), id=f"label:{entry}") for entry, text in named.items()),

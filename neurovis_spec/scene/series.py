@@ -14,6 +14,7 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
 from neurovis_spec.compiler.names.state_references import StateOf, names_of_states
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.layout.labels import names_in_parts, parts_of
 from neurovis_spec.runtime.recording import Recording, RecordingError
 
 _NONE: npt.NDArray[np.int64] = np.zeros(0, dtype=np.int64)
@@ -42,15 +43,20 @@ def full_name(curve: Curve, network: Network) -> str:
     return network.neurons.names[curve.index] if curve.of == "neuron" else network.connection_names[curve.index]
 
 
-def short_name(curve: Curve, network: Network) -> str:
-    """What a picture calls it: labels of neurons, an arrow for a connection."""
-    labels = network.neurons.labels
-    if curve.of == "neuron":
-        name = network.neurons.names[curve.index]
-        own = labels[curve.index] if "." not in name else name
-        return f"{own}.{curve.state}" if curve.state else own
-    name = network.connection_names[curve.index].replace("->", "→")
-    return f"({name}).{curve.state}" if curve.state else name
+def short_names(curves: Sequence[Curve], network: Network) -> list[tuple[str, str]]:
+    """What a picture calls each of them, and a subscript: labels of neurons, an arrow for a connection."""
+    labels, names = parts_of(network.neurons), names_in_parts(network.neurons)
+    found: list[tuple[str, str]] = []
+    for curve in curves:
+        if curve.of == "connection":
+            name = network.connection_names[curve.index].replace("->", "→")
+            found.append((f"({name}).{curve.state}" if curve.state else name, ""))
+            continue
+        path, dot, _ = network.neurons.names[curve.index].rpartition(".")
+        base, subscript = names[curve.index] if dot else labels[curve.index]
+        own = f"{path}{dot}{base}"
+        found.append((f"{own}{subscript}.{curve.state}", "") if curve.state else (own, subscript))
+    return found
 
 
 def kind_of(curves: Sequence[Curve]) -> str:

@@ -2,14 +2,15 @@
 
 In: boxes in user units, what is in the way. Out: a Text for each box, or None where there is no room for any. A title
 that has no room in the place of the others stands elsewhere, in or beside its box. Boxes of one name and size, as
-instances of a module have them, are alike, and so are the instances themselves; their titles are worded alike, and
-elsewhere stand in the same place or in its mirror image.
+instances of a module have them, are alike, and so are the instances themselves; elsewhere their titles stand in the
+same place or in its mirror image. Of the boxes that compute the same all say it or none does: one that alone does not
+would seem to compute something else.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -45,6 +46,11 @@ class Titled:
     room: Rect
     foreign: tuple[Rect, ...] = ()
 
+    @property
+    def computes(self) -> str:
+        """What the title says besides the name."""
+        return self.box.title.removeprefix(self.box.name)
+
 
 def in_one_place(
     boxes: Sequence[Titled], obstacles: Obstacles, theme: Theme, kept: Sequence[Rect] = ()
@@ -53,46 +59,77 @@ def in_one_place(
     several that in which they cover least, rather within the frames and not too small. One that has no room there is in
     the mirror image of the place, as in the other half of a picture. None is on what is ``kept`` for others."""
     around = [obstacles.near(_grown(item)) for item in boxes]
+    same: dict[str, list[int]] = {}
+    for index, item in enumerate(boxes):
+        same.setdefault(item.computes, []).append(index)
     best: tuple[int, int, dict[int, _Title]] = 0, 0, {}
     for closer, (size, inset, gap) in enumerate(_INSIDE):
         for row, slid in _PLACES:
             each, slot = _CLOSER * closer + (_BEYOND if row in _OUTSIDE else 0), _Slot(row, inset, gap, slid)
             found: dict[int, _Title] = {}
-            for members in _alike(boxes):
+            less = 0
+            for computes, members in same.items():
                 taken = [*kept, *(title.taken for title in found.values())]
-                wordings: list[dict[int, _Title]] = []
-                for whole in (True, False):
-                    worded: dict[int, _Title] = {}
-                    for i in members:
-                        text = boxes[i].box.title if whole else boxes[i].box.name
-                        for title in _at(boxes[i], text, size, slot, around[i], taken, _TOO_MUCH):
-                            if title.hits < _TOO_MUCH and title.taken[2] + inset < boxes[i].rect[2] + 1.01:
-                                worded[i] = title
-                                break
-                    wordings.append(worded)
-                chosen: dict[int, _Title] = min(wordings, key=_worth)
-                found.update(chosen)
+                some = {i: (boxes[i], around[i]) for i in members}
+                worded = _in_slot(some, False, size, slot, taken)
+                if computes:
+                    short = _in_slot(some, True, size, slot, taken)
+                    cost = _LESS * len(short)
+                    (missing, hits), (fewer, lower) = _worth(worded), _worth(short)
+                    if 0 < len(worded) < len(members) or (fewer, lower + cost) < (missing, hits):
+                        worded, less = short, less + cost
+                found.update(worded)
             missing, hits = _worth(found)
-            best = min(best, (missing, hits + each * len(found), found), key=lambda worth: worth[:2])
+            best = min(best, (missing, hits + less + each * len(found), found), key=lambda worth: worth[:2])
     texts = {i: _drawn(boxes[i], title, title.hits, obstacles, theme) for i, title in best[2].items()}
     return {i: text for i, text in texts.items() if text is not None}
 
 
-def elsewhere(boxes: Sequence[Titled], obstacles: Obstacles, theme: Theme) -> list[Text | None]:
-    """Titles that have no room in one place, in the order of the boxes: inside, then just outside; the name alone
-    where the whole finds no room, or as much of the name as finds it. Where no place is free for all that are alike,
-    those that would cover something find their own."""
+def _in_slot(
+    boxes: Mapping[int, tuple[Titled, Obstacles]], short: bool, size: float, slot: _Slot, kept: Sequence[Rect]
+) -> dict[int, _Title]:
+    """The titles that have room in this place of their boxes, or in its mirror image; ``short``, the names alone."""
+    found: dict[int, _Title] = {}
+    for i, (item, around) in boxes.items():
+        taken = [*kept, *(title.taken for title in found.values())]
+        for title in _at(item, item.box.name if short else item.box.title, size, slot, around, taken, _TOO_MUCH):
+            if title.hits < _TOO_MUCH and title.taken[2] + slot.inset < item.rect[2] + 1.01:
+                found[i] = title
+                break
+    return found
+
+
+def elsewhere(
+    boxes: Sequence[Titled], obstacles: Obstacles, theme: Theme, unsaid: Collection[str] = ()
+) -> list[Text | None]:
+    """Titles that have no room in one place, in the order of the boxes: inside, then just outside; the name alone where
+    the whole of a title that says the same finds no room or is ``unsaid``, or as much of the name as finds it. Where no
+    place is free for all that are alike, those that would cover something find their own."""
+    before, told = len(obstacles.texts()), {"", *unsaid}
+    while True:
+        result = _elsewhere(boxes, obstacles, theme, told)
+        less = {item.computes for text, item in zip(result, boxes, strict=True) if text and text.text != item.box.title}
+        if less <= told:
+            return result
+        told |= less
+        obstacles.keep_texts(before)
+
+
+def _elsewhere(
+    boxes: Sequence[Titled], obstacles: Obstacles, theme: Theme, unsaid: Collection[str]
+) -> list[Text | None]:
     result: list[Text | None] = [None] * len(boxes)
     for members in _alike(boxes):
         reach = {i: _grown(boxes[i]) for i in members}
         near = {i: tuple(other for other in boxes[i].foreign if meet(reach[i], other)) for i in members}
         alike = {i: (replace(boxes[i], foreign=near[i]), obstacles.near(reach[i])) for i in members}
-        found = _found(list(alike.values()))
+        wordings = _WORDINGS[any(boxes[i].computes in unsaid for i in members) :]
+        found = _found(list(alike.values()), wordings)
         if found is None:
             continue
         for i, title in sorted(zip(members, found, strict=True), key=lambda each: each[1].hits > 0):
             hits = title.hits + _TOO_MUCH * obstacles.text_hits(title.taken)
-            own = _found([alike[i]]) if hits else None
+            own = _found([alike[i]], wordings) if hits else None
             if own is not None and own[0].hits < hits:
                 title, hits = own[0], own[0].hits
             result[i] = _drawn(boxes[i], title, hits, obstacles, theme)
@@ -152,11 +189,11 @@ def _worth(titles: Mapping[int, _Title]) -> tuple[int, int]:
     return -len(titles), sum(title.hits + _OVER * title.over for title in titles.values())
 
 
-def _found(boxes: Sequence[tuple[Titled, Obstacles]]) -> list[_Title] | None:
+def _found(boxes: Sequence[tuple[Titled, Obstacles]], wordings: Sequence[_Wording]) -> list[_Title] | None:
     """Titles worded alike in the place that covers least; None where there is no place for all."""
     best: tuple[float, list[_Title] | None] = math.inf, None
     tried: set[tuple[float, tuple[str, ...]]] = set()
-    for wording in _WORDINGS:
+    for wording in wordings:
         said = tuple(wording.of(item) for item, _ in boxes)
         if not all(said) or (wording.size, said) in tried:
             continue
@@ -206,9 +243,9 @@ _ROWS = 4
 #: where titles stand in one place: in which row, and how far across their frames
 _PLACES = tuple((row, slid) for row in range(_ROWS) for slid in (0.0, 1.0, 0.5))
 _OUTSIDE = (2, 3)
-#: what it costs a title to stand outside of its frame: less than a line that it covers; and to be closer to it or
-#: smaller, by one step
-_BEYOND, _CLOSER = 10, 1
+#: what it costs a title to stand outside of its frame, or to be the name alone: less than a line that it covers; and to
+#: be closer to it or smaller, by one step
+_BEYOND, _LESS, _CLOSER = 10, 10, 1
 #: what it costs a title to stand in the mirror image of the place: so much that only one that has no room there does
 _OVER = 1_000
 #: how far letters reach above and below their baseline, by their size

@@ -36,9 +36,10 @@ _BOLD = 600
 
 @dataclass(frozen=True)
 class Trace:
-    """A curve: its values (rows,) and (frames,), its name, and what a pointer shows."""
+    """A curve: its name and a subscript, its values (rows,) and (frames,), and what a pointer shows."""
 
     name: str
+    subscript: str
     values: FloatArray
     moments: FloatArray
     full: str
@@ -68,7 +69,8 @@ class Traces:
     @property
     def right(self) -> float:
         """How wide the names at the ends of the lines are."""
-        parts = [_words(trace, self._cut) for trace in self.traces]
+        cut = self._cut
+        parts = [_words(trace, cut) for trace in self.traces]
         return max((texts.width(text, SMALL, _BOLD, sub) for text, sub in parts), default=0.0) + _OFF + 2
 
     @property
@@ -183,8 +185,7 @@ def _curves(frame: _Frame, members: Sequence[Trace], cut: Cut, theme: Theme, nam
 
 
 def _words(trace: Trace, cut: Cut) -> tuple[str, str]:
-    parts = texts.with_subscript(trace.name) if trace.name == trace.full else (trace.name, "")
-    return cut.parts(*parts, SMALL, _LABEL, _BOLD)
+    return cut.parts(trace.name, trace.subscript, SMALL, _LABEL, _BOLD)
 
 
 def _last(frame: _Frame, values: FloatArray) -> float:

@@ -30,7 +30,7 @@ from neurovis_spec.scene.palette import MOST as MOST_COLOURS
 from neurovis_spec.scene.parts import Part
 from neurovis_spec.scene.poses import Poses, posed_of, start_of
 from neurovis_spec.scene.scales import ScaleLabel, scale_of
-from neurovis_spec.scene.series import chosen, full_name, kind_of, short_name, values_of
+from neurovis_spec.scene.series import chosen, full_name, kind_of, short_names, values_of
 from neurovis_spec.scene.shots import Shots
 from neurovis_spec.scene.strips import SMALL, Span
 from neurovis_spec.scene.texts import number
@@ -245,10 +245,9 @@ class Maker:
             words += f" · {most} of {len(curves):,}{how}"
         rows, frames = self.shots.rows, self.shots.frames
         traces = []
-        for curve in shown:
+        for curve, name in zip(shown, short_names(shown, self.network), strict=True):
             values = values_of(curve, self.network, self.shots.recording)
-            name = short_name(curve, self.network), full_name(curve, self.network)
-            traces.append(Trace(name[0], values[rows], values[frames], name[1]))
+            traces.append(Trace(*name, values[rows], values[frames], full_name(curve, self.network)))
         return Curves(Traces(panel.view, words, tuple(traces)))
 
     def _changing_most(self, curves: Sequence[Curve], most: int) -> tuple[Curve, ...]:
@@ -294,8 +293,8 @@ class Maker:
         own = set(np.unique(gains.activity[neurons]).tolist())
         used = [(one, 1 / abs(one.gain or 1e-9)) for one in gains.activity_scales if one.gain in own]
         scale = ScaleLabel("") if self.explained else scale_of("", used)
-        names = tuple(short_name(curve, network) for curve in curves if curve.of == "neuron")
-        return Raster(Heat("activity", activity, colour, stateful[neurons], names, *bands, scale))
+        names = short_names([curve for curve in curves if curve.of == "neuron"], network)
+        return Raster(Heat("activity", activity, colour, stateful[neurons], tuple(names), *bands, scale))
 
     def _matrix(self, shown: tuple[Curve, ...] | None) -> Block:
         network = self.network
