@@ -16,7 +16,7 @@ from neurovis_spec.layout.model import Point, Route
 #: Heights tried where every connection can be followed, and where they are many.
 MANY_TRIES, FEW_TRIES = 12, 2
 #: Clear enough.
-_ENOUGH = REACH - 0.03
+ENOUGH = REACH - 0.03
 
 
 def bow(start: Point, end: Point, height: float, hold: float) -> Route:
@@ -65,9 +65,9 @@ def clear_bows(
         for (i, height, _), route, clearance in zip(chosen, bows, clearances, strict=True):
             tried.add(i)
             best = found[i]
-            if i not in clear and (best is None or clearance > best[1] or clearance >= _ENOUGH):
+            if i not in clear and (best is None or clearance > best[1] or clearance >= ENOUGH):
                 found[i] = route, clearance, height
-                if clearance >= _ENOUGH:
+                if clearance >= ENOUGH:
                     clear.add(i)
         waiting = [i for i in waiting if i in tried and i not in clear]
         many = 4

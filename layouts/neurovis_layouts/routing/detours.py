@@ -36,9 +36,9 @@ _NARROW = 0.6
 #: 1.2 a hundredth fewer crossings in dense networks).
 _HASTE = 1.5
 #: What it costs to cross a line, in units of length (without: 10 % more crossings in drawings with frames), and, by its
-#: own length, all that the straight way crosses: a way round a bundle is worse than one more line in it (with 2: some
-#: lines between fully connected layers go round them; without: most of those that drive a layer back).
-_CROSSING, _CROSSED = 4.0, 1.0
+#: own length, all that the straight way crosses: a way round a bundle is worse than one more line in it (without: what
+#: drives a layer back goes round its box; with 1: a quarter more crossings in the hexapod at other spacings).
+_CROSSING, _CROSSED = 4.0, 2.0
 #: What it costs to turn at a corner, by the chord of the turn: a right angle is a unit and a half of length (without:
 #: 3 % more crossings among 30 coupled instances, and kinks; with twice as much a sixth more work).
 _TURNING = 1.0
