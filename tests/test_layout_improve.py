@@ -352,6 +352,19 @@ def test_a_route_that_meets_its_own_image_pays_for_it() -> None:
         assert RouteCost(paired, 0).cost() - RouteCost(alone, 0).cost() == pytest.approx(1.2 * crossings, abs=1e-6)
 
 
+def test_a_route_that_may_not_be_gives_way_to_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
+    there, back = straight((0.0, 0.0), (6.0, 0.0)), straight((6.0, 0.0), (0.0, 0.0))
+    refused: list[Route] = []
+
+    def trespasses(_: RouteCost, route: Route) -> bool:
+        refused.append(route)
+        return len(refused) <= 3
+
+    monkeypatch.setattr(RouteCost, "trespasses", trespasses)
+    found = improved(Drawn([edge(0, 1), edge(1, 0)], [there[0], back[0]], {0: there, 1: back}), {1})
+    assert found[1] not in refused[:3]
+
+
 #: the way of `r2.y -> l1.x` is only just clear of the frame of `l2`
 ASIDE = """
 neurovis: 1

@@ -82,13 +82,11 @@ def _better(cost: RouteCost, winds: bool) -> Route | None:
         return None  # between discs that overlap, as pins may have it
     now = cost.cost()
     best = _searched(cost, now) if winds else None
-    if best is None:
-        tries = [cost.whole(route) for route in (*_shifted(cost.route), *_turned(cost.route))]
-        found = cost.cheapest(polylines(tries), now)
-        best = None if found is None else tries[found[0]]
-    if best is None:
-        return None
-    return None if cost.trespasses(best) else best
+    if best is not None and not cost.trespasses(best):
+        return best
+    tries = [cost.whole(route) for route in (*_shifted(cost.route), *_turned(cost.route))]
+    cheaper = (tries[k] for k, _ in cost.cheaper(polylines(tries), now))
+    return next((route for route in cheaper if not cost.trespasses(route)), None)
 
 
 def _searched(cost: RouteCost, now: float) -> Route | None:

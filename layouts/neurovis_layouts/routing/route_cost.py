@@ -331,6 +331,11 @@ class RouteCost:
     def cheapest(self, lines: Polylines, limit: float, most: int | None = None) -> tuple[int, float] | None:
         """The cheapest of these lines and its cost, if that is below the limit; no more than so many are checked
         closely, those first that are cheap by themselves."""
+        return next(iter(self.cheaper(lines, limit, most)), None)
+
+    def cheaper(self, lines: Polylines, limit: float, most: int | None = None) -> list[tuple[int, float]]:
+        """Those of these lines that cost less than the limit, and what they do, the cheapest first; no more than so
+        many are checked closely, those that are cheap by themselves."""
         costs = self._by_itself(lines)
         chosen = np.flatnonzero(costs < limit)
         chosen = chosen[np.argsort(costs[chosen], kind="stable")][:most]
@@ -338,12 +343,12 @@ class RouteCost:
         for add in (self._in_the_way, self._beside, self._across):
             near = costs < limit
             if not near.any():
-                return None
+                return []
             if 2 * int(near.sum()) < len(near):  # less work than to weigh them all
                 chosen, costs, lines = chosen[near], costs[near], lines.some(np.flatnonzero(near))
             costs += add(lines)
-        least = int(np.argmin(costs))
-        return (int(chosen[least]), float(costs[least])) if costs[least] < limit else None
+        order = [k for k in np.argsort(costs, kind="stable").tolist() if costs[k] < limit]
+        return [(int(chosen[k]), float(costs[k])) for k in order]
 
     def _by_itself(self, lines: Polylines) -> FloatArray:
         """(n,) what they cost whatever there is around them."""
