@@ -386,15 +386,19 @@ class RouteCost:
         return cost
 
     def _across(self, lines: Polylines) -> FloatArray:
-        """(n,) what it costs to cross others."""
+        """(n,) what it costs to cross others, and to cross and to run on their own images."""
         cost = lines.crossed(self._a, self._b, self._weight)
         if self._reflect:
             (low, high), axis = lines.extents(), self._drawn.images.twice / 2
-            flip, shift = np.array([-1.0, 1.0]), np.array([self._drawn.images.twice, 0.0])
             # only what reaches over the axis meets its own image
-            for k in np.flatnonzero((low[:, 0] <= axis) & (high[:, 0] >= axis)).tolist():
-                one = lines.some(np.array([k], dtype=np.int64))
-                cost[k] += _CROSSING * float(one.crossed(one.a * flip + shift, one.b * flip + shift)[0])
+            over = np.flatnonzero((low[:, 0] <= axis) & (high[:, 0] >= axis))
+            if len(over):
+                some = lines.some(over)
+                others = some.reflected(self._drawn.images.twice)
+                cost[over] += ALONG * STEP * some.shared(others)
+                for k, line in enumerate(over.tolist()):
+                    one, own = some.some(np.array([k], dtype=np.int64)), others.owner == k
+                    cost[line] += _CROSSING * float(one.crossed(others.a[own], others.b[own])[0])
         return cost
 
 
