@@ -212,10 +212,10 @@ def _component(
     interleaved(levels, problem, folds)
     with_spines(problem, levels, columns)
     partner: list[int] | None = None
+    free = frozenset[int]() if columns or folds.ranks else _free(levels, units, bonds, pair)
     if pair:
-        order, partner = mirrored(problem, levels, pair, draft)
+        levels, order, partner = mirrored(problem, levels, pair, free, draft)
     else:
-        free = frozenset[int]() if columns or folds.ranks else _free(levels, units, bonds)
         levels, order = ordered(levels, free, problem.effort, draft)
         straight = straightened(levels, order, columns) if columns else None
         if straight is None:
@@ -320,13 +320,14 @@ def _ranks(
     return [ranks[numbers[bond]] for bond in bonds]
 
 
-def _free(levels: Levels, units: Sequence[Unit], bonds: Sequence[int]) -> frozenset[int]:
-    """The nodes that may change their rank: single neurons that share none with others, outside of boxes."""
+def _free(levels: Levels, units: Sequence[Unit], bonds: Sequence[int], pair: Mapping[int, int]) -> frozenset[int]:
+    """The nodes that may change their rank: single neurons that share none with others but their images, outside of
+    boxes."""
     count = Counter(bonds)
     alone = {
         unit.members[0]
         for unit, bond in zip(units, bonds, strict=True)
-        if count[bond] == 1 and len(unit.members) == 1 and unit.places is None
+        if count[bond] == 1 + (unit.members[0] in pair) and len(unit.members) == 1 and unit.places is None
     }
     return frozenset(
         n for n, node in enumerate(levels.nodes) if node.members and node.members[0][0] in alone and node.box < 0

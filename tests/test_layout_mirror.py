@@ -1,0 +1,96 @@
+"""Mirrors: what runs across the axis is ordered as well."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+import neurovis_spec as nv
+from neurovis_spec.layout.arrange import lay_out_problem
+from neurovis_spec.layout.metrics import metrics
+from neurovis_spec.layout.model import LayoutProblem
+from neurovis_spec.layout.problem import problem_of
+
+
+def crossings(problem: LayoutProblem) -> int:
+    """Of the routes as ``layered`` draws them."""
+    return int(metrics(lay_out_problem(problem, "layered"), problem)["crossings"])
+
+
+#: Each segment's E drives C, L and M; C inhibits the other side. Nothing says which segments' neurons belong together.
+SEGMENTS = range(4)
+SPINAL = "\n".join(
+    [
+        "neurovis: 1",
+        "name: spinal",
+        "neurons: {D_L: {bias: 1}, D_R: {bias: 1}, "
+        + ", ".join(f"{name}_{side}{i}: {{}}" for side in "LR" for i in SEGMENTS for name in "ECLM")
+        + "}",
+        "connections:",
+        *(
+            f"  {line}: 1"
+            for side, other in ("LR", "RL")
+            for i in SEGMENTS
+            for line in (
+                f"D_{side} -> E_{side}{i}",
+                f"E_{side}{i} -> C_{side}{i} + L_{side}{i} + M_{side}{i}",
+                f"L_{side}{i} -> C_{side}{i}",
+                f"C_{side}{i} -> E_{other}{i} + C_{other}{i}",
+                *([f"E_{side}{i} -> E_{side}{i + 1}"] if i + 1 in SEGMENTS else []),
+            )
+        ),
+        "layout: {mirror: [[D_L, D_R], "
+        + ", ".join(f"[{name}_L{i}, {name}_R{i}]" for i in SEGMENTS for name in "ECLM")
+        + "]}",
+    ]
+)
+
+
+def test_what_crosses_the_axis_stands_beside_it() -> None:
+    problem = problem_of(nv.compile_text(SPINAL).network)
+    layout = lay_out_problem(problem, "layered")
+    found = metrics(layout, problem)
+    assert found["symmetry"] == 1
+    # without the mirror there are twelve; a line from side to side crosses its own image, at least
+    assert crossings(replace(problem, mirrors=())) == 12
+    assert found["crossings"] <= 8
+    axis = layout.positions["D_L"][0] + layout.positions["D_R"][0]
+    for i in SEGMENTS:
+        (x, y), others = layout.positions[f"C_L{i}"], layout.positions.values()
+        assert not any(x < a < axis - x and b == y for a, b in others)
+
+
+@pytest.mark.parametrize("name", ["b", "d"])
+def test_names_say_nothing_of_who_stands_beside_the_axis(name: str) -> None:
+    text = f"""
+neurovis: 1
+name: names
+neurons: {{D: {{bias: 1}}, a_L: {{}}, {name}_L: {{}}, c_L: {{}}, a_R: {{}}, {name}_R: {{}}, c_R: {{}}}}
+connections:
+  D -> a_L + a_R: 1
+  a_L -> {name}_L + c_L: 1
+  a_R -> {name}_R + c_R: 1
+  c_L -> a_R: -1
+  c_R -> a_L: -1
+layout: {{mirror: [[a_L, a_R], [{name}_L, {name}_R], [c_L, c_R]]}}
+"""
+    assert crossings(problem_of(nv.compile_text(text).network)) == 1
+
+
+def test_mirror_images_move_to_the_ranks_in_which_they_cross_least() -> None:
+    text = """
+neurovis: 1
+name: half_centre
+neurons: {D: {bias: 1}, H_L: {}, H_R: {}, I_L: {}, I_R: {}, M_L: {}, M_R: {}, S_L: {bias: 1}, S_R: {bias: 1}}
+connections:
+  D -> H_L + H_R: 1
+  H_L -> I_L + M_L: 1
+  H_R -> I_R + M_R: 1
+  I_L -> H_R: -1
+  I_R -> H_L: -1
+  S_L -> M_L + M_R: 1
+  S_R -> M_L + M_R: 1
+layout: {mirror: [[H_L, H_R], [I_L, I_R], [M_L, M_R], [S_L, S_R]]}
+"""
+    assert crossings(problem_of(nv.compile_text(text).network)) <= 6
