@@ -1,4 +1,4 @@
-"""Mirrors: what runs across the axis is ordered as well."""
+"""Mirrors: what runs across the axis is ordered as well; chains of instances face each other."""
 
 from __future__ import annotations
 
@@ -94,3 +94,37 @@ connections:
 layout: {mirror: [[H_L, H_R], [I_L, I_R], [M_L, M_R], [S_L, S_R]]}
 """
     assert crossings(problem_of(nv.compile_text(text).network)) <= 6
+
+
+SWIMMER = """
+neurovis: 1
+name: swimmer
+modules:
+  hemi:
+    neurons: {E: {}, C: {}, L: {}, M: {}}
+    connections: {E -> C + L + M: 1, L -> C: -1}
+instances: {left: {module: hemi, count: 5}, right: {module: hemi, count: 5}}
+neurons: {D_left: {bias: 1}, D_right: {bias: 1}}
+connections:
+  D_left -> left.E: 1
+  D_right -> right.E: 1
+  left.C -> right.E: {pattern: one_to_one}
+  left.C -> right.C: {pattern: one_to_one}
+  right.C -> left.E: {pattern: one_to_one}
+  right.C -> left.C: {pattern: one_to_one}
+  left.E -> left.E: {pattern: chain}
+  right.E -> right.E: {pattern: chain}
+layout: {mirror: [[left, right], [D_left, D_right]]}
+"""
+
+
+def test_mirrored_chains_of_instances_are_columns_that_face_each_other() -> None:
+    compiled = nv.compile_text(SWIMMER)
+    layout = compiled.layout("layered")
+    at = layout.value.positions
+    assert [at[f"left{i}.E"][1] for i in range(1, 6)] == [at[f"right{i}.E"][1] for i in range(1, 6)]
+    for name in "ECLM":
+        rows = [at[f"left{i}.{name}"] for i in range(1, 6)]
+        assert [y for _, y in rows] == sorted({y for _, y in rows})
+        assert max(x for x, _ in rows) < min(at[f"right{i}.{name}"][0] for i in range(1, 6))
+    assert layout.metrics()["crossings"] <= 10
