@@ -1,4 +1,5 @@
-"""Mirrors: what runs across the axis is ordered as well; chains of instances face each other."""
+"""Mirrors: what runs across the axis is ordered as well, chains of instances face each other, and what has no image
+stands on the axis."""
 
 from __future__ import annotations
 
@@ -128,3 +129,26 @@ def test_mirrored_chains_of_instances_are_columns_that_face_each_other() -> None
         assert [y for _, y in rows] == sorted({y for _, y in rows})
         assert max(x for x, _ in rows) < min(at[f"right{i}.{name}"][0] for i in range(1, 6))
     assert layout.metrics()["crossings"] <= 10
+
+
+@pytest.mark.parametrize("direction", ["down", "up", "right", "left"])
+def test_what_has_no_image_stands_on_the_axis_beside_what_spans_it(direction: str) -> None:
+    text = """
+neurovis: 1
+name: axis
+neurons:
+  Drive: {bias: 1}
+  s_L: {bias: 1, box: sensors}
+  s_R: {bias: 1, box: sensors}
+  m_L: {box: muscles}
+  m_R: {box: muscles}
+  Load: {}
+connections: {s_L -> m_L: 1, s_R -> m_R: 1, Drive -> m_L + m_R: 1, s_L + s_R -> Load: 1}
+"""
+    more = f"layout: {{direction: {direction}, mirror: [[s_L, s_R], [m_L, m_R]]}}\n"
+    at = nv.compile_text(text + more).layout("layered").value.positions
+    across, along = (0, 1) if direction in ("down", "up") else (1, 0)
+    for name in ("Drive", "Load"):
+        assert 2 * at[name][across] == at["s_L"][across] + at["s_R"][across] == at["m_L"][across] + at["m_R"][across]
+    order = sorted(("s_L", "Drive", "m_L"), key=lambda name: at[name][along])
+    assert order == ["s_L", "Drive", "m_L"][:: 1 if direction in ("down", "right") else -1]

@@ -204,7 +204,7 @@ def _component(
     columns = {box for box in columns if here.issuperset(problem.boxes[box][1])}
     rank = _ranks(problem, units, bonds, edges, behind)
     if pair:
-        rank = _one_on_axis(units, bonds, rank, pair)
+        rank = _one_on_axis(problem, units, bonds, rank, pair)
     folds = folded(problem, units, bonds, rank, edges, pair)
     rank = folds.rank
     rank += [max(rank)] * len(guests)
@@ -335,18 +335,27 @@ def _free(levels: Levels, units: Sequence[Unit], bonds: Sequence[int], pair: Map
 
 
 def _one_on_axis(
-    units: Sequence[Unit], bonds: Sequence[int], rank: Sequence[int], pair: Mapping[int, int]
+    problem: LayoutProblem, units: Sequence[Unit], bonds: Sequence[int], rank: Sequence[int], pair: Mapping[int, int]
 ) -> list[int]:
-    """Ranks in which no two units have to stand on the axis."""
+    """Ranks in which no two units have to stand on the axis, and none without an image stands beside one that has to:
+    it has a rank of its own, on that side to which more of its connections lead."""
+    owner = {m: u for u, unit in enumerate(units) for m in unit.members}
+    down = [0] * len(units)
+    for edge in problem.edges:
+        if edge.source in owner and edge.target in owner:
+            a, b = owner[edge.source], owner[edge.target]
+            down[a] += (rank[b] > rank[a]) - (rank[b] < rank[a])
+            down[b] += (rank[a] > rank[b]) - (rank[a] < rank[b])
     fixed = [u for u, unit in enumerate(units) if symmetric(unit.members, pair)]
-    result = [2 * len(units) * r for r in rank]
+    held = {bonds[u] for u in fixed}
+    step: dict[int, int] = {}
     taken: dict[int, int] = {}
     for u in fixed:
-        number = taken[rank[u]] = taken.get(rank[u], -1) + 1
-        if number:
-            for mate, bond in enumerate(bonds):
-                if bond == bonds[u]:
-                    result[mate] += number
+        step[bonds[u]] = taken[rank[u]] = taken.get(rank[u], -1) + 1
+    for u, unit in enumerate(units):
+        if rank[u] in taken and bonds[u] not in held and pair.keys().isdisjoint(unit.members):
+            step[bonds[u]] = taken[rank[u]] + 1 if down[u] > 0 else -1
+    result = [2 * len(units) * r + step.get(bond, 0) for r, bond in zip(rank, bonds, strict=True)]
     levels = {value: place for place, value in enumerate(sorted(set(result)))}
     return [levels[value] for value in result]
 
