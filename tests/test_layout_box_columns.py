@@ -91,7 +91,7 @@ def test_the_hexapod_without_hints_runs_along(tmp_path: Path) -> None:
     boxes = rest.partition("  boxes:")[2]
     network = nv.compile_text(f"{before}  boxes:{boxes}", folder=folder)
     found = network.layout(engine="layered").metrics()
-    assert found["flow"] == 1
+    assert found["flow"] >= 0.95  # from leg to leg sideways
     assert found["edges_over_neurons"] == found["overlaps"] == 0
     assert found["crossings"] <= 80
 

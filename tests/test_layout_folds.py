@@ -26,6 +26,19 @@ MIRRORED = (
     + "connections: {I -> left.a: 1, I -> right.a: 1, left.b -> O: 1, right.b -> O: 1}\n"
     + "layout: {mirror: [[left, right]]}\n"
 )
+#: Five on each side, in two rows, each connected with its image.
+COUPLED = """
+neurovis: 1
+name: coupled
+modules: {m: {neurons: {E: {}, C: {}, L: {}, M: {}}, connections: {E -> C + L + M: 1, L -> C: -1}}}
+instances: {left: {module: m, count: 5}, right: {module: m, count: 5}}
+neurons: {D_left: {bias: 1}, D_right: {bias: 1}}
+connections:
+  - {D_left -> left.E: 1, D_right -> right.E: 1}
+  - {left.C -> right.E: {pattern: one_to_one}, left.C -> right.C: {pattern: one_to_one}}
+  - {right.C -> left.E: {pattern: one_to_one}, right.C -> left.C: {pattern: one_to_one}}
+layout: {mirror: [[left, right], [D_left, D_right]]}
+"""
 PAIRS = (
     MODULE
     + "instances: {x: {module: m, count: 20}, y: {module: m, count: 20}}\nneurons: {O: {}}\nconnections: {y.b -> O: 1"
@@ -105,6 +118,11 @@ def test_ranks_are_folded_in_every_direction(direction: str) -> None:
     problem, layout = drawn(f"{STAR}layout: {{direction: {direction}}}\n")
     assert metrics(layout, problem)["crossings"] == 0
     assert 1 / 3 <= proportions(layout) <= 3
+
+
+def test_what_runs_within_a_row_is_drawn_anew_beside_what_is_planned() -> None:
+    problem, layout = drawn(COUPLED)
+    assert metrics(layout, problem)["crossings"] <= 50
 
 
 def test_few_instances_stay_in_one_row() -> None:

@@ -234,6 +234,14 @@ def test_cells_are_those_that_a_line_runs_through_but_near_its_ends() -> None:
     assert not set(cells.tolist()) & set(other.tolist())
 
 
+def test_lines_share_cells_with_those_of_their_number() -> None:
+    lines = polylines([straight((0, 0), (3, 0)), straight((0, 1), (3, 1)), straight((0, 2), (3, 2))])
+    others = polylines([straight((1, 0), (6, 0)), straight((0, 2), (3, 2)), straight((0, 2), (3, 2))])
+    few, none, every = lines.shared(others).tolist()
+    assert (none, every) == (0, sum(lines.cells()[1] == 2))
+    assert 0 < few < every
+
+
 @given(st.lists(point, min_size=2, max_size=8, unique=True), st.sampled_from([0.2, 1.0, 4.0]))
 @settings(deadline=None)
 def test_a_smooth_line_stays_beside_its_corners(line: list[Point], cut: float) -> None:
@@ -347,7 +355,36 @@ def test_a_route_that_meets_its_own_image_pays_for_it() -> None:
         known = {0: route, 1: image}
         alone = Drawn([edge(0, 1), edge(2, 3)], centres, {0: route, 1: straight((9, 9), (9, 12))})
         paired = Drawn([edge(0, 1), edge(2, 3)], centres, known, images=Images({0: 1}))
-        assert RouteCost(paired, 0).cost() - RouteCost(alone, 0).cost() == pytest.approx(1.0 * crossings, abs=1e-6)
+        assert RouteCost(paired, 0).cost() - RouteCost(alone, 0).cost() == pytest.approx(1.2 * crossings, abs=1e-6)
+
+
+def test_a_route_that_lies_on_its_own_image_pays_for_it() -> None:
+    """As a way under a row of frames does, level where it crosses the axis; one aslant crosses there."""
+    level: list[Point] = [(-6.0, 2.0), (-5.0, 0.0), (5.0, 0.0), (6.0, 3.0)]
+    aslant: list[Point] = [(-6.0, 2.0), (-5.0, 0.0), (5.0, 1.0), (6.0, 3.0)]
+    paid: list[float] = []
+    for line in (level, aslant):
+        route = (line[0], *(p for a, b in pairwise(line) for p in straight(a, b)[1:]))
+        image: Route = tuple((0.0 - x, y) for x, y in route)
+        centres = [route[0], route[-1], image[0], image[-1]]
+        alone = Drawn([edge(0, 1), edge(2, 3)], centres, {0: route, 1: straight((9, 9), (9, 12))})
+        paired = Drawn([edge(0, 1), edge(2, 3)], centres, {0: route, 1: image}, images=Images({0: 1}))
+        paid.append(RouteCost(paired, 0).cost() - RouteCost(alone, 0).cost())
+    assert paid[0] > 10
+    assert paid[1] < 5
+
+
+def test_a_route_that_may_not_be_gives_way_to_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
+    there, back = straight((0.0, 0.0), (6.0, 0.0)), straight((6.0, 0.0), (0.0, 0.0))
+    refused: list[Route] = []
+
+    def trespasses(_: RouteCost, route: Route) -> bool:
+        refused.append(route)
+        return len(refused) <= 3
+
+    monkeypatch.setattr(RouteCost, "trespasses", trespasses)
+    found = improved(Drawn([edge(0, 1), edge(1, 0)], [there[0], back[0]], {0: there, 1: back}), {1})
+    assert found[1] not in refused[:3]
 
 
 #: the way of `r2.y -> l1.x` is only just clear of the frame of `l2`

@@ -1,4 +1,5 @@
-"""The order of ranks: exact counts of crossings, the best order of tiny graphs by trying all, and the contract."""
+"""The order of ranks: exact counts of crossings, the best order of tiny graphs by trying all, and the contract, also
+of ranks that are symmetric about an axis."""
 
 from __future__ import annotations
 
@@ -11,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from neurovis_layouts.layered.crossings import Ints, Segments, inversions
 from neurovis_layouts.layered.exchange import Exchange
+from neurovis_layouts.layered.halves import Halves
 from neurovis_layouts.layered.levels import Levels, Node, Segment
 from neurovis_layouts.layered.order import Order, crossings, ordered, places
 
@@ -56,13 +58,45 @@ def some_levels(
     return levels_by_hand(nodes, gaps)
 
 
+@st.composite
+def symmetric_levels(draw: st.DrawFn, most: int = 3, ranks: int = 4) -> Levels:
+    """Some ranks of which each is pairs of mirror images, the first of each before the axis, with up to two nodes in
+    the middle; segments are images of each other, of which one may be idle."""
+    offsets = st.sampled_from([-0.5, 0.0, 0.5])
+    sizes = draw(st.lists(st.tuples(st.integers(1, most), st.integers(0, 2)), min_size=2, max_size=ranks))
+    nodes = [[Node(r, ((0, 0.0, 0.0),)) for _ in range(2 * pairs + middle)] for r, (pairs, middle) in enumerate(sizes)]
+    gaps: list[list[tuple[int, float, int, float]]] = []
+    asked: list[int] = []
+    for above, below in pairwise(sizes):
+        ends = st.tuples(st.integers(0, 2 * above[0] + above[1] - 1), offsets)
+        others = st.tuples(st.integers(0, 2 * below[0] + below[1] - 1), offsets)
+        some = draw(st.lists(st.tuples(ends, others), min_size=1, max_size=6, unique=True))
+        both = [(opposite(one, *above), opposite(other, *below)) for one, other in some]
+        gaps.append([(*one, *other) for one, other in dict.fromkeys([*some, *both])])
+        asked.append(len(some) if draw(st.booleans()) else len(gaps[-1]))
+    levels = levels_by_hand(nodes, gaps)
+    levels.segments = [
+        [replace(s, idle=i >= many) for i, s in enumerate(gap)]
+        for gap, many in zip(levels.segments, asked, strict=True)
+    ]
+    for rank, (pairs, _) in zip(levels.ranks, sizes, strict=True):
+        levels.images.update((rank[i], rank[-1 - i]) for i in range(-pairs, pairs))
+    return levels
+
+
+def opposite(end: tuple[int, float], pairs: int, middle: int) -> tuple[int, float]:
+    """The image of a port of the node at a place; those in the middle are nobody's image."""
+    place, offset = end
+    return end if pairs <= place < pairs + middle else (2 * pairs + middle - 1 - place, -offset + 0.0)
+
+
 def by_pairs(levels: Levels, order: Order) -> int:
-    """Crossings, pair by pair, from the definition."""
+    """Crossings of what is not idle, pair by pair, from the definition."""
     total = 0
     for r, gap in enumerate(levels.segments):
         upper = {node: i for i, node in enumerate(order[r])}
         lower = {node: i for i, node in enumerate(order[r + 1])}
-        ends = [((upper[s.upper], s.a), (lower[s.lower], s.b)) for s in gap]
+        ends = [((upper[s.upper], s.a), (lower[s.lower], s.b)) for s in gap if not s.idle]
         total += sum(a < c and d < b for (a, b), (c, d) in product(ends, ends))
     return total
 
@@ -143,7 +177,47 @@ def test_exchanges_save_what_they_say(levels: Levels) -> None:
     classes = np.array([n.box for n in levels.nodes]), np.array([n.kin for n in levels.nodes])
     ranks: list[Ints] = [np.array(rank, dtype=np.int64) for rank in levels.ranks]
     before = by_pairs(levels, levels.ranks)
-    after, order = Exchange(Segments(levels), classes).improved(before, ranks)
+    after, order = Exchange(Segments(levels), classes, Halves(levels)).improved(before, ranks)
     assert after == by_pairs(levels, [rank.tolist() for rank in order]) <= before
     kept = [[n for n in rank if levels.nodes[n].kin == 0 and levels.nodes[n].box == -1] for rank in order]
     assert all(nodes == sorted(nodes) for nodes in kept)
+
+
+@given(symmetric_levels())
+@settings(deadline=None)
+def test_exchanges_of_mirror_images_save_what_they_say(levels: Levels) -> None:
+    none = np.full(len(levels.nodes), -1, dtype=np.int64)
+    ranks: list[Ints] = [np.array(rank, dtype=np.int64) for rank in levels.ranks]
+    before = by_pairs(levels, levels.ranks)
+    after, order = Exchange(Segments(levels), (none, none), Halves(levels)).improved(before, ranks)
+    assert after == by_pairs(levels, [rank.tolist() for rank in order]) <= before
+    assert_symmetric(levels, [rank.tolist() for rank in order])
+
+
+@given(symmetric_levels())
+@settings(deadline=None, max_examples=40, derandomize=True)
+def test_symmetric_ranks_are_ordered_as_well_as_can_be(levels: Levels) -> None:
+    order = ordered(levels)[1]
+    assert_symmetric(levels, order)
+    best = min(by_pairs(levels, list(every)) for every in product(*(halves_of(levels, r) for r in levels.ranks)))
+    assert by_pairs(levels, order) == best
+
+
+def halves_of(levels: Levels, rank: list[int]) -> list[list[int]]:
+    """Every symmetric order of a rank."""
+    pairs = len([n for n in rank if n in levels.images]) // 2
+    middle = rank[pairs : len(rank) - pairs]
+    return [
+        [*before, *between, *(levels.images[n] for n in reversed(before))]
+        for before in permutations(rank[:pairs])
+        for between in permutations(middle)
+    ]
+
+
+def assert_symmetric(levels: Levels, order: Order) -> None:
+    """The first of each pair stands before the axis, its image opposite."""
+    for rank, named in zip(order, levels.ranks, strict=True):
+        assert sorted(rank) == named
+        for n, other in zip(rank, reversed(rank), strict=True):
+            assert levels.images.get(n, other) == other
+        assert all(rank.index(n) < rank.index(m) for n, m in levels.images.items() if n < m and n in rank)

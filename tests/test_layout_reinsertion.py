@@ -12,6 +12,7 @@ from neurovis_layouts.layered.order import crossings, ordered
 from neurovis_layouts.layered.ranks import ranks_of
 from neurovis_layouts.layered.reinsertion import levels_in, reinserted
 from neurovis_layouts.layered.units import Unit
+from test_layout_order import assert_symmetric, halves_of, symmetric_levels
 
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.metrics import metrics
@@ -45,7 +46,7 @@ def downward(draw: st.DrawFn, most: int = 12) -> tuple[int, Pairs]:
 
 def cost_of(found: Levels, state: Insertion) -> int:
     """Counted in the levels that a state stands for."""
-    length = sum(state.rank[link.lower] - state.rank[link.upper] for link in state.links)
+    length = sum(state.rank[link.lower] - state.rank[link.upper] for link in state.links if not link.idle)
     return crossings(*levels_in(found, state)) * CROSSING + length
 
 
@@ -66,6 +67,23 @@ def test_what_is_taken_out_and_put_back_costs_what_is_counted(graph: tuple[int, 
         assert all(state.rank[link.upper] < state.rank[link.lower] for link in state.links)
         if random.random() < 0.3:
             state.restore(kept)
+        cost = cost_of(found, state)
+
+
+@given(symmetric_levels(), st.randoms(use_true_random=False))
+@settings(deadline=None, max_examples=60)
+def test_mirror_images_are_taken_out_and_put_back_together(found: Levels, random: Random) -> None:
+    order = [list(random.choice(halves_of(found, rank))) for rank in found.ranks]
+    state = Insertion(found, order, False)
+    cost = state.cost
+    assert cost == cost_of(found, state)
+    for _ in range(6):
+        leads = sorted(set(state.lead))
+        gone = random.sample(leads, random.randint(1, len(leads)))
+        saved = state.take(gone)
+        again = sum(state.put(node, random.getrandbits(20), 1 << 30) for node in gone)
+        assert cost_of(found, state) == cost - saved + again
+        assert_symmetric(found, levels_in(found, state)[1])
         cost = cost_of(found, state)
 
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from neurovis_layouts.layered.crossings import Segments
 from neurovis_layouts.layered.exchange import Exchange
+from neurovis_layouts.layered.halves import Halves
 from neurovis_layouts.layered.levels import Levels, Node, Segment
 from neurovis_layouts.layered.order import places
 from neurovis_spec.layout.model import LayoutProblem
@@ -68,7 +69,7 @@ def straightened(levels: Levels, order: Sequence[Sequence[int]], columns: Abstra
             kin = np.array([node.kin for node in levels.nodes], dtype=np.int64)
             arrays = [np.array(rank, dtype=np.int64) for rank in found]
             crossings = segments.count(places(len(levels.nodes), arrays))
-            better = Exchange(segments, (boxes, kin)).improved(crossings, arrays)[1]
+            better = Exchange(segments, (boxes, kin), Halves(levels)).improved(crossings, arrays)[1]
             return [rank.tolist() for rank in better]
     return None
 

@@ -46,14 +46,19 @@ ShapeKey: TypeAlias = tuple[bool, tuple[tuple[Fold, int], ...]]
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """How many bands or rows there are of what is folded; of a ``draft`` only the size counts."""
+    """How many bands or rows there are of what is folded; of a ``draft`` only the size counts. What is not folded is
+    as it comes."""
 
     counts: Mapping[Fold, int] = field(default_factory=dict)
     draft: bool = False
 
-    def count(self, where: int, what: int = RANKS) -> int:
-        """How many bands the ranks of a kind of instance stand in, or how many rows instances of one kind in it."""
-        return self.counts.get((where, what), 1)
+    def bands(self, where: int) -> int:
+        """How many bands the ranks of a kind of instance stand in."""
+        return self.counts.get((where, RANKS), 1)
+
+    def rows(self, where: int, what: int) -> int | None:
+        """How many rows instances of one kind that are declared together stand in, in another kind, if it says so."""
+        return self.counts.get((where, what))
 
     def of(self, kind: int, problem: LayoutProblem) -> ShapeKey:
         """What of it concerns one kind of instance, whose problem this is."""
@@ -77,8 +82,10 @@ def may_be_folded(problem: LayoutProblem) -> bool:
     return bool(asked) and not fixed and len(problem.neurons) + len(problem.edges) <= _MOST
 
 
-def compact(problem: LayoutProblem, drawn: Drawn, most: Mapping[Fold, int]) -> Shape:
-    """The shape that costs least. ``most`` says, once it has been drawn, what can be folded, and how often at most."""
+def compact(problem: LayoutProblem, drawn: Drawn, folds: Mapping[Fold, range]) -> Shape:
+    """The shape that costs least. ``folds`` says, once it has been drawn, what can be folded, and into how many bands
+    or rows. Bands are tried first: a row also is where instances that drive one another stand side by side, which
+    crosses more."""
     shape = Shape(draft=True)
     drawing = drawn(problem, shape)
     size = _size(drawing, problem.direction)
@@ -86,22 +93,22 @@ def compact(problem: LayoutProblem, drawn: Drawn, most: Mapping[Fold, int]) -> S
     if stretched(problem, *size) < _STRETCHED[free] or max(size) < _SHORT[free]:
         return Shape()
     first = least = _cost(problem, drawing)
-    for fold in sorted(most):
-        least, shape = _folded(problem, drawn, fold, most[fold], least, shape)
+    for fold in sorted(folds, key=lambda fold: (fold[1] != RANKS, fold)):
+        least, shape = _folded(problem, drawn, fold, folds[fold], least, shape)
     bands = any(what == RANKS and count > 1 for (_, what), count in shape.counts.items())
     worth = (_BANDS if bands else _ROWS) if free else _ASKED
     return replace(shape, draft=False) if least < worth * first else Shape()
 
 
 def _folded(
-    problem: LayoutProblem, drawn: Drawn, fold: Fold, most: int, least: float, shape: Shape
+    problem: LayoutProblem, drawn: Drawn, fold: Fold, counts: range, least: float, shape: Shape
 ) -> tuple[float, Shape]:
-    """The least cost, and the shape that has it, with whatever number of bands or rows of one kind; once more have been
-    no better for some times, even more are not tried."""
+    """The least cost, and the shape that has it, with any of these numbers of bands or rows of one kind; once more have
+    been no better for some times, even more are not tried."""
     best, found, vain = least, shape, 0
-    for count in range(1, min(_MOST_FOLDS, most) + 1):
-        if count == shape.count(*fold):
-            continue
+    for count in counts:
+        if count > _MOST_FOLDS:
+            break
         other = shape.changed(fold, count)
         now = _cost(problem, drawn(problem, other))
         vain += 1

@@ -209,7 +209,7 @@ def _component(
     here = {m for unit in units for m in unit.members}
     columns = {box for box in columns if here.issuperset(problem.boxes[box][1])}
     found = [
-        _one_on_axis(units, bonds, rank, pair) if pair else rank
+        _one_on_axis(problem, units, bonds, rank, pair) if pair else rank
         for rank in _ranks(problem, units, bonds, edges, behind)
     ]
     tried = partial(_in_order, problem, units, guests, bonds, edges, pair, columns)
@@ -290,10 +290,10 @@ def _in_order(
     interleaved(levels, problem, folds)
     with_spines(problem, levels, columns)
     partner: Sequence[int] | None = None
+    free = frozenset[int]() if columns or folds.ranks else _free(levels, units, bonds, pair)
     if pair:
-        order, partner = mirrored(problem, levels, pair, draft)
+        levels, order, partner = mirrored(problem, levels, pair, free, draft)
     else:
-        free = frozenset[int]() if columns or folds.ranks else _free(levels, units, bonds)
         levels, order = ordered(levels, free, problem.effort, draft)
     straight = straightened(levels, order, columns) if columns else None
     columns, order = (columns, straight) if straight else (frozenset(), order)
@@ -384,13 +384,14 @@ def _ranks(
     return [list(rank) for rank in found]
 
 
-def _free(levels: Levels, units: Sequence[Unit], bonds: Sequence[int]) -> frozenset[int]:
-    """The nodes that may change their rank: single neurons that share none with others, outside of boxes."""
+def _free(levels: Levels, units: Sequence[Unit], bonds: Sequence[int], pair: Mapping[int, int]) -> frozenset[int]:
+    """The nodes that may change their rank: single neurons that share none with others but their images, outside of
+    boxes."""
     count = Counter(bonds)
     alone = {
         unit.members[0]
         for unit, bond in zip(units, bonds, strict=True)
-        if count[bond] == 1 and len(unit.members) == 1 and unit.places is None
+        if count[bond] == 1 + (unit.members[0] in pair) and len(unit.members) == 1 and unit.places is None
     }
     return frozenset(
         n for n, node in enumerate(levels.nodes) if node.members and node.members[0][0] in alone and node.box < 0
@@ -398,18 +399,27 @@ def _free(levels: Levels, units: Sequence[Unit], bonds: Sequence[int]) -> frozen
 
 
 def _one_on_axis(
-    units: Sequence[Unit], bonds: Sequence[int], rank: Sequence[int], pair: Mapping[int, int]
+    problem: LayoutProblem, units: Sequence[Unit], bonds: Sequence[int], rank: Sequence[int], pair: Mapping[int, int]
 ) -> list[int]:
-    """Ranks in which no two units have to stand on the axis."""
+    """Ranks in which no two units have to stand on the axis, and none without an image stands beside one that has to:
+    it has a rank of its own, on that side to which more of its connections lead."""
+    owner = {m: u for u, unit in enumerate(units) for m in unit.members}
+    down = [0] * len(units)
+    for edge in problem.edges:
+        if edge.source in owner and edge.target in owner:
+            a, b = owner[edge.source], owner[edge.target]
+            down[a] += (rank[b] > rank[a]) - (rank[b] < rank[a])
+            down[b] += (rank[a] > rank[b]) - (rank[a] < rank[b])
     fixed = [u for u, unit in enumerate(units) if symmetric(unit.members, pair)]
-    result = [2 * len(units) * r for r in rank]
+    held = {bonds[u] for u in fixed}
+    step: dict[int, int] = {}
     taken: dict[int, int] = {}
     for u in fixed:
-        number = taken[rank[u]] = taken.get(rank[u], -1) + 1
-        if number:
-            for mate, bond in enumerate(bonds):
-                if bond == bonds[u]:
-                    result[mate] += number
+        step[bonds[u]] = taken[rank[u]] = taken.get(rank[u], -1) + 1
+    for u, unit in enumerate(units):
+        if rank[u] in taken and bonds[u] not in held and pair.keys().isdisjoint(unit.members):
+            step[bonds[u]] = taken[rank[u]] + 1 if down[u] > 0 else -1
+    result = [2 * len(units) * r + step.get(bond, 0) for r, bond in zip(rank, bonds, strict=True)]
     levels = {value: place for place, value in enumerate(sorted(set(result)))}
     return [levels[value] for value in result]
 

@@ -28,13 +28,14 @@ class Segments:
         self.upper_port = _ports(self.upper, [segment.a for segment in every])
         self.lower_port = _ports(self.lower, [segment.b for segment in every])
         self.ports = 1 + int(max(self.upper_port.max(initial=0), self.lower_port.max(initial=0)))
+        self.real = np.array([not segment.idle for segment in every], dtype=np.bool_)
         self.gap: Ints = np.repeat(np.arange(len(gaps), dtype=np.int64), gaps)
         #: where the segments of each gap begin and end
         self._bounds = np.cumsum([0, *gaps]).tolist()
 
     def count(self, place: Ints, turned: npt.NDArray[np.bool_] | None = None) -> int:
-        """Crossings of all segments whose nodes have these places in their ranks; those from one point have none. The
-        ports of nodes that are ``turned`` stand the other way round."""
+        """Crossings of all segments whose nodes have these places in their ranks; those from one point have none, nor
+        do idle ones. The ports of nodes that are ``turned`` stand the other way round."""
         upper, lower = self.upper_port, self.lower_port
         if turned is not None:
             upper = np.where(turned[self.upper], self.ports - 1 - upper, upper)
@@ -42,6 +43,7 @@ class Segments:
         wide = (int(place.max(initial=0)) + 1) * self.ports
         start = (self.gap * wide + place[self.upper]) * self.ports + upper
         end = self.gap * wide + place[self.lower] * self.ports + lower
+        start, end = start[self.real], end[self.real]
         return inversions(end[np.argsort(start * (int(end.max(initial=0)) + 1) + end)])
 
     def means(self, r: int, down: bool, place: Ints, size: int) -> Floats:

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from neurovis_layouts.layered.crossings import Ints, Segments
+from neurovis_layouts.layered.halves import Halves
 
 _MOST_ROUNDS = 60
 #: A round that saves less than this share of all crossings is the last.
@@ -21,14 +22,18 @@ _HARDLY = 1 / 4000
 class Exchange:
     """What exchanges need: the segments of each node on both sides, and who may change places with whom: within
     ``classes``, neighbours of one rank whose first number (the box) is the same and whose second (the group) is not, or
-    is less than 0."""
+    is less than 0; behind the axis of ``halves`` all follow their images."""
 
-    def __init__(self, segments: Segments, classes: tuple[Ints, Ints]) -> None:
-        self.ports = segments.ports
+    def __init__(self, segments: Segments, classes: tuple[Ints, Ints], halves: Halves) -> None:
+        self.ports, self._halves = segments.ports, halves
         self.box, self.kin = classes
         self.sides = [
-            _Ends(len(self.box), segments.lower, segments.upper, segments.upper_port),
-            _Ends(len(self.box), segments.upper, segments.lower, segments.lower_port),
+            _Ends(
+                len(self.box), *(ends[segments.real] for ends in (segments.lower, segments.upper, segments.upper_port))
+            ),
+            _Ends(
+                len(self.box), *(ends[segments.real] for ends in (segments.upper, segments.lower, segments.lower_port))
+            ),
         ]
 
     def improved(self, crossings: int, order: Sequence[Ints]) -> tuple[int, list[Ints]]:
@@ -39,7 +44,8 @@ class Exchange:
         within = np.arange(len(line), dtype=np.int64) - np.repeat(np.cumsum(sizes) - sizes, sizes)
         place = np.zeros(len(self.box), dtype=np.int64)
         place[line] = within
-        pair = rank[1:] == rank[:-1]
+        side = self._halves.side[line]
+        pair = (rank[1:] == rank[:-1]) & (side[1:] == side[:-1]) & (side[1:] <= 0)
         steps = [
             np.flatnonzero(pair & (rank[:-1] % 2 == ranks) & (within[:-1] % 2 == places))
             for ranks in (0, 1)
@@ -53,19 +59,27 @@ class Exchange:
         return crossings, np.split(line, np.cumsum(sizes)[:-1])
 
     def _step(self, line: Ints, place: Ints, at: Ints) -> int:
-        """Exchange what stands at these places with what comes next, where that saves crossings; how many."""
+        """Exchange what stands at these places with what comes next, where that saves crossings, and their images;
+        how many."""
         left, right = line[at], line[at + 1]
         may = (self.box[left] == self.box[right]) & ((self.kin[left] < 0) | (self.kin[left] != self.kin[right]))
         at, left, right = at[may], left[may], right[may]
+        twin = np.flatnonzero(self._halves.side[left] < 0)
+        first, second = self._halves.image[right[twin]], self._halves.image[left[twin]]
+        at = np.concatenate((at, at[twin] - place[left[twin]] + place[first]))
+        left, right = np.concatenate((left, first)), np.concatenate((right, second))
         gain = np.zeros(len(at), dtype=np.int64)
         for side in self.sides:
             gain += side.gains(left, right, place, self.ports)
+        images = slice(len(at) - len(twin), None)
+        gain[twin] += gain[images]
+        gain[images] = gain[twin]
         better = gain > 0
         at, left, right = at[better], left[better], right[better]
         line[at], line[at + 1] = right, left
         place[left] += 1
         place[right] -= 1
-        return int(gain.sum(where=better))
+        return int(gain[: images.start].sum(where=better[: images.start]))
 
 
 class _Ends:

@@ -27,7 +27,7 @@ from neurovis_layouts.layered.mirror_units import arranged_on_axis, symmetric_un
 from neurovis_layouts.layered.page_plan import facing, in_direction, parts_by_cell
 from neurovis_layouts.layered.parts import Part, columns_of, holds_instance, images_in, may_be_frame, parts_of
 from neurovis_layouts.layered.pinning import Settled, pinned
-from neurovis_layouts.layered.same_rank import bonded
+from neurovis_layouts.layered.same_rank import bonded, driven
 from neurovis_layouts.layered.templates import Book, restricted
 from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.pins import with_origins
@@ -47,8 +47,8 @@ class Composer:
         self._book = Book(problem)
         self._kinds: dict[tuple[int, Direction, ShapeKey], Drawing] = {}
         self._shape = Shape()
-        #: what can be folded, and how often at most
-        self._most: dict[Fold, int] = {}
+        #: what can be folded, and into how many bands or rows
+        self._folds: dict[Fold, range] = {}
 
     def whole(self, routed: bool = True) -> Drawing:
         """The drawing of the problem; without ``routed`` that of its neurons and frames alone, which stand where they
@@ -56,7 +56,7 @@ class Composer:
         problem = self._book.whole()
         problem = replace(problem, pins=self._with_origins(problem))
         if may_be_folded(problem):
-            self._shape = compact(problem, self._in_shape, self._most)
+            self._shape = compact(problem, self._in_shape, self._folds)
         return self.compose(problem, routed)
 
     def _in_shape(self, problem: LayoutProblem, shape: Shape) -> Drawing:
@@ -143,19 +143,22 @@ class Composer:
         behind: list[tuple[int, int]] = []
         lines = {m for line in problem.align for m in line}
         held = {piece.part.kind for piece in pieces if lines.intersection(piece.part.members)}
-        for (_, make), family in families.items():
+        for ((_, make), family), apart in zip(families.items(), driven(problem, units, families.values()), strict=True):
             if make not in held:
-                self._most[kind, make] = max(len(family), self._most.get((kind, make), 1))
-            own = in_rows(family, self._shape.count(kind, make))
-            behind += [(before[0], after[0]) for before, after in pairwise(own)]
-            rows += own
+                tries = self._folds.get((kind, make), range(2, 2))
+                self._folds[kind, make] = range(1 if apart else tries.start, max(len(family) + 1, tries.stop))
+            count = self._shape.rows(kind, make)
+            if count is not None or not apart:  # else each finds a rank of its own
+                own = in_rows(family, count or 1)
+                behind += [(before[0], after[0]) for before, after in pairwise(own)]
+                rows += own
         units, bonds = bonded(problem, _spread(problem, units), pair, rows)
         # a ring or a line of which a box holds some alone can be in no strip of its own
         columns = {box for box in columns if _whole(units, problem.boxes[box][1])}
         few = FEW if kind >= 0 or problem.modules else 1
-        wanted = Wanted(self._shape.count(kind), few)
+        wanted = Wanted(self._shape.bands(kind), few)
         plan = planned(problem, units, bonds, pair, columns, wanted, behind, self._shape.draft)
-        self._most[kind, RANKS] = plan.cuts + 1
+        self._folds[kind, RANKS] = range(2, plan.cuts + 2)
 
         resting = [_resting(plan, piece) for piece in pieces]
         rests = pinned(problem, plan, resting, pair, partial(self._redrawn, problem))

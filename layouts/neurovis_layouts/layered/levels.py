@@ -42,13 +42,15 @@ class Node:
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A piece of a connection from a node to one in the next rank; ``a`` and ``b`` are offsets at its ends."""
+    """A piece of a connection from a node to one in the next rank; ``a`` and ``b`` are offsets at its ends. What is
+    ``idle`` only keeps the room of its mirror image free, or makes that known to what is ordered: nothing passes."""
 
     upper: int
     a: float
     lower: int
     b: float
     weight: float
+    idle: bool = False
 
 
 @dataclass(slots=True)
@@ -64,6 +66,11 @@ class Levels:
     spines: set[int] = field(default_factory=set)
     #: by edge: the upper node and the offset there, the lower node and the offset there
     ends: dict[int, Ends] = field(default_factory=dict)
+    #: edges that nothing passes
+    idle: set[int] = field(default_factory=set)
+    #: whose mirror image each node is, itself what is symmetric in itself: nodes of one rank, whose segments are images
+    #: of each other, too
+    images: dict[int, int] = field(default_factory=dict)
 
 
 def levels_of(
@@ -91,7 +98,7 @@ def levels_of(
         for node in _nodes(problem, unit, level, boxes, groups):
             if len(node.members) == 1 and node.reach[0] and not node.framed and node.members[0][0] not in on_axis:
                 node = _aside(node, sides[node.members[0][0]])
-            index = _add(levels, node)
+            index = add(levels, node)
             where.update({member: (index, dx) for member, dx, _ in node.members})
     spans: list[tuple[int, int, Ends]] = []
     for i in edges:
@@ -102,7 +109,7 @@ def levels_of(
     passages = accumulate(span - 1 for span, *_ in sorted(spans))
     near = [one for one, many in zip(sorted(spans), passages, strict=True) if many <= _MOST_PASSAGES]
     for _, i, ends in sorted(near, key=itemgetter(1)):
-        _connect(levels, i, ends)
+        connect(levels, i, ends)
     return levels
 
 
@@ -138,7 +145,8 @@ def _reach(problem: LayoutProblem, members: Sequence[tuple[int, float, float]]) 
     return max(across), max(along)
 
 
-def _add(levels: Levels, node: Node) -> int:
+def add(levels: Levels, node: Node) -> int:
+    """A node more in its rank; its index."""
     levels.nodes.append(node)
     levels.ranks[node.rank].append(len(levels.nodes) - 1)
     return len(levels.nodes) - 1
@@ -146,25 +154,25 @@ def _add(levels: Levels, node: Node) -> int:
 
 def moved(levels: Levels, rank: Sequence[int], height: int) -> Levels:
     """The levels with each node in another of ``height`` ranks, by index, and connected anew; passages are others."""
-    result = Levels()
+    result = Levels(idle=levels.idle)
     result.ranks = [[] for _ in range(height)]
     result.segments = [[] for _ in range(height - 1)]
     for node, level in zip(levels.nodes, rank, strict=True):
         if node.members:
-            _add(result, replace(node, rank=level))
+            add(result, replace(node, rank=level))
     for i, ends in levels.ends.items():
-        _connect(result, i, ends)
+        connect(result, i, ends)
     return result
 
 
-def _connect(levels: Levels, i: int, ends: Ends) -> None:
+def connect(levels: Levels, i: int, ends: Ends) -> None:
     """Segments for one edge, through passages where it crosses ranks; a line of passages is pulled straight."""
     upper, a, lower, b = levels.ends[i] = ends
     top, bottom = levels.nodes[upper].rank, levels.nodes[lower].rank
-    passages = [_add(levels, Node(rank)) for rank in range(top + 1, bottom)]
+    passages = [add(levels, Node(rank)) for rank in range(top + 1, bottom)]
     if passages:
         levels.passages[i] = passages
     line = [(upper, a), *((node, 0.0) for node in passages), (lower, b)]
     for step, (one, other) in enumerate(pairwise(line)):
         ends_here = (step == 0) + (step == len(line) - 2)
-        levels.segments[top + step].append(Segment(*one, *other, (8.0, 2.0, 1.0)[ends_here]))
+        levels.segments[top + step].append(Segment(*one, *other, (8.0, 2.0, 1.0)[ends_here], i in levels.idle))

@@ -1,98 +1,115 @@
 """Mirror: the order of ranks that are to be symmetric about an axis.
 
 In: Levels of a problem, and whose mirror image each neuron is. Out: the order of every rank, which turned round is that
-of the mirror images, and for each node its image; what is in no pair stands on the axis or about it. It is found by
-folding the levels along the axis and ordering the half. Passages without an image get one that nothing passes, so that
-the room they take is the same on both sides.
+of the mirror images, and for each node its image; what is in no pair stands on the axis or about it. Each connection
+has an image, though it may be one that nothing passes, so that the room that they take is the same on both sides. What
+runs within a rank is ordered, too: it leads through a node of the next.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Mapping
+from collections.abc import Set as AbstractSet
+from dataclasses import replace
+from typing import TypeAlias
 
-from neurovis_layouts.layered.levels import Levels, Node, Segment
-from neurovis_layouts.layered.order import ordered
+from neurovis_layouts.layered.levels import Levels, Node, Segment, add, connect
+from neurovis_layouts.layered.order import Order, ordered
 from neurovis_layouts.layered.parts import symmetric
 from neurovis_layouts.routing.ends import keys_of
 from neurovis_spec.layout.model import LayoutProblem
 
+#: Where something is attached: the node, and how far from its middle.
+_End: TypeAlias = tuple[int, float]
+#: A connection: where it leaves, and where it arrives.
+_Line: TypeAlias = tuple[_End, _End]
+
 
 def mirrored(
-    problem: LayoutProblem, levels: Levels, pair: Mapping[int, int], draft: bool
-) -> tuple[list[list[int]], list[int]]:
-    """The symmetric order, and the image of each node; of a ``draft`` only lengths matter. Adds passages to the
-    levels."""
-    left = _left_of(problem, pair)
-    where = {m: n for n, node in enumerate(levels.nodes) for m, _, _ in node.members}
-    image = {
-        n: where[pair.get(node.members[0][0], node.members[0][0])]
-        for n, node in enumerate(levels.nodes)
-        if node.members
-    }
-    side = {n: 0 if image[n] == n else -1 if levels.nodes[n].members[0][0] in left else 1 for n in image}
-    _match_passages(problem, levels, pair, where, image, side)
-    half = _folded(levels, image, side)
-    order = _unfolded(ordered(half[0], effort=problem.effort, draft=draft)[1], half[1], image, side)
+    problem: LayoutProblem, levels: Levels, pair: Mapping[int, int], free: AbstractSet[int], draft: bool
+) -> tuple[Levels, Order, list[int]]:
+    """The levels, the symmetric order, and the image of each node; ``free`` nodes may have moved to other ranks, with
+    their images. Of a ``draft`` only lengths matter. Adds passages to the levels."""
+    first = {a for mirror in problem.mirrors for a, _ in mirror.pairs}  # of two as they were written
+    where = {m: (n, dx) for n, node in enumerate(levels.nodes) for m, dx, _ in node.members}
+    side: dict[int, int] = {}
+    for n, members in enumerate(node.members for node in levels.nodes):
+        if own := [m for m, _, _ in members]:
+            image = where[pair.get(own[0], own[0])][0]
+            side[n] = 0 if image == n else -1 if own[0] in first else 1
+            if side[n] or symmetric(own, pair):
+                levels.images[n] = image
+    fixed = {n for n, image in levels.images.items() if n == image}
+    _match(problem, levels, pair, where, side)
+    within = _within(problem, levels, pair, where)
+    even = _even(levels, side, within)
+    held = {n for n, at in side.items() if at == 0} | {n for line in within for n, _ in line}
+    found, order = ordered(even, free - held, problem.effort, draft)
+    if found is not even:
+        levels = found
+    else:
+        order = [[n for n in rank if n < len(levels.nodes)] for rank in order]
+    _forget_idle(levels)
     for rank in order:
-        _about(levels, rank, side, pair)
+        _about(levels, rank, side, fixed)
     result: list[int] = [0] * len(levels.nodes)
     for rank in order:
-        for node, other in zip(rank, rank[::-1], strict=True):
-            result[node] = other
-    return order, result
+        for n, other in zip(rank, rank[::-1], strict=True):
+            result[n] = other
+    return levels, order, result
 
 
-def _about(levels: Levels, rank: list[int], side: Mapping[int, int], pair: Mapping[int, int]) -> None:
+def _forget_idle(levels: Levels) -> None:
+    """Without the connections that nothing passes, but for their passages, which keep room free."""
+    for i in levels.idle:
+        del levels.ends[i]
+        levels.passages.pop(i, None)
+    passing = [not node.members for node in levels.nodes]
+    levels.segments = [
+        [s for s in gap if not s.idle or passing[s.upper] or passing[s.lower]] for gap in levels.segments
+    ]
+
+
+def _about(levels: Levels, rank: list[int], side: Mapping[int, int], fixed: AbstractSet[int]) -> None:
     """What has to stand on the axis in the middle, what need not beside it, with room for as much on the other side."""
-    centre = [n for n in rank if side[n] == 0]
-    fixed = [n for n in centre if symmetric([m for m, _, _ in levels.nodes[n].members], pair)]
-    if not fixed or len(centre) == 1:
+    centre = [n for n in rank if levels.nodes[n].members and side[n] == 0]
+    middle = [n for n in centre if n in fixed]
+    if not middle or len(centre) == 1:
         return
     loose = [n for n in centre if n not in fixed]
     start, half = rank.index(centre[0]), len(loose) // 2
     before, behind = loose[:half], loose[half:]
     if len(loose) % 2:
-        levels.nodes.append(Node(levels.nodes[fixed[0]].rank, reach=levels.nodes[loose[-1]].reach))
+        levels.nodes.append(Node(levels.nodes[middle[0]].rank, reach=levels.nodes[loose[-1]].reach))
         before.insert(0, len(levels.nodes) - 1)
-    rank[start : start + len(centre)] = [*before, fixed[0], *behind]
+    rank[start : start + len(centre)] = [*before, middle[0], *behind]
 
 
-def _left_of(problem: LayoutProblem, pair: Mapping[int, int]) -> set[int]:
-    """The first of each pair as it was written."""
-    return {a for mirror in problem.mirrors for a, _ in mirror.pairs if a in pair}
-
-
-def _match_passages(
-    problem: LayoutProblem,
-    levels: Levels,
-    pair: Mapping[int, int],
-    where: Mapping[int, int],
-    image: dict[int, int],
-    side: dict[int, int],
+def _match(
+    problem: LayoutProblem, levels: Levels, pair: Mapping[int, int], where: Mapping[int, _End], side: dict[int, int]
 ) -> None:
+    """Find the image of each connection; where there is none, or one in the middle would not be alone there, add one
+    that nothing passes. What runs from side to side changes sides half-way."""
     keys = keys_of(problem.edges)
     index = {key: i for i, key in enumerate(keys)}
-    on_axis: set[int] = {levels.nodes[n].rank for n, s in side.items() if s == 0}
-    for i, passages in sorted(levels.passages.items()):
-        if passages[0] in image:
-            continue
+    taken = {levels.nodes[n].rank for n, at in side.items() if at == 0}
+    for i, (upper, _, lower, _) in list(levels.ends.items()):
         source, target, number = keys[i]
-        other = index.get((pair.get(source, source), pair.get(target, target), number), -1)
-        upper, lower = where[source], where[target]
-        if levels.nodes[upper].rank > levels.nodes[lower].rank:
-            upper, lower = lower, upper
+        source, target = pair.get(source, source), pair.get(target, target)
+        other = index.get((source, target, number), -1)
+        passages = levels.passages.get(i, [])
+        ranks = {levels.nodes[p].rank for p in passages}
         sides = _sides(side[upper], side[lower], len(passages))
-        if other != i and other in levels.passages:
-            images = levels.passages[other]
-        elif side[upper] == side[lower] == 0 and not on_axis.intersection(levels.nodes[p].rank for p in passages):
-            images, sides = passages, [0] * len(passages)
-            on_axis.update(levels.nodes[p].rank for p in passages)
-        else:
-            images = [_passage(levels, levels.nodes[p].rank) for p in passages]
-            _run(levels, [image[upper], *images, image[lower]], (upper, *passages, lower))
-        for one, two, at in zip(passages, images, sides, strict=True):
-            image[one], image[two] = two, one
+        if other == i and taken.isdisjoint(ranks):
+            taken |= ranks
+            sides = [0] * len(passages)
+        elif other == i or other not in levels.ends:
+            other = len(keys) + i
+            levels.idle.add(other)
+            ends = sorted((where[source], where[target]), key=lambda end: levels.nodes[end[0]].rank)
+            connect(levels, other, (*ends[0], *ends[1]))
+        for one, two, at in zip(passages, levels.passages.get(other, ()), sides, strict=True):
+            levels.images[one], levels.images[two] = two, one
             side[one], side[two] = at, -at
 
 
@@ -102,44 +119,45 @@ def _sides(upper: int, lower: int, count: int) -> list[int]:
     return [first if 2 * i + 1 < count else last for i in range(count)]
 
 
-def _passage(levels: Levels, rank: int) -> int:
-    levels.nodes.append(Node(rank))
-    levels.ranks[rank].append(len(levels.nodes) - 1)
-    return len(levels.nodes) - 1
+def _within(
+    problem: LayoutProblem, levels: Levels, pair: Mapping[int, int], where: Mapping[int, _End]
+) -> dict[_Line, _Line]:
+    """The connections between two nodes of a rank, by where they leave and arrive, and their images."""
+    found: dict[_Line, _Line] = {}
+    for edge in problem.edges:
+        source, target = where.get(edge.source), where.get(edge.target)
+        if source is None or target is None or source[0] == target[0]:
+            continue
+        if levels.nodes[source[0]].rank == levels.nodes[target[0]].rank:
+            image = pair.get(edge.source, edge.source), pair.get(edge.target, edge.target)
+            found[source, target] = where[image[0]], where[image[1]]
+    return found
 
 
-def _run(levels: Levels, line: Sequence[int], model: Sequence[int]) -> None:
-    """Segments along passages that nothing passes, like those of the connection whose image they are."""
-    for (a, b), (c, d) in zip(pairwise(line), pairwise(model), strict=True):
-        gap = levels.segments[levels.nodes[a].rank]
-        twin = next(s for s in gap if (s.upper, s.lower) == (c, d))
-        gap.append(Segment(a, -twin.a, b, -twin.b, twin.weight))
-
-
-def _folded(levels: Levels, image: Mapping[int, int], side: Mapping[int, int]) -> tuple[Levels, list[int]]:
-    """The left half and what stands on the axis, the right half folded on to it; its nodes as those of the whole."""
-    chosen = [n for n in range(len(levels.nodes)) if side[n] <= 0]
-    number = {n: i for i, n in enumerate(chosen)}
-    half = Levels([levels.nodes[n] for n in chosen], [[number[n] for n in r if n in number] for r in levels.ranks])
-    for gap in levels.segments:
-        found: dict[tuple[int, float, int, float], Segment] = {}
-        for s in gap:
-            upper, a = (s.upper, s.a) if side[s.upper] <= 0 else (image[s.upper], -s.a)
-            lower, b = (s.lower, s.b) if side[s.lower] <= 0 else (image[s.lower], -s.b)
-            found.setdefault((upper, a, lower, b), Segment(number[upper], a, number[lower], b, s.weight))
-        half.segments.append(list(found.values()))
-    return half, chosen
-
-
-def _unfolded(
-    half: Sequence[Sequence[int]],
-    chosen: Sequence[int],
-    image: Mapping[int, int],
-    side: Mapping[int, int],
-) -> list[list[int]]:
-    order: list[list[int]] = []
-    for rank in half:
-        nodes = [chosen[n] for n in rank]
-        left = [n for n in nodes if side[n] < 0]
-        order.append([*left, *(n for n in nodes if side[n] == 0), *(image[n] for n in reversed(left))])
-    return order
+def _even(levels: Levels, side: Mapping[int, int], within: Mapping[_Line, _Line]) -> Levels:
+    """The levels as they are ordered: those before the axis first in their ranks, and what runs ``within`` a rank led
+    through a node of the rank before or behind, where fewer connections are; there and back through both. What is
+    behind the axis follows, and is held by no group."""
+    nodes = [replace(node, kin=-1) if side[n] > 0 else node for n, node in enumerate(levels.nodes)]
+    ranks = [sorted(rank, key=lambda n: side[n]) for rank in levels.ranks]
+    gaps = [list(gap) for gap in levels.segments]
+    even = replace(levels, nodes=nodes, ranks=ranks, segments=gaps, images=dict(levels.images))
+    many = [0, *(len(gap) for gap in gaps), 0]
+    known: dict[tuple[int, frozenset[_End]], int] = {}
+    for ends, image in within.items():
+        rank = nodes[ends[0][0]].rank
+        before = many[rank] < many[rank + 1]
+        for at in (rank - 1, rank + 1) if ends[::-1] in within else (rank - 1 if before else rank + 1,):
+            if not 0 <= at < len(ranks):
+                continue  # nothing is there to be crossed
+            for line in sorted((ends, image), key=lambda line: side[line[0][0]] + side[line[1][0]]):
+                if (at, frozenset(line)) not in known:
+                    turn = known[at, frozenset(line)] = add(even, Node(at))
+                    idle = line not in within and line[::-1] not in within
+                    gaps[min(at, rank)] += [
+                        Segment(turn, 0.0, *end, 1.0, idle) if at < rank else Segment(*end, turn, 0.0, 1.0, idle)
+                        for end in line
+                    ]
+            one, two = known[at, frozenset(ends)], known[at, frozenset(image)]
+            even.images[one], even.images[two] = two, one
+    return even

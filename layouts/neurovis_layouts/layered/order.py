@@ -16,6 +16,7 @@ import numpy as np
 
 from neurovis_layouts.layered.crossings import Floats, Ints, Segments
 from neurovis_layouts.layered.exchange import Exchange
+from neurovis_layouts.layered.halves import Halves
 from neurovis_layouts.layered.levels import Levels
 from neurovis_layouts.layered.reinsertion import reinserted
 from neurovis_spec.layout.model import Effort
@@ -68,8 +69,11 @@ def _swept(levels: Levels, segments: Segments, start: Order, strict: bool) -> tu
     box = np.array([node.box for node in levels.nodes], dtype=np.int64)
     group = np.array([node.kin if strict else -1 for node in levels.nodes], dtype=np.int64)
     kin = [_kin(levels, rank) if strict else [] for rank in levels.ranks]
-    order = [np.array(rank, dtype=np.int64) for rank in start]
-    order = [_settled(rank, np.arange(len(rank)), box, mates) for rank, mates in zip(order, kin, strict=True)]
+    halves = Halves(levels)
+    order = [halves.whole(np.array(rank, dtype=np.int64)) for rank in start]
+    order = [
+        halves.whole(_settled(rank, np.arange(len(rank)), box, mates)) for rank, mates in zip(order, kin, strict=True)
+    ]
     place = places(len(levels.nodes), order)
     best = segments.count(place), list(order)
     for sweep in range(_SWEEPS):
@@ -80,11 +84,11 @@ def _swept(levels: Levels, segments: Segments, start: Order, strict: bool) -> tu
             if known.any():
                 # what is connected to nothing there stays behind what it stands behind
                 last = np.maximum.accumulate(np.where(known, np.arange(len(means)), -1))
-                order[r] = _settled(order[r], np.where(last >= 0, means[last], -1.0), box, kin[r])
+                order[r] = halves.whole(_settled(order[r], np.where(last >= 0, means[last], -1.0), box, kin[r]))
                 place[order[r]] = np.arange(len(means))
         if (crossings := segments.count(place)) < best[0]:
             best = crossings, list(order)
-    crossings, order = Exchange(segments, (box, group)).improved(*best)
+    crossings, order = Exchange(segments, (box, group), halves).improved(*best)
     return crossings, [rank.tolist() for rank in order]
 
 

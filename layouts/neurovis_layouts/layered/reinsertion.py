@@ -39,7 +39,8 @@ def reinserted(
     stand in any rank in which what leads down leads down."""
     state = Insertion(levels, order, strict, free)
     cost = _Search(state, _TIMES[effort]).run()
-    crossings = (cost - sum(state.rank[link.lower] - state.rank[link.upper] for link in state.links)) // CROSSING
+    lengths = (state.rank[link.lower] - state.rank[link.upper] for link in state.links if not link.idle)
+    crossings = (cost - sum(lengths)) // CROSSING
     return crossings, *levels_in(levels, state)
 
 
@@ -49,12 +50,15 @@ class _Search:
     def __init__(self, state: Insertion, times: float) -> None:
         self._state = state
         self._budget = int(_BUDGET * times)
+        # of mirror images one stands for both
         self._near = [
-            sorted({state.links[c].upper for c in state.ups[n]} | {state.links[c].lower for c in state.downs[n]})
+            sorted({state.lead[m] for c in (*state.ups[n], *state.downs[n]) for m in state.ends_of(c)} - {n})
             for n in range(len(state.rank))
         ]
-        self._nodes = [n for n, near in enumerate(self._near) if near]
-        self._patience = int(_PATIENCE * times * len(self._nodes))
+        self._nodes = [n for n, near in enumerate(self._near) if near and state.lead[n] == n]
+        # what has an image moves, and saves crossings, by the pair
+        self._pair = 2 if any(n != m for n, m in enumerate(state.lead)) else 1
+        self._patience = int(_PATIENCE * times * len(self._nodes) / self._pair)
         self._dice = _dice()
 
     def run(self) -> int:
@@ -68,7 +72,7 @@ class _Search:
             ruin = self._ruin(1 + next(self._dice) % most)
             saved = state.take(ruin)
             in_vain += 1
-            limit = saved + max(0, best + CROSSING - now)
+            limit = saved + max(0, best + self._pair * CROSSING - now)
             if saved >= CROSSING and (cost := self._recreate(ruin, limit)) <= limit:
                 now += cost - saved
                 if now < best:
@@ -103,7 +107,8 @@ class _Search:
             else:
                 other, link = self._state.owner(self._one_of(self._state.order[self._state.rank[at]]))
                 if link >= 0:
-                    other = self._one_of((self._state.links[link].upper, self._state.links[link].lower))
+                    other = self._one_of(self._state.ends_of(link))
+                other = self._state.lead[other]
             if other not in ruin and self._near[other]:
                 ruin.append(other)
             if len(ruin) >= size:
@@ -126,7 +131,7 @@ class _Search:
 
 def levels_in(levels: Levels, state: Insertion) -> tuple[Levels, Order]:
     """The levels, without ranks in which nothing but passages is left, and their order."""
-    passages: dict[int, Sequence[int]] = {c: link.passages for c, link in enumerate(state.links)}
+    whole, passages = levels, dict[int, Sequence[int]](enumerate(link.passages for link in state.links))
     level = {r: r for r in range(len(levels.ranks))}
     if any(state.rank[n] != node.rank for n, node in enumerate(levels.nodes)):
         filled = sorted({rank for rank, node in zip(state.rank, levels.nodes, strict=True) if node.members})
@@ -142,7 +147,7 @@ def levels_in(levels: Levels, state: Insertion) -> tuple[Levels, Order]:
         for node, c in map(state.owner, state.order[r]):
             if c >= 0:
                 line.append(passages[c][level[r] - level[state.rank[state.links[c].upper]] - 1])
-            elif node not in line[-1:]:
+            elif node not in line[-1:] and (levels is whole or whole.nodes[node].members):
                 line.append(node)
         order.append(line)
     return levels, order

@@ -85,8 +85,8 @@ def _better(cost: RouteCost, winds: bool) -> Route | None:
     if best is not None and not cost.trespasses(best):
         return best
     tries = [cost.whole(route) for route in (*_shifted(cost.route), *_turned(cost.route))]
-    found = cost.cheapest(polylines(tries), now)
-    return None if found is None or cost.trespasses(tries[found[0]]) else tries[found[0]]
+    cheaper = (tries[k] for k, _ in cost.cheaper(polylines(tries), now))
+    return next((route for route in cheaper if not cost.trespasses(route)), None)
 
 
 def _searched(cost: RouteCost, now: float) -> Route | None:

@@ -72,6 +72,10 @@ class Polylines:
         chosen[number] = len(self)
         return self.and_then(line).some(chosen)
 
+    def reflected(self, twice: float) -> Polylines:
+        """Their mirror images, about an axis at half of ``twice``."""
+        return Polylines(self.points * (-1.0, 1.0) + (twice, 0.0), self.starts)
+
     def lengths(self) -> FloatArray:
         """(n,) how long they are."""
         return self._sums(self._lengths, self.owner)
@@ -117,6 +121,14 @@ class Polylines:
         place = np.floor(places / _CELL).astype(np.int64)
         cells: IntArray = place[:, 0] * _ROW + place[:, 1]
         return cells, owner
+
+    def shared(self, others: Polylines) -> FloatArray:
+        """(n,) through how many of its cells each runs where that of the others runs that has its number."""
+        (cells, owner), (there, number) = self.cells(), others.cells()
+        place = np.unique(np.concatenate([cells, there]), return_inverse=True)[1]
+        key = place * len(self) + np.concatenate([owner, number])
+        both = np.isin(key[: len(cells)], key[len(cells) :])
+        return np.bincount(owner, both, len(self)).astype(np.float64)
 
     def on(self, mates: Polylines) -> FloatArray:
         """(n,) the largest share of each that runs on one of these, beyond half of what may: a fifth, or less where

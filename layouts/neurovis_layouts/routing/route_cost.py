@@ -334,6 +334,11 @@ class RouteCost:
     def cheapest(self, lines: Polylines, limit: float, most: int | None = None) -> tuple[int, float] | None:
         """The cheapest of these lines and its cost, if that is below the limit; no more than so many are checked
         closely, those first that are cheap by themselves."""
+        return next(iter(self.cheaper(lines, limit, most)), None)
+
+    def cheaper(self, lines: Polylines, limit: float, most: int | None = None) -> list[tuple[int, float]]:
+        """Those of these lines that cost less than the limit, and what they do, the cheapest first; no more than so
+        many are checked closely, those that are cheap by themselves."""
         costs = self._by_itself(lines)
         chosen = np.flatnonzero(costs < limit)
         chosen = chosen[np.argsort(costs[chosen], kind="stable")][:most]
@@ -341,12 +346,12 @@ class RouteCost:
         for add in (self._in_the_way, self._beside, self._among_others):
             near = costs < limit
             if not near.any():
-                return None
+                return []
             if 2 * int(near.sum()) < len(near):  # less work than to weigh them all
                 chosen, costs, lines = chosen[near], costs[near], lines.some(np.flatnonzero(near))
             costs += add(lines)
-        least = int(np.argmin(costs))
-        return (int(chosen[least]), float(costs[least])) if costs[least] < limit else None
+        order = [k for k in np.argsort(costs, kind="stable").tolist() if costs[k] < limit]
+        return [(int(chosen[k]), float(costs[k])) for k in order]
 
     def _by_itself(self, lines: Polylines) -> FloatArray:
         """(n,) what they cost whatever there is around them."""
@@ -382,19 +387,23 @@ class RouteCost:
         return cost
 
     def _among_others(self, lines: Polylines) -> FloatArray:
-        """(n,) what it costs to run on others and to cross them."""
+        """(n,) what it costs to run on others and to cross them, their own images among them."""
         cells, owner = lines.cells()
         cost = ALONG * STEP * np.bincount(owner[_among(cells, self._cells)], minlength=len(lines))
         cost += lines.crossed(self._a, self._b, self._weight)
+        cost = _CROWDED * cost / (_CROWDED + cost)
         if self._reflect:
             (low, high), axis = lines.extents(), self._drawn.images.twice / 2
-            flip, shift = np.array([-1.0, 1.0]), np.array([self._drawn.images.twice, 0.0])
             # only what reaches over the axis meets its own image
-            for k in np.flatnonzero((low[:, 0] <= axis) & (high[:, 0] >= axis)).tolist():
-                one = lines.some(np.array([k], dtype=np.int64))
-                cost[k] += _CROSSING * float(one.crossed(one.a * flip + shift, one.b * flip + shift)[0])
-        crowded: FloatArray = _CROWDED * cost / (_CROWDED + cost)
-        return crowded
+            over = np.flatnonzero((low[:, 0] <= axis) & (high[:, 0] >= axis))
+            if len(over):
+                some = lines.some(over)
+                others = some.reflected(self._drawn.images.twice)
+                cost[over] += ALONG * STEP * some.shared(others)
+                for k, line in enumerate(over.tolist()):
+                    one, own = some.some(np.array([k], dtype=np.int64)), others.owner == k
+                    cost[line] += _CROSSING * float(one.crossed(others.a[own], others.b[own])[0])
+        return cost
 
 
 def _among(cells: IntArray, some: IntArray) -> BoolArray:

@@ -62,8 +62,8 @@ def route_all(
     gone round. No route enters one of the ``frames`` that holds neither of its ends, if there is a way round. ``drawn``
     are other routes, which are there, as are those of these edges that are ``there``. Nothing that is in the way is
     gone round outside of ``within``. ``begun`` are routes to begin with, not curves; of those with ``images`` one is
-    the other's reflection. Where some are ``planned``, which cross nothing, what would be drawn anew beside them might:
-    only arcs between images are.
+    the other's reflection. Those that are ``planned``, which cross nothing, are not drawn anew, but for arcs between
+    images.
     """
     near = Obstacles(centres)
     obstacles = near if len(edges) <= careful else Obstacles(())
@@ -83,8 +83,7 @@ def route_all(
     routes.update(images.kept(routes, edges, centres))
     routes.update((i, route) for i, route in (there or {}).items() if i in routes)
     free = set(routes) - (there or {}).keys() - {image for i, image in images.of.items() if image != i}
-    if planned:
-        free = {i for i in free if images.of.get(i) == i}
+    free -= {i for i in planned if images.of.get(i) != i}
     if free and len(edges) <= MOST_IMPROVED:
         routes.update(improved(Drawn(edges, centres, routes, frames, drawn, images), free))
     looped = _loops(edges, centres, routes, near, walls, there or {})
