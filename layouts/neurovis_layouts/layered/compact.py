@@ -84,8 +84,8 @@ def may_be_folded(problem: LayoutProblem) -> bool:
 
 def compact(problem: LayoutProblem, drawn: Drawn, folds: Mapping[Fold, range]) -> Shape:
     """The shape that costs least. ``folds`` says, once it has been drawn, what can be folded, and into how many bands
-    or rows. Bands are tried first: a row also is where instances that drive one another stand side by side, which
-    crosses more."""
+    or rows. Bands are tried first: in rows mirrored instances that drive one another stand side by side, where more
+    lines cross than where they stand behind each other."""
     shape = Shape(draft=True)
     drawing = drawn(problem, shape)
     size = _size(drawing, problem.direction)

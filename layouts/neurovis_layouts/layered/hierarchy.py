@@ -143,12 +143,15 @@ class Composer:
         behind: list[tuple[int, int]] = []
         lines = {m for line in problem.align for m in line}
         held = {piece.part.kind for piece in pieces if lines.intersection(piece.part.members)}
-        for ((_, make), family), apart in zip(families.items(), driven(problem, units, families.values()), strict=True):
+        drives = driven(problem, units, families.values())
+        for ((_, make), family), apart in zip(families.items(), drives, strict=True):
+            apart = apart and not pair.keys().isdisjoint(family)
             if make not in held:
                 tries = self._folds.get((kind, make), range(2, 2))
                 self._folds[kind, make] = range(1 if apart else tries.start, max(len(family) + 1, tries.stop))
             count = self._shape.rows(kind, make)
-            if count is not None or not apart:  # else each finds a rank of its own
+            # mirrored chains are columns that face each other, unless rows are asked for: each finds a rank of its own
+            if count is not None or not apart:
                 own = in_rows(family, count or 1)
                 behind += [(before[0], after[0]) for before, after in pairwise(own)]
                 rows += own

@@ -1,7 +1,7 @@
 """Same rank: units that have to share a rank, and how far each is shifted along the direction within it (its lift).
 
-In: units, the lists of neurons that are to be on one line, mirror images, instances that are to stand side by side.
-Out: the units with their lifts, and for each a number (its bond) that is the same for all units of one rank.
+In: units, the lists of neurons that are to be on one line, mirror images, instances declared together. Out: the units
+with their lifts, and for each a number (its bond) that is the same for all units of one rank.
 """
 
 from __future__ import annotations
@@ -13,6 +13,11 @@ import networkx as nx
 
 from neurovis_layouts.layered.units import Unit
 from neurovis_spec.layout.model import LayoutProblem, LayoutRefusalError
+
+#: Stairs rise by this share of the height of a frame from one to the next at most.
+_STEEPEST = 0.6
+#: Nobody looks along stairs of more steps.
+_MOST_IN_STAIRS = 64
 
 
 class _Lines:
@@ -42,12 +47,12 @@ class _Lines:
 
 
 def bonded(
-    problem: LayoutProblem, units: Sequence[Unit], pair: Mapping[int, int], rows: Sequence[Sequence[int]]
+    problem: LayoutProblem, units: Sequence[Unit], pair: Mapping[int, int], families: Sequence[Sequence[int]]
 ) -> tuple[list[Unit], list[int]]:
     """The units with their lifts, and the number of the rank's bond of each.
 
-    ``rows`` are neurons by which units are known that are to share a rank. Raises LayoutRefusalError for lines that
-    cannot be kept.
+    ``families`` are neurons by which the units of a family are known. Raises LayoutRefusalError for lines that cannot
+    be kept.
     """
     owner = {m: u for u, unit in enumerate(units) for m in unit.members}
     depth = {m: 0.0 for unit in units for m in unit.members}
@@ -67,12 +72,64 @@ def bonded(
                     "them apart",
                     about=(names[line[0]], names[member]),
                 )
-    for row in rows:
-        for member in row[1:]:
-            lines.join(owner[row[0]], owner[member], 0.0)
+    flow = _flow(problem, units, owner) if families else nx.DiGraph()
+    for family in families:
+        mates = [owner[m] for m in family]
+        stairs = _stairs(problem, units, owner, depth, pair, mates, flow)
+        for mate, step in zip(mates, stairs, strict=False):
+            lines.join(mates[0], mate, step - stairs[0])
     found = [lines.find(u) for u in range(len(units))]
     lifted = [replace(unit, lift=shift) if shift else unit for unit, (_, shift) in zip(units, found, strict=True)]
     return lifted, [root for root, _ in found]
+
+
+def _flow(problem: LayoutProblem, units: Sequence[Unit], owner: Mapping[int, int]) -> nx.DiGraph[int]:
+    graph: nx.DiGraph[int] = nx.DiGraph()
+    graph.add_nodes_from(range(len(units)))
+    graph.add_edges_from(
+        (owner[e.source], owner[e.target]) for e in problem.edges if owner[e.source] != owner[e.target]
+    )
+    return graph
+
+
+def _stairs(
+    problem: LayoutProblem,
+    units: Sequence[Unit],
+    owner: Mapping[int, int],
+    depth: Mapping[int, float],
+    pair: Mapping[int, int],
+    mates: Sequence[int],
+    flow: nx.DiGraph[int],
+) -> list[float]:
+    """How far behind the first of its rank each of a family stands: side by side where none drives another, in stairs
+    where one drives the next, so that what runs between them runs along; none where that would make them too steep."""
+    if len(mates) > _MOST_IN_STAIRS:
+        return [] if any(flow.has_edge(a, b) for a in mates for b in mates) else [0.0] * len(mates)
+    after = {mate: nx.descendants(flow, mate) for mate in mates}
+    ahead = {(a, b) for a in mates for b in mates if a != b and b in after[a] and a not in after[b]}
+    if not ahead:
+        return [0.0] * len(mates)
+    steps: dict[tuple[int, int], float] = {}
+    own = set(mates)
+    for edge in problem.edges:
+        ends = (edge.source, edge.target)
+        if pair and (owner[ends[0]] not in own or owner[ends[1]] not in own):
+            ends = pair.get(ends[0], -1), pair.get(ends[1], -1)
+        a, b = owner.get(ends[0], -1), owner.get(ends[1], -1)
+        if (a, b) in ahead:
+            steps[a, b] = max(steps.get((a, b), 0.0), depth[ends[0]] - depth[ends[1]] + problem.rank_spacing / 2)
+    graph: nx.DiGraph[int] = nx.DiGraph()
+    graph.add_nodes_from(mates)
+    graph.add_edges_from(steps)
+    found = dict.fromkeys(mates, 0.0)
+    for mate in nx.lexicographical_topological_sort(graph):
+        for before in graph.predecessors(mate):
+            found[mate] = max(found[mate], found[before] + steps[before, mate])
+    high = max((units[mate].reach or (0.0, 0.0))[1] for mate in mates)
+    through_others = any(not nx.has_path(graph, a, b) for a, b in ahead)
+    if through_others or max(found.values()) > _STEEPEST * 2 * high * (len(mates) - 1):
+        return []
+    return [found[mate] for mate in mates]
 
 
 def driven(problem: LayoutProblem, units: Sequence[Unit], families: Collection[Sequence[int]]) -> list[bool]:
@@ -81,10 +138,7 @@ def driven(problem: LayoutProblem, units: Sequence[Unit], families: Collection[S
     if not families:
         return []
     owner = {m: u for u, unit in enumerate(units) for m in unit.members}
-    flow: nx.DiGraph[int] = nx.DiGraph()
-    flow.add_nodes_from(range(len(units)))
-    flow.add_edges_from((owner[edge.source], owner[edge.target]) for edge in problem.edges)
-    loops = nx.condensation(flow)
+    loops = nx.condensation(_flow(problem, units, owner))
     loop_of = loops.graph["mapping"]
     order = list(nx.topological_sort(loops))
     found: list[bool] = []

@@ -389,20 +389,20 @@ class RouteCost:
     def _among_others(self, lines: Polylines) -> FloatArray:
         """(n,) what it costs to run on others and to cross them, their own images among them."""
         cells, owner = lines.cells()
-        cost = ALONG * STEP * np.bincount(owner[_among(cells, self._cells)], minlength=len(lines))
-        cost += lines.crossed(self._a, self._b, self._weight)
-        cost = _CROWDED * cost / (_CROWDED + cost)
+        others = ALONG * STEP * np.bincount(owner[_among(cells, self._cells)], minlength=len(lines))
+        others += lines.crossed(self._a, self._b, self._weight)
+        cost: FloatArray = _CROWDED * others / (_CROWDED + others)
         if self._reflect:
             (low, high), axis = lines.extents(), self._drawn.images.twice / 2
             # only what reaches over the axis meets its own image
             over = np.flatnonzero((low[:, 0] <= axis) & (high[:, 0] >= axis))
             if len(over):
                 some = lines.some(over)
-                others = some.reflected(self._drawn.images.twice)
-                cost[over] += ALONG * STEP * some.shared(others)
+                images = some.reflected(self._drawn.images.twice)
+                cost[over] += ALONG * STEP * some.shared(images)
                 for k, line in enumerate(over.tolist()):
-                    one, own = some.some(np.array([k], dtype=np.int64)), others.owner == k
-                    cost[line] += _CROSSING * float(one.crossed(others.a[own], others.b[own])[0])
+                    one, own = some.some(np.array([k], dtype=np.int64)), images.owner == k
+                    cost[line] += _CROSSING * float(one.crossed(images.a[own], images.b[own])[0])
         return cost
 
 
