@@ -17,6 +17,9 @@ from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.geometry import distance, sampled
 from neurovis_spec.layout.problem import canonical
 
+#: Farther than rounding to the grid of coordinates goes.
+_SLACK = 1 / 128
+
 Edge = tuple[str, str, str, int]
 Rect = tuple[float, float, float, float]
 
@@ -229,16 +232,16 @@ def frames_meet(layout: Layout, problem: LayoutProblem) -> bool:
         if any(_within(rect, point) for m, point in enumerate(at) if m not in own):
             return True
         for other, theirs in frames[:i]:
-            apart = rect[2] <= theirs[0] or theirs[2] <= rect[0] or rect[3] <= theirs[1] or theirs[3] <= rect[1]
-            if not (apart or own <= other or other <= own):
+            wide, high = (min(rect[k + 2], theirs[k + 2]) - max(rect[k], theirs[k]) for k in (0, 1))
+            if min(wide, high) > _SLACK and not (own <= other or other <= own):
                 return True
     return False
 
 
 def _within(rect: Rect, point: Point) -> bool:
     """Farther in than rounding to the grid of coordinates goes."""
-    slack = 1 / 128
-    return rect[0] + slack < point[0] < rect[2] - slack and rect[1] + slack < point[1] < rect[3] - slack
+    x0, y0, x1, y1 = rect
+    return x0 + _SLACK < point[0] < x1 - _SLACK and y0 + _SLACK < point[1] < y1 - _SLACK
 
 
 def across(problem: LayoutProblem) -> int:

@@ -152,3 +152,15 @@ connections: {s_L -> m_L: 1, s_R -> m_R: 1, Drive -> m_L + m_R: 1, s_L + s_R -> 
         assert 2 * at[name][across] == at["s_L"][across] + at["s_R"][across] == at["m_L"][across] + at["m_R"][across]
     order = sorted(("s_L", "Drive", "m_L"), key=lambda name: at[name][along])
     assert order == ["s_L", "Drive", "m_L"][:: 1 if direction in ("down", "right") else -1]
+
+
+def test_what_stands_about_the_axis_in_a_box_is_nobodys_image() -> None:
+    text = """
+neurovis: 1
+name: about
+neurons: {L: {}, R: {}, v0: {}, v1: {}, v2: {}, v3: {}}
+connections: {v2 -> v1: 1, R -> v0: 1, R -> v1: 1, L -> v2: 1, R -> v3: 1, v3 -> L: 1}
+layout: {mirror: [[L, R]], boxes: {inner: [L, R, v0, v1]}}
+"""
+    found = nv.compile_text(text).layout("layered").metrics()
+    assert (found["symmetry"], found["overlaps"], found["edges_over_neurons"]) == (1, 0, 0)

@@ -40,8 +40,8 @@ def mirrored(
             if side[n] or symmetric(own, pair):
                 levels.images[n] = image
     fixed = {n for n, image in levels.images.items() if n == image}
-    _match(problem, levels, pair, where, side)
-    within = _within(problem, levels, pair, where)
+    _match(problem, levels, pair, side)
+    within = _within(problem, levels, where)
     even = _even(levels, side, within)
     held = {n for n, at in side.items() if at == 0} | {n for line in within for n, _ in line}
     found, order = ordered(even, free - held, problem.effort, draft)
@@ -85,29 +85,33 @@ def _about(levels: Levels, rank: list[int], side: Mapping[int, int], fixed: Abst
     rank[start : start + len(centre)] = [*before, middle[0], *behind]
 
 
-def _match(
-    problem: LayoutProblem, levels: Levels, pair: Mapping[int, int], where: Mapping[int, _End], side: dict[int, int]
-) -> None:
+def _reflected(levels: Levels, end: _End) -> _End:
+    """Where the mirror image of what is attached here is attached, whether or not a neuron stands there."""
+    n, offset = end
+    return (levels.images[n], 0.0 - offset) if n in levels.images else end
+
+
+def _match(problem: LayoutProblem, levels: Levels, pair: Mapping[int, int], side: dict[int, int]) -> None:
     """Find the image of each connection; where there is none, or one in the middle would not be alone there, add one
     that nothing passes. What runs from side to side changes sides half-way."""
     keys = keys_of(problem.edges)
     index = {key: i for i, key in enumerate(keys)}
     taken = {levels.nodes[n].rank for n, at in side.items() if at == 0}
-    for i, (upper, _, lower, _) in list(levels.ends.items()):
+    for i, (upper, a, lower, b) in list(levels.ends.items()):
         source, target, number = keys[i]
-        source, target = pair.get(source, source), pair.get(target, target)
-        other = index.get((source, target, number), -1)
+        other = index.get((pair.get(source, source), pair.get(target, target), number), -1)
+        ends = *_reflected(levels, (upper, a)), *_reflected(levels, (lower, b))
         passages = levels.passages.get(i, [])
         ranks = {levels.nodes[p].rank for p in passages}
         sides = _sides(side[upper], side[lower], len(passages))
-        if other == i and taken.isdisjoint(ranks):
+        alike = levels.ends.get(other) == ends
+        if alike and other == i and taken.isdisjoint(ranks):
             taken |= ranks
             sides = [0] * len(passages)
-        elif other == i or other not in levels.ends:
+        elif other == i or not alike:
             other = len(keys) + i
             levels.idle.add(other)
-            ends = sorted((where[source], where[target]), key=lambda end: levels.nodes[end[0]].rank)
-            connect(levels, other, (*ends[0], *ends[1]))
+            connect(levels, other, ends)
         for one, two, at in zip(passages, levels.passages.get(other, ()), sides, strict=True):
             levels.images[one], levels.images[two] = two, one
             side[one], side[two] = at, -at
@@ -119,9 +123,7 @@ def _sides(upper: int, lower: int, count: int) -> list[int]:
     return [first if 2 * i + 1 < count else last for i in range(count)]
 
 
-def _within(
-    problem: LayoutProblem, levels: Levels, pair: Mapping[int, int], where: Mapping[int, _End]
-) -> dict[_Line, _Line]:
+def _within(problem: LayoutProblem, levels: Levels, where: Mapping[int, _End]) -> dict[_Line, _Line]:
     """The connections between two nodes of a rank, by where they leave and arrive, and their images."""
     found: dict[_Line, _Line] = {}
     for edge in problem.edges:
@@ -129,8 +131,7 @@ def _within(
         if source is None or target is None or source[0] == target[0]:
             continue
         if levels.nodes[source[0]].rank == levels.nodes[target[0]].rank:
-            image = pair.get(edge.source, edge.source), pair.get(edge.target, edge.target)
-            found[source, target] = where[image[0]], where[image[1]]
+            found[source, target] = _reflected(levels, source), _reflected(levels, target)
     return found
 
 
