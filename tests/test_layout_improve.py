@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from neurovis_layouts.routing import route_cost
+from neurovis_layouts.routing import route_all, route_cost
 from neurovis_layouts.routing.corners import corners, smooth, smoothed
 from neurovis_layouts.routing.images import Images
 from neurovis_layouts.routing.improve import improved
+from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
 from neurovis_layouts.routing.polylines import Polylines, close_segments, polylines
 from neurovis_layouts.routing.route_cost import Drawn, RouteCost
-from neurovis_layouts.routing.walls import Frame
+from neurovis_layouts.routing.walls import Frame, Walls
 
 import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray
@@ -372,6 +373,22 @@ def test_a_route_that_lies_on_its_own_image_pays_for_it() -> None:
         paid.append(RouteCost(paired, 0).cost() - RouteCost(alone, 0).cost())
     assert paid[0] > 10
     assert paid[1] < 5
+
+
+def test_mirrored_routes_keep_off_what_has_no_image() -> None:
+    """A frame, or a disc, on the way of the second alone: the first keeps off where that would be reflected."""
+    centres = [(0.0, 0.0), (-6.0, 9.0), (6.0, 9.0), (3.0, 4.5)]
+    edges, images = [edge(0, 1), edge(0, 2)], Images({0: 1})
+    walls: list[Frame] = [(frozenset({3}), (2.0, 2.0, 6.0, 5.0))]
+    for frames in (walls, []):
+        found = route_all(edges, centres, frames=frames, images=images)
+        assert found[1] == tuple((0.0 - x, y) for x, y in found[0])
+        assert not Walls(frames, 4).entered([found[1]], [(0, 2)])[0]
+        assert Obstacles(centres).clearance(found[1], (0, 2)) >= TOUCH
+        bent = {0: kink((0, 0), (-7, 1), (-6, 9)), 1: kink((0, 0), (7, 1), (6, 9))}
+        better = improved(Drawn(edges, centres, bent, frames, images=images), {0}).get(1, bent[1])
+        assert not Walls(frames, 4).entered([better], [(0, 2)])[0]
+        assert Obstacles(centres).clearance(better, (0, 2)) >= TOUCH
 
 
 def test_a_route_that_may_not_be_gives_way_to_the_next(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -233,6 +233,15 @@ class Drawn:
         other = self.images.of.get(i, i)
         return (i,) if other == i else (i, other)
 
+    def entered(self, i: int, route: Route) -> int:
+        """How many frames a route enters that hold neither end of this edge."""
+        line, foreign = polylines([route]), self.walls.foreign(self.edges[i].source, self.edges[i].target)
+        return int(meet(line.a, line.b, self.rects[foreign]).any(axis=0).sum())
+
+    def too_close(self, i: int, route: Route) -> float:
+        """By how much a route of this edge is too close to a foreign disc, if it is more than 0."""
+        return TOUCH + _SLACK - self.obstacles.clearance(route, (self.edges[i].source, self.edges[i].target))
+
     def draw(self, i: int, route: Route) -> None:
         """Give an edge another route, and its mirror image the reflection of it."""
         self._draw(i, route)
@@ -302,18 +311,17 @@ class RouteCost:
 
     def trespasses(self, route: Route) -> bool:
         """Whether a route enters more foreign frames than the present one, is too close to a disc by more, both
-        measured exactly, or crosses more; an arc between images goes to its side, whatever it crosses."""
-        line = polylines([route])
-        entered, close = self._entered(line), self._too_close(route)
-        if (entered and entered > self._entered(self._present)) or (close > 0 and close > self._too_close(self.route)):
-            return True
-        return not self._drawn.even(self.edge) and self._crossed(line) > self._crossed(self._present)
-
-    def _entered(self, line: Polylines) -> int:
-        return int(meet(line.a, line.b, self._foreign).any(axis=0).sum())
-
-    def _too_close(self, route: Route) -> float:
-        return TOUCH + _SLACK - self._drawn.obstacles.clearance(route, self._own)
+        measured exactly and of its mirror image as well, or crosses more; an arc between images goes to its side,
+        whatever it crosses."""
+        drawn = self._drawn
+        for edge in drawn.both(self.edge):
+            now, then = drawn.routes[edge], route
+            if edge != self.edge:
+                then = drawn.images.reflected(route, drawn.edges[edge], drawn.centres)
+            entered, close = drawn.entered(edge, then), drawn.too_close(edge, then)
+            if (entered and entered > drawn.entered(edge, now)) or (close > 0 and close > drawn.too_close(edge, now)):
+                return True
+        return not drawn.even(self.edge) and self._crossed(polylines([route])) > self._crossed(self._present)
 
     def _crossed(self, line: Polylines) -> float:
         return float(line.crossed(self._a, self._b)[0])

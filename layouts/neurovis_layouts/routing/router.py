@@ -79,7 +79,7 @@ def route_all(
     most = _MOST_AROUND if waypoints is None else _MOST_AROUND_PLANNED
     detours = detoured(edges, centres, routes, obstacles, walls, ways, drawn, most)
     routes.update((i, way) for i, way in detours.items() if within is None or united([bounds(way), within]) == within)
-    images = images or Images()
+    images = _led(images or Images(), routes, edges, centres, obstacles, walls)
     routes.update(images.kept(routes, edges, centres))
     routes.update((i, route) for i, route in (there or {}).items() if i in routes)
     free = set(routes) - (there or {}).keys() - {image for i, image in images.of.items() if image != i}
@@ -90,6 +90,34 @@ def route_all(
     routes.update(looped)
     routes.update(images.kept(looped, edges, centres))
     return [routes[i] for i in range(len(edges))]
+
+
+def _led(
+    images: Images,
+    routes: Mapping[int, Route],
+    edges: Sequence[LayoutEdge],
+    centres: Sequence[Point],
+    obstacles: Obstacles,
+    walls: Walls,
+) -> Images:
+    """The same images, of which the second is drawn and the first is its reflection where that is the only way in which
+    both are clear: not everything that is in the way has an image itself."""
+
+    def in_the_way(images: Images) -> set[int]:
+        found = images.kept(routes, edges, centres)
+        ways, own = list(found.values()), [(edges[i].source, edges[i].target) for i in found]
+        over, entered = obstacles.run_over(ways, own), walls.entered(ways, own)
+        return {i for i, *unclear in zip(found, over, entered, strict=True) if any(unclear)}
+
+    first = in_the_way(images)
+    if not first:
+        return images
+    second = in_the_way(Images({image: i for i, image in images.of.items()}, images.twice))
+    of = {}
+    for pair in images.of.items():
+        one, other = pair if first.isdisjoint(pair) or not second.isdisjoint(pair) else pair[::-1]
+        of[one] = other
+    return Images(of, images.twice)
 
 
 def _runs_along(edge: LayoutEdge, centres: Sequence[Point]) -> bool:
