@@ -45,7 +45,7 @@ class Composer:
     def __init__(self, problem: LayoutProblem) -> None:
         """Raises LayoutRefusalError where a mirror pairs what cannot be mirror images."""
         self._book = Book(problem)
-        self._kinds: dict[tuple[int, Direction, ShapeKey], Drawing] = {}
+        self._kinds: dict[tuple[int, Direction, ShapeKey, bool], Drawing] = {}
         self._shape = Shape()
         #: what can be folded, and into how many bands or rows
         self._folds: dict[Fold, range] = {}
@@ -84,12 +84,12 @@ class Composer:
                 free.update(zip(module.members, map(way.point, drawing.places), strict=True))
         return with_origins(problem, free, problem.direction in ("up", "left"))
 
-    def kind(self, number: int, direction: Direction) -> Drawing:
+    def kind(self, number: int, direction: Direction, routed: bool = True) -> Drawing:
         """The drawing of a kind of instance in a direction, in the frame of an engine that draws in it."""
         problem = self._book.problem_of(number)
-        key = number, direction, self._shape.of(number, problem)
+        key = number, direction, self._shape.of(number, problem), routed
         if key not in self._kinds:
-            self._kinds[key] = self.compose(replace(problem, direction=direction), kind=number)
+            self._kinds[key] = self.compose(replace(problem, direction=direction), routed, number)
         return self._kinds[key]
 
     def compose(self, problem: LayoutProblem, routed: bool = True, kind: int = WHOLE) -> Drawing:
@@ -129,7 +129,7 @@ class Composer:
         columns: AbstractSet[int] = frozenset(),
     ) -> _Standing:
         """Where everything stands with these parts; ``known`` are boxes that are drawn already."""
-        pieces = [self._piece(problem, part, problem.direction, parts, known) for part in parts]
+        pieces = [self._piece(problem, parts, known, True, part, problem.direction) for part in parts]
         kin: dict[str, int] = {}
         families: dict[tuple[str, int], list[int]] = {}
         for number, piece in enumerate(pieces, len(problem.groups)):
@@ -175,13 +175,10 @@ class Composer:
 
     def _on_page(self, problem: LayoutProblem, pair: Mapping[int, int], routed: bool, kind: int) -> Drawing:
         """The drawing of a problem whose cells say what stands in which row and column."""
-        known: dict[tuple[Part, Direction], Piece] = {}
-
-        def drawn(part: Part, direction: Direction) -> Piece:
-            return self._piece(problem, part, direction, parts, known)
-
         parts, where = parts_by_cell(problem, pair)
-        pieces = facing(problem, parts, where, pair, drawn, self._upright(kind))
+        # routes, which cost most, are drawn once it is known how each part is turned
+        sketched, drawn = (partial(self._piece, problem, parts, {}, routed) for routed in (False, True))
+        pieces = facing(problem, parts, where, pair, sketched, drawn, self._upright(kind))
         plan = ComponentLayout()
         for piece, move in pieces:
             plan.places.update(zip(piece.part.members, map(move.point, piece.drawing.places), strict=True))
@@ -197,19 +194,21 @@ class Composer:
     def _piece(
         self,
         problem: LayoutProblem,
-        part: Part,
-        direction: Direction,
         parts: Sequence[Part],
         known: dict[tuple[Part, Direction], Piece],
+        routed: bool,
+        part: Part,
+        direction: Direction,
     ) -> Piece:
-        """One of the parts, drawn in a direction, or as it is ``known``; a mirror image as what it is the image of."""
+        """One of the parts, drawn in a direction, ``routed`` or not, or as it is ``known``; a mirror image as what it
+        is the image of."""
         lead = parts[part.image_of] if part.image_of >= 0 else part
         key = lead, direction
         if key not in known:
             if lead.kind >= 0:
-                drawing = self.kind(lead.kind, direction)
+                drawing = self.kind(lead.kind, direction, routed)
             else:
-                drawing = self.compose(replace(_boxed(problem, lead), direction=direction), kind=NONE)
+                drawing = self.compose(replace(_boxed(problem, lead), direction=direction), routed, NONE)
             known[key] = piece_of(lead, in_direction(drawing, direction, problem.direction))
         return replace(known[key], part=part)
 

@@ -143,13 +143,15 @@ def facing(
     parts: Sequence[Part],
     where: Mapping[int, int],
     pair: Mapping[int, int],
+    sketched: Drawn,
     drawn: Drawn,
     upright: bool,
 ) -> list[tuple[Piece, Move]]:
-    """Each part in the direction, and as the mirror image, in which the connections between parts are short and the
-    page has its proportions, and where it stands. Copies of one instance are drawn in one direction, so that they are
-    alike. ``upright``: nothing turns the whole upside down, and frames keep room for titles on their upper sides alone.
-    Raises LayoutRefusalError where mirror images do not stand in mirrored cells."""
+    """Each part ``drawn`` in the direction, and as the mirror image, in which, as ``sketched`` without routes, the
+    connections between parts are short and the page has its proportions, and where it stands. Copies of one instance
+    are drawn in one direction, so that they are alike. ``upright``: nothing turns the whole upside down, and frames
+    keep room for titles on their upper sides alone. Raises LayoutRefusalError where mirror images do not stand in
+    mirrored cells."""
     _check_mirrors(problem, parts, where, pair)
     slots = _slots(problem, parts, where)
     owner = {m: k for k, part in enumerate(parts) for m in part.members}
@@ -159,10 +161,10 @@ def facing(
     for k, part in enumerate(parts):
         if part.image_of < 0:
             makes.setdefault((part.kind, -1 if part.kind >= 0 else k), []).append(k)
-    directions = {own[0]: _directions(problem, parts[own[0]], pair, drawn) for own in makes.values()}
+    directions = {own[0]: _directions(problem, parts[own[0]], pair, sketched) for own in makes.values()}
     column = {k: slot.across for slot in slots for line in slot.lines for k in line}
 
-    def stood(shape: _Shape) -> list[tuple[Piece, Move]]:
+    def stood(shape: _Shape, drawn: Drawn) -> list[tuple[Piece, Move]]:
         pieces = [drawn(part, turn) for part, turn in zip(parts, shape.turns, strict=True)]
         if upright:
             pieces = [piece.titled_above(flip) for piece, flip in zip(pieces, shape.flips, strict=True)]
@@ -172,7 +174,7 @@ def facing(
     def cost(shape: _Shape) -> float:
         """How large the page is, how long straight lines between the ends of connections from part to part are
         together, how often they cross and run over discs, and how far the whole page is from its proportions."""
-        moved = stood(shape)
+        moved = stood(shape, sketched)
         at: dict[int, Point] = {}
         for piece, move in moved:
             at.update(zip(piece.part.members, map(move.point, piece.drawing.places), strict=True))
@@ -188,7 +190,7 @@ def facing(
     def flipped(shape: _Shape, own: Sequence[int]) -> _Shape:
         """These parts drawn as their mirror images, all of one column, where that costs less."""
         lead = parts[own[0]]
-        if drawn(lead, shape.turns[own[0]]).drawing.fixed or symmetric(lead.members, pair):
+        if sketched(lead, shape.turns[own[0]]).drawing.fixed or symmetric(lead.members, pair):
             return shape
         for across in dict.fromkeys(column[k] for k in own):
             other = shape.flipped(both([k for k in own if column[k] == across]))
@@ -218,7 +220,7 @@ def facing(
         for own in makes.values():
             start = start.turned(both(own), direction) if direction in directions[own[0]] else start
         starts.append(start)
-    return stood(min(map(settled, dict.fromkeys(starts)), key=cost))
+    return stood(min(map(settled, dict.fromkeys(starts)), key=cost), drawn)
 
 
 @dataclass(frozen=True, slots=True)
