@@ -92,7 +92,7 @@ def _closed(found: Folds) -> Folds:
 
 
 def _free(problem: LayoutProblem, units: Sequence[Unit], bonds: Sequence[int], pair: Mapping[int, int]) -> set[int]:
-    """Frames that nobody asked to be on a line, and that do not stand on the axis."""
+    """Frames that nobody asked to be on a line, and that stand in no stairs and not on the axis."""
     lines = {m for line in problem.align for m in line}
     bound = {bond for unit, bond in zip(units, bonds, strict=True) if unit.lift or lines.intersection(unit.members)}
     return {

@@ -143,9 +143,10 @@ class Composer:
         behind: list[tuple[int, int]] = []
         lines = {m for line in problem.align for m in line}
         held = {piece.part.kind for piece in pieces if lines.intersection(piece.part.members)}
-        drives = driven(problem, units, families.values())
-        for ((_, make), family), apart in zip(families.items(), drives, strict=True):
-            apart = apart and not pair.keys().isdisjoint(family)
+        images = {key: family for key, family in families.items() if not pair.keys().isdisjoint(family)}
+        chains = dict(zip(images, driven(problem, units, images.values()), strict=True))
+        for key, family in families.items():
+            make, apart = key[1], chains.get(key, False)
             if make not in held:
                 tries = self._folds.get((kind, make), range(2, 2))
                 self._folds[kind, make] = range(1 if apart else tries.start, max(len(family) + 1, tries.stop))
