@@ -14,6 +14,7 @@ import neurovis_spec as nv
 from neurovis_spec import pipeline
 from neurovis_spec.scene import Disc, Text
 from neurovis_spec.scene.beside import placed
+from neurovis_spec.scene.labels import _among_own
 from neurovis_spec.scene.spots import Field, Slot, Wanted
 from neurovis_spec.scene.texts import shorten, width
 
@@ -208,6 +209,20 @@ def test_a_number_stands_alone_only_among_its_own(mixed: bool) -> None:
     alone = [name for name, text in found.items() if text.text.isdecimal()]
     assert bool(alone) is not mixed
     assert "Basketcell1" not in alone  # at the end of the row there is room
+
+
+@given(st.lists(st.tuples(*[st.integers(0, 9)] * 2, st.integers(0, 2)), max_size=12), st.sampled_from([1, 7]))
+def test_who_stands_among_its_own_is_found_however_far_these_are(discs: list[tuple[int, int, int]], far: int) -> None:
+    places, group = np.array([disc[:2] for disc in discs], float).reshape(-1, 2) * far, [own for *_, own in discs]
+
+    def among_own(index: int) -> bool:
+        others = [k for k in range(len(discs)) if k != index]
+        near = sorted((math.dist(places[k], places[index]), group[k] != group[index]) for k in others)[:2]
+        return len(near) == 2 and not any(foreign for _, foreign in near)
+
+    every = np.arange(len(discs), dtype=np.int64)
+    found = _among_own(places, np.array(group, dtype=np.int64), every)
+    assert sorted(found.tolist()) == [index for index in every.tolist() if among_own(index)]
 
 
 def test_names_that_find_no_room_in_a_reduced_picture_are_cut() -> None:

@@ -15,9 +15,9 @@ from typing import Literal
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.layout.geometry import Rect
+from neurovis_spec.layout.geometry import Cells, Rect
 from neurovis_spec.layout.labels import (
     ASIDE,
     BESIDE,
@@ -244,15 +244,27 @@ def _told_alone(network: Network, ground: Ground, chosen: Sequence[int]) -> froz
     for number, own in enumerate(network.neurons.groups):
         group[own.start : own.start + own.count] = number
     told, shown = told_by_number(network.neurons), np.array(chosen, np.int64)
-    found = []
-    for index in chosen:
-        if told[index] and ground.radius(index) >= _SMALLEST_DISC:
-            away = np.hypot(*(ground.places[shown] - ground.places[index]).T).round(6)
-            own = group[shown] == group[index]
-            nearest = np.lexsort((~own, away))[1:3]  # itself is the first
-            if len(nearest) == 2 and own[nearest].all():
-                found.append(index)
-    return frozenset(found)
+    numbered = np.array([told[index] and ground.radius(index) >= _SMALLEST_DISC for index in chosen], np.bool_)
+    among = _among_own(ground.places[shown], group[shown], np.flatnonzero(numbered))
+    return frozenset(shown[among].tolist())
+
+
+def _among_own(places: FloatArray, group: IntArray, asked: IntArray) -> IntArray:
+    """Which of the places ``asked``, of all (n, 2), have two of their ``group`` (n,) next to them; of equally near ones
+    those of the group are nearer."""
+    found: list[IntArray] = []
+    far, reach = float(np.ptp(places, axis=0).max()) if len(places) else 0.0, 1.0
+    while len(asked):
+        row, other, squared = Cells(places, reach).near(places[asked])
+        away, foreign = np.sqrt(squared).round(6), group[other] != group[asked[row]]
+        near = np.flatnonzero((other != asked[row]) & (away < reach))
+        near = near[np.lexsort((foreign[near], away[near], row[near]))]
+        begin = np.searchsorted(row[near], np.arange(len(asked) + 1))
+        decided = np.diff(begin) >= 2
+        first = begin[:-1][decided]
+        found.append(asked[decided][~(foreign[near[first]] | foreign[near[first + 1]])])
+        asked, reach = asked[~decided] if reach <= 2 * far else asked[:0], 2 * reach
+    return np.concatenate(found) if found else asked
 
 
 def _lines(network: Network, ground: Ground, chosen: Sequence[int]) -> dict[int, int]:
