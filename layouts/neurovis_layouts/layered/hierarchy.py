@@ -47,7 +47,8 @@ class Composer:
         self._book = Book(problem)
         self._kinds: dict[tuple[int, Direction, ShapeKey, bool], Drawing] = {}
         self._shape = Shape()
-        #: what can be folded, and into how many bands or rows
+        #: whether anything can be folded; what, and into how many bands or rows
+        self._folding = False
         self._folds: dict[Fold, range] = {}
 
     def whole(self, routed: bool = True) -> Drawing:
@@ -55,7 +56,8 @@ class Composer:
         do with it. Raises LayoutRefusalError for what cannot be met."""
         problem = self._book.whole()
         problem = replace(problem, pins=self._with_origins(problem))
-        if may_be_folded(problem):
+        self._folding = may_be_folded(problem)
+        if self._folding:
             self._shape = compact(problem, self._in_shape, self._folds)
         return self.compose(problem, routed)
 
@@ -144,6 +146,7 @@ class Composer:
         lines = {m for line in problem.align for m in line}
         held = {piece.part.kind for piece in pieces if lines.intersection(piece.part.members)}
         images = {key: family for key, family in families.items() if not pair.keys().isdisjoint(family)}
+        images = images if self._folding else {}  # columns that nothing folds would be towers
         chains = dict(zip(images, driven(problem, units, images.values()), strict=True))
         for key, family in families.items():
             make, apart = key[1], chains.get(key, False)
