@@ -7,12 +7,14 @@ and below it: the rows beside a high one are no farther apart. What has room to 
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from neurovis_layouts.alike import Move, shifted_by
 from neurovis_layouts.layered.drawing import Piece, brought
+from neurovis_spec.layout import FloatArray
 from neurovis_spec.layout.geometry import Rect, bounds, padded, sampled, shifted, snap, united
 from neurovis_spec.layout.model import RADIUS, LayoutProblem, Point
 
@@ -71,27 +73,21 @@ def placed(
     return moves
 
 
-def _streets(
-    problem: LayoutProblem, slots: Sequence[Slot], pieces: Sequence[Piece], street: float
-) -> list[list[float]]:
+def _streets(problem: LayoutProblem, slots: Sequence[Slot], pieces: Sequence[Piece], street: float) -> FloatArray:
     """How far apart every two cells are at least: as neurons in a rank, but as ranks where neither is a frame and one
     holds several neurons, so that it is seen what they hold, or something leads from the one to the other, so that its
     arrow is seen."""
     slot_of = {k: number for number, slot in enumerate(slots) for line in slot.lines for k in line}
     owner = {m: slot_of[k] for k, piece in enumerate(pieces) for m in piece.part.members if not piece.framed}
-    wide = max(street, problem.rank_spacing)
-    held = Counter(owner.values())
-    streets = [
-        [
-            wide if one in held and other in held and held[one] + held[other] > 2 else street
-            for other in range(len(slots))
-        ]
-        for one in range(len(slots))
-    ]
+    wide, held = max(street, problem.rank_spacing), np.zeros(len(slots))
+    for slot in owner.values():
+        held[slot] += 1
+    both = (held[:, None] > 0) & (held > 0)
+    streets = np.where(both & (held[:, None] + held > 2), wide, street)
     for edge in problem.edges:
         one, other = owner.get(edge.source, -1), owner.get(edge.target, -1)
         if min(one, other) >= 0 and one != other:
-            streets[one][other] = streets[other][one] = wide
+            streets[one, other] = streets[other, one] = wide
     return streets
 
 
@@ -146,7 +142,7 @@ def _axis(
     spans: Sequence[tuple[range, range]],
     rooms: Sequence[_Room],
     count: int,
-    streets: Sequence[Sequence[float]],
+    streets: FloatArray,
     rows: bool,
     even: bool,
 ) -> dict[range, float]:
@@ -167,8 +163,8 @@ def _axis(
         ends[span] = max(known[0], before), max(known[1], behind)
 
     for i in range(count - 1):
-        apart(range(i, i + 1), range(i + 1, i + 2), streets[0][0])
-    for k, (span, room) in enumerate(zip(spans, rooms, strict=True)):
+        apart(range(i, i + 1), range(i + 1, i + 2), float(streets[0, 0]))
+    for span, room in zip(spans, rooms, strict=True):
         own = span[axis]
         reaching(own, -room.whole[axis], room.whole[axis + 2])
         if even:
@@ -176,18 +172,36 @@ def _axis(
         if len(own) > 1:
             apart(own[:1], own, 0.0)
             apart(own, own[-1:], 0.0)
-        for other, beside, street in zip(spans, rooms, streets[k], strict=True):
-            if own.stop <= other[axis].start:
-                far = room.whole[axis + 2] - beside.whole[axis]
-                if rows and not set(span[1 - axis]) & set(other[1 - axis]):
-                    far = room.centres[axis + 2] - beside.centres[axis]
-                apart(own, other[axis], far + street)
+    for (one, other), far in _least(axis, spans, rooms, streets, rows).items():
+        apart(one, other, far)
     low = _reached({span: before for span, (before, _) in ends.items()}, least)
     high = _reached(
         {span: behind for span, (_, behind) in ends.items()}, {(b, a): far for (a, b), far in least.items()}
     )
     middle = {span: (low[span] - high[span]) / 2 for span in ends}
     return {span: (at - middle[_image(span, count)]) / 2 if even else at for span, at in middle.items()}
+
+
+def _least(
+    axis: int, spans: Sequence[tuple[range, range]], rooms: Sequence[_Room], streets: FloatArray, rows: bool
+) -> dict[tuple[range, range], float]:
+    """How far apart two spans are at least of which one is before the other."""
+    own = list(dict.fromkeys(span[axis] for span in spans))
+    number = np.array([own.index(span[axis]) for span in spans])
+    start, stop = np.array([[(s.start, s.stop) for s in span] for span in spans]).T
+    (low, high), (first, last) = (
+        np.array([(rect[axis], rect[axis + 2]) for rect in rects]).T
+        for rects in ([room.whole for room in rooms], [room.centres for room in rooms])
+    )
+    far = high[:, None] - low
+    if rows:
+        other = 1 - axis
+        beside = (start[other][:, None] < stop[other]) & (start[other] < stop[other][:, None])
+        far = np.where(beside, far, last[:, None] - first)
+    one, two = np.nonzero(stop[axis][:, None] <= start[axis])
+    least = np.full((len(own), len(own)), -np.inf)
+    np.maximum.at(least, (number[one], number[two]), (far + streets)[one, two])
+    return {(own[a], own[b]): float(least[a, b]) for a, b in np.argwhere(least > -np.inf).tolist()}
 
 
 def _image(span: range, count: int) -> range:
