@@ -90,3 +90,21 @@ def test_a_ring_of_instances_comes_near_to_a_page() -> None:
     layout = nv.compile_text(text.partition("render")[0]).layout()
     xs, ys = zip(*layout.positions.values(), strict=True)
     assert (max(xs) - min(xs) + 1) / (max(ys) - min(ys) + 1) < 2
+
+
+@pytest.mark.parametrize(("wide", "high"), [(1600, 400), (400, 1600)])
+def test_mirrored_chains_stand_as_the_page_that_is_asked_for(wide: int, high: int) -> None:
+    chain = ", ".join(f"{side}{k}.O -> {side}{k + 1}.O: 1" for side in "lr" for k in range(1, 4))
+    text = f"""
+neurovis: 1
+name: chains
+modules: {{u: {{neurons: {{O: {{}}, M: {{}}}}, connections: {{O -> M: 1}}}}}}
+instances: {{l: {{module: u, count: 4}}, r: {{module: u, count: 4}}}}
+neurons: {{D: {{bias: 1}}}}
+connections: {{{chain}, D -> l1.O + r1.O: 1}}
+layout: {{mirror: [[l, r]]}}
+render: {{size: [{wide}, {high}]}}
+"""
+    layout = nv.compile_text(text).layout()
+    xs, ys = zip(*layout.positions.values(), strict=True)
+    assert (max(xs) - min(xs) > max(ys) - min(ys)) == (wide > high)

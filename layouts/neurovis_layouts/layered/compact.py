@@ -9,11 +9,17 @@ are tried as drafts, which show how large the whole becomes; only the one that i
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
+from operator import itemgetter
 from typing import TypeAlias
 
+import numpy as np
+
 from neurovis_layouts.layered.drawing import Drawing
+from neurovis_layouts.layered.straight_lines import crossings, unrelated
+from neurovis_spec.layout import IntArray
 from neurovis_spec.layout.geometry import distance
 from neurovis_spec.layout.model import Direction, LayoutProblem
 
@@ -31,6 +37,9 @@ _ASKED, _ROWS, _BANDS = 0.9, 0.6, 0.5
 _EACH = 0.9
 #: What it costs if all connections run back: one in ten is worth twice the page.
 _BACK = 10.0
+#: What it costs if each connection is crossed once, as straight lines would be: half of the page (with 1: a ring of
+#: instances stays in one row, as lines to a second one would cross).
+_CROSSING = 0.5
 #: So many numbers of bands one after the other are tried in vain.
 _IN_VAIN = 2
 #: In no more bands or rows than this, nor more neurons and connections.
@@ -84,24 +93,30 @@ def may_be_folded(problem: LayoutProblem) -> bool:
 
 def compact(problem: LayoutProblem, drawn: Drawn, folds: Mapping[Fold, range]) -> Shape:
     """The shape that costs least. ``folds`` says, once it has been drawn, what can be folded, and into how many bands
-    or rows. Bands are tried first: in rows mirrored instances that drive one another stand side by side, where more
-    lines cross than where they stand behind each other."""
+    or rows. The one may leave no room for the other: bands are tried first, and rows."""
     shape = Shape(draft=True)
     drawing = drawn(problem, shape)
     size = _size(drawing, problem.direction)
     free = int(problem.aspect is None or not problem.modules)
     if stretched(problem, *size) < _STRETCHED[free] or max(size) < _SHORT[free]:
         return Shape()
-    first = least = _cost(problem, drawing)
-    for fold in sorted(folds, key=lambda fold: (fold[1] != RANKS, fold)):
-        least, shape = _folded(problem, drawn, fold, folds[fold], least, shape)
+    lines = [(edge.source, edge.target) for edge in problem.edges]
+    cost = partial(_cost, problem, lines, unrelated(lines))
+    first = cost(drawing)
+    tried: list[tuple[float, Shape]] = []
+    for rows_first in (False, True):
+        found = first, shape
+        for fold in sorted(folds, key=lambda fold: ((fold[1] == RANKS) == rows_first, fold)):
+            found = _folded(lambda shape: cost(drawn(problem, shape)), fold, folds[fold], *found)
+        tried.append(found)
+    least, shape = min(tried, key=itemgetter(0))
     bands = any(what == RANKS and count > 1 for (_, what), count in shape.counts.items())
     worth = (_BANDS if bands else _ROWS) if free else _ASKED
     return replace(shape, draft=False) if least < worth * first else Shape()
 
 
 def _folded(
-    problem: LayoutProblem, drawn: Drawn, fold: Fold, counts: range, least: float, shape: Shape
+    cost: Callable[[Shape], float], fold: Fold, counts: range, least: float, shape: Shape
 ) -> tuple[float, Shape]:
     """The least cost, and the shape that has it, with any of these numbers of bands or rows of one kind; once more have
     been no better for some times, even more are not tried."""
@@ -110,7 +125,7 @@ def _folded(
         if count > _MOST_FOLDS:
             break
         other = shape.changed(fold, count)
-        now = _cost(problem, drawn(problem, other))
+        now = cost(other)
         vain += 1
         if now < _EACH * best:
             best, found, vain = now, other, 0
@@ -130,11 +145,15 @@ def stretched(problem: LayoutProblem, wide: float, high: float) -> float:
     return max(wide / (problem.page * high), problem.page * high / wide)
 
 
-def _cost(problem: LayoutProblem, drawing: Drawing) -> float:
+def _cost(
+    problem: LayoutProblem, lines: Sequence[tuple[int, int]], apart: tuple[IntArray, IntArray], drawing: Drawing
+) -> float:
     """How large a page is that holds a drawing, times how long straight lines between the ends of its connections
-    are, times what those cost that run back."""
+    are, times what those cost that run back, times what it costs that these lines cross."""
     wide, high = _size(drawing, problem.direction)
     page = max(wide, problem.page * high) ** 2
-    lengths = [distance(drawing.places[edge.source], drawing.places[edge.target]) for edge in problem.edges]
-    back = sum(drawing.places[edge.source][1] > drawing.places[edge.target][1] for edge in problem.edges)
-    return page * math.fsum(lengths) * (1 + _BACK * back / max(1, len(problem.edges)))
+    ends = np.array([(drawing.places[a], drawing.places[b]) for a, b in lines], dtype=np.float64).reshape(-1, 2, 2)
+    length = math.fsum(distance(drawing.places[a], drawing.places[b]) for a, b in lines)
+    back = sum(drawing.places[a][1] > drawing.places[b][1] for a, b in lines)
+    many = max(1, len(lines))
+    return page * length * (1 + _BACK * back / many) * (1 + _CROSSING * crossings(ends, *apart) / many)

@@ -23,9 +23,8 @@ from neurovis_layouts.layered.compact import stretched
 from neurovis_layouts.layered.drawing import Drawing, Piece
 from neurovis_layouts.layered.parts import Part, imaged, part_of_module, symmetric
 from neurovis_layouts.layered.plan_places import Slot, placed
-from neurovis_layouts.routing.obstacles import REACH
-from neurovis_spec.layout import FloatArray, IntArray
-from neurovis_spec.layout.geometry import Rect, crossing, squared_distances, united
+from neurovis_layouts.layered.straight_lines import crossings, run_over, unrelated
+from neurovis_spec.layout.geometry import Rect, united
 from neurovis_spec.layout.model import Direction, LayoutProblem, LayoutRefusalError, Point, Seat
 
 #: A part drawn in a direction, with the frame around it.
@@ -38,8 +37,8 @@ _ROUNDS = 3
 #: the area where ranks are farther apart), and to cross a line or to run over a disc.
 _SIDE, _CROSSING = 10.0, 4.0
 #: What all crossings cost at most, by the length of all lines: layers that are fully connected face each other, though
-#: they cross less where one is turned away. Of more lines than so many neither crossings nor discs are counted.
-_CROSSED, _MOST = 2.0, 300
+#: they cross less where one is turned away.
+_CROSSED = 2.0
 #: What is no longer than this, in units of the layout, may have any proportions.
 _SMALL = 8.0
 _DIRECTIONS: tuple[Direction, ...] = ("down", "up", "right", "left")
@@ -156,7 +155,7 @@ def facing(
     slots = _slots(problem, parts, where)
     owner = {m: k for k, part in enumerate(parts) for m in part.members}
     between = [(e.source, e.target) for e in problem.edges if owner[e.source] != owner[e.target]]
-    apart = _apart(between)
+    apart = unrelated(between)
     makes: dict[tuple[int, int], list[int]] = {}
     for k, part in enumerate(parts):
         if part.image_of < 0:
@@ -182,8 +181,8 @@ def facing(
         wide, high = (x1 - x0, y1 - y0) if problem.direction in ("down", "up") else (y1 - y0, x1 - x0)
         lines = np.array([(at[a], at[b]) for a, b in between], dtype=np.float64).reshape(-1, 2, 2)
         length = float(np.sqrt(((lines[:, 1] - lines[:, 0]) ** 2).sum(axis=1)).sum())
-        met = min(_CROSSING * _crossings(lines, *apart), _CROSSED * length)
-        met += _CROSSING * _over(lines, np.array([at[i] for i in range(len(at))]))
+        met = min(_CROSSING * crossings(lines, *apart), _CROSSED * length)
+        met += _CROSSING * run_over(lines, np.array([at[i] for i in range(len(at))]))
         page = math.sqrt(stretched(problem, wide, high)) if max(wide, high) > _SMALL else 1.0
         return (_SIDE * math.sqrt(wide * high) + length + met) * page
 
@@ -235,30 +234,6 @@ class _Shape:
 
     def flipped(self, own: AbstractSet[int]) -> _Shape:
         return replace(self, flips=tuple(flip != (k in own) for k, flip in enumerate(self.flips)))
-
-
-def _apart(lines: Sequence[tuple[int, int]]) -> tuple[IntArray, IntArray]:
-    """Every two lines that have no end in common; none where they are too many to be followed."""
-    one, other = np.triu_indices(len(lines) if len(lines) <= _MOST else 0, 1)
-    ends = np.array(lines, dtype=np.int64).reshape(-1, 2)
-    shared = (ends[one][:, :, None] == ends[other][:, None, :]).any(axis=(1, 2))
-    return one[~shared], other[~shared]
-
-
-def _crossings(lines: FloatArray, one: IntArray, other: IntArray) -> int:
-    """How many of these pairs of straight lines (n, 2, 2) cross."""
-    (a, b), (c, d) = lines[one].transpose(1, 2, 0), lines[other].transpose(1, 2, 0)
-    return int(crossing(*a, *(b - a), *c, *(d - c))[1].sum())
-
-
-def _over(lines: FloatArray, places: FloatArray) -> int:
-    """How many discs straight lines (n, 2, 2) run over, but for those at their ends."""
-    if len(lines) > _MOST:
-        return 0
-    x, y = (places[None] - lines[:, None, 0]).transpose(2, 0, 1)
-    dx, dy = (lines[:, 1] - lines[:, 0]).T[:, :, None]
-    over = squared_distances(x, y, dx, dy) < REACH * REACH
-    return int(over.sum()) - 2 * len(lines)
 
 
 def _directions(problem: LayoutProblem, part: Part, pair: Mapping[int, int], drawn: Drawn) -> tuple[Direction, ...]:
