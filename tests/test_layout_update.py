@@ -11,11 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_layout_pins import check_pins
 
+import neurovis_spec as nv
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.layout import Direction, Layout, LayoutProblem, LayoutRefusalError, Point
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.file import dump, parse
-from neurovis_spec.layout.problem import canonical
+from neurovis_spec.layout.problem import canonical, problem_of
 
 
 @dataclass(frozen=True)
@@ -157,3 +158,28 @@ def test_a_new_instance_is_drawn_like_those_whose_module_has_grown() -> None:
     once = lay_out_problem(more.problem(written(first)), "layered")
     check_pins(more.problem(), once)
     assert once.positions.items() >= first.positions.items()
+
+
+#: two half-centres, each with a mirror of its own, about the mirror of the whole
+PAIR = """
+neurovis: 1
+name: pair
+modules: {hc: {neurons: {F: {}, E: {}, M: {}}, connections: {F -> M: 1, E -> M: 1}, layout: {mirror: [[F, E]]}}}
+instances: {a: {module: hc}, b: {module: hc}}
+layout: {mirror: [[a, b]]}
+"""
+
+
+@pytest.mark.parametrize("moved", ["a", "b"])
+def test_the_image_of_what_was_moved_by_hand_takes_its_own_axis_along(moved: str) -> None:
+    problem = problem_of(nv.compile_text(PAIR).network)
+    first = lay_out_problem(problem, "layered")
+    by = -3.0 if moved == min("ab", key=lambda side: first.positions[f"{side}.M"][0]) else 3.0
+    edited = {n: (x + by if n.startswith(moved) else x, y) for n, (x, y) in first.positions.items()}
+    once = lay_out_problem(replace(problem, memory=written(replace(first, positions=edited))), "layered")
+    axis = first.positions["a.M"][0] + first.positions["b.M"][0]
+    for own, image in (("F", "F"), ("E", "E"), ("M", "M")):
+        x, y = once.positions[f"{moved}.{own}"]
+        assert (x, y) == edited[f"{moved}.{own}"]
+        assert once.positions[f"{'b' if moved == 'a' else 'a'}.{image}"] == (axis - x, y)
+    assert dump(lay_out_problem(replace(problem, memory=written(once)), "layered")) == dump(once)

@@ -46,14 +46,24 @@ class Memory:
         self._hand = _by_hand(problem, self.known, self.outer.values())
         #: twice where the axis of a scope stands, if a pair of it is known
         self.twice: dict[int, float] = {}
-        across = across_of(problem.direction)
-        for scope, pairs in pairs_by_axis(problem).items():
-            both = [(a, b) for a, b in pairs if a in self.known and b in self.known]
+        known = self.known
+        for scope, pairs in _outermost_first(problem):
+            both = [(a, b) for a, b in pairs if a in known and b in known]
             # what was moved by hand does not take the axis along, unless all was
             firm = [(a, b) for a, b in both if a not in self._hand or b not in self._hand]
             if both:
-                where = {**self.known, **self._hand} if firm else self.known
-                self.twice[scope] = twice_axis(firm or both, where, across)
+                where = {**known, **self._hand} if firm else known
+                self.twice[scope] = twice_axis(firm or both, where, across_of(problem.direction))
+                known = {**known, **self._followed(scope, both)}
+
+    def _followed(self, scope: int, pairs: Iterable[tuple[int, int]]) -> dict[int, Point]:
+        """The images of what was moved by hand, where they are then."""
+        mirror, found = reflection(across_of(self._problem.direction), self.twice[scope]), dict[int, Point]()
+        for pair in pairs:
+            for one, other in (pair, pair[::-1]):
+                if one in self._hand and other not in self._hand:
+                    found[other] = mirror.point(self.known[one])
+        return found
 
     def earlier(self, held: Mapping[int, Point], twice: Mapping[int, float]) -> Earlier:
         """Where neurons are wanted, with some ``held`` by pins, and axes at ``twice``, by their scopes."""
@@ -96,7 +106,7 @@ class Memory:
         """Mirror images made so; those that have to move. The image of what was ``put`` by hand is so, too."""
         across, followed, on_axis = across_of(self._problem.direction), set[int](), set[int]()
         bent = {i for own in self.outer.values() if not held.keys().isdisjoint(own) for i in own}
-        for scope, pairs in pairs_by_axis(self._problem).items():
+        for scope, pairs in _outermost_first(self._problem):
             mirror = reflection(across, twice.get(scope, 0.0))
             for a, b in pairs if scope in twice else ():
                 if {a, b} & (bent | held.keys()):
@@ -148,6 +158,11 @@ def routed_from(problem: LayoutProblem) -> dict[int, Point]:
             before.setdefault(edge.source, route[0])
             before.setdefault(edge.target, route[-1])
     return before
+
+
+def _outermost_first(problem: LayoutProblem) -> list[tuple[int, list[tuple[int, int]]]]:
+    """The pairs of mirror images by their scopes, those of the whole before those within instances."""
+    return sorted(pairs_by_axis(problem).items())
 
 
 def _by_hand(problem: LayoutProblem, now: Mapping[int, Point], outer: Iterable[frozenset[int]]) -> dict[int, Point]:
