@@ -40,10 +40,11 @@ _KIN = 2.4
 #: To run on others for a unit: as bad as a crossing, since they are one line there (without: 1059 instead of 828 cells
 #: that several lines share, and 456 crossings).
 ALONG = 1.5
-#: All that a line crosses and runs on costs no more than this together: one line of forty in a bundle is not followed
-#: by eye, and not worth a way round all of them (without: fully connected layers in boxes send lines round the whole
-#: picture, which a test holds that none goes; North graphs have 3 % fewer crossings).
-_CROWDED = 6.0
+#: All that the straight line between its ends would cross costs no more than this times its length, and each crossing
+#: less where that is many: one line of forty in a bundle is not followed by eye, and not worth a way round all of them
+#: (without: fully connected layers in boxes send lines round the whole picture, which a test holds that none goes;
+#: North graphs have 3 % fewer crossings).
+_CROWDED = 0.75
 #: To run on another between the same ends, times the share of the line that does: then one of the two is not seen at
 #: all (without: a sheaf of six between two neurons, which a test draws, is not told apart).
 _SAME = 12.0
@@ -308,6 +309,9 @@ class RouteCost:
         self._margins: FloatArray = walls.rects[foreign]
         self._foreign: FloatArray = drawn.rects[foreign]
         self._discs: FloatArray = np.delete(drawn.discs, self._own, axis=0)
+        crossed = float(polylines([straight(self.route[0], self.route[-1])]).crossed(self._a, self._b, self._weight)[0])
+        #: what crossings cost in the crowd that there is
+        self._price = min(1.0, _CROWDED * self._far / max(crossed, 1e-9))
 
     def trespasses(self, route: Route) -> bool:
         """Whether a route enters more foreign frames than the present one, is too close to a disc by more, both
@@ -397,9 +401,9 @@ class RouteCost:
     def _among_others(self, lines: Polylines) -> FloatArray:
         """(n,) what it costs to run on others and to cross them, their own images among them."""
         cells, owner = lines.cells()
-        others = ALONG * STEP * np.bincount(owner[_among(cells, self._cells)], minlength=len(lines))
-        others += lines.crossed(self._a, self._b, self._weight)
-        cost: FloatArray = _CROWDED * others / (_CROWDED + others)
+        cost: FloatArray = lines.crossed(self._a, self._b, self._weight)
+        cost += ALONG * STEP * np.bincount(owner[_among(cells, self._cells)], minlength=len(lines))
+        cost *= self._price
         if self._reflect:
             (low, high), axis = lines.extents(), self._drawn.images.twice / 2
             # only what reaches over the axis meets its own image
