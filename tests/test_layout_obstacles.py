@@ -70,3 +70,10 @@ def test_bows_found_together_are_those_found_one_by_one(centres: list[Point], da
         if clearance < REACH - 0.03:  # then the flattest, among others, is no better
             flat, _, _ = clear_bows([wish], Obstacles(()), MANY_TRIES, None)[0]
             assert obstacles.clearance(flat, wish.own) <= clearance
+
+
+@pytest.mark.parametrize("along", [100.3 + 0.2 * k for k in range(8)])
+def test_a_disc_beside_a_long_line_is_not_missed(along: float) -> None:
+    """Its points are no farther apart than those of a short one."""
+    line = straight((0.0, 0.0), (900.0, 120.0))
+    assert Obstacles([(along, along * 120 / 900 + 0.2)]).clearance(line, (-1, -1)) == pytest.approx(0.2, abs=0.01)

@@ -23,7 +23,7 @@ Rect: TypeAlias = tuple[float, float, float, float]
 _PER_UNIT = round(1 / GRID)
 _PI = 3.141592653589793
 #: How many points there are on a piece, and how many are made at once: so many stay in the processor's cache.
-_FEWEST, _MOST, _AT_ONCE = 4, 400, 1 << 14
+_FEWEST, _MOST, _AT_ONCE = 4, 4096, 1 << 14
 #: With at most so many cells for each place all of them are counted; more would fill the memory.
 _MOST_CELLS = 64
 
