@@ -584,3 +584,37 @@ def test_an_instance_that_something_was_put_on_gives_way_as_a_whole() -> None:
         way = {tuple(now.positions[name][k] - before.positions[name][k] for k in (0, 1)) for name in own}
         assert len(way) == 1
     assert lay_out_problem(replace(problem, memory=now), "layered").positions == now.positions
+
+
+TURNED = """\
+neurovis: 1
+name: turned
+modules:
+  joint: {neurons: {F: {bias: 1}, E: {bias: 1}}, connections: {F -> E: -1, E -> F: -1}, layout: {mirror: [[F, E]]}}
+  leg:
+    instances: {hip: {module: joint}, knee: {module: joint}}
+    neurons: {foot: {bias: 1}EXTRA}
+    connections: {hip.F -> knee.E: 1, hip.E -> knee.F: 1, foot -> hip.E: 1INNER}
+instances: {A: {module: leg}, B: {module: leg}}
+connections: {A.hip.F -> B.hip.F: 1}
+layout: {DIRECTIONplan: PLAN}
+"""
+
+
+@pytest.mark.parametrize("direction", ["", "direction: right, "])
+@pytest.mark.parametrize("plan", ["[[A], [B]]", "[[A, B]]"])
+def test_what_a_plan_turns_keeps_the_mirror_images_within_it(plan: str, direction: str) -> None:
+    """The axis of an instance is as its pairs stand, not along the direction of the page."""
+    text = TURNED.replace("PLAN", plan).replace("DIRECTION", direction)
+    earlier = nv.compile_text(text.replace("EXTRA", "").replace("INNER", ""))
+    later = nv.compile_text(text.replace("EXTRA", ", skin: {bias: 1}").replace("INNER", ", skin -> foot: 1"))
+    before, now = after(earlier, later)
+    assert now.positions.items() >= before.positions.items()
+    assert apart(now)
+    assert metrics(now, problem_of(later.network))["symmetry"] == 1
+    steps = {
+        tuple(abs(a - b) for a, b in zip(now.positions[f"{leg}.skin"], now.positions[f"{leg}.foot"], strict=True))
+        for leg in "AB"
+    }
+    assert len(steps) == 1
+    assert later.layout("layered", earlier=now).positions == now.positions

@@ -67,6 +67,19 @@ def reflection(across: int, twice: float) -> Move:
     return Move((-1.0, 1.0), (twice, 0.0)) if across == 0 else Move((1.0, -1.0), (0.0, twice))
 
 
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """The axis of a mirror: the coordinate ``across`` it (0: x, it is upright), and ``twice`` where it stands on that."""
+
+    across: int
+    twice: float = 0.0
+
+    @property
+    def mirror(self) -> Move:
+        """The reflection on it."""
+        return reflection(self.across, self.twice)
+
+
 def move_of(pairs: Sequence[tuple[Point, Point]]) -> Move | None:
     """The move that takes the first of each pair to the second; None where there is none.
 
@@ -96,9 +109,9 @@ class Alike:
         self,
         problem: LayoutProblem,
         placed: Mapping[int, Point],
-        twice: Mapping[int, float] = MappingProxyType({}),
+        axes: Mapping[int, Axis] = MappingProxyType({}),
     ) -> None:
-        """``twice`` where the axis of a scope stands, else it is where it is among what is placed."""
+        """``axes`` are those of scopes, as far as they are known; others are where they are among what is placed."""
         self._placed = placed
         self._makes: dict[str, list[LayoutModule]] = {}
         self._around: dict[int, list[tuple[LayoutModule, int]]] = {}
@@ -107,13 +120,12 @@ class Alike:
             for place, neuron in enumerate(module.members):
                 self._around.setdefault(neuron, []).append((module, place))
         self._images: dict[int, tuple[int, Move]] = {}
-        across = across_of(problem.direction)
         for scope, pairs in pairs_by_axis(problem).items():
             there = [(a, b) for a, b in pairs if a in placed and b in placed]
-            move = reflection(across, twice.get(scope, twice_axis(there, placed, across)))
-            for a, b in pairs if there or scope in twice else ():
-                self._images[a] = b, move
-                self._images[b] = a, move
+            axis = axes.get(scope) or axis_of(problem, scope, there, placed)
+            for a, b in pairs if there or scope in axes else ():
+                self._images[a] = b, axis.mirror
+                self._images[b] = a, axis.mirror
 
     def of(self, neuron: int) -> list[tuple[int, Move]]:
         """The neurons drawn like this one, itself first, each with the move from its place."""
@@ -166,6 +178,19 @@ def pairs_by_axis(problem: LayoutProblem) -> dict[int, list[tuple[int, int]]]:
     for mirror in problem.mirrors:
         found.setdefault(mirror.scope, []).extend(mirror.pairs)
     return found
+
+
+def axis_of(
+    problem: LayoutProblem, scope: int, pairs: Sequence[tuple[int, int]], where: Mapping[int, Point] | Sequence[Point]
+) -> Axis:
+    """The axis of a scope, by some of its pairs. That of the whole is along the direction. That of an instance is as
+    most of the pairs stand, since a plan of the page may have turned the instance; where these do not say, along the
+    direction, too."""
+    across = across_of(problem.direction)
+    steps = [(abs(where[a][0] - where[b][0]), abs(where[a][1] - where[b][1])) for a, b in pairs if scope >= 0]
+    votes = [sum(step[side] > _SLACK >= step[1 - side] for step in steps) for side in (0, 1)]
+    across = 1 - across if votes[1 - across] > votes[across] else across
+    return Axis(across, twice_axis(pairs, where, across))
 
 
 def twice_axis(pairs: Sequence[tuple[int, int]], where: Mapping[int, Point] | Sequence[Point], across: int) -> float:
