@@ -618,3 +618,45 @@ def test_what_a_plan_turns_keeps_the_mirror_images_within_it(plan: str, directio
     }
     assert len(steps) == 1
     assert later.layout("layered", earlier=now).positions == now.positions
+
+
+SIDES = """\
+neurovis: 1
+name: sides
+modules: {u: {neurons: {O: {}, L: {}, C: {}, M: {}EXTRA}, connections: {O -> L + C + M: 1, L -> C: -1}}}
+instances: {l: {module: u, count: 2}, r: {module: u, count: 2}}
+neurons: {D: {bias: 1}}
+connections:
+  l1.C -> l2.O: 1
+  r1.C -> r2.O: 1
+  l2.C -> r1.O: -1
+  r2.C -> l1.O: -1
+  D -> l1.O + l2.O + r1.O + r2.O: 1
+layout: {direction: DIRECTION, mirror: [[l, r]]}
+"""
+
+
+@pytest.mark.parametrize("direction", ["left", "right", "down"])
+def test_routes_beside_frames_that_have_grown_are_mirror_images(direction: str) -> None:
+    """Their titles are on top on both sides of an axis that runs across the page: what is clear of one may not be clear
+    of the other."""
+    text = SIDES.replace("DIRECTION", direction)
+    later = nv.compile_text(text.replace("EXTRA", ", Z: {bias: 1}"))
+    _, now = after(nv.compile_text(text.replace("EXTRA", "")), later)
+    problem = problem_of(later.network)
+    suite.check_mirror(now, problem)
+    assert not suite.through_frames(now, problem)
+    assert later.layout("layered", earlier=now).value == now
+
+
+@pytest.mark.parametrize("direction", ["left", "down"])
+@pytest.mark.parametrize("by", [-2.0, 0.5, 1.0])
+def test_routes_from_a_neuron_moved_along_the_axis_are_mirror_images(by: float, direction: str) -> None:
+    network = nv.compile_text(SIDES.replace("DIRECTION", direction).replace("EXTRA", ""))
+    before = network.layout("layered").value
+    (x, y), problem = before.positions["D"], problem_of(network.network)
+    moved = (x + by, y) if suite.across(problem) else (x, y + by)
+    now = network.layout("layered", earlier=replace(before, positions={**before.positions, "D": moved})).value
+    assert now.positions == {**before.positions, "D": moved}
+    suite.check_mirror(now, problem)
+    suite.check_routes(problem, now)

@@ -69,7 +69,7 @@ def reflection(across: int, twice: float) -> Move:
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """The axis of a mirror: the coordinate ``across`` it (0: x, it is upright), and ``twice`` where it stands on that."""
+    """The axis of a mirror: which coordinate is ``across`` it (0: x, it is upright), and ``twice`` where it stands."""
 
     across: int
     twice: float = 0.0
