@@ -13,6 +13,7 @@ import pytest
 from click.testing import CliRunner, Result
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from neurovis_layouts.alike import Alike
 from neurovis_layouts.occupancy import Occupancy, Wish, lone
 
 import neurovis_spec as nv
@@ -660,3 +661,17 @@ def test_routes_from_a_neuron_moved_along_the_axis_are_mirror_images(by: float, 
     assert now.positions == {**before.positions, "D": moved}
     suite.check_mirror(now, problem)
     suite.check_routes(problem, now)
+
+
+def test_a_neuron_is_drawn_like_its_images_about_the_axis_of_its_instance_and_about_that_of_the_whole() -> None:
+    """Two neurons above each other do not show whether their instance is reflected: their images do."""
+    joint = "{neurons: {F: {}, E: {}}, layout: {mirror: [[F, E]]}}"
+    text = (
+        f"neurovis: 1\nname: x\nmodules: {{joint: {joint}}}\ninstances: {{A: {{module: joint}}, B: {{module: joint}}}}"
+    )
+    problem = problem_of(nv.compile_text(text + "\nlayout: {mirror: [[A, B]], plan: [[A, B]]}").network)
+    at = {"A.E": (0.0, 1.0), "A.F": (0.0, 0.0), "B.E": (5.0, 1.0), "B.F": (5.0, 0.0)}
+    alike = Alike(problem, dict(enumerate(at.values())))
+    assert problem.neurons == tuple(at)
+    flips = {problem.neurons[mate]: move.flip for mate, move in alike.of(problem.neurons.index("A.F"))}
+    assert flips == {"A.F": (1.0, 1.0), "A.E": (1.0, -1.0), "B.F": (-1.0, 1.0), "B.E": (-1.0, -1.0)}

@@ -119,29 +119,27 @@ class Alike:
             self._makes.setdefault(module.template, []).append(module)
             for place, neuron in enumerate(module.members):
                 self._around.setdefault(neuron, []).append((module, place))
-        self._images: dict[int, tuple[int, Move]] = {}
+        #: about the axis of the whole, and about those of instances
+        self._images: dict[int, list[tuple[int, Move]]] = {}
         for scope, pairs in pairs_by_axis(problem).items():
             there = [(a, b) for a, b in pairs if a in placed and b in placed]
             axis = axes.get(scope) or axis_of(problem, scope, there, placed)
             for a, b in pairs if there or scope in axes else ():
-                self._images[a] = b, axis.mirror
-                self._images[b] = a, axis.mirror
+                self._images.setdefault(a, []).append((b, axis.mirror))
+                self._images.setdefault(b, []).append((a, axis.mirror))
 
     def of(self, neuron: int) -> list[tuple[int, Move]]:
         """The neurons drawn like this one, itself first, each with the move from its place."""
         found: dict[int, Move] = {}
         waiting: list[tuple[int, str]] = []
 
-        def add(mate: int, move: Move, by: str) -> None:
-            found[mate] = move
-            waiting.append((mate, by))
-
         def reach(mate: int, move: Move, by: str) -> None:
-            add(mate, move, by)
-            # its image at once: instances too narrow to show whether they are reflected follow their images
-            image = self._images.get(mate)
-            if image is not None and image[0] not in found:
-                add(image[0], move.then(image[1]), "")
+            if mate not in found:
+                found[mate] = move
+                waiting.append((mate, by))
+                # its images at once: instances too narrow to show whether they are reflected follow their images
+                for image, mirror in self._images.get(mate, ()):
+                    reach(image, move.then(mirror), "")
 
         reach(neuron, STAY, "")
         for one, by in waiting:

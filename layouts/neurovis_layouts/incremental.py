@@ -199,7 +199,7 @@ def _found(problem: LayoutProblem, ways: _Ways, rest: Sequence[int], routes: Map
 
     new = set(rest)
     made = found(new)
-    wrong = ways.unclear(made, routes)
+    wrong = ways.unclear(made, routes) if ways.image else set()
     if wrong.isdisjoint(ways.image):
         return made
     again = found(new - wrong)
