@@ -13,6 +13,7 @@ import pytest
 from click.testing import CliRunner, Result
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from neurovis_layouts.alike import Alike
 from neurovis_layouts.occupancy import Occupancy, Wish, lone
 
 import neurovis_spec as nv
@@ -584,3 +585,93 @@ def test_an_instance_that_something_was_put_on_gives_way_as_a_whole() -> None:
         way = {tuple(now.positions[name][k] - before.positions[name][k] for k in (0, 1)) for name in own}
         assert len(way) == 1
     assert lay_out_problem(replace(problem, memory=now), "layered").positions == now.positions
+
+
+TURNED = """\
+neurovis: 1
+name: turned
+modules:
+  joint: {neurons: {F: {bias: 1}, E: {bias: 1}}, connections: {F -> E: -1, E -> F: -1}, layout: {mirror: [[F, E]]}}
+  leg:
+    instances: {hip: {module: joint}, knee: {module: joint}}
+    neurons: {foot: {bias: 1}EXTRA}
+    connections: {hip.F -> knee.E: 1, hip.E -> knee.F: 1, foot -> hip.E: 1INNER}
+instances: {A: {module: leg}, B: {module: leg}}
+connections: {A.hip.F -> B.hip.F: 1}
+layout: {DIRECTIONplan: PLAN}
+"""
+
+
+@pytest.mark.parametrize("direction", ["", "direction: right, "])
+@pytest.mark.parametrize("plan", ["[[A], [B]]", "[[A, B]]"])
+def test_what_a_plan_turns_keeps_the_mirror_images_within_it(plan: str, direction: str) -> None:
+    """The axis of an instance is as its pairs stand, not along the direction of the page."""
+    text = TURNED.replace("PLAN", plan).replace("DIRECTION", direction)
+    earlier = nv.compile_text(text.replace("EXTRA", "").replace("INNER", ""))
+    later = nv.compile_text(text.replace("EXTRA", ", skin: {bias: 1}").replace("INNER", ", skin -> foot: 1"))
+    before, now = after(earlier, later)
+    assert now.positions.items() >= before.positions.items()
+    assert apart(now)
+    assert metrics(now, problem_of(later.network))["symmetry"] == 1
+    steps = {
+        tuple(abs(a - b) for a, b in zip(now.positions[f"{leg}.skin"], now.positions[f"{leg}.foot"], strict=True))
+        for leg in "AB"
+    }
+    assert len(steps) == 1
+    assert later.layout("layered", earlier=now).positions == now.positions
+
+
+SIDES = """\
+neurovis: 1
+name: sides
+modules: {u: {neurons: {O: {}, L: {}, C: {}, M: {}EXTRA}, connections: {O -> L + C + M: 1, L -> C: -1}}}
+instances: {l: {module: u, count: 2}, r: {module: u, count: 2}}
+neurons: {D: {bias: 1}}
+connections:
+  l1.C -> l2.O: 1
+  r1.C -> r2.O: 1
+  l2.C -> r1.O: -1
+  r2.C -> l1.O: -1
+  D -> l1.O + l2.O + r1.O + r2.O: 1
+layout: {direction: DIRECTION, mirror: [[l, r]]}
+"""
+
+
+@pytest.mark.parametrize("direction", ["left", "right", "down"])
+def test_routes_beside_frames_that_have_grown_are_mirror_images(direction: str) -> None:
+    """Their titles are on top on both sides of an axis that runs across the page: what is clear of one may not be clear
+    of the other."""
+    text = SIDES.replace("DIRECTION", direction)
+    later = nv.compile_text(text.replace("EXTRA", ", Z: {bias: 1}"))
+    _, now = after(nv.compile_text(text.replace("EXTRA", "")), later)
+    problem = problem_of(later.network)
+    suite.check_mirror(now, problem)
+    assert not suite.through_frames(now, problem)
+    assert later.layout("layered", earlier=now).value == now
+
+
+@pytest.mark.parametrize("direction", ["left", "down"])
+@pytest.mark.parametrize("by", [-2.0, 0.5, 1.0])
+def test_routes_from_a_neuron_moved_along_the_axis_are_mirror_images(by: float, direction: str) -> None:
+    network = nv.compile_text(SIDES.replace("DIRECTION", direction).replace("EXTRA", ""))
+    before = network.layout("layered").value
+    (x, y), problem = before.positions["D"], problem_of(network.network)
+    moved = (x + by, y) if suite.across(problem) else (x, y + by)
+    now = network.layout("layered", earlier=replace(before, positions={**before.positions, "D": moved})).value
+    assert now.positions == {**before.positions, "D": moved}
+    suite.check_mirror(now, problem)
+    suite.check_routes(problem, now)
+
+
+def test_a_neuron_is_drawn_like_its_images_about_the_axis_of_its_instance_and_about_that_of_the_whole() -> None:
+    """Two neurons above each other do not show whether their instance is reflected: their images do."""
+    joint = "{neurons: {F: {}, E: {}}, layout: {mirror: [[F, E]]}}"
+    text = (
+        f"neurovis: 1\nname: x\nmodules: {{joint: {joint}}}\ninstances: {{A: {{module: joint}}, B: {{module: joint}}}}"
+    )
+    problem = problem_of(nv.compile_text(text + "\nlayout: {mirror: [[A, B]], plan: [[A, B]]}").network)
+    at = {"A.E": (0.0, 1.0), "A.F": (0.0, 0.0), "B.E": (5.0, 1.0), "B.F": (5.0, 0.0)}
+    alike = Alike(problem, dict(enumerate(at.values())))
+    assert problem.neurons == tuple(at)
+    flips = {problem.neurons[mate]: move.flip for mate, move in alike.of(problem.neurons.index("A.F"))}
+    assert flips == {"A.F": (1.0, 1.0), "A.E": (1.0, -1.0), "B.F": (-1.0, 1.0), "B.E": (-1.0, -1.0)}

@@ -67,6 +67,19 @@ def reflection(across: int, twice: float) -> Move:
     return Move((-1.0, 1.0), (twice, 0.0)) if across == 0 else Move((1.0, -1.0), (0.0, twice))
 
 
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """The axis of a mirror: which coordinate is ``across`` it (0: x, it is upright), and ``twice`` where it stands."""
+
+    across: int
+    twice: float = 0.0
+
+    @property
+    def mirror(self) -> Move:
+        """The reflection on it."""
+        return reflection(self.across, self.twice)
+
+
 def move_of(pairs: Sequence[tuple[Point, Point]]) -> Move | None:
     """The move that takes the first of each pair to the second; None where there is none.
 
@@ -96,9 +109,9 @@ class Alike:
         self,
         problem: LayoutProblem,
         placed: Mapping[int, Point],
-        twice: Mapping[int, float] = MappingProxyType({}),
+        axes: Mapping[int, Axis] = MappingProxyType({}),
     ) -> None:
-        """``twice`` where the axis of a scope stands, else it is where it is among what is placed."""
+        """``axes`` are those of scopes, as far as they are known; others are where they are among what is placed."""
         self._placed = placed
         self._makes: dict[str, list[LayoutModule]] = {}
         self._around: dict[int, list[tuple[LayoutModule, int]]] = {}
@@ -106,30 +119,27 @@ class Alike:
             self._makes.setdefault(module.template, []).append(module)
             for place, neuron in enumerate(module.members):
                 self._around.setdefault(neuron, []).append((module, place))
-        self._images: dict[int, tuple[int, Move]] = {}
-        across = across_of(problem.direction)
+        #: about the axis of the whole, and about those of instances
+        self._images: dict[int, list[tuple[int, Move]]] = {}
         for scope, pairs in pairs_by_axis(problem).items():
             there = [(a, b) for a, b in pairs if a in placed and b in placed]
-            move = reflection(across, twice.get(scope, twice_axis(there, placed, across)))
-            for a, b in pairs if there or scope in twice else ():
-                self._images[a] = b, move
-                self._images[b] = a, move
+            axis = axes.get(scope) or axis_of(problem, scope, there, placed)
+            for a, b in pairs if there or scope in axes else ():
+                self._images.setdefault(a, []).append((b, axis.mirror))
+                self._images.setdefault(b, []).append((a, axis.mirror))
 
     def of(self, neuron: int) -> list[tuple[int, Move]]:
         """The neurons drawn like this one, itself first, each with the move from its place."""
         found: dict[int, Move] = {}
         waiting: list[tuple[int, str]] = []
 
-        def add(mate: int, move: Move, by: str) -> None:
-            found[mate] = move
-            waiting.append((mate, by))
-
         def reach(mate: int, move: Move, by: str) -> None:
-            add(mate, move, by)
-            # its image at once: instances too narrow to show whether they are reflected follow their images
-            image = self._images.get(mate)
-            if image is not None and image[0] not in found:
-                add(image[0], move.then(image[1]), "")
+            if mate not in found:
+                found[mate] = move
+                waiting.append((mate, by))
+                # its images at once: instances too narrow to show whether they are reflected follow their images
+                for image, mirror in self._images.get(mate, ()):
+                    reach(image, move.then(mirror), "")
 
         reach(neuron, STAY, "")
         for one, by in waiting:
@@ -166,6 +176,19 @@ def pairs_by_axis(problem: LayoutProblem) -> dict[int, list[tuple[int, int]]]:
     for mirror in problem.mirrors:
         found.setdefault(mirror.scope, []).extend(mirror.pairs)
     return found
+
+
+def axis_of(
+    problem: LayoutProblem, scope: int, pairs: Sequence[tuple[int, int]], where: Mapping[int, Point] | Sequence[Point]
+) -> Axis:
+    """The axis of a scope, by some of its pairs. That of the whole is along the direction. That of an instance is as
+    most of the pairs stand, since a plan of the page may have turned the instance; where these do not say, along the
+    direction, too."""
+    across = across_of(problem.direction)
+    steps = [(abs(where[a][0] - where[b][0]), abs(where[a][1] - where[b][1])) for a, b in pairs if scope >= 0]
+    votes = [sum(step[side] > _SLACK >= step[1 - side] for step in steps) for side in (0, 1)]
+    across = 1 - across if votes[1 - across] > votes[across] else across
+    return Axis(across, twice_axis(pairs, where, across))
 
 
 def twice_axis(pairs: Sequence[tuple[int, int]], where: Mapping[int, Point] | Sequence[Point], across: int) -> float:

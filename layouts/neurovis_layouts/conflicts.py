@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from neurovis_layouts.alike import Move, mirror_images, move_of, pairs_by_axis, reflection, same, twice_axis
+from neurovis_layouts.alike import Axis, Move, axis_of, mirror_images, move_of, pairs_by_axis, reflection, same
 from neurovis_layouts.frame import across_of
 from neurovis_layouts.occupancy import overlapping
 from neurovis_spec.layout.geometry import distance, snap
@@ -44,29 +44,28 @@ class Memory:
         self.outer = {k: frozenset(module.members) for k, module in enumerate(problem.modules) if module.parent < 0}
         self._images = mirror_images(problem)
         self._hand = _by_hand(problem, self.known, self.outer.values())
-        #: twice where the axis of a scope stands, if a pair of it is known
-        self.twice: dict[int, float] = {}
+        #: the axis of a scope, if a pair of it is known
+        self.axes: dict[int, Axis] = {}
         known = self.known
         for scope, pairs in _outermost_first(problem):
             both = [(a, b) for a, b in pairs if a in known and b in known]
             # what was moved by hand does not take the axis along, unless all was
             firm = [(a, b) for a, b in both if a not in self._hand or b not in self._hand]
             if both:
-                where = {**known, **self._hand} if firm else known
-                self.twice[scope] = twice_axis(firm or both, where, across_of(problem.direction))
+                self.axes[scope] = axis_of(problem, scope, firm or both, {**known, **self._hand} if firm else known)
                 known = {**known, **self._followed(scope, both)}
 
     def _followed(self, scope: int, pairs: Iterable[tuple[int, int]]) -> dict[int, Point]:
         """The images of what was moved by hand, where they are then."""
-        mirror, found = reflection(across_of(self._problem.direction), self.twice[scope]), dict[int, Point]()
+        mirror, found = self.axes[scope].mirror, dict[int, Point]()
         for pair in pairs:
             for one, other in (pair, pair[::-1]):
                 if one in self._hand and other not in self._hand:
                     found[other] = mirror.point(self.known[one])
         return found
 
-    def earlier(self, held: Mapping[int, Point], twice: Mapping[int, float]) -> Earlier:
-        """Where neurons are wanted, with some ``held`` by pins, and axes at ``twice``, by their scopes."""
+    def earlier(self, held: Mapping[int, Point], axes: Mapping[int, Axis]) -> Earlier:
+        """Where neurons are wanted, with some ``held`` by pins, and the ``axes`` of scopes."""
         where = {**self.known, **held}
         changed = {i for i, point in held.items() if i not in self.known or not same(self.known[i], point)}
         for own in self.outer.values():  # it is drawn around its pins anew
@@ -74,7 +73,7 @@ class Memory:
                 where = {i: point for i, point in where.items() if i in held or i not in own}
         lost = self._follow_makes(where, held)
         put = self._hand.keys() & where.keys() - held.keys() - lost
-        lost |= self._follow_mirrors(where, put, held, twice)
+        lost |= self._follow_mirrors(where, put, held, axes)
         both = self.together(overlapping({i: where[i] for i in put}, held)) & put
         put -= both
         lost = (lost | both) - put
@@ -101,14 +100,16 @@ class Memory:
         return lost
 
     def _follow_mirrors(
-        self, where: dict[int, Point], put: set[int], held: Mapping[int, Point], twice: Mapping[int, float]
+        self, where: dict[int, Point], put: set[int], held: Mapping[int, Point], axes: Mapping[int, Axis]
     ) -> set[int]:
         """Mirror images made so; those that have to move. The image of what was ``put`` by hand is so, too."""
-        across, followed, on_axis = across_of(self._problem.direction), set[int](), set[int]()
+        followed, on_axis = set[int](), set[int]()
         bent = {i for own in self.outer.values() if not held.keys().isdisjoint(own) for i in own}
         for scope, pairs in _outermost_first(self._problem):
-            mirror = reflection(across, twice.get(scope, 0.0))
-            for a, b in pairs if scope in twice else ():
+            if scope not in axes:
+                continue
+            mirror = axes[scope].mirror
+            for a, b in pairs:
                 if {a, b} & (bent | held.keys()):
                     continue
                 if a in where and b in where and not same(mirror.point(where[a]), where[b]):

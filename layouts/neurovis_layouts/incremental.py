@@ -7,22 +7,25 @@ was, routes included; what is new, or runs into something new, is routed anew, a
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
 
 import numpy as np
 
-from neurovis_layouts.alike import Alike, Move, same
+from neurovis_layouts.alike import Alike, Axis, Move, pairs_by_axis, same, twice_axis
 from neurovis_layouts.conflicts import carried, routed_from
 from neurovis_layouts.frame import from_picture, to_picture, turned
 from neurovis_layouts.occupancy import overlapping
 from neurovis_layouts.pins import with_origins
 from neurovis_layouts.routing import route_all
 from neurovis_layouts.routing.ends import keys_of
+from neurovis_layouts.routing.images import Images, images_of
 from neurovis_layouts.routing.obstacles import Obstacles
 from neurovis_layouts.routing.walls import Frame, Walls
 from neurovis_layouts.settling import Whole, settled
+from neurovis_spec.layout import FloatArray
 from neurovis_spec.layout.frames import Frames
-from neurovis_spec.layout.geometry import bounds
+from neurovis_spec.layout.geometry import bounds, united
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point, Route, Side
 
 #: With more new connections than this nobody can follow one: they do not go round frames.
@@ -75,6 +78,7 @@ def kept(problem: LayoutProblem, fresh: Layout, pins: Mapping[int, Point] | None
     # such as those within a new instance
     along = carried(problem, fresh, dict(enumerate(centres)))
     ways.add_clear({i: route for i, route in along.items() if i not in routes}, routes)
+    ways.pair_up(routes)
     # what is within a frame first, since the frame is around it: others may then run into it that did not before
     within = [i for i in range(len(problem.edges)) if i not in routes and ways.within(i)]
     routes.update(_found(problem, ways, within, routes))
@@ -82,6 +86,7 @@ def kept(problem: LayoutProblem, fresh: Layout, pins: Mapping[int, Point] | None
     for i, entering in zip(outside, _entering(problem, memory, ways, outside, routes), strict=True):
         if entering:
             del routes[i]
+    ways.pair_up(routes)
     new = sorted({*new, *(i for i in outside if i not in routes)})
     rest = [i for i in range(len(problem.edges)) if i not in routes]
     routes.update(_found(problem, ways, rest, routes))
@@ -103,6 +108,17 @@ class _Ways:
         self.problem, self.centres = problem, centres
         self.frames = Frames(problem, sides)
         self._obstacles = Obstacles(centres)
+        #: where the neurons are in the frame of an engine
+        self.flat = [from_picture(point, problem.direction) for point in centres]
+        pairs = pairs_by_axis(problem).get(-1, [])
+        self._mirror = Axis(0, twice_axis(pairs, self.flat, 0)).mirror
+        exact = [(a, b) for a, b in pairs if self._mirror.point(self.flat[a]) == self.flat[b]]
+        self._pair = {a: b for one in exact for a, b in (one, one[::-1])}
+        axis = self._mirror.shift[0] / 2
+        #: which routes are reflections of others, in the frame of an engine, as far as neurons stand so
+        self.images = images_of(keys_of(problem.edges), self.flat, self._pair, axis) if exact else Images()
+        #: by edge its mirror image
+        self.image = {a: b for one in self.images.of.items() for a, b in (one, one[::-1])}
 
     def within(self, edge: int) -> bool:
         """Whether an edge runs within an instance."""
@@ -110,32 +126,58 @@ class _Ways:
         around = self.frames.around
         return not set(around.get(ends.source, ())).isdisjoint(around.get(ends.target, ()))
 
+    def pair_up(self, routes: dict[int, Route]) -> None:
+        """Take out routes whose mirror image has none, so that both are found as one: what is clear on one side of the
+        axis may run into something on the other, such as a frame, whose title is on top on both."""
+        for i in [i for i in routes if self.image.get(i, i) not in routes]:
+            del routes[i]
+
     def walls(self, routes: Mapping[int, Route]) -> list[Frame]:
         """The frames as they are drawn with these routes; one that would hold a foreign neuron is not drawn."""
-        x, y = np.array(self.centres, dtype=np.float64).reshape(-1, 2).T
         rects = self.frames.rects(dict(enumerate(self.centres)), routes)
-        found: list[Frame] = []
-        for own, rect in zip(self.frames.members, rects, strict=True):
-            if rect is not None:
-                inside = (x > rect[0]) & (x < rect[2]) & (y > rect[1]) & (y < rect[3])
-                if int(inside.sum()) <= len(own):
-                    found.append((own, rect))
-        return found
+        found = [(own, rect) for own, rect in zip(self.frames.members, rects, strict=True) if rect is not None]
+        centres = np.array(self.centres, dtype=np.float64).reshape(-1, 2)
+        return [wall for wall in found if _closed(wall, centres)]
+
+    def even_walls(self, routes: Mapping[int, Route]) -> list[Frame]:
+        """The same in the frame of an engine, each as large as the reflection of its image, so that what is clear on
+        one side of the axis is on the other: titles are on top on both."""
+        walls = [(own, turned(rect, self.problem.direction)) for own, rect in self.walls(routes)]
+        rects, flat = dict(walls), np.array(self.flat, dtype=np.float64).reshape(-1, 2)
+        for number, (own, rect) in enumerate(walls if self._pair else ()):
+            image = rects.get(frozenset(self._pair.get(m, m) for m in own))
+            even = own, united([rect, self._mirror.rect(image)]) if image else rect
+            if _closed(even, flat):
+                walls[number] = even
+        return walls
 
     def ends(self, chosen: Iterable[int]) -> list[tuple[int, int]]:
         """Between which neurons these edges are."""
         return [(self.problem.edges[i].source, self.problem.edges[i].target) for i in chosen]
 
-    def add_clear(self, found: Mapping[int, Route], routes: dict[int, Route]) -> None:
-        """Add those of the found routes, by edge, that have a clear way."""
+    def unclear(self, found: Mapping[int, Route], routes: Mapping[int, Route]) -> set[int]:
+        """Which of these routes, by edge, run over a disc or enter a foreign frame, and their mirror images."""
         lines, ends = list(found.values()), self.ends(found)
         through = Walls(self.walls({**routes, **found}), len(self.centres)).entered(lines, ends)
-        wrong = zip(found, self._obstacles.run_over(lines, ends), through, strict=True)
-        routes.update({i: found[i] for i, over, enters in wrong if not (over or enters)})
+        tried = zip(found, self._obstacles.run_over(lines, ends), through, strict=True)
+        return {k for i, over, enters in tried if over or enters for k in (i, self.image.get(i, i))}
+
+    def add_clear(self, found: Mapping[int, Route], routes: dict[int, Route]) -> None:
+        """Add those of the found routes, by edge, that have a clear way, and whose mirror images have."""
+        wrong = self.unclear(found, routes)
+        routes.update({i: route for i, route in found.items() if i not in wrong})
+
+
+def _closed(wall: Frame, centres: FloatArray) -> bool:
+    """Whether of these neurons (n, 2) nobody stands in a frame who does not belong there."""
+    own, (x0, y0, x1, y1) = wall
+    x, y = centres.T
+    return int(((x > x0) & (x < x1) & (y > y0) & (y < y1)).sum()) <= len(own)
 
 
 def _found(problem: LayoutProblem, ways: _Ways, rest: Sequence[int], routes: Mapping[int, Route]) -> dict[int, Route]:
-    """Routes found anew for these edges, beside those between the same neurons, which have theirs."""
+    """Routes found anew for these edges, beside those between the same neurons, which have theirs; mirror images are
+    reflections of each other, but for those that have a clear way only if they are not."""
     if not rest:
         return {}
 
@@ -144,14 +186,24 @@ def _found(problem: LayoutProblem, ways: _Ways, rest: Sequence[int], routes: Map
 
     ends = {frozenset((problem.edges[i].source, problem.edges[i].target)) for i in rest}
     shown = [i for i, e in enumerate(problem.edges) if frozenset((e.source, e.target)) in ends]
-    walls = ways.walls(routes) if len(shown) <= _CAREFULLY else []
-    walls = [(own, turned(rect, problem.direction)) for own, rect in walls]
-    edges, centres = [problem.edges[i] for i in shown], [flat(point) for point in ways.centres]
+    walls = ways.even_walls(routes) if len(shown) <= _CAREFULLY else []
+    edges, place = [problem.edges[i] for i in shown], {i: k for k, i in enumerate(shown)}
     others = [tuple(map(flat, routes[i])) for i in sorted(routes.keys() - set(shown))]
     there = {k: tuple(map(flat, routes[i])) for k, i in enumerate(shown) if i in routes}
-    made = route_all(edges, centres, {}, frames=walls, drawn=others, there=there)
-    new = [k for k in range(len(shown)) if k not in there]
-    return {shown[k]: tuple(to_picture(point, problem.direction) for point in made[k]) for k in new}
+
+    def found(even: AbstractSet[int]) -> dict[int, Route]:
+        images = Images({place[a]: place[b] for a, b in ways.images.of.items() if {a, b} <= even}, ways.images.twice)
+        made = route_all(edges, ways.flat, {}, frames=walls, drawn=others, there=there, images=images)
+        new = (k for k in range(len(shown)) if k not in there)
+        return {shown[k]: tuple(to_picture(point, problem.direction) for point in made[k]) for k in new}
+
+    new = set(rest)
+    made = found(new)
+    wrong = ways.unclear(made, routes) if ways.image else set()
+    if wrong.isdisjoint(ways.image):
+        return made
+    again = found(new - wrong)
+    return again if len(ways.unclear(again, routes)) < len(wrong) else made
 
 
 def _old_routes(problem: LayoutProblem, memory: Layout, ways: _Ways) -> dict[int, Route]:

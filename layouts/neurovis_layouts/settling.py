@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from neurovis_layouts.alike import STAY, Alike, Move, pairs_by_axis, reflection, same, twice_axis
+from neurovis_layouts.alike import STAY, Alike, Axis, Move, pairs_by_axis, reflection, same, twice_axis
 from neurovis_layouts.axes import axes, shift_of
 from neurovis_layouts.conflicts import Earlier, Memory, carried
 from neurovis_layouts.frame import across_of, from_picture, to_picture
@@ -62,8 +62,8 @@ class _Settling:
         self._memory = Memory(problem, fresh)
         pairs = pairs_by_axis(problem)
         self._pair = {a: b for one in pairs.get(-1, ()) for a, b in (one, one[::-1])}
-        #: twice where the axes stand in the fresh drawing
-        self._twice = {scope: twice_axis(own, fresh, self._across) for scope, own in pairs.items()}
+        #: twice where the axis of the whole stands in the fresh drawing
+        self._twice = twice_axis(pairs.get(-1, ()), fresh, self._across)
         self._lines = {member: line for line in problem.align for member in line}
         self._numbers = {frozenset(whole.members): whole.frame for whole in wholes}
         self._makes: dict[str, list[Whole]] = {}
@@ -110,11 +110,11 @@ class _Settling:
 
     def _axes(self) -> Iterator[tuple[float, Mapping[int, Point]]]:
         """Where the axis may stand, the likeliest first, and where what is pinned and its images are then."""
-        problem, twice, pins = self._problem, self._memory.twice, self._problem.pins
+        problem, known, pins = self._problem, self._memory.axes, self._problem.pins
         if not pins and not self._memory.known:
             return
-        start = shift_of(self._fresh, pins or self._memory.known)[self._across] + self._twice.get(-1, 0.0) / 2
-        start = twice[-1] / 2 if -1 in twice else start
+        start = shift_of(self._fresh, pins or self._memory.known)[self._across] + self._twice / 2
+        start = known[-1].twice / 2 if -1 in known else start
         if not pins:
             yield start, {}
             return
@@ -123,15 +123,15 @@ class _Settling:
         for axis, held in axes(turned, start, self._pair, wide):
             yield axis, {i: to_picture(point, problem.direction) for i, point in held.items()}
 
-    def _axes_at(self, axis: float) -> Mapping[int, float]:
-        """Twice where each axis stands that is known."""
-        return {**self._memory.twice, -1: 2 * axis} if self._pair else self._memory.twice
+    def _axes_at(self, axis: float) -> Mapping[int, Axis]:
+        """Each axis that is known."""
+        return {**self._memory.axes, -1: Axis(self._across, 2 * axis)} if self._pair else self._memory.axes
 
     def _shift(self, held: Mapping[int, Point], axis: float) -> Point:
         """How the drawing is moved to what is held."""
         shift = list(shift_of(self._fresh, held)) if held else [0.0, 0.0]
         if self._pair:
-            shift[self._across] = axis - self._twice[-1] / 2
+            shift[self._across] = axis - self._twice / 2
         return shift[0], shift[1]
 
     def _occupancy(self, placed: Mapping[int, Point], held: Mapping[int, Point], axis: float) -> Occupancy:
@@ -147,12 +147,12 @@ class _Settling:
     def _sides(self, axis: float, held: Mapping[int, Point]) -> dict[int, AxisSide]:
         """For neurons with a mirror image the axis, and on which side of it they are, as in the fresh drawing; what is
         drawn with something held is where that is."""
-        known, across, sides = self._memory.known, self._across, dict[int, AxisSide]()
-        twice = self._axes_at(axis)
+        known, sides, there = self._memory.known, dict[int, AxisSide](), self._axes_at(axis)
         for scope, pairs in pairs_by_axis(self._problem).items():
-            if scope not in twice:
+            if scope not in there:
                 continue
-            now, other = twice[scope] / 2, self._twice[scope] / 2
+            across, now = there[scope].across, there[scope].twice / 2
+            other = twice_axis(pairs, self._fresh, across) / 2
             agree = sum(
                 _sign(known[a][across] - now) * _sign(self._fresh[a][across] - other) for a, _ in pairs if a in known
             )
@@ -259,7 +259,7 @@ class _Settling:
                 along[rank] = False
                 wish[rank] = next((placed[m][rank] - offset[rank] for m in line if m in placed), wish[rank])
         images = [self._pair[m] for m in first.members if m in self._pair]
-        middle = self._fresh[first.members[0]][self._across] - self._twice.get(-1, 0.0) / 2
+        middle = self._fresh[first.members[0]][self._across] - self._twice / 2
         alone = middle == 0 and len(first.members) == 1 and not self._memory.known
         if self._pair and (images[0] in first.members if images else alone):
             along[self._across], wish[self._across] = False, axis + middle
