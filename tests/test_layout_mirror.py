@@ -164,3 +164,20 @@ layout: {mirror: [[L, R]], boxes: {inner: [L, R, v0, v1]}}
 """
     found = nv.compile_text(text).layout("layered").metrics()
     assert (found["symmetry"], found["overlaps"], found["edges_over_neurons"]) == (1, 0, 0)
+
+
+def test_mirrored_legs_that_drive_each_other_around_a_body_stand_as_they_do_on_it() -> None:
+    text = """
+neurovis: 1
+name: legs
+modules: {leg: {neurons: {X: {}, Y: {}, M: {}}, connections: {X -> Y + M: 1, Y -> X: -1}}}
+instances: {l: {module: leg, count: 3}, r: {module: leg, count: 3}}
+connections: {l1.X -> l2.X: 1, l2.X -> l3.X: 1, l3.X -> r3.X: 1, r3.X -> r2.X: 1, r2.X -> r1.X: 1, r1.X -> l1.X: 1}
+layout: {mirror: [[l, r]]}
+"""
+    layout = nv.compile_text(text).layout("layered")
+    at = layout.value.positions
+    assert layout.metrics()["crossings"] == 0
+    for side in "lr":
+        assert [at[f"{side}{k}.X"][1] for k in (1, 2, 3)] == sorted({at[f"{side}{k}.X"][1] for k in (1, 2, 3)})
+    assert max(at[f"l{k}.X"][0] for k in (1, 2, 3)) < min(at[f"r{k}.X"][0] for k in (1, 2, 3))

@@ -147,7 +147,7 @@ class Composer:
         held = {piece.part.kind for piece in pieces if lines.intersection(piece.part.members)}
         images = {key: family for key, family in families.items() if not pair.keys().isdisjoint(family)}
         images = images if self._folding else {}  # columns that nothing folds would be towers
-        chains = dict(zip(images, driven(problem, units, images.values()), strict=True))
+        chains = dict(zip(images, driven(problem, units, pair, images.values()), strict=True))
         for key, family in families.items():
             make, apart = key[1], chains.get(key, False)
             if make not in held:

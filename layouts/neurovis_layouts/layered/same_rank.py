@@ -132,21 +132,27 @@ def _stairs(
     return [found[mate] for mate in mates]
 
 
-def driven(problem: LayoutProblem, units: Sequence[Unit], families: Collection[Sequence[int]]) -> list[bool]:
-    """For families of units, each known by a neuron, whether one of them drives another, by whatever way, that does not
-    drive it back."""
+def driven(
+    problem: LayoutProblem, units: Sequence[Unit], pair: Mapping[int, int], families: Collection[Sequence[int]]
+) -> list[bool]:
+    """For families of units, each known by a neuron, whether one of them drives another that is not its mirror image,
+    and, where that is through others, is not driven by it."""
     if not families:
         return []
     owner = {m: u for u, unit in enumerate(units) for m in unit.members}
-    loops = nx.condensation(_flow(problem, units, owner))
+    image = {u: owner[pair[m]] for m, u in owner.items() if m in pair}
+    flow = _flow(problem, units, owner)
+    loops = nx.condensation(flow)
     loop_of = loops.graph["mapping"]
     order = list(nx.topological_sort(loops))
     found: list[bool] = []
     for family in families:
-        own = {loop_of[owner[m]] for m in family}
+        mates = {owner[m] for m in family}
+        own = {loop_of[mate] for mate in mates}
         behind: set[int] = set()
         for loop in order:
             if loop in own or loop in behind:
                 behind.update(loops.successors(loop))
-        found.append(not own.isdisjoint(behind))
+        direct = any(b in mates and b != image.get(a) for a in mates for b in flow.successors(a))
+        found.append(direct or not own.isdisjoint(behind))
     return found
