@@ -70,11 +70,11 @@ def test_at_a_distance_boxes_are_closed_and_have_the_mean_colour_of_their_neuron
             network, view = compiled.network, view_of(compiled, compiled.gains)
             (instance,) = (entry for entry in network.instances if entry.path == "left1")
             at = np.mean([places(compiled)[network.neurons.names[index]] for index in instance.indices], axis=0)
-            await fit(opened, 432, 342)
-            await fit(opened, 432, 342)
+            await fit(opened, 360, 285)
+            await fit(opened, 360, 285)
             small = await picture(opened)
             small.save(tmp_path / "closed.png")
-            x, y = 0.3 * at
+            x, y = 0.25 * at
             await opened.point(x, y)
             await opened.until(f"{TIP}.textContent.startsWith('left1\\nmean ')")
             words = str(await opened.ask(f"{TIP}.textContent")).split("\n")
