@@ -14,9 +14,9 @@ import numpy as np
 from neurovis_layouts.apart import apart, jitter
 from neurovis_layouts.finish import alone, drawn, nearest, pinned_places
 from neurovis_layouts.frame import from_picture
-from neurovis_layouts.routing.obstacles import REACH, Obstacles
+from neurovis_layouts.routing.bows import unhindered
+from neurovis_layouts.routing.obstacles import REACH
 from neurovis_spec.layout import FloatArray
-from neurovis_spec.layout.geometry import straight
 from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem, Point
 
 #: In spacings: how far half of the discs are from their next, how far nine tenths of them (the picture may grow by this
@@ -74,15 +74,9 @@ class SpatialEngine:
         low, high = places.min(axis=0), places.max(axis=0)
         beyond = max(1.0, _BEYOND * float((high - low).min()))
         within = (*(low - beyond).tolist(), *(high + beyond).tolist())
-        return drawn(problem, self.name, places, frames=False, clear=_clear(problem, places), within=within)
-
-
-def _clear(problem: LayoutProblem, places: FloatArray) -> list[int]:
-    """The edges between which and whose ends nothing is in the way."""
-    ends = [(edge.source, edge.target) for edge in problem.edges]
-    centres: list[Point] = [(x, y) for x, y in places.tolist()]
-    far = Obstacles(centres).clearances([straight(centres[a], centres[b]) for a, b in ends], ends)
-    return alone(problem, [i for i, (a, b) in enumerate(ends) if a != b and far[i] >= REACH - _ROUNDED])
+        centres: list[Point] = [(x, y) for x, y in places.tolist()]
+        clear = alone(problem, unhindered(problem.edges, centres, REACH - _ROUNDED))
+        return drawn(problem, self.name, places, frames=False, clear=clear, within=within)
 
 
 def _data(problem: LayoutProblem) -> FloatArray:

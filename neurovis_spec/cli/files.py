@@ -16,6 +16,7 @@ import click
 
 from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.progress import progress
+from neurovis_spec.cli.targets import refuse_dash
 
 if TYPE_CHECKING:
     from neurovis_spec.arrays import FloatArray
@@ -182,7 +183,6 @@ folder_option = click.option(
 
 def write_folder(folder: Path, write: Callable[[], tuple[list[Path], list[Path]]]) -> None:
     """Write files, and say which were written; on standard error, which were there and stay. Raises Failure."""
-    from neurovis_spec.cli.targets import refuse_dash
     from neurovis_spec.runtime.c_settable import ExportError
 
     refuse_dash(folder, "folder")

@@ -20,7 +20,7 @@ import numpy as np
 from neurovis_layouts.layered.drawing import Drawing
 from neurovis_layouts.layered.straight_lines import crossings, unrelated
 from neurovis_spec.layout import IntArray
-from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.geometry import lengths
 from neurovis_spec.layout.model import Direction, LayoutProblem
 
 #: The number of the whole, beside those of kinds of instances; and of what is never folded.
@@ -153,7 +153,7 @@ def _cost(
     wide, high = _size(drawing, problem.direction)
     page = max(wide, problem.page * high) ** 2
     ends = np.array([(drawing.places[a], drawing.places[b]) for a, b in lines], dtype=np.float64).reshape(-1, 2, 2)
-    length = math.fsum(distance(drawing.places[a], drawing.places[b]) for a, b in lines)
-    back = sum(drawing.places[a][1] > drawing.places[b][1] for a, b in lines)
+    length = math.fsum(lengths(ends[:, 1] - ends[:, 0]).tolist())
+    back = int((ends[:, 0, 1] > ends[:, 1, 1]).sum())
     many = max(1, len(lines))
     return page * length * (1 + _BACK * back / many) * (1 + _CROSSING * crossings(ends, *apart) / many)

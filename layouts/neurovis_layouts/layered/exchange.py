@@ -27,14 +27,9 @@ class Exchange:
     def __init__(self, segments: Segments, classes: tuple[Ints, Ints], halves: Halves) -> None:
         self.ports, self._halves = segments.ports, halves
         self.box, self.kin = classes
-        self.sides = [
-            _Ends(
-                len(self.box), *(ends[segments.real] for ends in (segments.lower, segments.upper, segments.upper_port))
-            ),
-            _Ends(
-                len(self.box), *(ends[segments.real] for ends in (segments.upper, segments.lower, segments.lower_port))
-            ),
-        ]
+        upper, above = segments.upper[segments.real], segments.upper_port[segments.real]
+        lower, below = segments.lower[segments.real], segments.lower_port[segments.real]
+        self.sides = [_Ends(len(self.box), lower, upper, above), _Ends(len(self.box), upper, lower, below)]
 
     def improved(self, crossings: int, order: Sequence[Ints]) -> tuple[int, list[Ints]]:
         """The order after exchanges, and its crossings."""

@@ -12,13 +12,12 @@ from neurovis_layouts.layered.component_layout import ComponentLayout
 from neurovis_layouts.layered.pinning import Settled
 from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.routing import Waypoint, route_all
-from neurovis_layouts.routing.bows import ENOUGH
+from neurovis_layouts.routing.bows import unhindered
 from neurovis_layouts.routing.corners import smooth
 from neurovis_layouts.routing.ends import Key
 from neurovis_layouts.routing.images import images_of
-from neurovis_layouts.routing.obstacles import REACH, Obstacles
-from neurovis_layouts.routing.walls import Frame, Walls
-from neurovis_spec.layout.geometry import Rect, bounds, distance, meet, snapped, straight
+from neurovis_layouts.routing.obstacles import REACH
+from neurovis_spec.layout.geometry import Rect, bounds, distance, meet, snapped
 from neurovis_spec.layout.model import GRID, LayoutEdge, LayoutProblem, Point, Route
 
 #: How much of the corners of a line from band to band is cut off.
@@ -62,7 +61,8 @@ def linked(
         edges,
         places,
         ways,
-        _clear(edges, places, framed) if problem.plan else _bowed(edges, units),
+        # between cells of a page, all ways are as good
+        frozenset(unhindered(edges, places, frames=framed)) if problem.plan else _bowed(edges, units),
         frames=framed,
         drawn=drawn,
         begun=begun,
@@ -96,14 +96,6 @@ def _aslant(line: Sequence[Point]) -> Point:
     (x, y), turn, end = line[0], line[2], line[3]
     far = min(abs(turn[0] - x), abs(end[1] - y) / 2)
     return turn[0], y + (far if end[1] > y else -far)
-
-
-def _clear(edges: Sequence[LayoutEdge], places: Sequence[Point], framed: Sequence[Frame]) -> frozenset[int]:
-    """Edges that nothing is in the way of, which run straight: between cells of a page, all ways are as good."""
-    ends = [(edge.source, edge.target) for edge in edges]
-    lines = [straight(places[a], places[b]) for a, b in ends]
-    far, entered = Obstacles(places).clearances(lines, ends), Walls(framed, len(places)).entered(lines, ends)
-    return frozenset(i for i, near in enumerate(far) if near >= ENOUGH and not entered[i])
 
 
 def _bowed(edges: Sequence[LayoutEdge], units: Sequence[Unit]) -> frozenset[int]:

@@ -145,8 +145,9 @@ class Composer:
         behind: list[tuple[int, int]] = []
         lines = {m for line in problem.align for m in line}
         held = {piece.part.kind for piece in pieces if lines.intersection(piece.part.members)}
-        images = {key: family for key, family in families.items() if not pair.keys().isdisjoint(family)}
-        images = images if self._folding else {}  # columns that nothing folds would be towers
+        # columns that nothing folds would be towers
+        foldable = families if self._folding else {}
+        images = {key: family for key, family in foldable.items() if not pair.keys().isdisjoint(family)}
         chains = dict(zip(images, driven(problem, units, pair, images.values()), strict=True))
         for key, family in families.items():
             make, apart = key[1], chains.get(key, False)

@@ -24,7 +24,7 @@ from neurovis_layouts.layered.drawing import Drawing, Piece
 from neurovis_layouts.layered.parts import Part, imaged, part_of_module, symmetric
 from neurovis_layouts.layered.plan_places import Slot, placed
 from neurovis_layouts.layered.straight_lines import crossings, run_over, unrelated
-from neurovis_spec.layout.geometry import Rect, united
+from neurovis_spec.layout.geometry import Rect, lengths, united
 from neurovis_spec.layout.model import Direction, LayoutProblem, LayoutRefusalError, Point, Seat
 
 #: A part drawn in a direction, with the frame around it.
@@ -180,7 +180,7 @@ def facing(
         x0, y0, x1, y1 = united(move.rect(piece.rect) for piece, move in moved)
         wide, high = (x1 - x0, y1 - y0) if problem.direction in ("down", "up") else (y1 - y0, x1 - x0)
         lines = np.array([(at[a], at[b]) for a, b in between], dtype=np.float64).reshape(-1, 2, 2)
-        length = float(np.sqrt(((lines[:, 1] - lines[:, 0]) ** 2).sum(axis=1)).sum())
+        length = float(lengths(lines[:, 1] - lines[:, 0]).sum())
         met = min(_CROSSING * crossings(lines, *apart), _CROSSED * length)
         met += _CROSSING * run_over(lines, np.array([at[i] for i in range(len(at))]))
         page = math.sqrt(stretched(problem, wide, high)) if max(wide, high) > _SMALL else 1.0

@@ -10,13 +10,24 @@ from dataclasses import dataclass
 from itertools import islice
 
 from neurovis_layouts.routing.obstacles import REACH, Obstacles
+from neurovis_layouts.routing.walls import Frame, Walls
 from neurovis_spec.layout.geometry import Rect, bounds, distance, straight, united
-from neurovis_spec.layout.model import Point, Route
+from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
 #: Heights tried where every connection can be followed, and where they are many.
 MANY_TRIES, FEW_TRIES = 12, 2
 #: Clear enough.
-ENOUGH = REACH - 0.03
+_ENOUGH = REACH - 0.03
+
+
+def unhindered(
+    edges: Sequence[LayoutEdge], centres: Sequence[Point], clear: float = _ENOUGH, frames: Sequence[Frame] = ()
+) -> list[int]:
+    """Which edges may run straight: as far from all foreign discs as is ``clear``, and through no foreign frame."""
+    ends = [(edge.source, edge.target) for edge in edges]
+    lines = [straight(centres[a], centres[b]) for a, b in ends]
+    far, entered = Obstacles(centres).clearances(lines, ends), Walls(frames, len(centres)).entered(lines, ends)
+    return [i for i, (a, b) in enumerate(ends) if a != b and far[i] >= clear and not entered[i]]
 
 
 def bow(start: Point, end: Point, height: float, hold: float) -> Route:
@@ -65,9 +76,9 @@ def clear_bows(
         for (i, height, _), route, clearance in zip(chosen, bows, clearances, strict=True):
             tried.add(i)
             best = found[i]
-            if i not in clear and (best is None or clearance > best[1] or clearance >= ENOUGH):
+            if i not in clear and (best is None or clearance > best[1] or clearance >= _ENOUGH):
                 found[i] = route, clearance, height
-                if clearance >= ENOUGH:
+                if clearance >= _ENOUGH:
                     clear.add(i)
         waiting = [i for i in waiting if i in tried and i not in clear]
         many = 4
