@@ -340,7 +340,7 @@ class Drawable(ABC):
         """The gains of the views that show each neuron also where the picture of the network has ``glyphs``."""
         if not (self.network.render.collapse and _shows(panels, "matrix", "raster")):
             return glyphs
-        from neurovis_spec.snapshots import fitted
+        from neurovis_spec.runtime.fitting import fitted
 
         whole = replace(self.network, render=replace(self.network.render, collapse=()))
         return pipeline.measure_recording(whole, fitted(shown, whole))
@@ -352,7 +352,7 @@ class Drawable(ABC):
         if recording is None:
             return self.gains
         if recording not in self._recorded:
-            from neurovis_spec.snapshots import fitted
+            from neurovis_spec.runtime.fitting import fitted
 
             self._recorded[recording] = pipeline.measure_recording(self.network, fitted(recording, self.network))
         return self._recorded[recording]

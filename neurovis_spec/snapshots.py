@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.runtime.columns import columns_of
+from neurovis_spec.runtime.fitting import fitted
 from neurovis_spec.runtime.inputs import InputError
-from neurovis_spec.runtime.recording import After, Numbers, Recording, RecordingError, Snapshot, recording_of
+from neurovis_spec.runtime.recording import Recording, RecordingError, Snapshot
 from neurovis_spec.runtime.simulation import Simulation
 from neurovis_spec.scene.fading import Fading, snapshots_of
 
@@ -101,21 +101,3 @@ def in_parts(snapshots: Iterable[Snapshot], many: int) -> Iterator[list[Snapshot
             part = []
     if part:
         yield part
-
-
-def fitted(recording: Recording, network: Network) -> Recording:
-    """A recording with all connections of the network: a ``.csv`` holds the changing ones alone, and the others are the
-    network's. Raises RecordingError for a recording of another network: its neurons and connections are not the same.
-    """
-    ends, own = network.connections, recording.neurons == network.neurons.names
-    if own and np.array_equal(recording.sources, ends.sources) and np.array_equal(recording.targets, ends.targets):
-        return recording
-    changing = tuple(network.connection_names[index] for index in network.changing.tolist())
-    if own and len(recording.plastic) == len(recording.sources) and recording.connection_names == changing:
-        after = After(recording.weights_after, recording.reached)
-        sensors = None if recording.sensors is None else recording.sensor_names
-        columns = replace(columns_of(network), sensors=sensors)
-        numbers = Numbers(recording.step, recording.rows)
-        return recording_of(network, columns, numbers, network.connections.weights, after)
-    whose = f"{recording.network or 'unnamed'}, {len(recording.neurons)} neurons"
-    raise RecordingError(f"the recording is of another network ({whose})")

@@ -35,10 +35,10 @@ from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.layout.model import LayoutRefusalError
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.files import replacing
+from neurovis_spec.runtime.fitting import fitted
 from neurovis_spec.runtime.recording import Recording, RecordingError
 from neurovis_spec.scene.model import Scene, Theme
 from neurovis_spec.scene.themes import theme_of
-from neurovis_spec.snapshots import fitted
 
 #: The most curves of a picture, bars of a ranking, rows of a table over time, and neurons of a gait diagram.
 _CURVES, _BARS, _ROWS, _LEGS = 24, 30, 2_000, 40
@@ -141,7 +141,7 @@ class _Report:
         return {
             "steps": f"{step[0]} to {step[-1]} ({len(step):,} rows)",
             "neurons": f"{len(names):,} of {len(self.recording.neurons):,}"
-            if self.options.of
+            if len(names) < len(self.recording.neurons)
             else f"all {len(names):,}",
             "active": f"above an absolute activity of {self.options.threshold:g}",
             "bins": str(self.options.bins),

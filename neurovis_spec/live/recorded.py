@@ -15,10 +15,10 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.history import Recorded
 from neurovis_spec.live.source import Capabilities, Mask, Reach, Seen, SourceError, Turned, drawn, recalled
 from neurovis_spec.live.turns import Turn
+from neurovis_spec.runtime.fitting import fitted
 from neurovis_spec.runtime.recording import Recording, RecordingError
 from neurovis_spec.scene.fading import snapshots_of
 from neurovis_spec.scene.lesions import lesions_of
-from neurovis_spec.snapshots import fitted
 
 
 class RecordedSource:
@@ -28,8 +28,8 @@ class RecordedSource:
     capabilities = Capabilities(ends=True)
 
     def __init__(self, network: Network, recording: Recording) -> None:
-        recording.check_whole("a live view cannot show")
         self.network, self._recording = network, fitted(recording, network)
+        self._recording.check_whole("a live view cannot show")
         if not len(recording):
             raise RecordingError("the recording holds no step")
         first = None if recording.pose is None else recording.pose[0]

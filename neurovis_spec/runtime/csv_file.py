@@ -2,9 +2,11 @@
 
 In: a Recording and a path, or a path. Out: a file written row by row, or a Recording. The header is ``step``, ``t``,
 the names of the neurons, then ``K1 -> O`` for each changing connection, then the states (``K1.v``, ``(K1 -> O).e``),
-then ``sensor NAME`` for each number that a body senses. Numbers read back exactly. What stays in a run, and the pose of
-a body, is not in the table, so a recording read from it knows the changing connections alone, with delay 1; nor is what
-is true after the last step, for which the last row stands.
+then ``sensor NAME`` for each number that a body senses. In the table of a partial recording a state is ``state K1.v``,
+as K1 need not have a column that tells it from a neuron v in an instance K1. Numbers read back exactly. What stays in a
+run, and the pose of a body, is not in the table, so a recording read from it knows the changing connections alone, with
+delay 1, and of the neurons that were not recorded those that its columns name; nor is what is true after the last step,
+for which the last row stands.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from io import FileIO
 from pathlib import Path
@@ -31,6 +33,8 @@ from neurovis_spec.runtime.unfinished import Part, move, part_of
 
 #: before the names of sensors, which may be anything
 _SENSOR = "sensor "
+#: before the names of states in the table of a partial recording
+_STATE = "state "
 #: the pose, the last kind, is no part of a table
 _KEPT = 4
 _CONNECTION = re.compile(r"(?P<source>\S+) -> (?P<target>\S+)(?: \((?P<rank>[0-9]{1,9})\))?")
@@ -94,7 +98,8 @@ class _Table:
         plastic = frame.plastic.tolist() if frame.weights.shape[1] else []
         names = [frame.connection_names[index] for index in plastic]
         sensors = [_SENSOR + name for name in frame.sensor_names]
-        self._writer.writerow(["step", "t", *frame.columns, *names, *frame.state_names, *sensors])
+        states = [("" if frame.recorded is None else _STATE) + name for name in frame.state_names]
+        self._writer.writerow(["step", "t", *frame.columns, *names, *states, *sensors])
 
     def write(self, steps: IntArray, rows: Rows) -> None:
         """Further rows, which are with the system afterwards."""
@@ -179,11 +184,13 @@ def _recording(header: list[str], table: FloatArray) -> Recording:
     first = len(header) - len(sensors)
     if header[first:] != sensors or len(set(sensors)) != len(sensors):
         raise RecordingError("not a recording: sensors are mixed with others, or one is named twice")
-    neurons, connections, states = _columns(header[2:first])
-    index = {name: number for number, name in enumerate(neurons)}
-    if len(index) != len(neurons) or len(set(states)) != len(states):
+    columns, connections, states = _columns(header[2:first])
+    if len(set(columns)) != len(columns) or len(set(states)) != len(states):
         raise RecordingError("not a recording: a neuron or a state is named twice")
-    ends = [_ends(name, index) for name in connections]
+    pairs = [_ends(name) for name in connections]
+    neurons = tuple(dict.fromkeys([*columns, *(name for pair in pairs for name in pair[:2]), *_owners(states)]))
+    index = {name: number for number, name in enumerate(neurons)}
+    ends = [(index[source], index[target], rank) for source, target, rank in pairs]
     if len(set(ends)) != len(ends):
         raise RecordingError("a connection stands there twice")
     sources, targets, ranks = (np.array([e[i] for e in ends], dtype=np.int64) for i in range(3))
@@ -191,7 +198,7 @@ def _recording(header: list[str], table: FloatArray) -> Recording:
     whole = (steps == np.floor(steps)) & (np.abs(steps) < 2.0**53)
     if not (whole.all() and (np.diff(steps, prepend=-1.0) > 0).all()):
         raise RecordingError("the steps are no ascending whole numbers")
-    n, p = 2 + len(neurons), len(connections)
+    n, p = 2 + len(columns), len(connections)
     weights = table[:, n : n + p].copy()
     after = after_rows(steps.astype(np.int64), weights, p)
     return Recording(
@@ -210,47 +217,71 @@ def _recording(header: list[str], table: FloatArray) -> Recording:
         reached=after.reached,
         states=table[:, n + p : first].copy(),
         state_names=tuple(states),
+        recorded=None if len(columns) == len(neurons) else np.arange(len(columns)),
         sensors=table[:, first:].copy() if sensors else None,
         sensor_names=tuple(name.removeprefix(_SENSOR) for name in sensors),
     )
 
 
-def _columns(names: list[str]) -> tuple[tuple[str, ...], list[str], list[str]]:
-    """The columns of neurons, of connections, of states: of a rule's (``(K1 -> O).e``), or of the model of a neuron
-    that has a column itself (``K1.v``), or behind others that are no neurons. Raises RecordingError where they
-    are mixed."""
-    kinds = {"neuron": 0, "connection": 1, "state": 2}
+def _columns(names: list[str]) -> tuple[list[str], list[str], list[str]]:
+    """The columns of neurons, of connections, of states: ``state K1.v``, or, where they are not marked so, those of a
+    rule (``(K1 -> O).e``), of the model of a neuron that has a column itself (``K1.v``), and what is behind others that
+    are no neurons. Raises RecordingError where they are mixed."""
     result: tuple[list[str], list[str], list[str]] = ([], [], [])
     seen: set[str] = set()
     last = 0
     for name in names:
-        written = parse(name)
-        state = state_of(written.parts[0]) if isinstance(written, Sum) else None
-        if state is not None and (state.of_rule or state.owner.text in seen or last):
-            kind = kinds["state"]
-        else:
-            kind = kinds["neuron"] if isinstance(written, Sum) else kinds["connection"]
+        kind = _kind(name, seen, last)
         if kind < last:
             raise RecordingError("not a recording: neurons are mixed with weights or states")
         last = kind
-        result[kind].append(name)
+        result[kind].append(name.removeprefix(_STATE))
         if kind == 0:
             seen.add(name)
-    return tuple(result[0]), result[1], result[2]
+    return result
+
+
+def _kind(name: str, neurons: Collection[str], last: int) -> int:
+    """Whether a column is of a neuron (0), a connection (1) or a state (2); ``last`` is what the one before it is."""
+    if name.startswith(_STATE):
+        return 2
+    written = parse(name)
+    if not isinstance(written, Sum):
+        return 1
+    state = state_of(written.parts[0])
+    return 2 if state is not None and (state.of_rule or state.owner.text in neurons or last) else 0
+
+
+def _owners(states: Iterable[str]) -> Iterator[str]:
+    """The neurons that have these states, or are the ends of connections whose rule has them. Raises RecordingError
+    for what is no state."""
+    for name in states:
+        written = parse(name)
+        state = state_of(written.parts[0]) if isinstance(written, Sum) and len(written.parts) == 1 else None
+        if state is None:
+            raise RecordingError(f"the column '{name}' is no state")
+        if state.of_rule:
+            yield from _ends(state.owner.text)[:2]
+        else:
+            yield state.owner.text
 
 
 def _dt(table: FloatArray) -> float:
-    """Seconds a step, from the last row; 1 where there is only step 0."""
+    """Seconds a step, as the column ``t`` gives it; 1 where there is only step 0."""
     if not len(table) or table[-1, 0] == 0:
         return 1.0
-    dt = float(table[-1, 1] / table[-1, 0])
+    steps, seconds = table[:, 0], table[:, 1]
+    dt = float(seconds[-1] / steps[-1])
     if not (math.isfinite(dt) and dt > 0):
         raise RecordingError(f"the column 't' gives a step of {dt} s")
-    return dt
+    # the quotient of two rounded numbers may be beside the number that was written down
+    near = (float(f"{dt:.15g}"), dt, math.nextafter(dt, 0.0), math.nextafter(dt, math.inf))
+    return next((one for one in near if np.array_equal(steps * one, seconds)), dt)
 
 
-def _ends(name: str, index: dict[str, int]) -> tuple[int, int, int]:
+def _ends(name: str) -> tuple[str, str, int]:
+    """The ends of a connection, and which of those it is that share them. Raises RecordingError."""
     match = _CONNECTION.fullmatch(name)
-    if match is None or match["source"] not in index or match["target"] not in index:
-        raise RecordingError(f"the column '{name}' is no connection of neurons in the table")
-    return index[match["source"]], index[match["target"]], int(match["rank"] or 1)
+    if match is None:
+        raise RecordingError(f"the column '{name}' is no connection of neurons")
+    return match["source"], match["target"], int(match["rank"] or 1)

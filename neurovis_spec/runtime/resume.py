@@ -24,6 +24,7 @@ from neurovis_spec.compiler.events.patch import PatchError
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.runtime.conditions import Controls
+from neurovis_spec.runtime.fitting import of_table
 from neurovis_spec.runtime.recording import Recording, RecordingError
 from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.state import State, initial_state
@@ -31,7 +32,7 @@ from neurovis_spec.runtime.state import State, initial_state
 
 def resumed_state(network: Network, recording: Recording) -> State:
     """The state in which a run goes on. Raises RecordingError where names do not agree or the recording is empty."""
-    recording.check_whole("a run cannot go on from")
+    (of_table(recording, network) or recording).check_whole("a run cannot go on from")
     if not len(recording):
         raise RecordingError("the recording holds no step to go on from")
     order = _matching_neurons(network, recording)

@@ -1,0 +1,61 @@
+"""A recording and a network that it may be of: what a table leaves out, the network knows.
+
+In: a Recording and a Network. Out: the Recording with all connections of the network, or what is wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.runtime.columns import Columns, Keep, Probe, columns_of
+from neurovis_spec.runtime.recording import After, Numbers, Recording, RecordingError, recording_of
+
+
+def fitted(recording: Recording, network: Network) -> Recording:
+    """A recording with all connections of the network: a ``.csv`` holds the changing ones alone, or none, and may hold
+    some neurons alone; the others are the network's. Raises RecordingError for a recording of another network: its
+    neurons and connections are not the same."""
+    ends, own = network.connections, recording.neurons == network.neurons.names
+    if own and np.array_equal(recording.sources, ends.sources) and np.array_equal(recording.targets, ends.targets):
+        return recording
+    table = of_table(recording, network)
+    if table is None:
+        whose = f"{recording.network or 'unnamed'}, {len(recording.neurons)} neurons"
+        raise RecordingError(f"the recording is of another network ({whose})")
+    return table
+
+
+def of_table(recording: Recording, network: Network) -> Recording | None:
+    """What a table holds, in the structure of a network whose neurons and changing connections it names; else None."""
+    changing = tuple(network.connection_names[index] for index in network.changing.tolist())
+    table = not recording.hash and len(recording.plastic) == len(recording.sources)
+    known = all(name in network.neuron_index for name in recording.neurons)
+    if not (table and known and recording.connection_names in ((), changing)):
+        return None
+    indices = np.array([network.neuron_index[name] for name in recording.columns], dtype=np.int64)
+    order = np.argsort(indices)
+    rows = recording.rows._replace(activity=recording.activity[:, order])
+    weights = len(recording.plastic) == len(changing)
+    after = After(recording.weights_after if weights else np.full(len(changing), np.nan), recording.reached)
+    held = columns_of(network, Keep(weights=weights))
+    columns = replace(
+        held,
+        neurons=None if len(indices) == len(network.neurons) else indices[order],
+        probe=Probe(recording.state_names, ()),
+        outputs=dict(_outputs(held, recording.state_names)),
+        sensors=None if recording.sensors is None else recording.sensor_names,
+    )
+    return recording_of(network, columns, Numbers(recording.step, rows), network.connections.weights, after)
+
+
+def _outputs(held: Columns, states: tuple[str, ...]) -> Iterator[tuple[str, tuple[tuple[int, ...], bool]]]:
+    """The outputs that name states, where all of these are in a table with these ones."""
+    place = {name: column for column, name in enumerate(states)}
+    for name, (columns, single) in held.outputs.items():
+        wanted = [held.probe.names[column] for column in columns]
+        if place.keys() >= set(wanted):
+            yield name, (tuple(place[one] for one in wanted), single)
