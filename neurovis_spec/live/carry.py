@@ -20,6 +20,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import SourceError, Turned
 from neurovis_spec.live.turns import Feed, turn
+from neurovis_spec.runtime.conditions import lose
 from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.simulation import Simulation
 from neurovis_spec.runtime.state import State
@@ -181,3 +182,6 @@ def _carry_signals(
         slots = np.arange(delay)
         one, other = before[connections[0][own]], after[connections[1][own]]
         state.signals[other[:, None] + slots] = old.signals[one[:, None] + slots]
+    anew = np.ones(len(network.connections), dtype=np.bool_)
+    anew[connections[1][same]] = False
+    lose(network, state, np.flatnonzero(anew))

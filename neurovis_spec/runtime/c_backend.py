@@ -51,6 +51,7 @@ typedef struct {
     double *activity, *weights, *signals, *history;
     const double *x, *s, *holding;
     const uint8_t *held, *gone, *still;
+    const int64_t *lost;
     const void *const *given;
     double *const *cells;
     double *const *traces;
@@ -172,7 +173,7 @@ def _write(network: Network) -> Written:
         ("double nv_plain", Form(written_out=small, watched=watched), StepCode.write, of_step),
         (
             "void nv_general",
-            Form(first=True, held=True, gone=True, still=True),
+            Form(first=True, held=True, gone=True, still=True, lost=True),
             StepCode.write,
             f"{of_step}, int first",
         ),
@@ -204,6 +205,7 @@ def _taken(network: Network) -> dict[str, str]:
         ("double", ("activity", "weights", "signals", "history", "packed")),
         ("const double", ("x", "holding", "before")),
         ("const uint8_t", ("held", "gone", "still")),
+        ("const int64_t", ("lost",)),
     )
     taken = {name: f"{kind} *restrict const {name} = p->{name};" for kind, names in kinds for name in names}
     for kind, counts in owned(network):
@@ -240,7 +242,7 @@ def _odd(name: str, sizes: list[tuple[int, int]]) -> list[str]:
 
 _POINTERS: Final = (
     *("activity", "weights", "signals", "history", "x", "s", "holding"),
-    *("held", "gone", "still", "given", "cells", "traces", "before", "packed"),
+    *("held", "gone", "still", "lost", "given", "cells", "traces", "before", "packed"),
 )
 
 
@@ -373,7 +375,9 @@ class CStepper:
                 self._holding[held[0]] = held[1]
         self._gone, self._still = (_bytes(mask) for mask in (now.structure.gone, now.structure.still))
         pointers.held, pointers.holding = self._held.ctypes.data, self._holding.ctypes.data
+        self._lost = np.ascontiguousarray(now.structure.lost, dtype=np.int64)
         pointers.gone, pointers.still = self._gone.ctypes.data, self._still.ctypes.data
+        pointers.lost = self._lost.ctypes.data
 
 
 def _addresses(arrays: Sequence[npt.NDArray[np.generic]]) -> ctypes.Array[ctypes.c_void_p]:

@@ -81,17 +81,18 @@ class Tables:
 class Form:
     """What a step has to handle. ``written_out``: neuron by neuron, without loops. ``first``: neurons with ``initial``
     take it at step 0, where the argument ``first`` is not 0. ``held``: neurons whose byte of ``held`` is set have the
-    activity ``holding``. ``gone`` and ``still``: connections whose byte is set are left out, do not learn. ``fused``:
-    what arrives after one step along weights that do not change is summed by the neuron it arrives at, from the
-    activities of the step ``before`` and the weights ``packed`` in its order, instead of being sent. ``watched``: what
-    loops over connections store is checked: the number ``odd`` is NaN after the step where some of it is not finite,
-    else 0."""
+    activity ``holding``. ``gone`` and ``still``: connections whose byte is set are left out, do not learn. ``lost``:
+    what a connection has sent before the step in ``lost`` never arrives. ``fused``: what arrives after one step along
+    weights that do not change is summed by the neuron it arrives at, from the activities of the step ``before`` and the
+    weights ``packed`` in its order, instead of being sent. ``watched``: what loops over connections store is checked:
+    the number ``odd`` is NaN after the step where some of it is not finite, else 0."""
 
     written_out: bool = False
     first: bool = False
     held: bool = False
     gone: bool = False
     still: bool = False
+    lost: bool = False
     fused: bool = False
     watched: bool = False
 

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.changes import Change, Clamp
@@ -25,7 +26,7 @@ from neurovis_spec.runtime.c_draws import drawing
 from neurovis_spec.runtime.c_names import LONGEST_STRING, identifiers, prefix, string, words
 from neurovis_spec.runtime.c_settable import formula, write_follow
 from neurovis_spec.runtime.c_step import StepCode
-from neurovis_spec.runtime.conditions import Controls, Mask
+from neurovis_spec.runtime.conditions import NOTHING, Controls, Mask
 from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.state import State, initial_state
 
@@ -39,6 +40,7 @@ class Phase:
     lesioned: Mask
     gone: Mask
     still: Mask
+    lost: IntArray
     clamps: Mapping[int, Clamp]
 
 
@@ -83,6 +85,7 @@ class Exported:
             for change in network.changes:
                 if _only_sets(change):
                     continue
+                state.k = change.at
                 # what is set changes nothing of this; it is done in C
                 controls.apply(state, change._replace(parameters=()))
                 phases.append(self._phase(change.at, state))
@@ -92,7 +95,8 @@ class Exported:
         now = state.conditions
         order = tuple(now.held.order.tolist())
         structure = now.structure
-        return Phase(at, order, now.lesioned_neurons.copy(), structure.gone, structure.still, dict(now.held.active))
+        lesioned, clamps = now.lesioned_neurons.copy(), dict(now.held.active)
+        return Phase(at, order, lesioned, structure.gone, structure.still, structure.lost, clamps)
 
     def _members(self) -> list[Member]:
         network, state = self.network, self.state
@@ -276,10 +280,15 @@ class Exported:
         before: list[str] = []
         for name, masks in (("gone", [p.gone for p in self.phases]), ("still", [p.still for p in self.phases])):
             if any(mask.any() for mask in masks):
-                lines, which = _masks(name, masks)
+                lines, which = _by_phase(name, "unsigned char", [mask.astype(np.uint8) for mask in masks])
                 before += lines
                 taken[name] = f"const unsigned char *const {name} = {which};"
-        form = Form(small, self.first, self.holding, "gone" in taken, "still" in taken)
+        if any((phase.lost > NOTHING).any() for phase in self.phases):
+            first = -int(network.connections.delays.max())  # nothing is read of before
+            lines, which = _by_phase("lost", "int64_t", [np.maximum(phase.lost, first) for phase in self.phases])
+            before += lines
+            taken["lost"] = f"const int64_t *const lost = {which};"
+        form = Form(small, self.first, self.holding, *(name in taken for name in ("gone", "still", "lost")))
         StepCode(network, code, form).write()
         if self.first:
             code.head["first"] = "const int first = k == 0;"
@@ -497,17 +506,18 @@ def _only_sets(change: Change) -> bool:
     return not (change.clamps or change.released or change.learning or any(len(array) for array in arrays))
 
 
-def _masks(name: str, masks: list[Mask]) -> tuple[list[str], str]:
-    """The bytes of a mask in each phase, each different one once, and the code of those of now."""
-    unique: dict[bytes, int] = {}
-    for mask in masks:
-        unique.setdefault(mask.tobytes(), len(unique))
-    rows = ["    {" + ", ".join(str(byte) for byte in data) + "}," for data in unique]
-    lines = [f"static const unsigned char nv_{name}[{len(rows)}][{len(masks[0])}] = {{", *rows, "};"]
-    if len(masks) == 1:
+def _by_phase(name: str, kind: str, arrays: list[npt.NDArray[np.integer]]) -> tuple[list[str], str]:
+    """The numbers of an array in each phase, each different one once, and the code of those of now."""
+    unique: dict[tuple[int, ...], int] = {}
+    numbers = [tuple(array.tolist()) for array in arrays]
+    for own in numbers:
+        unique.setdefault(own, len(unique))
+    rows = ["    {" + ", ".join(map(str, own)) + "}," for own in unique]
+    lines = [f"static const {kind} nv_{name}[{len(rows)}][{len(numbers[0])}] = {{", *rows, "};"]
+    if len(arrays) == 1:
         return lines, f"nv_{name}[0]"
-    which = ", ".join(str(unique[mask.tobytes()]) for mask in masks)
-    lines.append(f"static const int32_t nv_{name}_at[{len(masks)}] = {{{which}}};")
+    which = ", ".join(str(unique[own]) for own in numbers)
+    lines.append(f"static const int32_t nv_{name}_at[{len(arrays)}] = {{{which}}};")
     return lines, f"nv_{name}[nv_{name}_at[state->phase]]"
 
 

@@ -21,8 +21,8 @@ from neurovis_spec.language.expressions.tree import Tree, names
 from neurovis_spec.runtime.c_arrivals import Arrivals
 from neurovis_spec.runtime.c_code import Code, Form, Place
 from neurovis_spec.runtime.conditions import Mask
+from neurovis_spec.runtime.presynaptic import history_depth, rule_names
 from neurovis_spec.runtime.signals import SignalLayout, signal_layout
-from neurovis_spec.runtime.state import history_depth, rule_names
 
 #: connections that learn beside each other: a compiler makes vectors of them
 _RULES = 4
@@ -338,24 +338,33 @@ class StepCode:
         """What a rule may read besides its own: pre, sent, post, the signals."""
         code, connections, members = self.code, self.network.connections, plasticity.members
         sources, targets = connections.sources[members], connections.targets[members]
-        source = code.at(sources, place)
+        source, read = code.at(sources, place), rule_names(plasticity.rule)
         seen: dict[str, Value] = {
             "sent": f"activity[{source}]",
             "post": f"activity[{code.at(targets, place)}]",
             "pre": f"activity[{source}]",
         }
-        if self.depth:
-            seen["pre"] = self.remembered(connections.delays[members], source, place)
+        if self.depth and "pre" in read:
+            seen["pre"] = self.remembered(plasticity, source, place)
         for name, indices in plasticity.signals.items():
             seen[name] = self.signal(indices, place)
-        return {name: value for name, value in seen.items() if name in rule_names(plasticity.rule)}
+        return {name: value for name, value in seen.items() if name in read}
 
-    def remembered(self, delays: IntArray, source: Place, place: Place) -> str:
-        """a_j[t−d]."""
-        code, n = self.code, len(self.network.neurons)
+    def remembered(self, plasticity: Plasticity, source: Place, place: Place) -> Value:
+        """a_j[t−d], 0 where what was sent then is lost."""
+        code, delays = self.code, self.network.connections.delays[plasticity.members]
         own = delays if not isinstance(place, int) else delays[place : place + 1]
         if not own.any():
             return f"activity[{source}]"
+        past = self.past(delays, own, source, place)
+        if not self.form.lost:
+            return past
+        lost = f"lost[{code.at(plasticity.members, place)}]"
+        return code.let("a", f"k - ({code.at(delays, place)}) < {lost} ? {code.text(0.0)} : {past}")
+
+    def past(self, delays: IntArray, own: IntArray, source: Place, place: Place) -> str:
+        """a_j[t−d], from the history."""
+        code, n = self.code, len(self.network.neurons)
         if (own == own[0]).all():
             name, row = f"h{own[0]}", f"(size_t)((k + {self.depth - own[0]}) % {self.depth})*{n}"
             code.head[name] = f"const {code.real} *const {name} = history + {row};"

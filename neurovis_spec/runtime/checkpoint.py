@@ -59,6 +59,8 @@ def save_state(state: State, path: Path) -> None:
         "clamped": _joined([clamp.neurons for clamp in clamps]).astype(np.int64),
         "clamp_values": np.array([_number(clamp) for clamp in clamps], dtype=np.float64),
     }
+    if now.structure.has_lost:
+        arrays["lost"] = now.structure.lost
     if body is not None and body.carried is not None:
         arrays["body"] = numbers_of(body.carried)
     with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
@@ -79,7 +81,7 @@ def load_state(network: Network, path: Path) -> State:
         state = initial_state(network)
         wanted = _arrays(state)
         size, most = regular_size(path), sum(array.nbytes for array in wanted.values())
-        most += 0 if network.body is None else _BODY
+        most += state.conditions.structure.lost.nbytes + (0 if network.body is None else _BODY)
         if size > most + len(network.neurons) * _CLAMPS + _ROOM:
             raise RecordingError("not a checkpoint of this network: it is larger than its state")
         with path.open("rb") as file, zipfile.ZipFile(file) as archive:
@@ -94,11 +96,14 @@ def load_state(network: Network, path: Path) -> State:
             state.k, state.drawn = _whole(about, "k"), _whole(about, "drawn")
             state.begun, state.continued = _whole(about, "begun", -1), about.get("continued") is True
             _clamp_again(network, state, archive, size)
+            lost = state.conditions.structure.lost
+            if "lost.npy" in archive.namelist():
+                lost = _member(archive, "lost", lost).astype(np.int64)
             state.body = _body(network, about, archive, size)
     controls = Controls(network)
     controls.restructure(state)
     now = state.conditions
-    now.structure = replace(now.structure, since=found["gone_since"].astype(np.int64))
+    now.structure = replace(now.structure, since=found["gone_since"].astype(np.int64), lost=lost)
     return state
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,7 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.changes import Change, Held
 from neurovis_spec.compiler.events.patch import Patcher
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.runtime.presynaptic import remembering
 from neurovis_spec.runtime.signals import signal_layout
 
 if TYPE_CHECKING:
@@ -25,21 +26,32 @@ if TYPE_CHECKING:
 
 Mask = npt.NDArray[np.bool_]
 
+#: a step before all others: nothing that was sent is lost
+NOTHING: Final = -(1 << 62)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Structure:
     """Which connections a step leaves out: ``gone`` (m,) those that are lesioned, or one of whose ends is, ``since``
-    (m,) the step from which each of them is, and ``still`` (m,) those whose rule is not carried out. A backend that has
-    made code for one structure makes it anew where that of a State is another object."""
+    (m,) the step from which each of them is, and ``still`` (m,) those whose rule is not carried out. ``lost`` (m,): all
+    that a connection has sent before this step never arrives, so that ``pre`` is 0 in its place; only of those whose
+    rule looks there, else NOTHING. A backend that has made code for one structure makes it anew where that of a State
+    is another object."""
 
     gone: Mask
     since: IntArray
     still: Mask
+    lost: IntArray
 
     @property
     def whole(self) -> bool:
         """Whether nothing is left out."""
-        return not (self.gone.any() or self.still.any())
+        return not (self.gone.any() or self.still.any() or self.has_lost)
+
+    @property
+    def has_lost(self) -> bool:
+        """Whether anything that a rule would read of the past never arrives."""
+        return bool((self.lost > NOTHING).any())
 
 
 @dataclass
@@ -85,7 +97,8 @@ def first_conditions(network: Network) -> Conditions:
     settable = network.settable
     nothing = np.zeros(m, dtype=np.bool_)
     never = np.zeros(m, dtype=np.int64)
-    nothing.flags.writeable = never.flags.writeable = False
+    lost = np.full(m, NOTHING)
+    nothing.flags.writeable = never.flags.writeable = lost.flags.writeable = False
     return Conditions(
         parameters=settable.parameters.copy(),
         chosen=np.zeros(len(settable.slots), dtype=np.bool_),
@@ -94,8 +107,21 @@ def first_conditions(network: Network) -> Conditions:
         lesioned_neurons=np.zeros(n, dtype=np.bool_),
         lesioned_connections=np.zeros(m, dtype=np.bool_),
         paused=np.zeros(m, dtype=np.bool_),
-        structure=Structure(nothing, never, nothing),
+        structure=Structure(nothing, never, nothing, lost),
     )
+
+
+def lose(network: Network, state: State, connections: IntArray) -> None:
+    """Nothing is under way on these connections: what they have sent so far never arrives."""
+    offsets, delays = signal_layout(network).offsets, network.connections.delays
+    for connection in connections.tolist():
+        if delays[connection]:
+            state.signals[offsets[connection] : offsets[connection] + delays[connection]] = 0.0
+    looked_for = connections[remembering(network)[connections]]
+    if len(looked_for):
+        lost = state.conditions.structure.lost.copy()
+        lost[looked_for] = state.k
+        state.conditions.structure = replace(state.conditions.structure, lost=lost)
 
 
 @dataclass
@@ -166,14 +192,7 @@ class Controls:
         now.lesioned_connections[connections] = False
         before = now.structure
         self.restructure(state)
-        self.clear(state, np.flatnonzero(before.gone & (before.since < state.k) & ~now.structure.gone))
-
-    def clear(self, state: State, connections: IntArray) -> None:
-        """Nothing is under way on these connections."""
-        offsets, delays = signal_layout(self.network).offsets, self.network.connections.delays
-        for connection in connections.tolist():
-            if delays[connection]:
-                state.signals[offsets[connection] : offsets[connection] + delays[connection]] = 0.0
+        lose(self.network, state, np.flatnonzero(before.gone & (before.since < state.k) & ~now.structure.gone))
 
     def learn(self, state: State, connections: IntArray, on: bool) -> None:
         """Switch the rules of connections on or off; weights and states of a rule that is off stay as they are."""
@@ -201,5 +220,5 @@ class Controls:
         still = gone | now.paused
         if not (np.array_equal(gone, now.structure.gone) and np.array_equal(still, now.structure.still)):
             since = np.where(gone & ~now.structure.gone, state.k, now.structure.since)
-            now.structure = Structure(gone, since, still)
+            now.structure = replace(now.structure, gone=gone, since=since, still=still)
         self.hold(now)

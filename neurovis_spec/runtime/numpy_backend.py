@@ -17,8 +17,9 @@ from neurovis_spec.runtime.conditions import Mask, Structure
 from neurovis_spec.runtime.numpy_blocks import emit_gather, emit_send, emit_update
 from neurovis_spec.runtime.numpy_code import Code
 from neurovis_spec.runtime.numpy_learn import emit_history, emit_learn
+from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import signal_layout
-from neurovis_spec.runtime.state import State, history_depth
+from neurovis_spec.runtime.state import State
 from neurovis_spec.runtime.watch import all_finite, carried_by
 
 #: neurons, connections and steps of one call together, and how many of these an operation takes the time of: some tens
@@ -101,7 +102,7 @@ def step_code(network: Network, structure: Structure) -> Code:
                 emit_send(code, network, layout)
                 emit_history(code, depth)
             case Learn(plasticity=number):
-                emit_learn(code, network, number, depth, structure.still)
+                emit_learn(code, network, number, depth, structure)
     return code
 
 

@@ -14,10 +14,10 @@ from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Plasticity
 from neurovis_spec.language.expressions.tree import Tree
-from neurovis_spec.runtime.conditions import Mask
+from neurovis_spec.runtime.conditions import NOTHING, Structure
 from neurovis_spec.runtime.numpy_blocks import emit_let
 from neurovis_spec.runtime.numpy_code import Code
-from neurovis_spec.runtime.state import rule_names
+from neurovis_spec.runtime.presynaptic import rule_names
 
 
 def emit_history(code: Code, depth: int) -> None:
@@ -26,11 +26,11 @@ def emit_history(code: Code, depth: int) -> None:
         code.line(f"history[k % {depth}] = activity")
 
 
-def emit_learn(code: Code, network: Network, number: int, depth: int, still: Mask) -> None:
+def emit_learn(code: Code, network: Network, number: int, depth: int, structure: Structure) -> None:
     """The rule of a plasticity at a step and, where it has one, at an episode's end; not of connections that are
-    ``still`` (m,)."""
+    ``still`` in this structure."""
     plasticity, some = network.plasticity[number], None
-    moving = ~still[plasticity.members]
+    moving = ~structure.still[plasticity.members]
     if not moving.all():
         some = np.flatnonzero(moving)
         if not len(some):
@@ -38,7 +38,9 @@ def emit_learn(code: Code, network: Network, number: int, depth: int, still: Mas
         signals = {name: indices[some] for name, indices in plasticity.signals.items()}
         plasticity = replace(plasticity, members=plasticity.members[some], signals=signals)
     rule = plasticity.rule
-    known = code.parameters(f"rule/{number}", plasticity.parameters, some) | _seen(code, network, plasticity, depth)
+    known = code.parameters(f"rule/{number}", plasticity.parameters, some) | _seen(
+        code, network, plasticity, depth, structure.lost[plasticity.members]
+    )
     place = "" if some is None else f"[{code.constant(some)}]"
     traces = {q.name: code.let("v", f"traces[{number}][{i}]{place}") for i, q in enumerate(rule.state)}
     stored = {q.name: f"traces[{number}][{i}]{place}" if place else "" for i, q in enumerate(rule.state)}
@@ -91,21 +93,30 @@ def _bounded(code: Code, network: Network, plasticity: Plasticity, weight: str) 
     return weight
 
 
-def _seen(code: Code, network: Network, plasticity: Plasticity, depth: int) -> dict[str, str]:
-    """Arrays for pre, sent, post and the signals; only what the rule reads is gathered."""
+def _seen(code: Code, network: Network, plasticity: Plasticity, depth: int, lost: IntArray) -> dict[str, str]:
+    """Arrays for pre, sent, post and the signals; only what the rule reads is gathered. What was sent before the steps
+    ``lost`` never arrives."""
     read, members = rule_names(plasticity.rule), plasticity.members
     connections, n = network.connections, len(network.neurons)
     sources, targets = connections.sources[members], connections.targets[members]
     made: dict[str, Callable[[], str]] = {
         "sent": lambda: code.select("activity", sources, n, broadcast=True),
         "post": lambda: code.select("activity", targets, n, broadcast=True),
-        "pre": lambda: _pre(code, sources, connections.delays[members], n, depth),
+        "pre": lambda: _arrived(code, sources, connections.delays[members], n, depth, lost),
     }
     seen = {name: code.let("a", make()) for name, make in made.items() if name in read}
     for signal, indices in plasticity.signals.items():
         if signal in read:
             seen[signal] = code.let("a", _signal(code, indices, n, network.vector_size))
     return seen
+
+
+def _arrived(code: Code, sources: IntArray, delays: IntArray, n: int, depth: int, lost: IntArray) -> str:
+    """a_j[t−d] of each connection, 0 where what was sent then is lost."""
+    pre = _pre(code, sources, delays, n, depth)
+    if not (lost > NOTHING).any():
+        return pre
+    return f"np.where(k < {code.constant(lost + delays)}, 0.0, {pre})"
 
 
 def _pre(code: Code, sources: IntArray, delays: IntArray, n: int, depth: int) -> str:

@@ -181,14 +181,16 @@ class ReferenceStepper:
         state.weights[connection] = new["weight"]
 
     def seen(self, connection: int, state: State) -> dict[str, float]:
-        """``pre`` = a_j[t−d], ``sent`` = a_j[t] and ``post`` = a_i[t] of a connection from j to i."""
+        """``pre`` = a_j[t−d], 0 where what was sent then is lost, ``sent`` = a_j[t] and ``post`` = a_i[t] of a
+        connection from j to i."""
         connections = self.network.connections
         source, target = int(connections.sources[connection]), int(connections.targets[connection])
         delay = int(connections.delays[connection])
         sent = float(state.activity[source])
         pre = sent
         if delay > 0 and len(state.history):
-            pre = float(state.history[(state.k - delay) % len(state.history), source])
+            lost = state.k - delay < state.conditions.structure.lost[connection]
+            pre = 0.0 if lost else float(state.history[(state.k - delay) % len(state.history), source])
         return {"pre": pre, "sent": sent, "post": float(state.activity[target])}
 
     def clock(self, state: State) -> dict[str, float]:

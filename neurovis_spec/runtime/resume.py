@@ -23,7 +23,7 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.patch import PatchError
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
-from neurovis_spec.runtime.conditions import Controls
+from neurovis_spec.runtime.conditions import Controls, lose
 from neurovis_spec.runtime.fitting import of_table
 from neurovis_spec.runtime.recording import Recording, RecordingError
 from neurovis_spec.runtime.signals import signal_layout
@@ -49,7 +49,7 @@ def resumed_state(network: Network, recording: Recording) -> State:
         weights = state.weights.copy()
         weights[same] = recording.all_weights(row)[recorded]
         _send(network, state, -ago, recording.activity[row][order], weights)
-    controls.clear(state, np.flatnonzero(state.conditions.structure.gone))
+    lose(network, state, np.flatnonzero(state.conditions.structure.gone))
     state.activity = recording.activity[-1][order]
     state.weights[places] = recording.weights_after[columns]
     return state

@@ -15,10 +15,10 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.initial_states import starts_of
-from neurovis_spec.compiler.program import Plasticity, Quantity, Rule
+from neurovis_spec.compiler.program import Quantity
 from neurovis_spec.language.expressions.arrays import evaluate_array
-from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.runtime.conditions import Conditions, first_conditions
+from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import signal_layout
 
 
@@ -96,26 +96,6 @@ def initial_state(network: Network) -> State:
         conditions=first_conditions(network),
         network=network.mark,
     )
-
-
-def history_depth(network: Network) -> int:
-    """Rows of the history: a[t−d] … a[t] for the largest d of a rule that reads ``pre``; 0 where none is delayed."""
-    deepest = max(
-        (int(network.connections.delays[entry.members].max(initial=0)) for entry in _readers_of_pre(network)),
-        default=0,
-    )
-    return deepest + 1 if deepest else 0
-
-
-def _readers_of_pre(network: Network) -> list[Plasticity]:
-    return [entry for entry in network.plasticity if "pre" in rule_names(entry.rule)]
-
-
-def rule_names(rule: Rule) -> frozenset[str]:
-    """All names that the expressions of a rule read at a step or at an episode's end."""
-    trees = [tree for _, tree in rule.let] + [rule.each_step, rule.each_episode]
-    trees += [tree for quantity in rule.state for tree in (quantity.each_step, quantity.each_episode)]
-    return frozenset().union(*(names(tree) for tree in trees if tree is not None))
 
 
 def constants(dt: float) -> dict[str, float]:

@@ -1,0 +1,41 @@
+"""What rules read of the past: ``pre``, the activity of a source when that left which now reaches the synapse.
+
+In: a Network. Out: how far back its activities are kept, and which connections look there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Plasticity, Rule
+from neurovis_spec.language.expressions.tree import names
+
+
+def history_depth(network: Network) -> int:
+    """Rows of the history: a[t−d] … a[t] for the largest d of a rule that reads ``pre``; 0 where none is delayed."""
+    deepest = max(
+        (int(network.connections.delays[entry.members].max(initial=0)) for entry in _readers_of_pre(network)),
+        default=0,
+    )
+    return deepest + 1 if deepest else 0
+
+
+def remembering(network: Network) -> npt.NDArray[np.bool_]:
+    """The connections (m,) whose rule reads an activity of the past: delayed ones whose rule reads ``pre``."""
+    reading = np.zeros(len(network.connections), dtype=np.bool_)
+    for entry in _readers_of_pre(network):
+        reading[entry.members] = True
+    return reading & (network.connections.delays > 0)
+
+
+def rule_names(rule: Rule) -> frozenset[str]:
+    """All names that the expressions of a rule read at a step or at an episode's end."""
+    trees = [tree for _, tree in rule.let] + [rule.each_step, rule.each_episode]
+    trees += [tree for quantity in rule.state for tree in (quantity.each_step, quantity.each_episode)]
+    return frozenset().union(*(names(tree) for tree in trees if tree is not None))
+
+
+def _readers_of_pre(network: Network) -> list[Plasticity]:
+    return [entry for entry in network.plasticity if "pre" in rule_names(entry.rule)]
