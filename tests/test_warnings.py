@@ -8,6 +8,7 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
+from toy_bodies import registered
 
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
@@ -421,3 +422,63 @@ def test_any_text_can_be_searched(before: str, codes: str) -> None:
 
 def test_a_commented_spec_is_no_allow() -> None:
     assert warnings("neurons: {A: {}}\n# neurovis: 1\n# neurovis: allowance\n") == []
+
+
+# What something outside the run reads
+
+
+MONITOR = """\
+models:
+  cell:
+    parameters: {slow: 0.9}
+    let: {low: v - 1}
+    state:
+      v: {each_step: 0.9 * v + drive}
+      calcium: {each_step: slow * calcium + low}
+    activity: f(v)
+rules:
+  counting:
+    parameters: {rate: 0, slow: 0.5}
+    let: {both: pre * post}
+    state: {seen: {each_step: slow * seen + both}}
+    weight: {each_step: weight + rate * pre}
+neurons: {A: {bias: 1, model: cell}, B: {}}
+"""
+
+
+@pytest.mark.parametrize(
+    "readers",
+    [
+        "outputs: {calcium: A.calcium, seen: (A -> B).seen}\n",
+        "outputs: {seen: (A -> B).seen}\nrender: {figure: [{traces: [A.calcium]}]}\n",
+        "outputs: {seen: (A -> B).seen}\n",  # 'run --states A.calcium' reads it, 'sweep --metric', 'sim.step', …
+    ],
+)
+@pytest.mark.parametrize("bounds", ["", ", bounds: [1, 1]"])
+def test_a_state_is_there_to_be_recorded(readers: str, bounds: str) -> None:
+    """Nor is what it reads unused, nor a rule that changes no weight without effect where its states are outputs."""
+    assert warnings(f"{MONITOR}connections: {{A -> B: {{plasticity: counting{bounds}}}}}\n{readers}") == []
+
+
+def test_what_no_state_reads_either_is_told() -> None:
+    body = MONITOR.replace("+ low}", "}").replace("+ both}", "}")
+    assert warnings(body + "connections: {A -> B: {plasticity: {counting: {rate: 0}}}}\n") == [
+        ("unused-part", "low"),
+        ("unused-part", "both"),
+        ("zero-rate", "0"),
+    ]
+
+
+def test_a_strict_check_passes_a_spec_whose_states_are_recorded(tmp_path: Path) -> None:
+    (tmp_path / "x.yaml").write_text(f"neurovis: 1\nname: x\n{MONITOR}connections: {{A -> B: 1}}\n", "utf-8")
+    spec = str(tmp_path / "x.yaml")
+    found = CliRunner().invoke(neurovis, ["validate", spec, "--strict"])
+    assert "unused-part" not in found.stderr
+    ran = CliRunner().invoke(neurovis, ["run", spec, "--steps", "3", "--states", "A.calcium"])
+    assert "unused-part" not in ran.stderr
+
+
+def test_a_body_that_ends_its_episodes_itself_is_reset(monkeypatch: pytest.MonkeyPatch) -> None:
+    registered(monkeypatch)
+    body = "time: {dt: 0.05}\nneurons: {A: {bias: 1}}\noutputs: {a: A}\n"
+    assert warnings(body + "body: {toy: short, actuators: {push: a}, reset: each_episode}\n") == []

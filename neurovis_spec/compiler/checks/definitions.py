@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from collections.abc import Mapping as AnyMapping
-from itertools import chain
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -33,7 +32,7 @@ from neurovis_spec.language.values import Choice
 from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
 
 _Definition: TypeAlias = ActivationModel | ModelModel | RuleModel
-_NOUNS = {"let": "intermediate value", "state": "state", "signals": "signal", "parameters": "parameter"}
+_NOUNS = {"let": "intermediate value", "signals": "signal", "parameters": "parameter"}
 
 
 def check_definitions(compiled: Compiled, findings: Findings) -> None:
@@ -99,36 +98,21 @@ def _reached(names: Iterable[str], parts: AnyMapping[str, _Part]) -> set[str]:
 
 
 def _check_parts(definition: _Definition, wanted: frozenset[str], what: str, findings: Findings) -> None:
-    """Each part on which neither the activity nor the weight depends. A part that only such parts read is not reported:
-    that follows from these."""
+    """Each part on which neither the activity or the weight depends, nor a state: states can be recorded, by an output
+    or whoever runs the network, so all of them count as read. A part that only such parts read is not reported: that
+    follows from these."""
     parts = _parts_of(definition)
-    used = _reached(wanted, parts)
-    for name in _first({name: part for name, part in parts.items() if name not in used}):
-        section, span, _ = parts[name]
+    states = [name for name, part in parts.items() if part.section == "state"]
+    used = _reached([*wanted, *states], parts)
+    unused = {name: part for name, part in parts.items() if name not in used}
+    for name, (section, span, _) in unused.items():
+        if any(name in part.reads for other, part in unused.items() if other != name):
+            continue
         message = f"{what} does not depend on the {_NOUNS[section]} '{name}'"
         if section == "parameters":
             findings.warning("unused-parameter", span, message, "remove it, or use it")
         else:
             findings.warning("unused-part", span, message, "remove it, or use it")
-
-
-def _first(unused: AnyMapping[str, _Part]) -> Iterator[str]:
-    """Of unused parts those that no other reads, and one of those that read each other."""
-    readers: dict[str, set[str]] = {name: set() for name in unused}
-    for other, part in unused.items():
-        for name in part.reads & unused.keys() - {other}:
-            readers[name].add(other)
-    left = dict(unused)
-    while left:
-        alone = (name for name in left if not readers[name])
-        cyclic = (name for name in left if readers[name] <= _reached((name,), unused))
-        first = next(chain(alone, cyclic))
-        yield first
-        gone = _reached((first,), unused) & left.keys()
-        for name in gone:
-            del left[name]
-        for name in left:
-            readers[name] -= gone
 
 
 # Weights that are replaced where a change is meant

@@ -14,6 +14,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.checks.compiled import Compiled, WrittenEntry
 from neurovis_spec.compiler.connections.entries import Bundle
+from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Rule
 from neurovis_spec.diagnostics import Findings, shorten
 from neurovis_spec.language.expressions.arrays import Value, evaluate_array
@@ -27,6 +28,7 @@ _STEPS = 6
 
 def check_rules(compiled: Compiled, findings: Findings) -> None:
     """Warn of every entry whose rule changes no weight."""
+    watched = _watched(compiled.network)
     for entry in compiled.entries.values():
         learning, choice = entry.learning, entry.body.plasticity
         if learning is None or choice is None:
@@ -34,8 +36,9 @@ def check_rules(compiled: Compiled, findings: Findings) -> None:
         for signal in learning.rule.signals:
             if all(_is_own(bundle, signal) for bundle in entry.bundles):
                 _check_signal(entry, signal, findings)
-        _check_rate(entry, findings)
-        _check_bounds(entry, findings)
+        if watched.isdisjoint(bundle.name for bundle in entry.bundles):  # else it is there for its states
+            _check_rate(entry, findings)
+            _check_bounds(entry, findings)
         if compiled.network.episode is None and learning.rule.each_step is None:
             name = learning.rule.name
             message = f"'{name}' changes weights at the end of an episode, and there are none: no weight will change"
@@ -68,6 +71,13 @@ def changes(rule: Rule, parameters: Mapping[str, FloatArray], own: Collection[st
                     new[state.name] = evaluate_array(change, values)
             values |= new
     return False
+
+
+def _watched(network: Network) -> set[str]:
+    """The entries a state of whose rule is named by an output."""
+    connections = network.connections
+    states = [state.connections for output in network.outputs for state in output.states]
+    return {connections.entries[number] for own in states for number in set(connections.entry[own].tolist())}
 
 
 def _is_own(bundle: Bundle, signal: str) -> bool:

@@ -125,9 +125,12 @@ def _outputs(compiled: Compiled, findings: Findings) -> None:
 
 
 def _reset(compiled: Compiled, findings: Findings) -> None:
-    """A body that is reset where an episode ends, in a run without episodes."""
+    """A body of MuJoCo that is reset where an episode ends, in a run without episodes; those of other kinds may end
+    episodes themselves."""
     body = compiled.spec.body
     if body is None or body.reset is None or body.reset.value == "never" or compiled.network.episode is not None:
+        return
+    if body.mujoco is None:
         return
     message = "the body is reset at the end of an episode, and there are none: it will not be"
     findings.warning(
