@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -128,6 +129,26 @@ def test_other_programs_read_it_through_the_index(name: str, ros: Ros, tmp_path:
             assert about.name == "neurovis"
             assert about.metadata["hash"] == HASH
     assert found == [(START + k * 1_000_000, data) for k, data in enumerate(messages)]
+
+
+def test_the_header_of_a_bag_is_as_large_as_rosbag_counts_on(tmp_path: Path) -> None:
+    """Which writes its own over it, while what comes behind stays where it is."""
+    made(tmp_path / "x.bag", 1, 1)
+    data = (tmp_path / "x.bag").read_bytes()
+    (fields,) = struct.unpack_from("<I", data, 13)
+    (filled,) = struct.unpack_from("<I", data, 17 + fields)
+    assert fields == 4 + 4 + 4 + 4 + len(b"op=.index_pos=........conn_count=....chunk_count=....")
+    assert fields + filled == 4096
+    assert data[21 + 4096 + 8 : 21 + 4096 + 12] == b"op=\5", "the first chunk follows"
+
+
+def test_a_bag_of_an_earlier_version_is_read() -> None:
+    """Its header was shorter, and said of which network it is."""
+    bag = read_bag(Path(__file__).parent / "golden" / "earlier.bag")
+    assert bag.about["hash"] == HASH
+    first, *rest = bag.messages()
+    assert first.topic.name == "/neurovis/x/spec"
+    assert [one.data for one in rest] == sent(1, range(3))
 
 
 def test_chunks_have_64_kib_at_most_and_end_after_a_tenth_of_a_second(tmp_path: Path) -> None:

@@ -39,10 +39,18 @@ class Record(NamedTuple):
 
 
 class Head(NamedTuple):
-    """What the header of a bag says: where its index is, and of which network it is, if it is one of ours."""
+    """What the header of a bag says: where its index is, and of which network it is, where an earlier version of ours
+    wrote it."""
 
     place: int
     whole: bool
+    about: Mapping[str, str]
+
+
+class Connections(NamedTuple):
+    """The connections of a bag, by their numbers, and what they say of the network, if it is a bag of ours."""
+
+    topics: Mapping[int, Topic]
     about: Mapping[str, str]
 
 
@@ -109,43 +117,49 @@ def head_of(file: BinaryIO) -> Head:
         raise RecordingError("not a bag: it has no header")
     if first.fields.get("encryptor"):
         raise RecordingError("its messages are encrypted")
-    about = first.fields.get(ABOUT)
     index = first.number("index_pos")
-    return Head(index, 0 < index <= size, {} if about is None else Reader(about).mapping())
+    return Head(index, 0 < index <= size, _about(first.fields))
 
 
-def connections_of(file: BinaryIO, head: Head) -> dict[int, Topic]:
-    """The connections, by their numbers: those of the index, else of all chunks. Raises RecordingError."""
-    result: dict[int, Topic] = {}
+def connections_of(file: BinaryIO, head: Head) -> Connections:
+    """The connections: those of the index, else of all chunks. Raises RecordingError."""
+    topics: dict[int, Topic] = {}
+    about = head.about
+    for record, data in _connections(file, head):
+        number, fields = record.number("conn"), {**_fields(data), **record.fields}
+        if number in topics:
+            continue
+        if len(topics) >= MOST_NAMED:
+            raise RecordingError("it holds more connections than there can be")
+        topics[number] = _topic(fields)
+        about = about or _about(fields)
+    return Connections(topics, about)
+
+
+def _connections(file: BinaryIO, head: Head) -> Iterator[tuple[Record, bytes]]:
+    """The records of connections, with their data; each may come several times."""
     size = _size(file)
-    if head.whole:
-        for record in _scan(file, head.place, size):
-            if record.op == CONNECTION:
-                _learn(record, _data(file, record), result)
-        return result
-    for record in _scan(file, len(BAG_MAGIC), size):
-        if record.op == CHUNK:
+    for record in _scan(file, head.place if head.whole else len(BAG_MAGIC), size):
+        if record.op == CONNECTION:
+            yield record, _data(file, record)
+        elif record.op == CHUNK and not head.whole:
             content = io.BytesIO(_expanded(record, _data(file, record)))
             for inner in _scan(content, 0, len(content.getbuffer())):
                 if inner.op == CONNECTION:
-                    _learn(inner, _data(content, inner), result)
-        elif record.op == CONNECTION:
-            _learn(record, _data(file, record), result)
-    return result
+                    yield inner, _data(content, inner)
 
 
-def _learn(record: Record, data: bytes, known: dict[int, Topic]) -> None:
-    number = record.number("conn")
-    if number in known:
-        return
-    if len(known) >= MOST_NAMED:
-        raise RecordingError("it holds more connections than there can be")
-    about = _fields(data)
-    topic = record.fields.get("topic", about.get("topic", b"")).decode(errors="replace")
-    type_, text = about.get("type", b"").decode(errors="replace"), about.get("message_definition", b"")
+def _topic(fields: Mapping[str, bytes]) -> Topic:
+    names = ("topic", "type", "message_definition")
+    topic, type_, text = (fields.get(name, b"").decode(errors="replace") for name in names)
     if not topic or "/" not in type_:
         raise RecordingError("a connection does not say of which type its messages are")
-    known[number] = Topic(topic, plain(type_), "ros1", text.decode(errors="replace"))
+    return Topic(topic, plain(type_), "ros1", text)
+
+
+def _about(fields: Mapping[str, bytes]) -> Mapping[str, str]:
+    about = fields.get(ABOUT)
+    return {} if about is None else Reader(about).mapping()
 
 
 def messages_of(file: BinaryIO) -> Iterator[Found]:

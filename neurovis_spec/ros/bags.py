@@ -255,8 +255,8 @@ class _Bag:
         self.left_out: dict[str, str] = {}
         with path.open("rb") as file:
             head = bag1.head_of(file)
-            self.about, self.whole = head.about, head.whole
-            self._connections = bag1.connections_of(file, head)
+            self._connections, self.about = bag1.connections_of(file, head)
+        self.whole = head.whole
         self.topics = tuple(dict.fromkeys(self._connections.values()))
 
     def messages(self) -> Iterator[Stored]:

@@ -20,7 +20,7 @@ from neurovis_spec.runtime.mcap_file import FRAME
 from neurovis_spec.runtime.wire import ENCODINGS, Encoding
 from neurovis_spec.version import __version__
 
-#: the metadata record of an MCAP file, and the field of a bag's header
+#: the metadata record of an MCAP file, and the field of a bag's connections
 ABOUT: Final = "neurovis"
 
 
@@ -139,6 +139,7 @@ class McapLog(_Whole):
 BAG_MAGIC: Final = b"#ROSBAG V2.0\n"
 #: operations of the records of a bag
 MESSAGE_DATA, BAG_HEADER, INDEX_DATA, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7
+#: of the header's fields and of what fills it up: rosbag writes it anew in its place, and counts on that size
 _HEADER_SIZE: Final = 4096
 
 
@@ -166,7 +167,8 @@ class _ChunkInfo(NamedTuple):
 
 
 class BagLog(_Whole):
-    """A bag of ROS 1, format 2.0; ``about`` stands in a field of its header, which others pass over."""
+    """A bag of ROS 1, format 2.0; ``about`` stands in a field of its connections: others pass over it, and rosbag keeps
+    it where it writes a bag anew."""
 
     def __init__(self, path: Path, ros: Ros, about: Mapping[str, str], frame: bytes = b"") -> None:
         if ros != 1:
@@ -177,23 +179,22 @@ class BagLog(_Whole):
         super().__init__(path, BAG_MAGIC + self._header(0))
 
     def _header(self, index: int) -> bytes:
-        """The first record, always of the same size."""
+        """The first record, to the byte as rosbag's are."""
         fields = {
             "op": bytes([BAG_HEADER]),
             "index_pos": struct.pack("<Q", index),
             "conn_count": struct.pack("<I", len(self._connections)),
             "chunk_count": struct.pack("<I", len(self._infos)),
-            ABOUT: self._about,
         }
-        return _record(fields, b" " * (_HEADER_SIZE - len(_record(fields, b""))))
+        return _record(fields, b" " * (_HEADER_SIZE - len(_fields(fields))))
 
-    @staticmethod
-    def _connection(topic: Topic, number: int) -> bytes:
+    def _connection(self, topic: Topic, number: int) -> bytes:
         data = {
             "topic": topic.name.encode(),
             "type": topic.type.encode(),
             "md5sum": md5sum(topic.type, topic.definition).encode(),
             "message_definition": topic.definition.encode(),
+            ABOUT: self._about,
         }
         fields = {"op": bytes([CONNECTION]), "conn": struct.pack("<I", number), "topic": topic.name.encode()}
         return _record(fields, _fields(data))
