@@ -117,6 +117,8 @@ needs-ros:
 	  && (for command in roscore rosmaster rostopic rosbag rosparam g++ pkg-config; do command -v $$command >/dev/null || exit 1; done) \
 	  && pkg-config --exists roscpp sensor_msgs \
 	  || { echo "make test-ros needs what is not here: ROS 1 (apt-get install $(ROS_1))" >&2; exit 1; }
+	@for command in ip unshare nsenter; do PATH="$$PATH:/usr/sbin:/sbin" command -v $$command >/dev/null \
+	  || { echo "make test-ros needs what is not here: two machines on one (apt-get install iproute2 util-linux)" >&2; exit 1; }; done
 	@command -v g++ >/dev/null && command -v rosnode >/dev/null && pkg-config --exists roscpp 2>/dev/null \
 	  && test -e /usr/include/sensor_msgs/JointState.h -a -e /usr/include/geometry_msgs/TwistStamped.h \
 	    -a -e /usr/include/diagnostic_msgs/DiagnosticArray.h \

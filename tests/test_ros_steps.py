@@ -18,7 +18,7 @@ from neurovis_spec.ros import middleware
 from neurovis_spec.ros.counts import Teller
 from neurovis_spec.ros.definitions import Definition
 from neurovis_spec.ros.inputs import Inputs
-from neurovis_spec.ros.middleware import Arrival, MiddlewareError, NodeOptions, choose, confine
+from neurovis_spec.ros.middleware import Arrival, MiddlewareError, choose
 from neurovis_spec.ros.pace import Pace
 
 FLOAT = "std_msgs/Float64"
@@ -156,18 +156,6 @@ def test_which_ros_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     assert choose(None, {"ROS_VERSION": "2"}) == 1
     with pytest.raises(MiddlewareError, match="ROS 2 is not here: the module 'rclpy'"):
         choose(2, {})
-
-
-def test_this_machine_alone_is_met() -> None:
-    assert confine(NodeOptions("a", environment={}), 2) == {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-    assert confine(NodeOptions("a", environment={}), 1) == {"ROS_IP": "127.0.0.1"}
-    assert confine(NodeOptions("a", environment={"ROS_MASTER_URI": "http://localhost:1"}), 1) == {"ROS_IP": "127.0.0.1"}
-    elsewhere = {"ROS_MASTER_URI": "http://robot:11311"}
-    with pytest.raises(MiddlewareError, match="another machine, 'robot'"):
-        confine(NodeOptions("a", environment=elsewhere), 1)
-    assert confine(NodeOptions("a", remote=True, environment=elsewhere), 1) == {}
-    assert confine(NodeOptions("a", environment={**elsewhere, "ROS_IP": "10.0.0.1"}), 1) == {}
-    assert confine(NodeOptions("a", environment={"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}), 2) == {}
 
 
 def test_without_ros_it_is_said_how_to_get_one(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

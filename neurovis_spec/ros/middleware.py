@@ -12,16 +12,12 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Final, Literal, NamedTuple, Protocol, TypeAlias
-from urllib.parse import urlsplit
 
 from neurovis_spec.runtime.wire import Encoding
 
 Ros: TypeAlias = Literal[1, 2]
 #: the module that each ROS is imported as
 MODULES: Final[Mapping[Ros, str]] = {1: "rospy", 2: "rclpy"}
-#: what says who may listen; where one of them is set, nothing is changed
-_OPEN: Final = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_IP", "ROS_HOSTNAME")
-_HERE: Final = ("localhost", "127.0.0.1", "::1")
 
 
 class MiddlewareError(ValueError):
@@ -229,26 +225,8 @@ def _missing(message: str) -> MiddlewareError:
     )
 
 
-def confine(options: NodeOptions, ros: Ros) -> dict[str, str]:
-    """What is added to the environment so that this machine alone is met. Raises MiddlewareError for a master on
-    another machine."""
-    if options.remote or any(options.environment.get(name) for name in _OPEN):
-        return {}
-    if ros == 2:
-        return {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-    master = options.environment.get("ROS_MASTER_URI", "")
-    host = urlsplit(master).hostname
-    if host is not None and host not in _HERE:
-        raise MiddlewareError(
-            f"ROS_MASTER_URI names another machine, '{host}', which does not see this node",
-            "--remote lets other machines listen; or set ROS_IP to the address of this machine that they reach",
-        )
-    return {"ROS_IP": "127.0.0.1"}
-
-
 def open_node(options: NodeOptions, tell: Tell) -> Node:
     """A node with these options. Raises MiddlewareError."""
     ros = choose(options.ros, options.environment)
-    os.environ.update(confine(options, ros))
     opened: Node = import_module(f"neurovis_spec.ros.ros{ros}").open_node(options, tell)
     return opened

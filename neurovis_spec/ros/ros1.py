@@ -37,6 +37,7 @@ from neurovis_spec.ros.middleware import (
     Subscription,
     Tell,
 )
+from neurovis_spec.ros.reach import reach_1
 from neurovis_spec.runtime.wire import Encoding
 
 #: seconds between two questions to the master, to the cache of parameters, and until the master counts as away
@@ -48,6 +49,7 @@ _BUFFER: Final = 1 << 20
 
 def open_node(options: NodeOptions, tell: Tell) -> Node:
     """A node of ROS 1; waits for its master."""
+    reach_1(options).take(tell)
     return Ros1Node(options, tell)
 
 

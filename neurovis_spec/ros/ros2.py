@@ -10,6 +10,8 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from threading import Event, Lock, Thread
 from typing import Final, cast
 
@@ -21,6 +23,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.parameter import Parameter as Given
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos import qos_policy_name_from_kind as policy_name
+from rclpy.utilities import get_rmw_implementation_identifier
 
 from neurovis_spec.ros.middleware import (
     Arrival,
@@ -36,11 +39,14 @@ from neurovis_spec.ros.middleware import (
     Subscription,
     Tell,
 )
+from neurovis_spec.ros.reach import Carrier, reach_2
 from neurovis_spec.runtime.wire import Encoding
 
 #: seconds that another node has to answer
 _ANSWER: Final = 1.0
 _HUGE: Final = 1.7976931348623157e308
+#: the version of Jazzy's rclpy
+_JAZZY: Final = 7
 #: names of primitives in interfaces, where they are others than in messages
 _PRIMITIVE: Final[Mapping[str, str]] = {"boolean": "bool", "octet": "byte", "double": "float64", "float": "float32"}
 _ARRAY: Final = re.compile(r"(?:sequence<(.+?)(?:, (\d+))?>|(.+)\[(\d+)\])")
@@ -48,7 +54,25 @@ _ARRAY: Final = re.compile(r"(?:sequence<(.+?)(?:, (\d+))?>|(.+)\[(\d+)\])")
 
 def open_node(options: NodeOptions, tell: Tell) -> Node:
     """A node of ROS 2."""
+    reach_2(options, _carrier(), Path.cwd()).take(tell)
     return Ros2Node(options, tell)
+
+
+def _carrier() -> Carrier:
+    """What carries messages. Raises MiddlewareError."""
+    try:
+        name = str(get_rmw_implementation_identifier())
+    except Exception as error:
+        raise MiddlewareError(f"ROS 2 has no middleware: {error}") from None
+    if not name.startswith("rmw_fastrtps"):
+        return Carrier(name, None)
+    # Fast DDS does not say itself which it is: the distributions behind Jazzy have the third, which takes a profile as
+    # the second does, and warns of it
+    try:
+        third = int(version("rclpy").partition(".")[0]) > _JAZZY
+    except (PackageNotFoundError, ValueError):
+        third = False
+    return Carrier(name, 3 if third else 2)
 
 
 def _message(type_: str) -> type:
