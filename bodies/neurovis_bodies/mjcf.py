@@ -1,11 +1,13 @@
 """The files that a model of MuJoCo names: included models, meshes, textures, height fields.
 
-In: the path of a file in MJCF. Out: where each file that it names may lie. Nothing but the text is read, and only so
-far as it is XML that has no definitions of its own (no DOCTYPE), so that whoever opens it later reads the same.
+In: the path of a file in MJCF. Out: where each file that it names may lie, if the model makes no more points of
+textures and height fields than memory is good for. Nothing but the text and the sizes of images is read, and the text
+only so far as it is XML that has no definitions of its own (no DOCTYPE), so that whoever opens it later reads the same.
 """
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -22,16 +24,31 @@ MOST_FILES: Final = 1000
 #: what is read as a model of its own
 _MODELS: Final = ("include", "model")
 #: where the files of the other elements are looked for, by keys of ``compiler``
-_FOLDERS: Final = {"texture": ("texturedir", "assetdir"), "": ("meshdir", "assetdir")}
+_FOLDERS: Final = {
+    "texture": ("texturedir", "assetdir"),
+    "hfield": ("meshdir", "assetdir"),
+    "": ("meshdir", "assetdir"),
+}
+#: what is made of points: which keys say of how many, what they are called, how many there are at most in all, as
+#: MuJoCo takes some 6 bytes for one of a texture and 16 for one of a height field
+_POINTS: Final = {
+    "texture": (("width", "height"), "textures", 1 << 28),
+    "hfield": (("nrow", "ncol"), "height fields", 1 << 26),
+}
+#: how an image begins that is compressed (PNG), and how many bytes say how large it is
+_PNG: Final = b"\x89PNG\r\n\x1a\n"
+_PNG_HEAD: Final = 24
 
 
 @dataclass
 class _Text:
     """What a file says: the names of files by the kind of the element that names them, the folders that ``compiler``
-    names. MuJoCo takes a backslash for a slash, everywhere."""
+    names, how many points are made. MuJoCo takes a backslash for a slash, everywhere."""
 
     files: dict[str, list[str]] = field(default_factory=dict)
     folders: dict[str, list[str]] = field(default_factory=dict)
+    #: what it says of how many points textures and height fields have, that are in no file
+    points: dict[str, float] = field(default_factory=dict)
 
     def begin(self, element: str, attributes: dict[str, str]) -> None:
         """An element begins."""
@@ -42,6 +59,10 @@ class _Text:
                 self.folders.setdefault(key, []).append(path)
             elif key.startswith("file"):  # of a texture also fileright, fileup, …
                 self.files.setdefault(kind, []).append(path)
+        if element in _POINTS:
+            sides = 1 if element == "hfield" or attributes.get("type", "cube") == "2d" else 6
+            made = math.prod(_number(attributes.get(key)) for key in _POINTS[element][0])
+            self.points[element] = self.points.get(element, 0.0) + sides * made
 
     def named(self, kinds: Iterable[str]) -> list[str]:
         """The names of files that elements of these kinds give."""
@@ -52,25 +73,64 @@ def files_of(path: Path) -> Iterator[Path]:
     """Where the files may lie that a model names, those of the models in it, too; the model itself is left out.
 
     A name is looked for beside the first model and beside the one that names it, in the folders that any of them gives
-    for files of its kind. No file is opened before its place was given. Raises BodyError.
+    for files of its kind. No file is opened before its place was given. Raises BodyError, also where the model has too
+    many points.
     """
     texts = {path: _read(path)}
-    read, waiting = {path.resolve()}, [path]
+    read, waiting = {Path(os.path.realpath(path))}, [path]
     while waiting:
         own = waiting.pop()
         for place in _places(path, own, texts[own].named(_MODELS), ()):
             yield place
-            real = place.resolve()
+            real = Path(os.path.realpath(place))
             if real not in read and real.is_file():
                 if len(texts) == MOST_FILES:
                     raise BodyError(f"the model consists of more than {MOST_FILES:,} files")
                 texts[place] = _read(place)
                 read.add(real)
                 waiting.append(place)
-    for own, text in texts.items():
-        for kind, keys in _FOLDERS.items():
-            folders = [folder for one in texts.values() for key in keys for folder in one.folders.get(key, ())]
-            yield from _places(path, own, text.named((kind,)), folders)
+    for kind, keys in _FOLDERS.items():
+        folders = [folder for one in texts.values() for key in keys for folder in one.folders.get(key, ())]
+        points = sum(text.points.get(kind, 0.0) for text in texts.values())
+        for own, text in texts.items():
+            for name in text.named((kind,)):
+                images = [0.0]
+                for place in _places(path, own, (name,), folders):
+                    yield place
+                    images.append(_points_of(place) if kind in _POINTS else 0.0)
+                points += max(images)
+        _check_points(kind, points)
+
+
+def _check_points(kind: str, points: float) -> None:
+    """Refuse more points than memory is good for. Raises BodyError."""
+    _, called, most = _POINTS.get(kind, ((), "", math.inf))
+    if points > most:
+        raise BodyError(f"the model has {called} of {points:,.0f} points: {most:,} are the most")
+
+
+def _points_of(place: Path) -> float:
+    """How many points an image has by what it says at its beginning; 0 where it is none, or not compressed: then it is
+    as large as its file."""
+    try:
+        if not place.is_file():
+            return 0.0
+        with place.open("rb") as file:
+            head = file.read(_PNG_HEAD)
+    except OSError:
+        return 0.0  # whoever opens it later says so
+    if len(head) < _PNG_HEAD or not head.startswith(_PNG):
+        return 0.0
+    return float(math.prod(int.from_bytes(head[at : at + 4], "big") for at in (16, 20)))
+
+
+def _number(written: str | None) -> float:
+    """A number as it is written; 0 where it is none, as MuJoCo will say."""
+    try:
+        number = float(written or 0)
+    except ValueError:
+        return 0.0
+    return number if 0 < number < math.inf else 0.0
 
 
 def _places(first: Path, own: Path, names: Iterable[str], folders: Iterable[str]) -> Iterator[Path]:

@@ -6,8 +6,9 @@ runs read; or findings. Where what a body needs is not installed, its names are 
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -25,14 +26,19 @@ from neurovis_spec.compiler.values.constants import ALWAYS, Constants, is_consta
 from neurovis_spec.compiler.values.constants import Scope as Together
 from neurovis_spec.diagnostics import Findings, Span, shorten, suggest
 from neurovis_spec.language.body import BodyModel
-from neurovis_spec.language.data.files import read_data
+from neurovis_spec.language.data.files import LARGEST, read_data
 from neurovis_spec.language.expressions.tree import Name, names, walk
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.model import names_of
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
+from neurovis_spec.language.yaml.opening import FileFault, fault_of
 
 #: More steps of a body within one of the network are a mistake.
 MOST_SUBSTEPS: Final = 1_000_000
+#: Bytes of all files that a body is made of; each is as large as any data file at most.
+LARGEST_TOGETHER: Final = 1 << 30
+#: What is wrong with places where there is nothing to open.
+_NOT_THERE: Final = ("file-missing", "file-unreadable")
 #: One number of a sensor, an actuator or an output: ``torso_up[2]``.
 _ONE: Final = re.compile(r"(.*)\[\s*([0-9]{1,9})\s*\]", re.DOTALL)
 
@@ -97,16 +103,7 @@ def _found(kind: str, given: Located[str], place: Place, findings: Findings) -> 
         if read_data(*where) is UNKNOWN:
             return None, False
         path = (place.base / given.value).resolve()
-        inside = place.root.resolve()
-        for part in loaded.files(path):
-            real = part.resolve()
-            if not real.is_relative_to(inside) and real.exists():
-                message = f"'{shorten(given.value)}' names the file '{shorten(str(part.name))}', "
-                hint = "data lies in the folder of the main spec or below it (--root names another folder)"
-                findings.error("path-outside", given.span, f"{message}which lies outside the folder of the spec", hint)
-                return path, False
-            findings.files.add(real)
-        return path, True
+        return path, _all_sound(loaded.files(path), given, place.root.resolve(), findings)
     except BodyMissingError as error:
         _warn_unchecked(error, given, findings)
         return (place.base / given.value).resolve(), False
@@ -115,6 +112,31 @@ def _found(kind: str, given: Located[str], place: Place, findings: Findings) -> 
     except Exception as error:  # whatever somebody's code raises while it looks at a file
         findings.error("bad-body", given.span, f"'{shorten(given.value)}' cannot be opened: {error!r}")
     return None, False
+
+
+def _all_sound(parts: Iterable[Path], given: Located[str], inside: Path, findings: Findings) -> bool:
+    """Whether what lies at the places that a body's file names may be opened: regular files inside the folder, not too
+    large, each and together. A place is looked at before the next is asked for, as only then a kind may open it."""
+    sizes: dict[Path, int] = {}
+    for part in parts:
+        real = Path(os.path.realpath(part))
+        findings.files.add(real)
+        fault, hint = fault_of(real, LARGEST), None
+        if not real.is_relative_to(inside) and real.exists():
+            fault = FileFault("path-outside", "lies outside the folder of the spec")
+            hint = "data lies in the folder of the main spec or below it (--root names another folder)"
+        elif real.is_dir() or (fault is not None and fault.code in _NOT_THERE):
+            continue  # whoever opens the body says what is missing, and where else it was looked for
+        if fault is not None:
+            message = f"'{shorten(given.value)}' names the file '{shorten(part.name)}', which {fault.reason}"
+            findings.error(fault.code, given.span, message, hint)
+            return False
+        sizes[real] = real.stat().st_size
+        if sum(sizes.values()) > LARGEST_TOGETHER:
+            most = f"{LARGEST_TOGETHER >> 20:,} MiB together"
+            findings.error("too-large", given.span, f"'{shorten(given.value)}' names files that are larger than {most}")
+            return False
+    return True
 
 
 def _warn_unchecked(error: BodyMissingError, given: Located[str], findings: Findings) -> None:

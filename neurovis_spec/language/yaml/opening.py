@@ -22,15 +22,21 @@ class FileFault(NamedTuple):
     reason: str
 
 
+def fault_of(path: Path, most: int) -> FileFault | None:
+    """Why a path is no regular file of at most ``most`` bytes, if it is none; nothing is opened."""
+    try:
+        return _fault(path.stat(), most)
+    except (OSError, ValueError) as error:
+        return _unreadable(error)
+
+
 def read_bytes(path: Path, most: int) -> bytes | FileFault:
     """The bytes of a regular file of at most ``most`` bytes; symbolic links are followed (see ``data.files``)."""
+    fault = fault_of(path, most)
+    if fault is not None:
+        return fault
     try:
-        fault = _fault(path.stat(), most)
-        if fault is not None:
-            return fault
         handle = os.open(path, _FLAGS)
-    except (FileNotFoundError, NotADirectoryError):
-        return FileFault("file-missing", "does not exist")
     except (OSError, ValueError) as error:
         return _unreadable(error)
     try:
@@ -63,5 +69,7 @@ def _too_large(most: int) -> FileFault:
 
 
 def _unreadable(error: Exception) -> FileFault:
+    if isinstance(error, FileNotFoundError | NotADirectoryError):
+        return FileFault("file-missing", "does not exist")
     reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
     return FileFault("file-unreadable", f"cannot be read: {reason}")
