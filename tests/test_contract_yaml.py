@@ -74,6 +74,8 @@ LINEAR = {
     "refused": "  d{0}: !x &y 1\n  d{0}: 2\n",
     "comments": "  # {0}\n  c{0}: 1   # here\n",
     "unclosed": "  u{0}: [1, 2\n",
+    "quotes": "  q{0}: ['it''s {0}', \"\\\\ {0}\\n\"]\n",
+    "long": "  l{0}: a:b c#d  e, f: g\n      :h #i\n",
 }
 
 

@@ -15,24 +15,24 @@ from neurovis_spec.language.yaml.packed import PACK_FROM, Packer, balance
 from neurovis_spec.language.yaml.refusals import DEEPEST, ReadingStoppedError
 from neurovis_spec.language.yaml.scalars import NumberRangeError, resolve
 from neurovis_spec.language.yaml.scanner import (
+    ENDS_TEXT,
     FIRST,
     LONGEST_KEY,
     SIMPLE,
     VISIBLE,
     Plain,
     Scanner,
+    Unquoted,
     UnsoundError,
 )
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Scalar, ScalarValue, Sequence
 from neurovis_spec.language.yaml.written_text import Written
 
-_FLOW_TEXT: Final = r"(?:[^\s:,\[\]{}]+|:(?![\s,\[\]{}]|\Z)|[ \t]+(?![\s#,\[\]{}]|:[\s,\[\]{}]|:\Z|\Z))"
-_FLOW_PLAIN: Final = re.compile(FIRST + r"-(?![\s,\[\]{}]|\Z))" + _FLOW_TEXT + "*+", re.ASCII)
-#: What is behind a comma within brackets, and no key.
-_CUT_OFF: Final = re.compile(
-    rf"\s*,\s*{FIRST}-(?![\s,\[\]{{}}]|\Z)){_FLOW_TEXT}*+(?![ \t]*:(?:[\s,\[\]{{}}]|\Z))", re.ASCII
+_FLOW_TEXT: Final = Unquoted(
+    re.compile(FIRST + r"-(?![\s,\[\]{}]|\Z))", re.ASCII),
+    re.compile(rf":(?=[\s,\[\]{{}}]|\Z)|{ENDS_TEXT}|,|\[|\]|\{{|\}}", re.ASCII),
 )
-_FLOW_MORE: Final = re.compile(_FLOW_TEXT + "++", re.ASCII)
+_COMMA: Final = re.compile(r"\s*,\s*", re.ASCII)
 _FLOW_COLON: Final = re.compile(r"[ \t]*:")
 _TIGHT: Final = re.compile(r":[,\[\]{}]")
 #: A list of texts and numbers that need no second look.
@@ -201,7 +201,7 @@ class Brackets(Scanner):
             return self._quoted(character)
         if character == "*":
             return self._alias()
-        scalar = self._plain_text(_FLOW_PLAIN, _FLOW_MORE, -1)
+        scalar = self._plain_text(_FLOW_TEXT, -1)
         return scalar if self._partial or self._plain is None else self._past_commas(self._plain)
 
     # Texts that a comma has cut
@@ -211,9 +211,9 @@ class Brackets(Scanner):
         goes on while one of its parentheses is open."""
         text, span = self._text, first.scalar.span
         unclosed = balance(text[first.begin : first.end])
-        while unclosed > 0 and (match := _CUT_OFF.match(text, self._at, self._end)):
-            unclosed += balance(match[0])
-            self._move(match.end())
+        while unclosed > 0 and (last := self._cut_off()) is not None:
+            unclosed += balance(text[self._at : last])
+            self._move(last)
         if self._at == first.end:
             return first.scalar
         written = text[first.begin : self._at]
@@ -223,6 +223,12 @@ class Brackets(Scanner):
         self._refuse.cut_text(whole, text[first.begin : first.end])
         self._plain = None
         return whole
+
+    def _cut_off(self) -> int | None:
+        """Where the text behind the next comma ends; None where there is none, or where it is a key."""
+        comma = _COMMA.match(self._text, self._at, self._end)
+        last = comma and _FLOW_TEXT.begun(self._text, comma.end(), self._end)
+        return None if last is None or _FLOW_COLON.match(self._text, last, self._end) else last
 
     def _is_cut_off(self, before: Plain | None, key: Plain | None) -> bool:
         """Whether a key without a colon is a piece of the value before it, which a comma has cut."""

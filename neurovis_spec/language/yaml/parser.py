@@ -23,14 +23,23 @@ from neurovis_spec.language.yaml.brackets import Brackets
 from neurovis_spec.language.yaml.faults import Words
 from neurovis_spec.language.yaml.packed import PACK_FROM, Packer
 from neurovis_spec.language.yaml.refusals import ReadingStoppedError
-from neurovis_spec.language.yaml.scanner import BLANKS, FIRST, LONGEST_KEY, REST, SIMPLE, UnsoundError
+from neurovis_spec.language.yaml.scanner import (
+    BLANKS,
+    ENDS_TEXT,
+    FIRST,
+    LONGEST_KEY,
+    REST,
+    SIMPLE,
+    Unquoted,
+    UnsoundError,
+)
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Scalar, Sequence
 
 _END: Final = r"(?=[ \t\r\n]|\Z)"
-#: A text without quotes on one line, outside of brackets and within them: to a blank and #, or to a colon and a blank.
-_TEXT: Final = r"(?:[^\s:]+|:(?=\S)|[ \t]+(?![\s#]|:\s|:\Z|\Z))"
-_PLAIN: Final = re.compile(FIRST + r"[-?:](?=\S))" + _TEXT + "*+", re.ASCII)
-_MORE: Final = re.compile(_TEXT + "++", re.ASCII)
+_TEXT: Final = Unquoted(
+    re.compile(FIRST + r"[-?:](?=\S))", re.ASCII),
+    re.compile(rf":(?=\s|\Z)|{ENDS_TEXT}", re.ASCII),
+)
 _COLON: Final = re.compile(r"[ \t]*:" + _END)
 _DIRECTIVE: Final = re.compile(r"%YAML[ \t]+1\.2[ \t]*(#.*)?")
 _MARKER: Final = re.compile(r"(?<![^\r\n])(?:---|\.\.\.)" + _END)
@@ -47,11 +56,11 @@ _ROW_LINE: Final = re.compile(r"- +\[([^\[\]{}'\"#&*!|>%@`?:\r\n]*)\][ \t]*(?:\r
 
 
 @cache
-def _stretch(column: int) -> re.Pattern[str]:
-    """The rest of a line, and the lines that belong to what stands in a column of it: those that are indented further,
-    are blank, hold a comment alone or begin with a closing bracket."""
+def _line_before_others(column: int) -> re.Pattern[str]:
+    """The line end before a line that does not belong to what stands in a column above it. Those do that are indented
+    further, are blank, hold a comment alone or begin with a closing bracket."""
     deeper = f" {{{column + 1}}}"
-    return re.compile(rf"[^\r\n]*(?:(?:\r\n|\n|\r)(?=[ \t]*(?:[#\r\n\]}}]|\Z)|{deeper})[^\r\n]*)*+(?:\r\n|\n|\r)?")
+    return re.compile(rf"(?:\r\n|\n|\r)(?![ \t]*(?:[#\r\n\]}}]|\Z)|{deeper})")
 
 
 @cache
@@ -159,9 +168,8 @@ class Parser(Brackets):
     def _limit(self, column: int) -> int:
         """Where the lines end that belong to a key or a dash in a column: those that are indented further, are blank or
         hold comments alone, or begin with a closing bracket."""
-        match = _stretch(column).match(self._text, self._at, self._end)
-        assert match is not None
-        return match.end()
+        match = _line_before_others(column).search(self._text, self._at, self._end)
+        return match.end() if match else self._end
 
     def _entry(self, column: int, depth: int, *, fresh: bool = False, dashes: bool = False) -> Node:
         """The value behind a colon or a dash that belongs to a block in a column, to the begin of the next line."""
@@ -253,7 +261,7 @@ class Parser(Brackets):
             return self._quoted(character)
         if character == "*":
             return self._alias()
-        return self._plain_text(_PLAIN, _MORE, indent)
+        return self._plain_text(_TEXT, indent)
 
     def _finish(self) -> None:
         """Behind a value of a block: only a comment may follow on the line."""
@@ -320,11 +328,11 @@ class Parser(Brackets):
         else:
             self._left_out(faults.no_colon(written), at)
         self._open = is_open
-        text = _PLAIN.match(line, column - 1) if self._partial else word
-        if text is None:
+        last = _TEXT.begun(line, column - 1, len(line)) if self._partial else word and column - 1 + word.end()
+        if last is None:
             return _Key(self._nothing(number, column).span, None, colon=False)
-        span = Span(self._file, number, column, number, column + len(text[0]))
-        return _Key(span, Scalar(text[0], span), colon=False)
+        span = Span(self._file, number, column, number, last + 1)
+        return _Key(span, Scalar(line[column - 1 : last], span), colon=False)
 
     # Mappings
 

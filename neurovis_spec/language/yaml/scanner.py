@@ -22,7 +22,11 @@ from neurovis_spec.language.yaml.written_text import Written
 LONGEST_KEY: Final = 1024
 #: What may begin a text without quotes; signs that depend on what follows are to be added, and a closing parenthesis.
 FIRST: Final = r"(?:[^\s\-?:,\[\]{}#&*!|>'\"%@`]|"
-_QUOTED: Final = {"'": re.compile(r"'(?:[^']|'')*+'"), '"': re.compile(r'"(?:[^"\\]|\\.)*+"', re.DOTALL)}
+#: What ends a text without quotes anywhere: a blank and #, the end of a line. A colon, and signs of brackets, are to
+#: be added. Each alternative begins with a character, so that a search looks at little more than these.
+ENDS_TEXT: Final = r"#(?<!\S#)|\r|\n"
+#: What a text in quotes is searched for: the quote that ends it, and what holds one that does not.
+_QUOTES: Final = {"'": re.compile("''?"), '"': re.compile(r'\\.|"', re.DOTALL)}
 _HEADER: Final = re.compile(r"[|>](?:([-+])?([1-9])?|([1-9])([-+]))(?:[ \t]+(#[^\r\n]*)?)?(?=[\r\n]|\Z)")
 _PROPERTY: Final = re.compile(r"!<[^>\s]*>|![^\s,\[\]{}]*|[&*][A-Za-z0-9_-]+(?=[\s,\[\]{}:?%@`]|\Z)")
 REST: Final = re.compile(r"[ \t]*(#[^\r\n]*)?")
@@ -45,6 +49,22 @@ class UnsoundError(Exception):
         super().__init__(words.message)
         self.words = words
         self.at = at
+
+
+class Unquoted(NamedTuple):
+    """How texts without quotes begin, and what ends them; the blanks before that are no part of them."""
+
+    first: re.Pattern[str]
+    stop: re.Pattern[str]
+
+    def begun(self, text: str, at: int, end: int) -> int | None:
+        """Where a text ends on its line that begins at an index; None where none does."""
+        return self.further(text, at + 1, end) if self.first.match(text, at, end) else None
+
+    def further(self, text: str, at: int, end: int) -> int:
+        """Where a text ends that goes on from an index on a line: there, where none of it follows."""
+        stop = self.stop.search(text, at, end)
+        return at + len(text[at : stop.start() if stop else end].rstrip(" \t"))
 
 
 class Plain(NamedTuple):
@@ -218,15 +238,15 @@ class Scanner:
         self._at += 1
         return Scalar(None, span)
 
-    def _plain_text(self, begin: re.Pattern[str], more: re.Pattern[str], indent: int | None) -> Scalar:
+    def _plain_text(self, kind: Unquoted, indent: int | None) -> Scalar:
         text, end, first = self._text, self._end, self._at
-        match = begin.match(text, first, end)
-        if match is None:
+        last = kind.begun(text, first, end)
+        if last is None:
             return self._no_text()
         line, column = self._here()
-        self._at = match.end()
+        self._at = last
         if indent is not None:
-            self._go_on(more, indent)
+            self._go_on(kind, indent)
         span = self._from(line, column)
         content, written = text[first : self._at], None
         if span.line != span.end_line:
@@ -240,7 +260,7 @@ class Scanner:
         self._plain = Plain(first, self._at, scalar)
         return scalar
 
-    def _go_on(self, more: re.Pattern[str], indent: int) -> None:
+    def _go_on(self, kind: Unquoted, indent: int) -> None:
         """Pass the further lines of a text without quotes."""
         text, end = self._text, self._end
         while breaks := _NEXT_TEXT.match(text, self._at, end):
@@ -249,34 +269,35 @@ class Scanner:
             at = blanks.end()
             while at < end and text[at] == "\t" and at - breaks.end() > indent:
                 at += 1
-            match = None if at - breaks.end() <= indent else more.match(text, at, end)
-            if match is None or text[at] == "#":
+            last = at if at - breaks.end() <= indent else kind.further(text, at, end)
+            if last == at:
                 return
             self._move(breaks.end())
-            self._at = match.end()
+            self._at = last
 
     def _quoted(self, quote: str) -> Scalar:
         text, first = self._text, self._at
         line, column = self._here()
-        match = _QUOTED[quote].match(text, first, self._end)
-        if match is None:
+        closing = next((one for one in _QUOTES[quote].finditer(text, first + 1, self._end) if one[0] == quote), None)
+        if closing is None:
             self._report(faults.quote(quote))
             self._at = self._line_end()
             return Scalar(text[first + 1 : self._at], self._from(line, column), 1)
-        written = match[0]
-        self._move(match.end())
+        last = closing.end()
+        written = text[first:last]
+        self._move(last)
         span = self._from(line, column)
         if "\n" not in written and "\r" not in written and ("\\" if quote == '"' else "''") not in written[1:-1]:
             return Scalar(written[1:-1], span, 1)
         if quote == "'":
-            return Scalar(texts.single(written[1:-1]), span, None, Written(text, first, match.end()))
+            return Scalar(texts.single(written[1:-1]), span, None, Written(text, first, last))
         try:
             value = texts.double(written[1:-1])
         except texts.EscapeError as error:
             at = first + 1 + error.at
             self._report(faults.escape(text[at : at + 2]), at)
             return Scalar(written[1:-1], span, None)
-        return Scalar(self._refuse.escaped_controls(value, span), span, None, Written(text, first, match.end()))
+        return Scalar(self._refuse.escaped_controls(value, span), span, None, Written(text, first, last))
 
     def _block_text(self, indent: int) -> Scalar:
         """A text behind | or >, up to the end of its last line."""
