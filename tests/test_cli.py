@@ -465,7 +465,23 @@ def test_new_overwrites_nothing(folder: Path) -> None:
 def test_new_may_share_the_data_of_an_example(folder: Path) -> None:
     assert good("new", "one", "--from", "cpg_rbf").split() == ["one.yaml", str(Path("data", "centres.csv"))]
     assert good("new", "two", "--from", "cpg_rbf").split() == ["two.yaml"]
-    assert {"cpg_rbf", "hexapod"} <= set(good("new", "x", "--from", "list").split())
+
+
+LISTS = {
+    ("new", "--from"): {"cpg_rbf", "hexapod"},
+    ("run", "--backend"): {"c", "numpy", "reference"},
+    ("sweep", "--backend"): {"c", "numpy", "reference"},
+    ("live", "--backend"): {"c", "numpy", "reference"},
+    ("ros", "run", "--backend"): {"c", "numpy", "reference"},
+}
+
+
+@pytest.mark.parametrize("option", LISTS)
+def test_what_is_there_is_listed_whatever_else_is_given(folder: Path, option: tuple[str, ...]) -> None:
+    shown = good(*option, "list")
+    assert LISTS[option] <= {line.split()[0] for line in shown.splitlines()}
+    assert good(*option[:-1], "absent", option[-1], "list") == shown
+    assert not (folder / "absent.yaml").exists()
 
 
 def test_new_copies_what_an_example_includes(folder: Path) -> None:

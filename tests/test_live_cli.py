@@ -130,7 +130,6 @@ def test_what_cannot_be_shown_is_answered_clearly(spec: Path) -> None:
         ((recording, "--watch"), 2, "is a recording: SPEC is the spec that it was made of"),
         ((recording, "--recording", recording), 2, "is a recording: SPEC is the spec that it was made of"),
         ((recording,), 1, f"help: name it: neurovis live SPEC --recording {recording}"),
-        ((spec, "--backend", "list"), 2, "run --backend list"),
         ((spec, "--host", "nowhere.invalid"), 1, "cannot listen at nowhere.invalid"),
         ((spec, "--port", "70000"), 2, "70000"),
         ((spec.with_name("y.yaml"),), 1, "y.yaml"),

@@ -94,8 +94,6 @@ def command(
         raise click.UsageError(f"live shows one network, and {len(specs)} specs are given: start it once for each")
     if recording is not None and start is not None:
         raise click.UsageError("--from begins a run, and --recording plays one that was made: give one of them")
-    if backend == "list":
-        raise click.UsageError("'neurovis run --backend list' lists the backends")
     (spec,) = specs
     if watch and spec == "-":
         raise click.UsageError("standard input cannot be watched: give the path of a spec")

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from importlib.resources import files as package_files
 from importlib.resources.abc import Traversable
 from pathlib import Path, PurePosixPath
 
 import click
 
-from neurovis_spec.cli.completion import one_of
 from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.files import writing
-from neurovis_spec.cli.options import examples, known
+from neurovis_spec.cli.options import examples, listed
 from neurovis_spec.cli.targets import check_target
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}")
@@ -41,30 +40,22 @@ def examples_at_hand() -> Mapping[str, Traversable]:
     return dict(sorted(found.items()))
 
 
-def _examples() -> Iterable[str]:
-    return ("list", *examples_at_hand())
-
-
-@click.command(
-    epilog=examples("neurovis new first", "neurovis new walking --from cpg_rbf", "neurovis new try --from list")
-)
+@click.command(epilog=examples("neurovis new first", "neurovis new walking --from cpg_rbf", "neurovis new --from list"))
 @click.argument("name", metavar="NAME")
-@click.option(
+@listed(
+    "example",
+    examples_at_hand,
+    examples_at_hand,
     "--from",
     "example",
     metavar="EXAMPLE",
-    callback=known("example", _examples),
-    shell_complete=one_of(_examples),
-    help="Copy an example with its data and included files; 'list' shows which there are.",
+    text="Copy an example with its data and included files; 'list' shows which there are.",
 )
 def command(name: str, example: str | None) -> None:
     """Write a commented starter spec NAME.yaml, or a copy of an example.
 
     An example with a folder of its own gets one, NAME/NAME.yaml. Nothing is overwritten.
     """
-    if example == "list":
-        click.echo("\n".join(examples_at_hand()))
-        return
     target = Path(name.removesuffix(".yaml") + ".yaml")
     if not _NAME.fullmatch(target.stem):
         hint = "a name is an ASCII letter or underscore, then letters, digits and underscores (at most 64)"

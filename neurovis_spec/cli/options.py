@@ -105,8 +105,41 @@ def known(what: str, names: Callable[[], Iterable[str]]) -> Callback:
     return check
 
 
+def listed(
+    what: str,
+    names: Callable[[], Iterable[str]],
+    lines: Callable[[], Iterable[str]],
+    *declared: str,
+    metavar: str,
+    text: str,
+) -> Option:
+    """An option whose value is one of ``names()``, or 'list': that prints ``lines()`` and ends the command, whatever
+    else it is given or lacks. It is ``declared`` as for ``click.option``, and explained by a text."""
+
+    def values() -> Iterable[str]:
+        return ("list", *names())
+
+    checked = known(what, values)
+
+    def answer(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+        if value == "list" and not ctx.resilient_parsing:  # as it is for completion
+            click.echo("\n".join(lines()))
+            ctx.exit()
+        return checked(ctx, param, value)
+
+    return click.option(
+        *declared, metavar=metavar, callback=answer, is_eager=True, shell_complete=one_of(values), help=text
+    )
+
+
 def _backends() -> Iterable[str]:
-    return ("list", *plugins.names(plugins.BACKENDS))
+    return plugins.names(plugins.BACKENDS)
+
+
+def _lines_of_backends() -> Iterable[str]:
+    from neurovis_spec.runtime.backend import listing
+
+    return listing()
 
 
 def _engines() -> Iterable[str]:
@@ -195,12 +228,13 @@ def need_run(inputs: Mapping[str, str], recording: str | None) -> None:
         raise click.UsageError("--input is for a run, and with --recording nothing is run: give one of the two")
 
 
-backend_option = click.option(
+backend_option = listed(
+    "backend",
+    _backends,
+    _lines_of_backends,
     "--backend",
     metavar="B",
-    callback=known("backend", _backends),
-    shell_complete=one_of(_backends),
-    help="What computes; 'list' shows which there are.",
+    text="What computes; 'list' shows which there are.",
 )
 engine_option = click.option(
     "--engine",

@@ -51,8 +51,6 @@ def command(
     The section 'ros' of the spec says which topics. Activities, weights and the spec itself are published, too; other
     nodes can set the parameters. Ctrl-C ends the run: safe outputs are sent, and a summary is printed.
     """
-    if backend == "list":
-        raise click.UsageError("'neurovis run --backend list' lists the backends")
     desk.check()
     compiled = network_of(spec, settings)
     from neurovis_spec.ros.run import Course, NodeRun

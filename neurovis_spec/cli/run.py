@@ -54,7 +54,7 @@ class Chosen(TypedDict):
         "neurovis run --backend list",
     )
 )
-@click.argument("spec", metavar="SPEC", required=False, shell_complete=paths)
+@click.argument("spec", metavar="SPEC", shell_complete=paths)
 @click.option(
     "--steps", type=click.IntRange(1, 2**53), metavar="N", help="Steps to run; default: the spec's time.steps."
 )
@@ -103,7 +103,7 @@ class Chosen(TypedDict):
 @body_options
 @compile_options
 def command(
-    spec: str | None,
+    spec: str,
     steps: int | None,
     settings: dict[str, float],
     inputs: dict[str, str],
@@ -128,11 +128,6 @@ def command(
     With --checkpoint a run is made in parts: each goes on exactly where the last one ended, --steps counts the steps to
     be made now, and the parts together are bit for bit the run in one go.
     """
-    if backend == "list":
-        _list_backends()
-        return
-    if spec is None:
-        raise click.UsageError("Missing argument 'SPEC'.")
     read = files_of(inputs)
     check_target(output, [("the spec itself", spec), ("the recording that the run goes on from", start), *read])
     others = [("the spec itself", spec), ("the recording that the run goes on from", start), *read]
@@ -179,13 +174,6 @@ def _summary(
     if until is not None and until.ending is not None:
         steps = until.ending.made
     return f"{count(steps, 'step')} in {seconds:.2f} s, backend {backend or network.choose_backend()[0]}"
-
-
-def _list_backends() -> None:
-    from neurovis_spec import api
-
-    for name, available, note in api.backends():
-        click.echo(f"{name} available {note}".rstrip() if available else f"{name} unavailable: {note}")
 
 
 def _check_format(output: Path | None) -> None:

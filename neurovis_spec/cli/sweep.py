@@ -89,8 +89,6 @@ def command(
         raise click.UsageError(f"'{both}' is given by --over and by --set")
     if jobs is not None and scheduler is not None:
         raise click.UsageError("--jobs is of this machine, --scheduler of a cluster: give one of them")
-    if backend == "list":
-        raise click.UsageError("--backend list is of 'neurovis run'")
     from neurovis_spec.sweeps.sweep import Source, carried_out, planned
     from neurovis_spec.sweeps.table import check_suffix
 
