@@ -50,6 +50,25 @@ class Diagnostic:
     hint: str | None = None
 
 
+class Home(NamedTuple):
+    """Where names are declared: under the keys ``parts`` (``layout.boxes`` is one key within another) of the mapping to
+    which the path ``within`` leads from the top of a file."""
+
+    within: tuple[str, ...]
+    parts: tuple[str, ...]
+
+
+class Undeclared(NamedTuple):
+    """A name that is used, and where its declaration should stand."""
+
+    name: str
+    home: Home
+
+
+#: What tells findings apart: the stretch, the code, and what its reporter says.
+Mark: TypeAlias = "tuple[Span, str, Hashable]"
+
+
 class SpecError(Exception):
     """The input is invalid. ``diagnostics`` holds every finding, sorted by place; ``sources`` the texts read."""
 
@@ -76,18 +95,32 @@ class Findings:
     sources: dict[str, str] = field(default_factory=dict)
     #: the files that an author names, as far as they were looked for
     files: set[Path] = field(default_factory=set)
-    _told: dict[tuple[Span, str, Hashable], Diagnostic] = field(default_factory=dict)
+    _told: dict[Mark, Diagnostic] = field(default_factory=dict)
+    #: the names that findings miss
+    _undeclared: dict[Mark, Undeclared] = field(default_factory=dict)
     _errors: int = 0
     #: the code of the first error about each stretch
     _first: dict[Span, str] = field(default_factory=dict)
     _unread: set[Span] = field(default_factory=set)
 
-    def error(self, code: str, span: Span, message: str, hint: Hint = None, *, key: Hashable = None) -> None:
+    def error(
+        self,
+        code: str,
+        span: Span,
+        message: str,
+        hint: Hint = None,
+        *,
+        key: Hashable = None,
+        undeclared: Undeclared | None = None,
+    ) -> None:
         """Report a mistake. ``key``: a stretch may have several mistakes, and this is what tells them apart, such as a
-        row of a data file that the stretch names."""
+        row of a data file that the stretch names. ``undeclared`` is the name that is missing, if that is the
+        mistake."""
         if callable(hint):
             hint = None if self.many else hint()
         self._add(Diagnostic(code, message, span, "error", hint), key)
+        if undeclared is not None:
+            self._undeclared.setdefault((span, code, key), undeclared)
 
     def warning(self, code: str, span: Span, message: str, hint: str | None = None) -> None:
         """Note something legal that is surely not meant."""
@@ -110,6 +143,19 @@ class Findings:
         self._unread |= others._unread
         for (_, _, key), item in others._told.items():
             self._add(item, key)
+        self._undeclared = others._undeclared | self._undeclared
+
+    def missing(self) -> dict[Mark, tuple[Diagnostic, Undeclared]]:
+        """The findings that miss a name, by place."""
+        there = {mark: self._told[mark] for mark in self._undeclared if mark in self._told and self._counts(mark)}
+        return {mark: (there[mark], self._undeclared[mark]) for mark in sorted(there, key=lambda mark: mark[0])}
+
+    def fold(self, marks: Iterable[Mark], into: Diagnostic) -> None:
+        """Tell one finding in the place of several."""
+        for mark in marks:
+            del self._told[mark]
+        self._told[into.span, into.code, None] = into
+        self._first[into.span] = into.code
 
     def drop(self, unwanted: Callable[[Diagnostic], bool]) -> None:
         """Forget warnings that the author has allowed; errors stay."""
@@ -136,12 +182,13 @@ class Findings:
 
     def sorted(self) -> tuple[Diagnostic, ...]:
         """All findings by place, those of one place in the order in which they were found."""
-        told = (
-            item
-            for (span, code, key), item in self._told.items()
-            if key is not None or self._first.get(span, code) == code
-        )
+        told = (item for mark, item in self._told.items() if self._counts(mark))
         return tuple(sorted(told, key=lambda item: (item.span, item.severity)))
+
+    def _counts(self, mark: Mark) -> bool:
+        """Whether a finding is no follow-up of another one."""
+        span, code, key = mark
+        return key is not None or self._first.get(span, code) == code
 
     def check(self) -> None:
         """Raise SpecError if there is an error."""

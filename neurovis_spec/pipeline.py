@@ -87,8 +87,18 @@ def compile(document: SourceDocument | None, request: Request, findings: Finding
         if network is not None:
             memory = remember(spec, request, network, findings)
             foresee(spec, network, findings)
+        gather(spec, request, findings)
     allow(findings)
     return Outcome(spec, request, network, memory)
+
+
+def gather(spec: Spec, request: Request, findings: Findings) -> None:
+    """Of the uses of a name that is declared nowhere make one finding, at the declaration where one is misspelt."""
+    if findings.failed:
+        from neurovis_spec.compiler.checks.undeclared import gather_undeclared
+
+        files = (included.model.source for included in request.includes.files)
+        gather_undeclared((spec.source, *files), findings)
 
 
 def allow(findings: Findings) -> None:

@@ -218,8 +218,8 @@ parameters: {legs1: 1}
 inputs: {legs2: {}}
 activations: {legs3: {value: legs3_x}}
 neurons: {legs4: {input: legs, bias: legs}, O: {activation: legs}}
-connections: {legs -> O: 1}
-outputs: {o: legs}
+connections: {legz -> O: 1}
+outputs: {o: legx}
 """
     found = json.loads(call("validate - --format json", text.replace("legs3_x", "x")).stdout)
     hints = {(item["line"], item["code"]): item["hint"] for item in found}

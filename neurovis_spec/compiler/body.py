@@ -24,7 +24,7 @@ from neurovis_spec.compiler.names.scope import Surroundings
 from neurovis_spec.compiler.network import Output
 from neurovis_spec.compiler.values.constants import ALWAYS, Constants, is_constant, parse_formula
 from neurovis_spec.compiler.values.constants import Scope as Together
-from neurovis_spec.diagnostics import Findings, Span, shorten, suggest
+from neurovis_spec.diagnostics import Findings, Home, Span, shorten, suggest
 from neurovis_spec.language.body import BodyModel
 from neurovis_spec.language.data.files import LARGEST, read_data
 from neurovis_spec.language.expressions.tree import Name, names, walk
@@ -39,6 +39,8 @@ MOST_SUBSTEPS: Final = 1_000_000
 LARGEST_TOGETHER: Final = 1 << 30
 #: What is wrong with places where there is nothing to open.
 _NOT_THERE: Final = ("file-missing", "file-unreadable")
+#: Where what commands may name is declared.
+_HOME: Final = Home((), ("outputs", "parameters"))
 #: One number of a sensor, an actuator or an output: ``torso_up[2]``.
 _ONE: Final = re.compile(r"(.*)\[\s*([0-9]{1,9})\s*\]", re.DOTALL)
 
@@ -197,7 +199,8 @@ def _report_input(name: str, span: Span, around: Surroundings, findings: Finding
         findings.error("unknown-input", span, message, f"name '{shorten(found.name)}'")
     else:
         message = f"there is no input '{shorten(name)}'"
-        findings.error("unknown-input", span, message, partial(known_inputs, name, known))
+        lost = around.scope.undeclared(name)
+        findings.error("unknown-input", span, message, partial(known_inputs, name, known), undeclared=lost)
 
 
 def _size(name: Located[str], ports: Sequence[Port] | None, what: str, findings: Findings) -> int | Unknown:
@@ -261,7 +264,7 @@ def _command(actuator: str, formula: Formula, around: Surroundings, constants: C
     made = {output.name: output for output in around.outputs}
     outputs = names_of(around.spec, "outputs", {**dict.fromkeys(around.spec.outputs, UNKNOWN), **made})
     known = _Bases(Together((outputs, constants.names, ALWAYS)))
-    tree = parse_formula(formula, known, findings, what="outputs and parameters", subscripts=True)
+    tree = parse_formula(formula, known, findings, what="outputs and parameters", subscripts=True, home=_HOME)
     if tree is UNKNOWN:
         return UNKNOWN
     constants.read |= names(tree)

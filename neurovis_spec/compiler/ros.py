@@ -23,7 +23,7 @@ from neurovis_spec.compiler.ros_settings import (
     absolute,
 )
 from neurovis_spec.compiler.values.constants import Constants
-from neurovis_spec.diagnostics import Findings, shorten, suggest
+from neurovis_spec.diagnostics import Findings, Home, Undeclared, shorten, suggest
 from neurovis_spec.language.located import Formula, said
 from neurovis_spec.language.model import names_of
 from neurovis_spec.language.ros import PublishModel, RosModel, SubscribeModel
@@ -96,7 +96,8 @@ def _subscriptions(model: RosModel, around: Surroundings, constants: Constants) 
         if found is None:
             span = key_of(model.source, "subscribe", name).span
             hint = partial(known_inputs, name, tuple(inputs))
-            findings.error("unknown-input", span, f"there is no input '{shorten(name)}'", hint)
+            message = f"there is no input '{shorten(name)}'"
+            findings.error("unknown-input", span, message, hint, undeclared=around.scope.undeclared(name))
         timeout = (
             None
             if entry.timeout is None
@@ -149,6 +150,7 @@ def _report_output(name: str, model: RosModel, spec: Spec, findings: Findings) -
         key_of(model.source, "publish", name).span,
         f"there is no output '{shorten(name)}'",
         lambda: suggest(name, declared, "outputs") or "no outputs are declared; add it under 'outputs'",
+        undeclared=Undeclared(name, Home((), ("outputs",))),
     )
 
 

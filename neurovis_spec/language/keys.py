@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator
 from typing import NamedTuple
 
-from neurovis_spec.diagnostics import Findings, did_you_mean, meant, nearest, shorten, slips, suggest
+from neurovis_spec.diagnostics import Findings, Home, Undeclared, did_you_mean, meant, nearest, shorten, slips, suggest
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.yaml.source import Entry, Mapping
 
@@ -71,16 +71,25 @@ def _read(
         yield entry if right is None else Entry(entry.key._replace(value=right, inner=None, written=None), entry.value)
 
 
-def settings_of(settings: Mapping, known: Collection[str], what: str, none: str, findings: Findings) -> Names[Entry]:
-    """The settings of a definition or a pattern by the names that it knows. An unknown one (of ``what``; ``none``
-    is said where none are known) is reported, and taken for the one that it can only be meant for; those that it may
-    be meant for are UNKNOWN."""
+def settings_of(
+    settings: Mapping,
+    known: Collection[str],
+    what: str,
+    none: str,
+    findings: Findings,
+    home: Home | None = None,
+) -> Names[Entry]:
+    """The settings of a definition or a pattern by the names that it knows, which are declared at ``home``. An unknown
+    one (of ``what``; ``none`` is said where none are known) is reported, and taken for the one that it can only be
+    meant for; those that it may be meant for are UNKNOWN."""
     found: dict[str, Entry | Unknown] = {entry.name: entry for entry in settings.entries if entry.name in known}
     for entry in settings.entries:
         if entry.name in known:
             continue
         hint = suggest(entry.name, known, "known here") or none
-        findings.error("unknown-parameter", entry.key.span, f"there is no {what} '{shorten(entry.name)}'", hint)
+        message = f"there is no {what} '{shorten(entry.name)}'"
+        lost = None if home is None else Undeclared(entry.name, home)
+        findings.error("unknown-parameter", entry.key.span, message, hint, undeclared=lost)
         free = [name for name in known if found.get(name, UNKNOWN) is UNKNOWN]
         right = meant(entry.name, free)
         found.update(dict.fromkeys(nearest(entry.name, free), UNKNOWN) if right is None else {right: entry})

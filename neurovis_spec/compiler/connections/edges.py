@@ -161,8 +161,11 @@ class EdgeReader:
             self.constants.findings.error("wrong-type", span, message)
             return
         hint = suggest(name, few(name, end.names), "neurons" if end.positions is UNKNOWN else f"{what}s of this entry")
-        message = f"'{shorten(name)}'{where} is not among the {what}s of this entry"
-        self.constants.findings.error("edge-outside", span, message, hint, key=(what, where) if where else None)
+        message, lost = f"'{shorten(name)}'{where} is not among the {what}s of this entry", None
+        if end.directory.find(name) is None:
+            message, lost = f"there is no neuron '{shorten(name)}'{where}", end.directory.undeclared(name)
+        key = (what, where) if where else None
+        self.constants.findings.error("edge-outside", span, message, hint, key=key, undeclared=lost)
 
     def _from_file(self, reference: FileReference) -> EdgeList | Unknown:
         table = self.files.edges(reference, self.most)

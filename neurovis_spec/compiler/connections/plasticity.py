@@ -72,7 +72,7 @@ def learning_of(
         return UNKNOWN
     rule, defaults = found
     known = (*(default.name for default in defaults), *rule.signals)
-    settled = settle(choice, known, constants.findings)
+    settled = settle(choice, ("rules", rule.name), known, constants.findings)
     targets = UNKNOWN if wired is UNKNOWN else wired.j
     each = Each("connection", dict.fromkeys(_SETTING.sees, UNKNOWN) if wired is UNKNOWN else wired._asdict())
     values = parameters(choice, defaults, UNKNOWN if targets is UNKNOWN else len(targets), constants, settled, each)
@@ -151,7 +151,11 @@ def _place(signal: str, node: Node, scope: Scope, directory: Directory, neurons:
         names = (*scope.section.inputs, *directory.known)
         message = f"there is no neuron, group or input '{shorten(name)}'"
         findings.error(
-            "unknown-signal", node.span, message, lambda: suggest(name, few(name, names), "inputs and neurons")
+            "unknown-signal",
+            node.span,
+            message,
+            lambda: suggest(name, few(name, names), "inputs and neurons"),
+            undeclared=directory.undeclared(name),
         )
         return UNKNOWN
     found = resolve_end(Located(node.value, node), directory, findings)

@@ -11,8 +11,8 @@ from typing import Literal
 
 from neurovis_spec.compiler.drawing.drawing_settings import Cell, Mirror, Seat
 from neurovis_spec.compiler.limits import plural
-from neurovis_spec.compiler.names.references import Directory
-from neurovis_spec.diagnostics import Findings, shorten, suggest
+from neurovis_spec.compiler.names.references import Directory, home_of
+from neurovis_spec.diagnostics import Findings, Undeclared, shorten, suggest
 from neurovis_spec.language.drawing import PlanRow
 from neurovis_spec.language.located import Located
 
@@ -80,7 +80,9 @@ def _members(
     if found is None:
         known = [*directory.instances, *directory.groups, *boxes]
         message = f"there is no instance, group or box '{shorten(name)}'"
-        findings.error("unknown-cell", cell.span, message, lambda: suggest(name, known, "known here"))
+        home = home_of(directory.module)
+        lost = Undeclared(name, home._replace(parts=(*home.parts, "layout.boxes")))
+        findings.error("unknown-cell", cell.span, message, lambda: suggest(name, known, "known here"), undeclared=lost)
     return found if isinstance(found, tuple) else ()
 
 

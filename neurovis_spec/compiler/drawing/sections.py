@@ -125,11 +125,10 @@ def _arranged(
 def _boxed(
     scope: Scope, model: LayoutModel | ModuleLayoutModel, directory: Directory, findings: Findings
 ) -> Iterator[tuple[str, tuple[int, ...]]]:
-    """The named boxes; a reference in them may name an instance, which stands for all of its neurons."""
+    """The named boxes; a reference in them may name an instance, which stands for all of its neurons. One with an
+    invalid reference is there all the same, with nothing in it."""
     for name, reference in model.boxes.items():
-        members = resolve(reference.parts, directory, findings, instances=True)
-        if members is not UNKNOWN:
-            yield scope.called(name), members
+        yield scope.called(name), known(resolve(reference.parts, directory, findings, instances=True), ())
 
 
 def _check_engine(engine: Located[str], findings: Findings) -> None:

@@ -13,7 +13,7 @@ from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.names.finder import Finder
 from neurovis_spec.compiler.names.references import check_keys, key_of, other_parameter
 from neurovis_spec.compiler.values.constants import Constants
-from neurovis_spec.diagnostics import Findings, Span, shorten
+from neurovis_spec.diagnostics import Findings, Span, Undeclared, shorten
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.model import names_of
 from neurovis_spec.language.references import Sum, parse
@@ -89,7 +89,10 @@ class EventReader:
         if name not in constants.names:
             message = f"there is no parameter '{shorten(name)}' to be set"
             known = constants.names
-            self.findings.error("unknown-parameter", span, message, lambda: other_parameter(name, known))
+            lost = Undeclared(name, constants.home)
+            self.findings.error(
+                "unknown-parameter", span, message, lambda: other_parameter(name, known), undeclared=lost
+            )
         elif name in self.constants.structural:
             message = f"'{name}' cannot be set in a run: the structure of the network depends on it"
             self.findings.error("structural-parameter", span, message)

@@ -17,7 +17,7 @@ from neurovis_spec.compiler.events.settable import ParameterFormula
 from neurovis_spec.compiler.limits import DEEPEST, MOST_INSTANCES, Limits
 from neurovis_spec.compiler.names.input_bindings import Binding, bindings_of, check_sizes, shared_out
 from neurovis_spec.compiler.names.modules import Library, Module
-from neurovis_spec.compiler.names.references import Section, key_of, key_span
+from neurovis_spec.compiler.names.references import Section, home_of, key_of, key_span
 from neurovis_spec.compiler.names.scope import Expansion, Scope
 from neurovis_spec.compiler.names.size_estimate import SizeEstimate
 from neurovis_spec.compiler.network import Input
@@ -25,7 +25,7 @@ from neurovis_spec.compiler.neurons.inputs import make_input
 from neurovis_spec.compiler.values.constants import Constants, Outside
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.parameters import make_parameters
-from neurovis_spec.diagnostics import Findings, shorten, suggest
+from neurovis_spec.diagnostics import Findings, Undeclared, shorten, suggest
 from neurovis_spec.language.expressions.tree import Number, names, substitute
 from neurovis_spec.language.located import NAME_RULE, too_long
 from neurovis_spec.language.model import names_of, unread
@@ -236,6 +236,7 @@ class Expander:
                 model.module.span,
                 f"there is no module '{shorten(name)}'",
                 lambda: suggest(name, known, "modules") or "there are no modules; add it under 'modules'",
+                undeclared=Undeclared(name, home_of(None, ("modules",))),
             )
         return UNKNOWN if found is None else found
 
@@ -251,7 +252,8 @@ class Expander:
                 if name not in known:
                     message = f"the module '{module.name}' has no {what} '{shorten(name)}'"
                     hint = suggest(name, known, f"{what}s of '{module.name}'")
-                    self.findings.error(f"unknown-{what}", key_of(model.source, part, name).span, message, hint)
+                    span, home = key_of(model.source, part, name).span, home_of(module.name, (f"{what}s",))
+                    self.findings.error(f"unknown-{what}", span, message, hint, undeclared=Undeclared(name, home))
 
     def _constants(
         self, model: InstanceModel, module: Module, scope: Scope, place: _Place
@@ -290,4 +292,5 @@ _OUTSIDE: Final = "a module sees its own parameters alone: declare '{0}' there, 
 
 def constants_of(module: Module, dt: float, findings: Findings) -> Constants:
     """Constants for the parameters of a module, before these are known."""
-    return Constants(names_of(module.model, "parameters", {}), dt, findings)
+    home = home_of(module.name, ("parameters",))
+    return Constants(names_of(module.model, "parameters", {}), dt, findings, home=home)

@@ -104,7 +104,8 @@ class Finder:
             neurons = resolve_part(name.owner, text, self.directory, self.findings)
             one = UNKNOWN if neurons is UNKNOWN else model_state(name, neurons, self.models)
         if isinstance(one, Refusal):
-            self.findings.error("unknown-state", text.node.at(part.start, part.end), one.message, one.hint)
+            span = text.node.at(part.start, part.end)
+            self.findings.error("unknown-state", span, one.message, one.hint, undeclared=one.undeclared)
             return UNKNOWN
         return one
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from neurovis_spec.compiler.limits import plural
-from neurovis_spec.compiler.names.references import Section, known_inputs
+from neurovis_spec.compiler.names.references import known_inputs
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import Input
 from neurovis_spec.diagnostics import Findings, Hint, Span, shorten
@@ -43,20 +43,22 @@ def bindings_of(model: InstanceModel, scope: Scope, findings: Findings) -> dict[
     for name, outer in model.inputs.items():
         found = scope.input(outer.value)
         if found is None:
-            _unknown(outer, scope.section, findings)
+            _unknown(outer, scope, findings)
         result[name] = Binding(outer.value, outer.span, UNKNOWN if found is None else found)
     for name, value in unread(model, "inputs").items():
         result[name] = Binding(name, model.source.span, value)
     return result
 
 
-def _unknown(outer: Located[str], section: Section, findings: Findings) -> None:
+def _unknown(outer: Located[str], scope: Scope, findings: Findings) -> None:
+    section, lost = scope.section, None
     hint: Hint = "connect it to the neurons of the instance"
     message = f"'{shorten(outer.value)}' is a group of neurons, not an input"
     if outer.value.partition(".")[0] not in section.neurons:
         message = f"there is no input '{shorten(outer.value)}'"
         hint = partial(known_inputs, outer.value, section.inputs)
-    findings.error("unknown-input", outer.span, message, hint)
+        lost = scope.undeclared(outer.value)
+    findings.error("unknown-input", outer.span, message, hint, undeclared=lost)
 
 
 def shared_out(made: Input, bound: Binding, position: int, count: int) -> Input | Unknown:

@@ -14,7 +14,18 @@ from typing import TypeAlias
 
 from neurovis_spec.compiler.limits import PATIENCE
 from neurovis_spec.compiler.network import Group
-from neurovis_spec.diagnostics import Findings, Span, did_you_mean, listed, meant, nearest, shorten, suggest
+from neurovis_spec.diagnostics import (
+    Findings,
+    Home,
+    Span,
+    Undeclared,
+    did_you_mean,
+    listed,
+    meant,
+    nearest,
+    shorten,
+    suggest,
+)
 from neurovis_spec.language.located import IDENTIFIER, Located
 from neurovis_spec.language.modules import ModuleModel
 from neurovis_spec.language.references import Arrow, NeuronRange, NoReference, Part, Sum, parse, parse_sum
@@ -51,6 +62,8 @@ class Directory:
     inputs: Collection[str] = ()
     #: the place of its scope among all
     scope: int = 0
+    #: the module that it is of
+    module: str | None = None
 
     @cached_property
     def known(self) -> tuple[str, ...]:
@@ -120,6 +133,20 @@ class Directory:
         right = self.instances[head][0].meant(rest)
         return None if right is None else f"{head}.{right}"
 
+    def misses(self, name: str) -> bool:
+        """Whether there is nothing that a name, or a number of its group, could be of."""
+        head, dot, rest = name.partition(".")
+        if dot:
+            return head not in self.instances or self.instances[head][0].misses(rest)
+        return name not in self.instances and name.rstrip("0123456789") not in self.groups and self.find(name) is None
+
+    def undeclared(self, name: str) -> Undeclared:
+        """Of a name that is unknown the part that is declared nowhere, and where it should be."""
+        head, dot, rest = name.partition(".")
+        if dot and head in self.instances:
+            return self.instances[head][0].undeclared(rest)
+        return Undeclared(head, home_of(self.module))
+
     def instance(self, name: str) -> tuple[Directory, ...]:
         """The instances that a name means; none where it means something else, or nothing."""
         head, dot, rest = name.partition(".")
@@ -156,7 +183,14 @@ class Directory:
             if a > b:
                 return "the range runs backwards"
             return tuple(range(group.start + a, group.start + b + 1))
+        if self.misses(low):
+            return f"there is no neuron '{shorten(low)}'"
         return "both ends of a range must be neurons of one counted group"
+
+
+def home_of(module: str | None, parts: tuple[str, ...] = ("neurons", "instances", "inputs")) -> Home:
+    """Where names of a spec, or of a module, are declared: those that groups, instances and inputs share, or others."""
+    return Home(() if module is None else ("modules", module), parts)
 
 
 def few(name: str, known: Collection[str]) -> Collection[str]:
@@ -216,7 +250,9 @@ def resolve_part(part: Part, text: Located[str], directory: Directory, findings:
         found = directory.range(part.low.text, part.high.text)
         if isinstance(found, str):
             hint = _range_help(part.low.text, part.high.text, directory)
-            findings.error("bad-range", span, f"'{shorten(part.text)}' is no range: {found}", hint)
+            lost = directory.undeclared(part.low.text) if directory.misses(part.low.text) else None
+            message = f"'{shorten(part.text)}' is no range: {found}"
+            findings.error("bad-range", span, message, hint, undeclared=lost)
         return UNKNOWN if isinstance(found, str) else found
     result = directory.find(part.text)
     if result is None:
@@ -254,7 +290,8 @@ def _unknown(name: str, span: Span, directory: Directory, findings: Findings) ->
         findings.error("unknown-neuron", span, message, "name a group, a neuron or a range")
         return
     message = f"there is no neuron or group '{shorten(name)}'"
-    findings.error("unknown-neuron", span, message, lambda: _several(name) or directory.hint(name))
+    lost = directory.undeclared(name)
+    findings.error("unknown-neuron", span, message, lambda: _several(name) or directory.hint(name), undeclared=lost)
 
 
 def _several(name: str) -> str | None:

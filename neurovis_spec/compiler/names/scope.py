@@ -9,11 +9,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from neurovis_spec.compiler.names.references import Section
+from neurovis_spec.compiler.names.references import Section, home_of
 from neurovis_spec.compiler.network import Input, Output
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.definitions import Definitions
+from neurovis_spec.diagnostics import Undeclared
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 
@@ -44,6 +45,10 @@ class Scope:
         """The input that is called so, here or in an instance; None where there is none."""
         head, dot, _ = name.partition(".")
         return UNKNOWN if dot and self.children.may_make(head) else self.inputs.get(name)
+
+    def undeclared(self, name: str) -> Undeclared | None:
+        """An input that is not declared here; None where it may be one of an instance, as modules declare these."""
+        return None if "." in name else Undeclared(name, home_of(self.module))
 
     def called(self, name: str) -> str:
         """The name that something of this scope has in the whole network."""

@@ -7,12 +7,12 @@ wrong with it. A name that is a neuron's is never a state's.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
 from neurovis_spec.arrays import IntArray
-from neurovis_spec.diagnostics import shorten, suggest
+from neurovis_spec.diagnostics import Home, Undeclared, shorten, suggest
 from neurovis_spec.language.references import StateName
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 
@@ -40,6 +40,7 @@ class Refusal(NamedTuple):
 
     message: str
     hint: str | None = None
+    undeclared: Undeclared | None = None
 
 
 class Holder(NamedTuple):
@@ -70,7 +71,7 @@ def model_state(name: StateName, neurons: Sequence[int], models: Iterable[Holder
     wanted = np.array(neurons, dtype=np.int64)
     for holder in models:
         if name.state not in holder.states and np.isin(wanted, holder.members).any():
-            return no_state(f"the model '{holder.kind}' of '{shorten(name.owner.text)}'", name.state, holder.states)
+            return no_state("model", holder.kind, f"of '{shorten(name.owner.text)}'", name.state, holder.states)
     return StateOf(name.state, wanted, _NONE)
 
 
@@ -87,14 +88,16 @@ def connections_state(name: StateName, connections: IntArray, wiring: Wiring) ->
         return Refusal(f"there is no connection '{shorten(name.owner.text)}'")
     if not holders:
         return Refusal(f"no rule changes '{shorten(name.owner.text)}', so it has no states")
-    return no_state(f"the rule '{holders[0].kind}' of '{shorten(name.owner.text)}'", name.state, holders[0].states)
+    return no_state("rule", holders[0].kind, f"of '{shorten(name.owner.text)}'", name.state, holders[0].states)
 
 
-def no_state(owner: str, state: str, states: tuple[str, ...]) -> Refusal:
-    """That a model or a rule, which is called ``owner``, has not this state, but ``states``."""
+def no_state(what: Literal["model", "rule"], name: str, of: str, state: str, states: tuple[str, ...]) -> Refusal:
+    """That a model or a rule, ``of`` somebody, has not this state, but ``states``."""
+    owner = f"the {what} '{name}' {of}"
     if not states:
         return Refusal(f"{owner} has no states")
-    return Refusal(f"{owner} has no state '{shorten(state)}'", suggest(state, states, "its states are"))
+    lost = Undeclared(state, Home((f"{what}s", name), ("state",)))
+    return Refusal(f"{owner} has no state '{shorten(state)}'", suggest(state, states, "its states are"), lost)
 
 
 def holders_of(network: Network) -> tuple[Holder, ...]:

@@ -23,7 +23,7 @@ from neurovis_spec.compiler.neurons.labels import labels_of
 from neurovis_spec.compiler.neurons.noise import noise_of
 from neurovis_spec.compiler.neurons.positions import positions_of
 from neurovis_spec.compiler.program import Activation, Model
-from neurovis_spec.compiler.values.arguments import check_initials, check_settings, choose, parameters, spread
+from neurovis_spec.compiler.values.arguments import check_initials, check_settings, choose, parameters, settle, spread
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.definitions import Defaults, Definitions
 from neurovis_spec.compiler.values.draws import Stream
@@ -37,7 +37,7 @@ from neurovis_spec.language.values import Choice, FormulaList, Initial
 from neurovis_spec.language.yaml.source import AnyList, Scalar
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 
-T = TypeVar("T")
+T = TypeVar("T", bound=Activation | Model)
 _SETTING = formula_at(GroupModel, "model", "NAME", "SETTING")
 
 
@@ -182,8 +182,9 @@ class Builder:
         states = tuple(state.name for state in kind.model.state)
         for state, formulas in given.states:
             if sure and state.value not in states:
-                found = no_state(f"the model '{kind.model.name}' of '{name}'", state.value, states)
-                self.constants.findings.error("unknown-state", state.span, *found)
+                found = no_state("model", kind.model.name, f"of '{name}'", state.value, states)
+                findings = self.constants.findings
+                findings.error("unknown-state", state.span, found.message, found.hint, undeclared=found.undeclared)
             values = self._drawn(formulas, n, "initial", name, state.value)
             if values is not UNKNOWN:
                 result[state.value] = values
@@ -269,8 +270,10 @@ class Builder:
         if found is UNKNOWN:
             check_settings(choice, self.constants, _SETTING.sees)
         else:
+            allowed = tuple(default.name for default in found[1])
+            settled = settle(choice, (f"{what}s", found[0].name), allowed, self.constants.findings)
             with self.constants.following() as parts:
-                values = parameters(choice, found[1], n, self.constants)
+                values = parameters(choice, found[1], n, self.constants, settled)
             if values is not UNKNOWN:
                 return found[0], values, [part._replace(field=what) for part in parts]
         return known.known()["identity" if what == "activation" else "static"][0], {}, []
@@ -294,7 +297,10 @@ class Builder:
             known = tuple(self.scope.section.inputs)
             found = None if findings.many else self.scope.input(meant(name, known) or "")
             message = f"there is no input '{shorten(name)}'"
-            findings.error("unknown-input", model.input.span, message, lambda: known_inputs(name, known))
+            lost = self.scope.undeclared(name)
+            findings.error(
+                "unknown-input", model.input.span, message, lambda: known_inputs(name, known), undeclared=lost
+            )
         if not isinstance(found, Input) or n is UNKNOWN:
             return UNKNOWN
         if found.size == 1:

@@ -239,5 +239,6 @@ def _directories(settled: list[_Settled], total: int) -> tuple[Directory, ...]:
             range(one.start, stop),
             one.scope.section.inputs,
             index,
+            one.scope.module,
         )
     return tuple(made[index] for index in range(len(settled)))

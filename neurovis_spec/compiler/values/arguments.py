@@ -18,7 +18,7 @@ from neurovis_spec.compiler.program import Quantity
 from neurovis_spec.compiler.values.constants import Constants, Randomness, Value, value_of
 from neurovis_spec.compiler.values.definitions import Default, Defaults, check_bounds
 from neurovis_spec.compiler.values.draws import Stream
-from neurovis_spec.diagnostics import Findings, meant, shorten, suggest
+from neurovis_spec.diagnostics import Findings, Home, Undeclared, meant, shorten, suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import Name, Tree, names
@@ -67,14 +67,18 @@ def choose(
     if found is None:
         right = None if findings.many else meant(name.value, known)
         message = f"there is no {what} '{shorten(name.value)}'"
-        findings.error(f"unknown-{what}", name.span, message, lambda: suggest(name.value, known, "known"))
+        lost = Undeclared(name.value, Home((), (f"{what}s",)))
+        findings.error(
+            f"unknown-{what}", name.span, message, lambda: suggest(name.value, known, "known"), undeclared=lost
+        )
         found = UNKNOWN if right is None else known[right]
     return found
 
 
-def settle(choice: Choice, known: Collection[str], findings: Findings) -> Names[Entry]:
-    """The settings of a choice by the names of its definition."""
-    return settings_of(choice.settings, known, "parameter", "it has no parameters", findings)
+def settle(choice: Choice, definition: tuple[str, str], known: Collection[str], findings: Findings) -> Names[Entry]:
+    """The settings of a choice by the names of its ``definition``: the section that this stands in, and its name."""
+    home = Home(definition, ("parameters", "signals"))
+    return settings_of(choice.settings, known, "parameter", "it has no parameters", findings, home)
 
 
 def check_settings(choice: Choice, constants: Constants, extra: Collection[str] = ()) -> None:
@@ -160,17 +164,12 @@ def parameters(
     defaults: Defaults,
     n: int | Unknown,
     constants: Constants,
-    settled: Names[Entry] | None = None,
+    settled: Names[Entry],
     each: Each | None = None,
 ) -> dict[str, FloatArray] | Unknown:
-    """The value of every parameter of a definition for n neurons, or for ``each`` of n connections; UNKNOWN where one
-    is.
-
-    ``settled`` are its settings, where the caller has read them for more than the parameters.
-    """
+    """The value of every parameter of a definition, whose settings are ``settled``, for n neurons, or for ``each`` of n
+    connections; UNKNOWN where one is."""
     findings = constants.findings
-    if settled is None:
-        settled = settle(choice, tuple(default.name for default in defaults), findings)
     values: dict[str, Value | Unknown] = {**CONSTANTS, "dt": constants.dt}
     result: dict[str, FloatArray] = {}
     following: dict[str, list[Part]] = {}

@@ -18,7 +18,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.settable import Dependent, ParameterFormula, Part, Slot, places_of
 from neurovis_spec.compiler.values.draws import Stream
-from neurovis_spec.diagnostics import Findings, shorten, suggest
+from neurovis_spec.diagnostics import Findings, Home, Undeclared, shorten, suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS, FUNCTIONS
 from neurovis_spec.language.expressions.given import GIVEN, meaning
@@ -68,6 +68,8 @@ class Outside(NamedTuple):
 
 
 NOTHING_OUTSIDE = Outside((), "")
+#: Where a spec declares its parameters.
+PARAMETERS = Home((), ("parameters",))
 
 
 def parse_formula(
@@ -81,11 +83,12 @@ def parse_formula(
     later: Collection[str] = (),
     subscripts: bool = False,
     outside: Outside = NOTHING_OUTSIDE,
+    home: Home = PARAMETERS,
 ) -> Tree | Unknown:
     """The tree of a formula whose names are all known; else findings at the invalid characters.
 
     ``later`` are names that are declared behind the formula, ``outside`` those that it does not see; ``subscripts``
-    allows names such as ``legs[3]``.
+    allows names such as ``legs[3]``; ``home`` is where its names are declared.
     """
     if formula.value is UNKNOWN:
         return UNKNOWN
@@ -112,7 +115,8 @@ def parse_formula(
             message, hint = f"'{name}' comes later", "a parameter sees those that are declared before it"
         elif name in outside.names:
             hint = outside.hint.format(name)
-        findings.error("unknown-name", formula.node.at(start, end), message, hint)
+        lost = Undeclared(name, home)
+        findings.error("unknown-name", formula.node.at(start, end), message, hint, undeclared=lost)
     return UNKNOWN
 
 
@@ -181,6 +185,8 @@ class Constants:
     settable: dict[str, int] = field(default_factory=dict)
     #: the path of the instance whose parameters these are, and those that it is given as formulas over others
     path: str = ""
+    #: where they are declared
+    home: Home = PARAMETERS
     settings: Mapping[str, ParameterFormula] = field(default_factory=dict)
     #: what follows parameters, of all that is evaluated while somebody asks for it
     _parts: list[Part] | None = None
@@ -242,7 +248,14 @@ class Constants:
         ``later`` are parameters that it does not see."""
         known = Scope((role.sees, self.names, ALWAYS))
         tree = parse_formula(
-            formula, known, self.findings, random=role.draws, what=what, later=later, outside=self.outside
+            formula,
+            known,
+            self.findings,
+            random=role.draws,
+            what=what,
+            later=later,
+            outside=self.outside,
+            home=self.home,
         )
         if tree is UNKNOWN:
             return UNKNOWN

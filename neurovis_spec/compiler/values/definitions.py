@@ -24,7 +24,7 @@ from neurovis_spec.compiler.values.constants import (
     parse_formula,
     value_of,
 )
-from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.diagnostics import Findings, Home, Span
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.errors import ExpressionError
 from neurovis_spec.language.expressions.functions import CONSTANTS
@@ -79,7 +79,8 @@ M = TypeVar("M", bound=LanguageModel)
 D = TypeVar("D")
 #: Keys of a definition that declare what is set where it is used, and those that declare names.
 _SET = frozenset({"parameters", "signals"})
-_DECLARING = frozenset({"parameters", "signals", "let", "state"})
+_SECTIONS = ("parameters", "signals", "let", "state")
+_DECLARING = frozenset(_SECTIONS)
 
 
 #: What to do where a definition reads a parameter of the spec.
@@ -105,11 +106,14 @@ NOTHING_AROUND = Around()
 class _Checker:
     """Checks one definition: the names that are taken, and the trees of its formulas."""
 
-    def __init__(self, given: tuple[str, ...], model: LanguageModel, findings: Findings, around: Around) -> None:
+    def __init__(
+        self, given: tuple[str, ...], model: LanguageModel, findings: Findings, around: Around, place: tuple[str, str]
+    ) -> None:
         self.model = model
         self.findings = findings
         self.constants = {**CONSTANTS, "dt": around.dt}
         self.outside = around.outside
+        self.home = Home(place, _SECTIONS)
         #: where each name is declared; nowhere those that are given
         self.known = Names[Span | None](dict.fromkeys((*ALWAYS, *given)), not model.unknown.isdisjoint(_DECLARING))
 
@@ -149,7 +153,9 @@ class _Checker:
         """The tree of a formula over what is declared so far, or what is ``known``; 0 in the place of one that is
         invalid, as nothing is computed with it any more."""
         known = self.known if known is None else known
-        tree = parse_formula(formula, known, self.findings, functions=functions, what=what, outside=self.outside)
+        tree = parse_formula(
+            formula, known, self.findings, functions=functions, what=what, outside=self.outside, home=self.home
+        )
         if tree is not UNKNOWN and not functions and is_constant(tree):
             check_finite(evaluate_array(tree, self.constants), formula, self.findings)
         return Number(0.0) if tree is UNKNOWN else tree
@@ -181,7 +187,8 @@ class _Checker:
         )
 
     def _finite(self, formula: Formula, values: Names[Value]) -> Tree | Unknown:
-        tree = parse_formula(formula, values, self.findings, what="known in this default", outside=self.outside)
+        what = "known in this default"
+        tree = parse_formula(formula, values, self.findings, what=what, outside=self.outside, home=self.home)
         value = value_of(tree, values)
         return UNKNOWN if value is not UNKNOWN and not check_finite(value, formula, self.findings) else tree
 
@@ -235,7 +242,7 @@ def _activation(
     name: str, model: ActivationModel, findings: Findings, around: Around
 ) -> tuple[Activation, Defaults] | Unknown:
     """The activation; UNKNOWN where an intermediate value is invalid."""
-    checker = _Checker(_ACTIVATION.sees, model, findings, around)
+    checker = _Checker(_ACTIVATION.sees, model, findings, around, ("activations", name))
     defaults = checker.parameters(model.parameters)
     replaced: dict[str, Tree] = {}
     let = checker.let(model.let)
@@ -259,7 +266,7 @@ def _expanded(tree: Tree, let: Mapping[str, Tree], span: Span, findings: Finding
 
 
 def _model(name: str, model: ModelModel, findings: Findings, around: Around) -> tuple[Model, Defaults]:
-    checker = _Checker(_MODEL.sees, model, findings, around)
+    checker = _Checker(_MODEL.sees, model, findings, around, ("models", name))
     defaults = checker.parameters(model.parameters)
     for key in names_of(model, "state", model.state):
         checker.declare("state", key)
@@ -273,7 +280,7 @@ def _model(name: str, model: ModelModel, findings: Findings, around: Around) -> 
 
 def _rule(name: str, model: RuleModel, findings: Findings, around: Around) -> tuple[Rule, Defaults] | Unknown:
     """The rule; UNKNOWN where it is not known which signals it has."""
-    checker = _Checker(_RULE.sees, model, findings, around)
+    checker = _Checker(_RULE.sees, model, findings, around, ("rules", name))
     defaults = checker.parameters(model.parameters)
     before = findings.errors
     for signal in model.signals:
