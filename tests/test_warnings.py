@@ -309,6 +309,39 @@ def test_strict(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert "x.yaml:3:14: error[unused-parameter]" in strict.stderr
 
 
+TWO_WARNINGS = "neurovis: 1\nname: x\nparameters: {a: 1, b: 2}\nneurons: {A: {bias: 1}}\n"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        "run SPEC --steps 2 -o x.npz",
+        "render SPEC -o x.svg",
+        "animate SPEC --steps 2 -o x.svg",
+        "sweep SPEC --over seed=1 --metric mean(A) --steps 2 --jobs 1 -o x.csv",
+        "analyze SPEC -o measures",
+        "layout SPEC -o layout.yaml",
+        "inspect SPEC",
+        "export SPEC --to c -o exported",
+        "ros export SPEC -o exported",
+    ],
+)
+def test_validate_alone_shows_warnings_in_full(arguments: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The others say how many there are, and by which command they are shown, of a SPEC as it is named."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a b.yaml").write_text(TWO_WARNINGS, encoding="utf-8")
+    told = CliRunner().invoke(neurovis, ["a b.yaml" if word == "SPEC" else word for word in arguments.split()])
+    assert told.exit_code == 0, told.output
+    assert "2 warnings: neurovis validate 'a b.yaml'" in told.stderr.splitlines()
+    assert "unused-parameter" not in told.stderr
+
+
+def test_warnings_of_standard_input_are_shown_with_the_options_that_matter() -> None:
+    given = ["inspect", "-", "--limit", "9", "--root", ".", "--no-body"]
+    told = CliRunner().invoke(neurovis, given, input=TWO_WARNINGS.replace(", b: 2", ""))
+    assert told.stderr == "1 warning: neurovis validate - --root . --limit 9 --no-body\n"
+
+
 # Comments that allow
 
 

@@ -6,6 +6,7 @@ recording, an array; or an error that ends the command.
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -79,10 +80,24 @@ def how_to_compile() -> Compiling:
 
 
 def network_of(spec: str, parameters: Mapping[str, float] | None = None) -> CompiledNetwork:
-    """``compiled``, with the warnings shown on standard error."""
+    """``compiled``; that there are warnings is said on standard error."""
     network = compiled(spec, parameters)
-    show(network.warnings, network.sources)
+    tell_warnings(spec, network.warnings)
     return network
+
+
+def tell_warnings(spec: str, found: Sequence[Diagnostic]) -> None:
+    """Say on standard error how many warnings a SPEC has, and what shows them: in full they stand there alone."""
+    if found:
+        from neurovis_spec.findings import printable
+
+        how = how_to_compile()
+        body = None if isinstance(how["body"], bool) else how["body"]
+        given = {"--root": how["root"], "--limit": how["limit"], "--body": body}
+        options = [word for name, value in given.items() if value is not None for word in (name, str(value))]
+        options += ["--no-body"] if how["body"] is False else []
+        line = shlex.join(["neurovis", "validate", spec, *options])
+        click.echo(f"{count(len(found), 'warning')}: {printable(line)}", err=True)
 
 
 def show(found: Sequence[Diagnostic], sources: Mapping[str, str]) -> None:

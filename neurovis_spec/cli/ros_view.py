@@ -10,7 +10,7 @@ import click
 
 from neurovis_spec.cli.completion import paths
 from neurovis_spec.cli.failure import fault
-from neurovis_spec.cli.files import network_of, show
+from neurovis_spec.cli.files import count, network_of
 from neurovis_spec.cli.options import examples, set_option
 from neurovis_spec.cli.ros_options import Meeting, meeting_options, tell
 from neurovis_spec.cli.ros_shown import Desk, shown_options
@@ -63,7 +63,8 @@ def command(spec: str | None, network: str | None, settings: dict[str, float], d
             if found is None:
                 raise fault("no network has announced itself", "name its spec: neurovis ros view SPEC")
             compiled, base = found
-            show(compiled.warnings, compiled.sources)
+            if compiled.warnings:
+                tell(f"{count(len(compiled.warnings), 'warning')} in the spec of {compiled.name}")
         with desk.open(compiled, node, base) as listening:
             quality = DISPLAY if desk.record is None else RECORDER
             reconnects = node.reconnects

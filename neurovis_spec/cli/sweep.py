@@ -10,7 +10,7 @@ from time import perf_counter
 import click
 
 from neurovis_spec.cli.completion import axes, paths
-from neurovis_spec.cli.files import STDIN, count, how_to_compile, show, standard_input, tables, writing
+from neurovis_spec.cli.files import STDIN, count, how_to_compile, standard_input, tables, tell_warnings, writing
 from neurovis_spec.cli.options import (
     backend_option,
     body_options,
@@ -98,7 +98,7 @@ def command(
     how = how_to_compile()
     with progress("compiling"):
         plan = planned(source, over, metrics, steps=steps, parameters=settings, backend=backend, **how)
-    show(plan.network.warnings, plan.network.sources)
+    tell_warnings(spec, plan.network.warnings)
     check_files(output, plan.network)
     arrays = tables(inputs, plan.network.network)
     begun, many = perf_counter(), jobs or min(_processors(), len(plan.points))
