@@ -207,17 +207,18 @@ class CompiledNetwork(Drawable):
         weights: Literal["plastic", "none"] = "plastic",
         checkpoint: str | Path | None = None,
         body: str | Path | bool = True,
-    ) -> None:
+    ) -> str:
         """Run as ``run`` does and write the recording to a file while it is made, in memory that does not grow with the
-        steps. What was there stays until the end. Raises what ``run`` and ``Recording.save`` raise, RecordingError
-        where the disk has not the room, and after Ctrl-C a KeyboardInterrupt; the file holds the steps until then.
-        After any other exception a part beside the file holds them, which is read where the file is not there."""
+        steps; gives the name of the backend. What was there stays until the end. Raises what ``run`` and
+        ``Recording.save`` raise, RecordingError where the disk has not the room, and after Ctrl-C a KeyboardInterrupt;
+        the file holds the steps until then. After any other exception a part beside the file holds them, which is read
+        where the file is not there."""
         check(backend=backend, start=start, progress=progress)
         target = arguments.path("path", path)
         keep = self._kept_in(target, _keep(states, neurons, weights))
         course = self._course(steps, inputs, backend, every, until, keep)
         kept = None if checkpoint is None else arguments.path("checkpoint", checkpoint)
-        pipeline.simulate_to(self.with_body(body).network, target, course, start, progress, kept)
+        return pipeline.simulate_to(self.with_body(body).network, target, course, start, progress, kept)
 
     def _kept_in(self, path: Path | None, keep: Keep) -> Keep:
         """What of a step is recorded in a file of this format."""
@@ -346,10 +347,12 @@ class CompiledNetwork(Drawable):
         return choose_engine(self.problem)
 
     def choose_backend(self) -> tuple[str, str]:
-        """The backend that runs it by default, and why."""
-        from neurovis_spec.runtime.backend import choose_backend
+        """The backend that runs it by default, and why; C has been compiled then, so that it is true. Raises
+        BackendError."""
+        from neurovis_spec.runtime.backend import ready
 
-        return choose_backend(self.network)
+        made = ready(self.network)
+        return made.name, made.why
 
     def describe(self) -> dict[str, object]:
         """What ``neurovis inspect --format json`` prints."""

@@ -129,11 +129,11 @@ def simulate_to(
     start: Recording | None = None,
     progress: Progress | None = None,
     checkpoint: Path | None = None,
-) -> None:
-    """The same, written to a file while it runs."""
+) -> str:
+    """The same, written to a file while it runs; gives the name of the backend."""
     from neurovis_spec.runtime.stream import record_to
 
-    record_to(network, path, course, start, progress, checkpoint)
+    return record_to(network, path, course, start, progress, checkpoint)
 
 
 def gauge(network: Network, text: str, recording: Recording) -> FloatArray:

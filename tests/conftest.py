@@ -3,6 +3,7 @@ committed."""
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -11,6 +12,7 @@ import pytest
 from hypothesis import settings
 
 from neurovis_spec.interrupts import ENDING
+from neurovis_spec.runtime.backend import DEFAULT
 
 if TYPE_CHECKING:
     from ros_worlds import World
@@ -20,6 +22,9 @@ if TYPE_CHECKING:
 for _number in ENDING:
     if signal.getsignal(_number) is signal.SIG_IGN:
         signal.signal(_number, signal.default_int_handler if _number == signal.SIGINT else signal.SIG_DFL)
+
+# Array code needs no compiler, and compiles nothing anew for each example: of this process and of those that it starts.
+os.environ[DEFAULT] = "numpy"
 
 # How long an example takes says something of the machine, not of the program. The examples are the same in each run, so
 # that a change is judged by what it changes; --hypothesis-profile=explore looks for new ones.

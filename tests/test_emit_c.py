@@ -12,11 +12,13 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from test_emit import DIVIDED, EXACT_TREES, LONG, NAMES, OPERATIONS, SMOOTH_TREES, VALUES
 
+from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.emit_c import Emitter, known_in
 from neurovis_spec.language.expressions.evaluate import evaluate
-from neurovis_spec.language.expressions.functions import FUNCTIONS
+from neurovis_spec.language.expressions.functions import FUNCTIONS, PLAIN
 from neurovis_spec.language.expressions.parser import parse
 from neurovis_spec.language.expressions.tree import Call, Name, Number, Tree
+from neurovis_spec.runtime import c_functions
 from neurovis_spec.runtime.c_code import words_of
 from neurovis_spec.runtime.c_library import load
 
@@ -97,3 +99,25 @@ def test_what_is_known_is_worked_out_and_a_power_stays_one() -> None:
 def test_numbers_of_32_bits_have_their_own_functions() -> None:
     value = Emitter("float").value(parse("tanh(a) + 0.1*sigmoid(a) - 1/0"), {"a": "x"})
     assert value == "tanhf(x) + 0.1f*nv_sigmoid(x) - 1.0f/0.0f"
+
+
+@settings(max_examples=8, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(
+    st.lists(EXACT_TREES | DIVIDED | SMOOTH_TREES, min_size=20, max_size=20),
+    st.lists(VALUES, min_size=6, max_size=6),
+)
+def test_a_library_gives_arrays_the_bits_of_the_reference(trees: list[Tree], values: list[list[float]]) -> None:
+    """Python's functions, and those that are compiled: of trees, and of each function and operator at the edges."""
+    calls = [Call(name, tuple(Name(n) for n in NAMES[: function.least])) for name, function in FUNCTIONS.items()]
+    rows = [*values, *([a, b, 0.5] for a, b in zip(EDGES, EDGES[5:] + EDGES[:5], strict=True))]
+    points = [dict(zip(NAMES, row, strict=True)) for row in rows]
+    places = dict(zip(NAMES, np.array(rows).T, strict=True))
+    for tree in [*trees, *calls, *OPERATIONS.values(), Call("max", (Name("a"), Name("b"), Name("c")))]:
+        expected = np.array([evaluate(tree, point) for point in points])
+        for library in (PLAIN, c_functions.library()):
+            found = np.broadcast_to(evaluate_array(tree, places, by=library), expected.shape)
+            scalar = [evaluate_array(tree, point, by=library) for point in points]
+            for given_ in (found, np.array(scalar)):
+                assert np.array_equal(given_, expected, equal_nan=True), tree
+                signs = np.signbit(given_) == np.signbit(expected)
+                assert (signs | np.isnan(expected)).all(), tree

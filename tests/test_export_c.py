@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import subprocess
 import tempfile
 import warnings
@@ -12,12 +13,14 @@ import pytest
 from click.testing import CliRunner
 from exported import LANGUAGES, STRICT, built, compiled
 from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
 from random_specs import specs
 from test_runtime_conformance import EVENTS, SPECS
 
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.runtime import c_export
 from neurovis_spec.runtime.c_export import Exported
 from neurovis_spec.runtime.c_package import files, size_of_state
@@ -101,7 +104,7 @@ def test_the_command_goes_on_from_a_recording(suffix: str, tmp_path: Path) -> No
     """`run -o FILE`, `export --from FILE`, a compiler: what a robot gets goes on as `run --from FILE` does."""
     spec, recording = tmp_path / "spec.yaml", tmp_path / f"learned{suffix}"
     spec.write_text(EVENTS, encoding="utf-8")
-    invoke("run", str(spec), "--steps", "17", "--set", "gain=0.55", "-o", str(recording))
+    invoke("run", str(spec), "--backend", "reference", "--steps", "17", "--set", "gain=0.55", "-o", str(recording))
     invoke("export", str(spec), "--to", "c", "--from", str(recording), "-o", str(tmp_path / "controller"))
     network = nv.compile(spec)
     expected = network.run(25, backend="reference", start=nv.load(recording))
@@ -264,3 +267,69 @@ def test_random_networks_run_alike_when_exported(spec: dict[str, object]) -> Non
     with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
         warnings.simplefilter("ignore")
         runs_alike(nv.compile(spec).network, Path(folder), steps=12)
+
+
+_CALLS = [
+    *(name for name, entry in FUNCTIONS.items() if entry.most == 1),
+    "atan2",
+    "pow",
+    "min",
+    "max",
+    "clip",
+    "%",
+    "^",
+]
+
+
+def formula(chooser: random.Random, names: tuple[str, ...], depth: int = 4) -> str:
+    """A formula of these names that is finite, of functions upon functions of numbers between 0.1 and 0.9."""
+    value = chooser.choice(names)
+    for _ in range(depth):
+        within = [f"(0.5 + 0.4*sin({value}*{chooser.uniform(0.5, 3):.3f} + {other}))" for other in (*names, 1, 2)]
+        x, y, z = chooser.sample(within, 3) if len(within) > 3 else within
+        match chooser.choice(_CALLS):
+            case "%" | "^" as operator:
+                value = f"({x} {operator} {y})"
+            case "atan2" | "pow" | "min" | "max" as name:
+                value = f"{name}({x}, {y})"
+            case "clip":
+                value = f"clip({x}, 0.3, {z})"
+            case name:
+                value = f"{name}({x})"
+    return value
+
+
+@settings(max_examples=12, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(seed=st.integers(0, 2**32))
+def test_what_is_computed_beside_the_step_has_the_same_bits(seed: int) -> None:
+    """Inputs, noise, clamps, what events set and what follows it: by the functions of the step, exported or not."""
+    chooser = random.Random(seed)
+    beside = {name: formula(chooser, ("k", "t", "p", "q")) for name in ("first", "second", "noise")}
+    followed = {name: formula(chooser, ("p", "q")) for name in ("bias", "weight", "leak", "set", "clamp")}
+    spec = {
+        "neurovis": 1,
+        "name": "beside",
+        "parameters": {"p": round(chooser.uniform(0.1, 1), 3), "q": round(chooser.uniform(0.1, 1), 3)},
+        "inputs": {name: {"expression": beside[name]} for name in ("first", "second")},
+        "neurons": {
+            "A": {"count": 3, "bias": f"i*({followed['bias']})", "input": "first", "activation": "tanh"},
+            "B": {"input": "second", "noise": f"normal(0, 0.1 + abs({beside['noise']}))"},
+            "C": {"model": {"leaky_integrator": {"leak": f"0.5 + 0.1*sin({followed['leak']})"}}, "activation": "tanh"},
+        },
+        "connections": {"A -> C": followed["weight"], "B -> C": 0.3},
+        "events": [{"at": 3, "set": {"p": followed["set"]}}, {"from": 6, "to": 9, "clamp": {"A1": followed["clamp"]}}],
+    }
+    with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
+        warnings.simplefilter("ignore")
+        network = nv.compile(spec).network
+        one, other = (record(network, 12, backend=backend) for backend in ("c", "reference"))
+        assert one.activity.tobytes() == other.activity.tobytes()
+        controller, simulation = compiled(network, Path(folder)), Simulation(network, "c")
+        for k in range(12):
+            if k in (5, 7, 8):  # what is set for the second time is set by code made for it
+                assert controller.set("q", 0.1 * k)
+                simulation.set(q=0.1 * k)
+            controller.step()
+            simulation.step()
+            np.testing.assert_array_equal(controller.activity, simulation.activity, f"a[{k}]")
+            np.testing.assert_array_equal(controller.weights, simulation.connection_weights, f"w[{k + 1}]")

@@ -32,7 +32,7 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Input, Network
 from neurovis_spec.compiler.program import Activation, Model
 from neurovis_spec.language.words import Combine
-from neurovis_spec.runtime.backend import BackendError, Capabilities, choose_backend, listing, load, prepare
+from neurovis_spec.runtime.backend import BackendError, Capabilities, listing, load, prepare
 from neurovis_spec.runtime.conditions import first_conditions
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.numpy_backend import NumpyBackend, step_code
@@ -399,9 +399,6 @@ def test_backends_are_found_by_name_and_refused_with_the_nearest() -> None:
     assert load("reference").name == "reference"
     assert [line.split()[0] for line in listing()] == ["c", "numpy", "reference"]
     assert [line.split()[1] for line in listing()][1:] == ["available", "available"]
-    name, why = choose_backend(cpg_rbf(), 10)
-    assert name == "numpy"
-    assert "28 connections" in why
     with pytest.raises(BackendError, match="'numpy'"):
         load("nmupy")
 

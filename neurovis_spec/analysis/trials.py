@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,7 @@ from neurovis_spec import arguments
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.network import Input, Network
-from neurovis_spec.runtime.backend import Availability, Capabilities, Stepper, prepare
+from neurovis_spec.runtime.backend import Stepper, ready
 from neurovis_spec.runtime.columns import ALL, columns_of
 from neurovis_spec.runtime.embodied import embodied
 from neurovis_spec.runtime.record import Course, InMemory, Last, RowSink, go
@@ -30,28 +30,9 @@ from neurovis_spec.runtime.state import State, initial_state
 STEPS = 500
 
 
-class Prepared:
-    """A backend that has made the network ready already; ``seen`` is given the inputs of each step, and says which it
-    is to take instead."""
-
-    name = "prepared"
-    capabilities = Capabilities(noise=True)
-
-    def __init__(self, stepper: Stepper, seen: Callable[[FloatArray], FloatArray] | None = None) -> None:
-        self._stepper = stepper if seen is None else _Turned(stepper, seen)
-
-    def availability(self) -> Availability:
-        """It is there."""
-        return Availability(True)
-
-    def prepare(self, network: Network) -> Stepper:
-        """The stepper that there is."""
-        return self._stepper
-
-
 @dataclass(frozen=True)
 class _Turned:
-    """A stepper that is given other inputs."""
+    """A stepper that is given other inputs: ``seen`` is given those of each step, and says which it is to take."""
 
     stepper: Stepper
     seen: Callable[[FloatArray], FloatArray]
@@ -80,11 +61,11 @@ class Trials:
         self.outputs = output_neurons(network) if of is None else _neurons(network, of)
         if not len(self.outputs):
             raise ValueError("the network has no outputs: name the neurons that count as outputs")
-        self._stepper, self._body = prepare(network, None, (first + count) * 100), embodied(network)
-        self._simulation = Simulation(network, Prepared(self._stepper), inputs=inputs, body=self._body)
+        self._made, self._body = ready(network), embodied(network)
+        self._simulation = Simulation(network, self._made, inputs=inputs, body=self._body)
         self._state = initial_state(network)
         self._widths = columns_of(network, ALL, self._body).widths(network)
-        course = Course(first, 1, inputs, Prepared(self._stepper), body=self._body)
+        course = Course(first, 1, inputs, self._made, body=self._body)
         _go(network, self._state, course, Last(self._widths))
         if self._body is not None:
             self._body.put(self._state)
@@ -133,7 +114,8 @@ class Trials:
 
     def _run(self, state: State, seen: Callable[[FloatArray], FloatArray] | None = None) -> FloatArray:
         rows = InMemory(self._widths, self.steps)
-        course = Course(self.steps, 1, self._inputs, Prepared(self._stepper, seen), body=self._body)
+        made = self._made if seen is None else replace(self._made, stepper=_Turned(self._made.stepper, seen))
+        course = Course(self.steps, 1, self._inputs, made, body=self._body)
         _go(self.network, state, course, rows)
         return rows.numbers(Steps(self.steps, 1, self.start)).rows.activity
 

@@ -234,7 +234,8 @@ backend_option = listed(
     _lines_of_backends,
     "--backend",
     metavar="B",
-    text="What computes; 'list' shows which there are.",
+    text="What computes; default: what made the steps that it goes on from, else C where a compiler is, else numpy "
+    "(NEUROVIS_BACKEND names another). 'list' shows which there are.",
 )
 engine_option = click.option(
     "--engine",

@@ -90,14 +90,16 @@ class Desk:
         return bound("127.0.0.1", port)
 
     @contextmanager
-    def open(self, compiled: CompiledNetwork, node: Node, base: str | None = None) -> Iterator[Listening]:
+    def open(
+        self, compiled: CompiledNetwork, node: Node, base: str | None = None, backend: str = ""
+    ) -> Iterator[Listening]:
         """A network's topics, by default those that its spec says, heard for a block, and shown in the page where that
-        is wanted."""
+        is wanted; ``backend`` is the name of the one that makes the steps, where that is known."""
         from neurovis_spec.ros.listening import Listening, Wanted
 
         path = None if self.record is None else self._path(self.record, node.ros)
         film = self._film(compiled)
-        wanted = Wanted(path, self.rotate, self.force, self.live is not None or film is not None)
+        wanted = Wanted(path, self.rotate, self.force, self.live is not None or film is not None, backend)
         with _told_of_files():
             listening = Listening(compiled, node.ros, wanted, tell, node.definition, base)
         with self._page(listening), self._filmed(listening, film):

@@ -126,7 +126,7 @@ def command(
     is read where the file is not there.
 
     With --checkpoint a run is made in parts: each goes on exactly where the last one ended, --steps counts the steps to
-    be made now, and the parts together are bit for bit the run in one go.
+    be made now, and the parts together are bit for bit the run in one go, as they are made by one backend.
     """
     read = files_of(inputs)
     check_target(output, [("the spec itself", spec), ("the recording that the run goes on from", start), *read])
@@ -151,14 +151,14 @@ def command(
     begun = perf_counter()
     if output is not None:
         with writing(output), progress("running") as bar:
-            network.run_to(output, steps, arrays, progress=bar, **chosen)
+            by = network.run_to(output, steps, arrays, progress=bar, **chosen)
         _tell(ends)
-        click.echo(f"{output}: {_summary(network, steps, perf_counter() - begun, backend, ends)}")
+        click.echo(f"{output}: {_summary(network, steps, perf_counter() - begun, by, ends)}")
         return
     with progress("running") as bar:
         recording = network.run(steps, arrays, progress=bar, last=ends is not None, **chosen)
     _tell(ends)
-    _print(network, recording, _summary(network, steps, perf_counter() - begun, backend, ends), states)
+    _print(network, recording, _summary(network, steps, perf_counter() - begun, recording.backend, ends), states)
 
 
 def _tell(until: Until | None) -> None:
@@ -167,13 +167,11 @@ def _tell(until: Until | None) -> None:
         click.echo(f"until {until.measure.text}: {until.ending}", err=True)
 
 
-def _summary(
-    network: CompiledNetwork, steps: int | None, seconds: float, backend: str | None, until: Until | None
-) -> str:
+def _summary(network: CompiledNetwork, steps: int | None, seconds: float, backend: str, until: Until | None) -> str:
     steps = network.network.steps if steps is None else steps
     if until is not None and until.ending is not None:
         steps = until.ending.made
-    return f"{count(steps, 'step')} in {seconds:.2f} s, backend {backend or network.choose_backend()[0]}"
+    return f"{count(steps, 'step')} in {seconds:.2f} s, backend {backend}"
 
 
 def _check_format(output: Path | None) -> None:

@@ -35,12 +35,14 @@ SPEC: Final = "spec"
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What is wanted of a network's topics: a recording, and that they are shown."""
+    """What is wanted of a network's topics: a recording, and that they are shown; ``backend`` is the name of the one
+    that makes the steps, "" where that is not known."""
 
     record: Path | None = None
     rotation: Rotation = field(default_factory=Rotation)
     force: bool = False
     shown: bool = False
+    backend: str = ""
 
 
 def base_of(compiled: CompiledNetwork) -> str:
@@ -48,12 +50,12 @@ def base_of(compiled: CompiledNetwork) -> str:
     return f"{compiled.network.ros.namespace.rstrip('/')}/{compiled.network.name}"
 
 
-def frame(compiled: CompiledNetwork) -> Recording:
+def frame(compiled: CompiledNetwork, backend: str = "") -> Recording:
     """A recording without rows, to which received activities and weights are added: it has the names, connections and
-    hash of the network."""
+    hash of the network, and the name of the backend, where that runs here."""
     network = compiled.network
     columns = replace(columns_of(network), probe=Probe((), ()), outputs={})
-    return frame_of(network, columns, compiled.simulator("reference").state())
+    return replace(frame_of(network, columns, compiled.simulator("reference").state()), backend=backend)
 
 
 class Listening:
@@ -91,7 +93,8 @@ class Listening:
         about = {"network": network.name, "hash": network.hash, "dt": repr(network.dt), "version": __version__}
         topic = topic_of(f"{self.base}/{SPEC}", STRING, self._definition(STRING), self.ros)
         first = [(topic, text_message(self.compiled.text(), ENCODINGS[self.ros]))]
-        return Files(path, self.ros, about, first, wanted.rotation, wanted.force, frame_bytes(frame(self.compiled)))
+        kept = frame_bytes(frame(self.compiled, wanted.backend))
+        return Files(path, self.ros, about, first, wanted.rotation, wanted.force, kept)
 
     def _definition(self, type_: str) -> str:
         return definition(type_, self.ros) or self._definitions_of(type_)

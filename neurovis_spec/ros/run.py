@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from threading import Event, Lock, Thread
-from typing import Final
 
 import numpy as np
 
@@ -32,13 +31,10 @@ from neurovis_spec.ros.middleware import LATCHED, Arrival, MiddlewareError, Node
 from neurovis_spec.ros.pace import Clock, Pace, SimulatedClock, SteadyClock
 from neurovis_spec.ros.steering import RunSteering
 from neurovis_spec.ros.summary import Summary
-from neurovis_spec.runtime.backend import BackendError, choose_backend
+from neurovis_spec.runtime.backend import Ready
 from neurovis_spec.runtime.ros_messages import label_of
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
 from neurovis_spec.runtime.wire import ArrayForm, WireError, text_message
-
-#: a run has no end: what compiling costs is soon paid for
-_ENDLESS: Final = 1 << 40
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,22 +46,12 @@ class Course:
     steps: int | None = None
     seconds: float | None = None
     wait: float = 0.0
-    backend: str | None = None
+    backend: str | Ready | None = None
 
 
-def simulation(network: Network, backend: str | None) -> Simulation:
-    """The network, made ready: in C where that can be. Its body is what is at the topics, not that of the
-    spec. Raises BackendError."""
-    network = replace(network, body=None)
-    if backend is not None:
-        return Simulation(network, backend)
-    chosen = choose_backend(network, _ENDLESS)[0]
-    try:
-        return Simulation(network, chosen)
-    except BackendError:
-        if chosen != "c":
-            raise
-        return Simulation(network, "numpy")  # a compiler that cannot compile
+def simulation(network: Network, backend: str | Ready | None) -> Simulation:
+    """The network, made ready. Its body is what is at the topics, not that of the spec. Raises BackendError."""
+    return Simulation(replace(network, body=None), backend)
 
 
 @dataclass

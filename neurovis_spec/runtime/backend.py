@@ -6,14 +6,21 @@ found through the entry point group ``neurovis.backends``; an entry point names 
 
 from __future__ import annotations
 
+import os
+import warnings
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from functools import cache
+from typing import Final, Protocol, runtime_checkable
 
 from neurovis_spec import plugins
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
+from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.runtime.state import State
+
+#: The environment variable that names the default.
+DEFAULT: Final = "NEUROVIS_BACKEND"
 
 
 class BackendError(ValueError):
@@ -38,10 +45,12 @@ class Capabilities:
 
 @dataclass(frozen=True, slots=True)
 class Availability:
-    """Whether a backend works here; ``note`` says which way, or why not."""
+    """Whether a backend works here; ``note`` says which way, or why not. ``by_default``: it is also taken where nobody
+    asks for it."""
 
     available: bool
     note: str = ""
+    by_default: bool = True
 
 
 class Stepper(Protocol):
@@ -52,6 +61,17 @@ class Stepper(Protocol):
 
         ``inputs`` are all inputs at step t. NumPy's floating-point warnings are left to the caller.
         """
+        ...
+
+
+@runtime_checkable
+class Computing(Protocol):
+    """A Stepper that has functions of its own: what is computed beside the steps (inputs that are expressions, clamps,
+    what follows a parameter that is set) is computed by them. Of others NumPy's are taken."""
+
+    @property
+    def functions(self) -> Library:
+        """What computes ``exp``, ``tanh``, … to the bit as the steps do."""
         ...
 
 
@@ -125,38 +145,100 @@ def listing() -> tuple[str, ...]:
     return tuple(lines)
 
 
-def choose_backend(network: Network, steps: int | None = None) -> tuple[str, str]:
-    """The name of the backend that runs this network unless another is asked for, and why. A run that is shorter than
-    ``time.steps``, and one step by step, count as one of these: a run and its parts give the same bits."""
+def choose_backend(network: Network) -> tuple[str, str]:
+    """The name of the backend that runs this network unless another is asked for, and why: by the network and the
+    machine alone, so that a run and its parts give the same bits. The environment may name another (``DEFAULT``).
+    Raises BackendError where it names none that there is."""
+    named = os.environ.get(DEFAULT, "").strip()
+    if named:
+        if named not in names():
+            raise BackendError(
+                f"{DEFAULT} names '{named}', which is no backend; {suggest(named, names(), 'there are')}"
+            )
+        return named, f"named by {DEFAULT}"
     size = f"{len(network.neurons)} neurons, {len(network.connections)} connections"
-    if "c" not in names():
-        return "numpy", f"array code made for this network ({size}); needs nothing but NumPy"
-    from neurovis_spec.runtime.c_choice import pays
+    why = "needs nothing but NumPy"
+    if "c" in names():
+        found = available("c")
+        reasons = (
+            (*lacking(network, load("c").capabilities),) if found.available and found.by_default else (found.note,)
+        )
+        if not reasons:
+            return "c", f"{found.note} ({size})"
+        why = "; ".join(reasons)
+    return "numpy", f"array code made for this network ({size}); {why}"
 
-    better, why = pays(network, max(network.steps, steps or 0))
-    return ("c", f"{why} ({size})") if better else ("numpy", f"array code made for this network ({size}); {why}")
+
+@dataclass(frozen=True, slots=True)
+class Ready:
+    """A network made ready to run: the ``name`` of the backend, what makes the steps, what computes the functions of
+    formulas beside them, and ``why`` it was chosen, where nobody asked for it."""
+
+    name: str
+    stepper: Stepper
+    functions: Library
+    why: str = ""
 
 
-def prepare(network: Network, backend: str | Backend | None = None, steps: int | None = None) -> Stepper:
-    """Make a network ready to run on a backend, by default on the one chosen for so many steps.
+def ready(network: Network, backend: str | Backend | Ready | None = None, before: str = "") -> Ready:
+    """Make a network ready to run on a backend; by default on the one that has made the steps ``before``, if there are
+    any, else on the one that is chosen. Where that is C and cannot be compiled, array code takes its place, which a
+    RuntimeWarning says once.
 
-    Raises BackendError where it is unknown, not available, or lacks something that the network asks for.
+    Raises BackendError where it is unknown, not available, or lacks something that the network asks for. Warns where
+    another one is asked for than has made the steps before.
     """
+    if isinstance(backend, Ready):
+        return backend
     if backend is None:
-        backend = choose_backend(network, steps)[0]
-        if backend == "c":
-            try:
-                return load(backend).prepare(network)
-            except (BackendError, plugins.PluginError):  # a compiler that cannot compile
-                backend = "numpy"
-    chosen = load(backend) if isinstance(backend, str) else backend
+        return _going_on(network, before) if before else _default(network)
+    made = _made(network, load(backend) if isinstance(backend, str) else backend)
+    if before not in ("", made.name):
+        other = f"the backend '{before}' made the steps before, and '{made.name}' makes those to come"
+        warnings.warn(f"{other}: their last bits may differ", stacklevel=2)
+    return made
+
+
+def prepare(network: Network, backend: str | Backend | None = None) -> Stepper:
+    """What makes the steps of a network, as ``ready`` does."""
+    return ready(network, backend).stepper
+
+
+def _going_on(network: Network, before: str) -> Ready:
+    """By the backend that has made the steps before. Raises BackendError, which says so."""
+    try:
+        return _made(network, load(before))
+    except (BackendError, plugins.PluginError) as error:
+        told = f"the steps before were made by the backend '{before}', which makes those to come: {error}"
+        raise BackendError(f"{told}; one that is named (--backend) goes on with other last bits") from None
+
+
+def _default(network: Network) -> Ready:
+    name, why = choose_backend(network)
+    try:
+        return _made(network, load(name), why)
+    except BackendError as error:
+        if name != "c" or os.environ.get(DEFAULT, "").strip():
+            raise
+        _say(f"{error}: NumPy computes instead")
+        return _made(network, load("numpy"), f"array code made for this network; {error}")
+
+
+@cache
+def _say(message: str) -> None:
+    """Warn once in a process."""
+    warnings.warn(message, RuntimeWarning, stacklevel=4)
+
+
+def _made(network: Network, chosen: Backend, why: str = "") -> Ready:
     found = chosen.availability()
     if not found.available:
         raise BackendError(f"the backend '{chosen.name}' is not available here: {found.note}")
     missing = lacking(network, chosen.capabilities)
     if missing:
         raise BackendError(f"the backend '{chosen.name}' cannot run '{network.name}': {'; '.join(missing)}")
-    return chosen.prepare(network)
+    stepper = chosen.prepare(network)
+    return Ready(chosen.name, stepper, stepper.functions if isinstance(stepper, Computing) else NUMPY, why)
 
 
 def lacking(network: Network, capabilities: Capabilities) -> tuple[str, ...]:

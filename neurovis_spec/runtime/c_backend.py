@@ -19,7 +19,8 @@ import numpy.typing as npt
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.expressions.emit_c import Emitter
-from neurovis_spec.runtime import c_library
+from neurovis_spec.language.expressions.functions import Library
+from neurovis_spec.runtime import c_functions, c_library
 from neurovis_spec.runtime.backend import Availability, BackendError, Capabilities
 from neurovis_spec.runtime.c_code import Code, Form, Table, Tables, function, words_of
 from neurovis_spec.runtime.c_step import StepCode
@@ -265,6 +266,8 @@ class CStepper:
         made = written(network)
         library = c_library.load(made.text)
         self._library = library
+        #: what computes formulas beside the steps
+        self.functions: Library = c_functions.library()
         self._step, self._run = library.nv_once, library.nv_run
         self._step.restype = None
         self._run.argtypes, self._run.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
@@ -398,7 +401,8 @@ class CBackend:
     def availability(self) -> Availability:
         """Whether there is a compiler."""
         try:
-            return Availability(True, f"C made for each network, compiled by {c_library.compiler().name}")
+            found = c_library.compiler()
+            return Availability(True, f"C made for each network, compiled by {found.name}", not found.on_request)
         except c_library.CompilerError as error:
             return Availability(False, str(error))
 

@@ -47,11 +47,13 @@ class CompilerError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Compiler:
-    """A command that compiles C; ``name`` as one would call it, ``stamp`` changes when it is another."""
+    """A command that compiles C; ``name`` as one would call it, ``stamp`` changes when it is another. What is taken
+    ``on_request`` alone is slow when it is first used."""
 
     command: tuple[str, ...]
     name: str
     stamp: str
+    on_request: bool = False
 
 
 def compiler() -> Compiler:
@@ -81,7 +83,8 @@ def _compiler(chosen: str, path: str) -> Compiler:
         zig = None
     if zig is not None and zig.origin is not None:
         # it makes code for this very processor unless it is told otherwise: another machine may share the cache
-        return Compiler((sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline"), "ziglang", _stamp(zig.origin))
+        command = (sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline")
+        return Compiler(command, "ziglang", _stamp(zig.origin), on_request=True)
     raise CompilerError("there is no C compiler; pip install 'neurovis-spec[c]' brings one")
 
 

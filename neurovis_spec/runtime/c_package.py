@@ -172,7 +172,7 @@ The state takes {size_of_state(made)} bytes where a pointer has 8. A step takes
     cmake -B build && cmake --build build && build/{name}_example
 
 `-ffp-contract=off` keeps a compiler from joining a product and a sum, which rounds otherwise than the reference does;
-so the numbers are those of `neurovis run --backend reference`, where the C library is the same.
+so the numbers are those of `neurovis run --backend c`, bit for bit where the C library is the same.
 """
 
 

@@ -49,6 +49,8 @@ def save_state(state: State, path: Path) -> None:
         "continued": state.continued,
         "begun": state.begun,
     }
+    if state.backend:
+        about["backend"] = state.backend
     if body is not None:
         about["body"] = {"episode": body.episode, "ended_episode": body.ended_episode}
     clamps = list(now.held.active.values())
@@ -94,6 +96,7 @@ def load_state(network: Network, path: Path) -> State:
             found = {name: _member(archive, name, array) for name, array in wanted.items()}
             _fill(state, found)
             state.k, state.drawn = _whole(about, "k"), _whole(about, "drawn")
+            state.backend = str(about.get("backend", ""))
             state.begun, state.continued = _whole(about, "begun", -1), about.get("continued") is True
             _clamp_again(network, state, archive, size)
             lost = state.conditions.structure.lost

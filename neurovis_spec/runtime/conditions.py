@@ -18,6 +18,7 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.changes import Change, Held
 from neurovis_spec.compiler.events.patch import Patcher
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.runtime.presynaptic import remembering
 from neurovis_spec.runtime.signals import signal_layout
 
@@ -126,12 +127,13 @@ def lose(network: Network, state: State, connections: IntArray) -> None:
 
 @dataclass
 class Controls:
-    """Changes the conditions of runs of one network."""
+    """Changes the conditions of runs of one network, whose functions are computed ``by`` a library."""
 
     network: Network
+    by: Library = NUMPY
 
     def __post_init__(self) -> None:
-        self._patcher = Patcher(self.network.settable)
+        self._patcher = Patcher(self.network.settable, self.by)
         self._changes = {change.at: change for change in self.network.changes}
 
     def begin(self, state: State) -> bool:
@@ -152,7 +154,7 @@ class Controls:
             now.chosen[slot] = True
         patch.write(weights, now.variables)
         if now.held.active:
-            now.held.follow(patch.changed, now.parameters)
+            now.held.follow(patch.changed, now.parameters, self.by)
             self.hold(now)
 
     def apply(self, state: State, change: Change) -> None:
@@ -161,9 +163,9 @@ class Controls:
         now = state.conditions
         self.set_parameters(now, state.weights, change)
         if change.released or change.clamps:
-            now.held.end(change.released, now.parameters)
+            now.held.end(change.released, now.parameters, self.by)
             for clamp in change.clamps:
-                now.held.begin(clamp, now.parameters)
+                now.held.begin(clamp, now.parameters, self.by)
             self.hold(now)
         if len(change.mended_neurons) or len(change.mended_connections):
             self.mend(state, change.mended_neurons, change.mended_connections)
@@ -175,7 +177,7 @@ class Controls:
     def set_parameters(self, now: Conditions, weights: FloatArray, change: Change) -> None:
         """Set the parameters that the events of a step set. Raises PatchError."""
         if change.parameters:
-            values = {slot: float(formula.values(now.parameters)) for slot, formula in change.parameters}
+            values = {slot: float(formula.values(now.parameters, self.by)) for slot, formula in change.parameters}
             self.set(now, weights, values)
 
     def lesion(self, state: State, neurons: IntArray, connections: IntArray) -> None:

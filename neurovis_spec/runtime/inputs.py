@@ -1,8 +1,9 @@
 """Inputs: s[t] as one vector, from expressions, tables and what the caller supplies; behind them the noise.
 
 In: a Network and the caller's values. Out: for each step the vector of all inputs. Expressions are evaluated a stretch
-of steps at a time, the same stretches however one runs, so that stepping and running give the same bits; rows are made
-from them for as many of these steps as make a fixed number of values, so that memory does not grow with the steps.
+of steps at a time, the same stretches however one runs, so that stepping and running give the same bits, by the
+functions that compute the steps; rows are made from them for as many of these steps as make a fixed number of values,
+so that memory does not grow with the steps.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from neurovis_spec.compiler.network import Input, Network, Noise
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
+from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.language.expressions.tree import Draw, Tree
 from neurovis_spec.language.expressions.undefined import either, hazards
 from neurovis_spec.runtime.state import State, constants
@@ -38,7 +40,8 @@ class InputReader:
     ``supplied`` maps names to whole arrays that replace their sources: (steps, size), (steps,) for size 1, or one
     number or (size,) for all steps; past its end the last row stays. ``made`` is called with rows of inputs as
     soon as they are computed: the first step, a row for each step from there on, and which of these numbers hide that
-    something is undefined in their formula (None: none does). Raises InputError.
+    something is undefined in their formula (None: none does). Functions are computed ``by`` a library. Raises
+    InputError.
     """
 
     def __init__(
@@ -46,8 +49,9 @@ class InputReader:
         network: Network,
         supplied: Mapping[str, npt.ArrayLike] | None = None,
         made: Callable[[int, FloatArray, BoolArray | None], None] | None = None,
+        by: Library = NUMPY,
     ) -> None:
-        self.network, self._told = network, made
+        self.network, self._told, self._by = network, made, by
         self._supplied = {name: _whole(_entry(network, name), value) for name, value in (supplied or {}).items()}
         self._parameters, self._variables, self._drawn_before = network.settable.parameters, network.settable.initial, 0
         read = (*(entry.slots for entry in network.inputs), *(noise.slots for noise in network.noises))
@@ -150,7 +154,7 @@ class InputReader:
         k, dt = steps.astype(np.float64), self.network.dt
         known: dict[str, float | FloatArray] = {**constants(dt), **self.network.parameters, "k": k, "t": k * dt}
         known |= self._set(entry.slots)
-        return evaluate_array(tree, known)
+        return evaluate_array(tree, known, by=self._by)
 
     def _set(self, slots: Mapping[str, int]) -> dict[str, float]:
         """The parameters of an expression that can be set, as they are by now."""
@@ -178,7 +182,7 @@ class InputReader:
         def draw(node: Draw, first: float | FloatArray, second: float | FloatArray) -> FloatArray:
             return stream.drawn(node.kind, first, second, i, 0, step, node.index)
 
-        return evaluate_array(tree, known, draw)
+        return evaluate_array(tree, known, draw, by=self._by)
 
 
 def _undefined(formulas: Iterable[Tree | None]) -> Iterator[tuple[int, Tree]]:

@@ -3,8 +3,8 @@
 In: a Recording and a path, or a path. Out: a file, or a Recording. Nothing in a file is trusted: headers are read
 before memory is taken, sizes must agree with each other and with the archive, and pickles are never loaded. Beside the
 arrays of §12 ours hold ``about``, a JSON text with what arrays do not say (names of groups and outputs, the network's
-hash, ranks of parallel connections, parameters that were set); a file without it is read as well. While a network runs
-its rows go into a journal beside the file, of which the archive is made at the end.
+hash, ranks of parallel connections, parameters that were set, the backend); a file without it is read as well. While a
+network runs its rows go into a journal beside the file, of which the archive is made at the end.
 """
 
 from __future__ import annotations
@@ -227,6 +227,8 @@ def _small(recording: Recording) -> dict[str, Array]:
         "parallel": [[int(index), int(recording.ranks[index])] for index in parallel],
         "set_parameters": dict(recording.set_parameters),
     }
+    if recording.backend:
+        about["backend"] = recording.backend
     more: dict[str, Array] = {}
     if recording.state_names:
         about["state_views"] = {
@@ -371,6 +373,7 @@ def _recording(arrays: Mapping[str, Array]) -> Recording:
         sensor_names=tuple(str(name) for name in arrays["sensor_names"].tolist()) if "sensors" in arrays else (),
         pose=None if skeleton is None else arrays["pose"].astype(np.float64),
         skeleton=skeleton,
+        backend=str(about.get("backend", "")),
     )
 
 

@@ -22,7 +22,7 @@ from neurovis_spec.compiler.events.patch import PatchError
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.interrupts import Asked, deferred
 from neurovis_spec.progress import Progress
-from neurovis_spec.runtime.backend import Backend, Runner, Stepper, prepare
+from neurovis_spec.runtime.backend import Backend, Ready, Runner, Stepper, ready
 from neurovis_spec.runtime.checkpoint import load_state, save_state
 from neurovis_spec.runtime.columns import ALL, Columns, Keep, columns_of
 from neurovis_spec.runtime.conditions import Controls
@@ -71,9 +71,8 @@ def record_course(
     there is not, ValueError.
     """
     steps = checked_steps(network, course.steps, course.every)
-    course = with_body(network, course)
+    course, state = begun(network, course, start, checkpoint)
     columns = columns_of(network, course.keep, course.body)
-    state = first_state(network, start, checkpoint, course.body)
     kept, widths = Steps(steps, course.every, state.k), columns.widths(network)
     if not course.keep.last:
         check_room(steps, course.every, sum(widths))
@@ -84,7 +83,7 @@ def record_course(
         with deferred() as rows.asked:
             go(network, state, course, rows, progress)
             keep_state(state, course, checkpoint)
-    return recording_of(network, columns, rows.numbers(kept), state.weights, after(network, state))
+    return recording_of(network, columns, rows.numbers(kept), state.weights, after(network, state), state.backend)
 
 
 def with_body(network: Network, course: Course) -> Course:
@@ -92,20 +91,29 @@ def with_body(network: Network, course: Course) -> Course:
     return course if network.body is None or course.body is not None else replace(course, body=Embodied(network))
 
 
-def first_state(
-    network: Network, start: Recording | None, checkpoint: Path | None, body: Embodied | None = None
-) -> State:
-    """The state that a run begins in: that of a checkpoint, if there is one, after a recording, or the first. Raises
-    RecordingError, BodyError where a checkpoint is wanted and the body cannot be kept."""
-    if checkpoint is not None:
-        if body is not None:
-            body.check_kept()
-        if checkpoint.exists():
-            if start is not None:
-                both = "go on from a checkpoint or from a recording, not from both"
-                raise RecordingError(f"{checkpoint} is there: {both}")
-            return load_state(network, checkpoint)
-    return initial_state(network) if start is None else resumed_state(network, start)
+def begun(network: Network, course: Course, start: Recording | None, checkpoint: Path | None) -> tuple[Course, State]:
+    """The course with its body opened and its backend made ready, and the state that the run begins in: that of a
+    checkpoint, if there is one, after a recording, or the first. What goes on goes on with its backend. Raises
+    RecordingError, BackendError, BodyError where a checkpoint is wanted and the body cannot be kept."""
+    course = with_body(network, course)
+    kept = None if checkpoint is None else _kept_state(network, start, checkpoint, course.body)
+    before = kept or start
+    made = ready(network, course.backend, "" if before is None else before.backend)
+    if kept is None:
+        kept = initial_state(network) if start is None else resumed_state(network, start, made.functions)
+    kept.backend = made.name
+    return replace(course, backend=made), kept
+
+
+def _kept_state(network: Network, start: Recording | None, checkpoint: Path, body: Embodied | None) -> State | None:
+    """The state in a checkpoint, None where there is none yet. Raises RecordingError, BodyError."""
+    if body is not None:
+        body.check_kept()
+    if not checkpoint.exists():
+        return None
+    if start is not None:
+        raise RecordingError(f"{checkpoint} is there: go on from a checkpoint or from a recording, not from both")
+    return load_state(network, checkpoint)
 
 
 def keep_state(state: State, course: Course, checkpoint: Path) -> None:
@@ -223,7 +231,7 @@ class Course:
     steps: int
     every: int = 1
     inputs: Mapping[str, npt.ArrayLike] | None = None
-    backend: str | Backend | None = None
+    backend: str | Backend | Ready | None = None
     #: what may end it earlier
     until: Until | None = None
     keep: Keep = ALL
@@ -250,8 +258,8 @@ def go(network: Network, state: State, course: Course, rows: RowSink, progress: 
     rows = rows if watched is None else watched
     watch = Watch(network)
     columns = columns_of(network, course.keep, body)
-    reader = InputReader(network, course.inputs, watch.given)
-    stepper = prepare(network, course.backend, steps)
+    made = ready(network, course.backend)
+    reader, stepper = InputReader(network, course.inputs, watch.given, made.functions), made.stepper
     make: _Make = _OneByOne(columns, stepper, body, frozenset(course.inputs or ()))
     plain = columns.neurons is None and not columns.probe.names and len(columns.weights) == len(network.changing)
     if (
@@ -261,7 +269,7 @@ def go(network: Network, state: State, course: Course, rows: RowSink, progress: 
         and (course.until is None or course.until.measure.together)
     ):
         make = _Together(stepper, watched)
-    controls, origin, last = Controls(network), state.k, state.k + steps
+    controls, origin, last = Controls(network, made.functions), state.k, state.k + steps
     changes = [change for change in network.changes if origin <= change.at < last]
     _check_events(controls, state, changes)
     edges = [origin, *(change.at for change in changes if change.at > origin), last]

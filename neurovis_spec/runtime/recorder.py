@@ -120,7 +120,8 @@ class Recorder:
         step = np.array([self._steps.at(row) for row in range(count)], dtype=np.int64)
         state = self._last
         numbers = Numbers(step, rows)
-        return recording_of(self._network, self._columns, numbers, state.weights, after(self._network, state))
+        told = after(self._network, state)
+        return recording_of(self._network, self._columns, numbers, state.weights, told, state.backend)
 
     def close(self, error: BaseException | None = None) -> None:
         """End the recording, as that of a run that broke off where there is an ``error``, an Exception. Raises what

@@ -136,6 +136,8 @@ class Recording:
     sensor_names: tuple[str, ...] = ()
     pose: FloatArray | None = None
     skeleton: Skeleton | None = None
+    #: the name of the backend that made it, "" where that is not known
+    backend: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sensor_names", tuple(self.sensor_names))
@@ -456,9 +458,10 @@ class Numbers:
 
 
 def recording_of(
-    network: Network, columns: Columns, numbers: Numbers, all_weights: FloatArray, after: After
+    network: Network, columns: Columns, numbers: Numbers, all_weights: FloatArray, after: After, backend: str = ""
 ) -> Recording:
-    """A recording with the structure of a network; ``all_weights`` (m,) gives those that stay."""
+    """A recording with the structure of a network, made by a ``backend`` of this name; ``all_weights`` (m,) gives those
+    that stay."""
     connections = network.connections
     static = np.setdiff1d(np.arange(len(connections)), network.changing, assume_unique=True)
     names, rows = names_of(network), numbers.rows
@@ -493,6 +496,7 @@ def recording_of(
         sensor_names=columns.sensors or (),
         pose=None if columns.skeleton is None else rows.pose,
         skeleton=columns.skeleton,
+        backend=backend,
     )
 
 

@@ -14,6 +14,7 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Block, Gather, Learn, ReadInputs, Send, Update
 from neurovis_spec.language.expressions.evaluate import evaluate
+from neurovis_spec.language.expressions.functions import PLAIN
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.backend import Availability, Capabilities
 from neurovis_spec.runtime.signals import signal_layout
@@ -41,7 +42,7 @@ class ReferenceStepper:
     """One network; ``step`` executes its program once."""
 
     def __init__(self, network: Network) -> None:
-        self.network = network
+        self.network, self.functions = network, PLAIN
         self.offsets = signal_layout(network).offsets
 
     def step(self, state: State, inputs: FloatArray, /) -> None:

@@ -23,6 +23,7 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.patch import PatchError
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
+from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.runtime.conditions import Controls, lose
 from neurovis_spec.runtime.fitting import of_table
 from neurovis_spec.runtime.recording import Recording, RecordingError
@@ -30,8 +31,9 @@ from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.state import State, initial_state
 
 
-def resumed_state(network: Network, recording: Recording) -> State:
-    """The state in which a run goes on. Raises RecordingError where names do not agree or the recording is empty."""
+def resumed_state(network: Network, recording: Recording, by: Library = NUMPY) -> State:
+    """The state in which a run goes on, whose functions are computed ``by`` a library. Raises RecordingError where
+    names do not agree or the recording is empty."""
     (of_table(recording, network) or recording).check_whole("a run cannot go on from")
     if not len(recording):
         raise RecordingError("the recording holds no step to go on from")
@@ -39,7 +41,7 @@ def resumed_state(network: Network, recording: Recording) -> State:
     learned = _learned(network, recording)
     state = initial_state(network)
     state.continued, state.drawn = True, recording.reached
-    controls = Controls(network)
+    controls = Controls(network, by)
     _set_again(network, recording, state, controls)
     _lesion_again(network, recording, state, controls)
     depth = int(network.connections.delays.max(initial=1))

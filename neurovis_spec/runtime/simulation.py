@@ -28,7 +28,7 @@ from neurovis_spec.compiler.network import Network, Output
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.expressions.tree import Number
 from neurovis_spec.language.references import Sum, parse
-from neurovis_spec.runtime.backend import Backend, prepare
+from neurovis_spec.runtime.backend import Backend, Ready, ready
 from neurovis_spec.runtime.columns import ALL, Keep, probe_of
 from neurovis_spec.runtime.conditions import Controls
 from neurovis_spec.runtime.embodied import Embodied, embodied
@@ -53,30 +53,41 @@ class ParameterError(ValueError):
 
 class Simulation:
     """A run in the making; ``start`` is a recording to go on from (see ``resume``), ``inputs`` are whole arrays that
-    replace the sources of inputs. Events of the spec apply at their
-    steps; what is done by hand between two steps comes after the events of the step to come. Raises BackendError,
-    RecordingError, ParameterError (see ``step``).
+    replace the sources of inputs. Without a ``backend`` it goes on with that of what it goes on from, else with the one
+    that is chosen. Events of the spec apply at their steps; what is done by hand between two steps comes after the
+    events of the step to come. Raises BackendError, RecordingError, ParameterError (see ``step``).
     """
 
     def __init__(
         self,
         network: Network,
-        backend: str | Backend | None = None,
+        backend: str | Backend | Ready | None = None,
         start: Recording | None = None,
         inputs: Mapping[str, npt.ArrayLike] | None = None,
         body: Embodied | None = None,
     ) -> None:
         self.network = network
-        self._backend, self._inputs = backend, inputs
-        self._stepper, self._watch = prepare(network, backend), Watch(network)
+        self._asked, self._inputs, self._watch = backend, inputs, Watch(network)
         self._body = embodied(network) if body is None else body
         self._given = frozenset(inputs or ())
-        self._reader = InputReader(network, inputs, self._watch.given)
-        self._controls = Controls(network)
-        self._begin = initial_state(network) if start is None else resumed_state(network, start)
+        self._made_by("" if start is None else start.backend)
+        self._begin = initial_state(network) if start is None else resumed_state(network, start, self._made.functions)
+        self._begin.backend = self._made.name
         self._apply(self._begin)
         self._recorder: Recorder | None = None
         self.reset()
+
+    def _made_by(self, before: str) -> None:
+        """Have the steps to come made by the backend that is asked for, else by the one that made those before."""
+        self._made = ready(self.network, self._asked, before)
+        self._stepper = self._made.stepper
+        self._reader = InputReader(self.network, self._inputs, self._watch.given, self._made.functions)
+        self._controls = Controls(self.network, self._made.functions)
+
+    @property
+    def backend(self) -> str:
+        """The name of the backend that makes the steps."""
+        return self._made.name
 
     def record(self, path: str | os.PathLike[str] | None = None, every: int = 1, keep: Keep = ALL) -> None:
         """Record from the next step on, one step in ``every``: into a file, which is there when the simulation is
@@ -116,7 +127,7 @@ class Simulation:
 
     def __reduce__(self) -> tuple[Callable[..., Simulation], tuple[object, ...]]:
         """A copy, in another process, goes on from here; code that was made for the network is made there anew."""
-        return _resumed, (self.network, self._backend, self._inputs, self._begin, self.state())
+        return _resumed, (self.network, self._asked, self._inputs, self._begin, self.state())
 
     @cached_property
     def _names(self) -> Names:
@@ -349,10 +360,16 @@ class Simulation:
         """Back to the beginning, with the parameters of the beginning. Raises RecordingError where it is recorded."""
         self._check_recorded(self._begin)
         self._watch.warned = False
-        self._state = self._begin.copy()
-        self._reader.use(self._state)
+        self._take(self._begin.copy())
         if self._body is not None:
             self._body.take(self._state)
+
+    def _take(self, state: State) -> None:
+        """Go on from this state, with its backend unless another is asked for."""
+        if state.backend not in ("", self._made.name):
+            self._made_by(state.backend)
+        state.backend, self._state = self._made.name, state
+        self._reader.use(state)
 
     def state(self) -> State:
         """A copy of all that the run carries from step to step, what was set, clamped and lesioned and the body
@@ -370,7 +387,8 @@ class Simulation:
         save_state(self.state(), arguments.path("path", path))
 
     def restore(self, state: State | str | os.PathLike[str]) -> None:
-        """Go on from a state of this network, or from a checkpoint, exactly as it was. Raises ValueError for one of
+        """Go on from a state of this network, or from a checkpoint, exactly as it was, with the backend that made it
+        unless the simulation was given another. Raises BackendError where that cannot be, ValueError for one of
         another network, RecordingError (a ValueError) for a file that is no checkpoint."""
         if isinstance(state, str | os.PathLike):
             from neurovis_spec.runtime.checkpoint import load_state
@@ -384,9 +402,9 @@ class Simulation:
             self._body.take(state)
         elif state.body is not None:
             raise ValueError("this is a state of a run with a body, and this one has none")
-        self._state = state.copy()
-        self._apply(self._state)
-        self._reader.use(self._state)
+        self._take(state.copy())
+        if self._apply(self._state):
+            self._reader.use(self._state)
 
     def _check_recorded(self, state: State) -> None:
         """A recording holds steps in their order, without a gap."""
@@ -396,15 +414,15 @@ class Simulation:
 
 def _resumed(
     network: Network,
-    backend: str | Backend | None,
+    backend: str | Backend | Ready | None,
     inputs: Mapping[str, npt.ArrayLike] | None,
     begin: State,
     state: State,
 ) -> Simulation:
     """A simulation whose run began with one state, at another."""
     simulation = Simulation(network, backend, inputs=inputs)
-    simulation._begin, simulation._state = begin, state
-    simulation._reader.use(state)
+    simulation._begin = begin
+    simulation._take(state)
     if simulation._body is not None:
         simulation._body.take(state)
     return simulation

@@ -17,6 +17,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.initial_states import starts_of
 from neurovis_spec.compiler.program import Quantity
 from neurovis_spec.language.expressions.arrays import evaluate_array
+from neurovis_spec.language.expressions.functions import PLAIN
 from neurovis_spec.runtime.conditions import Conditions, first_conditions
 from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import signal_layout
@@ -57,6 +58,8 @@ class State:
     begun: int = -1
     #: the mark of the network
     network: str = ""
+    #: the name of the backend that has made its steps, "" before any and where that is not known
+    backend: str = ""
     #: the body as it is for step k; None before step 0, and where the network has none
     body: BodyState | None = None
 
@@ -108,6 +111,6 @@ def _initials(
 ) -> tuple[FloatArray, ...]:
     known: dict[str, float | FloatArray] = {**constants(dt), **parameters}
     return tuple(
-        np.array(np.broadcast_to(evaluate_array(quantity.initial, known), (count,)), dtype=np.float64)
+        np.array(np.broadcast_to(evaluate_array(quantity.initial, known, by=PLAIN), (count,)), dtype=np.float64)
         for quantity in quantities
     )

@@ -24,12 +24,11 @@ from neurovis_spec.runtime.record import (
     Course,
     InMemory,
     after,
+    begun,
     checked_steps,
-    first_state,
     go,
     keep_state,
     record_course,
-    with_body,
 )
 from neurovis_spec.runtime.recording import After, Recording, for_path, recording_of
 from neurovis_spec.runtime.rows import RowWriter, Steps
@@ -53,7 +52,7 @@ class StoppedError(Ended):
 def frame_of(network: Network, columns: Columns, state: State) -> Recording:
     """A recording of a network without a step, which begins in this state."""
     none = InMemory(columns.widths(network), 0).numbers(Steps(0))
-    return recording_of(network, columns, none, state.weights, after(network, state))
+    return recording_of(network, columns, none, state.weights, after(network, state), state.backend)
 
 
 def record_to(
@@ -63,16 +62,16 @@ def record_to(
     start: Recording | None = None,
     progress: Progress | None = None,
     checkpoint: Path | None = None,
-) -> None:
-    """Run a network and write what ``record_course`` returns to a file. Raises what it and ``Recording.save`` raise,
-    StoppedError after a signal, when the steps until then are in the file; KeyboardInterrupt where there are none, and
-    after a second signal, which ends everything at once."""
+) -> str:
+    """Run a network and write what ``record_course`` returns to a file. Gives the name of the backend. Raises what it
+    and ``Recording.save`` raise, StoppedError after a signal, when the steps until then are in the file;
+    KeyboardInterrupt where there are none, and after a second signal, which ends everything at once."""
     format_ = for_path(path)
     if not isinstance(format_, StreamingFormat):
-        format_.save(record_course(network, course, start, progress, checkpoint), path)
-        return
-    course = with_body(network, course)
-    state = first_state(network, start, checkpoint, course.body)
+        made = record_course(network, course, start, progress, checkpoint)
+        format_.save(made, path)
+        return made.backend
+    course, state = begun(network, course, start, checkpoint)
     steps = Steps(checked_steps(network, course.steps, course.every), course.every, state.k)
     columns = columns_of(network, course.keep, course.body)
     frame = frame_of(network, columns, state)
@@ -95,6 +94,7 @@ def record_to(
             raise
     if asked:
         raise StoppedError(asked.number, path, state.k, rows.handed, steps)
+    return state.backend
 
 
 def _keep(state: State, course: Course, checkpoint: Path | None) -> None:

@@ -1,6 +1,7 @@
 """The probe: a run whose only purpose is to see how far the values of a network go.
 
-In: a network. Out: Gains. The run is the network's own: its inputs, its default length as far as ``BUDGET`` allows.
+In: a network. Out: Gains. The run is the network's own: its inputs, its default length as far as ``BUDGET`` allows, by
+array code, for which nothing is compiled.
 Where a recording is drawn, its gains are those of all its steps: inputs without a source have values in it alone.
 """
 
@@ -56,9 +57,9 @@ def probe(network: Network, progress: Progress | None = None, made: Recording | 
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # the run that the author asks for warns
             try:
-                made = record(network, steps, progress=progress)
+                made = record(network, steps, backend="numpy", progress=progress)
             except BodyMissingError:  # its pictures can be drawn all the same
-                made = record(replace(network, body=None), steps, progress=progress)
+                made = record(replace(network, body=None), steps, backend="numpy", progress=progress)
     return choose_gains(drawn.network, drawn.network.render, drawn.reached(made.part(slice(steps))))
 
 

@@ -24,7 +24,7 @@ from neurovis_spec.language.yaml.opening import FileFault, read_bytes
 from neurovis_spec.language.yaml.reader import LARGEST
 from neurovis_spec.plain import text_of
 from neurovis_spec.progress import Progress
-from neurovis_spec.runtime.backend import BackendError, available
+from neurovis_spec.runtime.backend import BackendError, available, ready
 from neurovis_spec.runtime.backend import load as load_backend
 from neurovis_spec.runtime.embodied import embodied
 from neurovis_spec.runtime.inputs import check_names
@@ -312,6 +312,8 @@ def _run(
     if not missing:
         return
     embodied(plan.network.network)
+    if job.backend is None:  # what has to be compiled is, before any process asks for it
+        ready(plan.network.network)
     with closing(run(job, missing)) as results:
         for place, result in results:
             add((*missing[place], *result.values, result.error))

@@ -15,6 +15,7 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.settable import Assembled
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.language.located import Formula
 from neurovis_spec.language.sections import ScaleModel
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
@@ -42,12 +43,12 @@ class Scaled:
             check_scale(self.model, self.constants)
         return self.weights.slots.union(*(part.formula.slots for part in parts))
 
-    def values(self, parameters: FloatArray) -> FloatArray:
+    def values(self, parameters: FloatArray, by: Library = NUMPY) -> FloatArray:
         """The scaled weights with these parameters; NaN where there is nothing to scale."""
         given = self.constants
         values = given.parameters | {name: float(parameters[slot]) for name, slot in given.settable.items()}
         quiet = Constants(Names(values), given.dt, Findings())
-        weights = self.weights.values(parameters)
+        weights = self.weights.values(parameters, by)
         result = scaled(self.model, weights, self.ends, self.pairs, quiet) if np.isfinite(weights).all() else UNKNOWN
         return np.full(len(weights), np.nan) if result is UNKNOWN else result
 

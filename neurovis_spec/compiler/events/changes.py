@@ -14,6 +14,7 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.events.settable import ParameterFormula
+from neurovis_spec.language.expressions.functions import NUMPY, Library
 
 NO_INDICES: IntArray = frozen(np.zeros(0, dtype=np.int64))
 
@@ -50,7 +51,8 @@ class Change(NamedTuple):
 @dataclass
 class Held:
     """The clamps that hold at a step: ``order`` (n,) is that of the clamp which holds a neuron, −1 where none does, and
-    ``value`` (n,) what it is held at. ``active`` are all that have not ended, by their order."""
+    ``value`` (n,) what it is held at. ``active`` are all that have not ended, by their order. What a formula says is
+    computed ``by`` a library."""
 
     order: IntArray
     value: FloatArray
@@ -65,19 +67,19 @@ class Held:
         """The same, of its own."""
         return Held(self.order.copy(), self.value.copy(), dict(self.active))
 
-    def begin(self, clamp: Clamp, parameters: FloatArray) -> None:
+    def begin(self, clamp: Clamp, parameters: FloatArray, by: Library = NUMPY) -> None:
         """A clamp holds from now on, with these parameters."""
         self.active[clamp.order] = clamp
-        self._hold(clamp, clamp.neurons, parameters)
+        self._hold(clamp, clamp.neurons, parameters, by)
 
-    def _hold(self, clamp: Clamp, neurons: IntArray, parameters: FloatArray) -> None:
+    def _hold(self, clamp: Clamp, neurons: IntArray, parameters: FloatArray, by: Library) -> None:
         own = neurons[self.order[neurons] < clamp.order]
         self.order[own] = clamp.order
-        self.value[own] = clamp.value.values(parameters)
+        self.value[own] = clamp.value.values(parameters, by)
 
-    def end(self, events: Collection[int], parameters: FloatArray) -> None:
+    def end(self, events: Collection[int], parameters: FloatArray, by: Library = NUMPY) -> None:
         """The clamps of these events end; those of other events that they have covered hold again."""
-        self._end([order for order, clamp in self.active.items() if clamp.event in events], parameters)
+        self._end([order for order, clamp in self.active.items() if clamp.event in events], parameters, by)
 
     def release(self, neurons: IntArray) -> None:
         """No clamp that has begun holds these neurons any more."""
@@ -89,7 +91,7 @@ class Held:
                 self.active[order] = clamp._replace(neurons=rest)
         self.order[neurons] = -1
 
-    def _end(self, orders: list[int], parameters: FloatArray) -> None:
+    def _end(self, orders: list[int], parameters: FloatArray, by: Library) -> None:
         for order in orders:
             del self.active[order]
         free = np.flatnonzero(np.isin(self.order, orders))
@@ -97,12 +99,12 @@ class Held:
         if len(free):
             for order in sorted(self.active, reverse=True):
                 clamp = self.active[order]
-                self._hold(clamp, clamp.neurons[np.isin(clamp.neurons, free)], parameters)
+                self._hold(clamp, clamp.neurons[np.isin(clamp.neurons, free)], parameters, by)
 
-    def follow(self, changed: Collection[int], parameters: FloatArray) -> None:
+    def follow(self, changed: Collection[int], parameters: FloatArray, by: Library = NUMPY) -> None:
         """Parameters have other values now: what is held follows them."""
         if not changed:
             return
         for order, clamp in self.active.items():
             if not clamp.value.slots.isdisjoint(changed):
-                self.value[self.order == order] = clamp.value.values(parameters)
+                self.value[self.order == order] = clamp.value.values(parameters, by)

@@ -1,7 +1,8 @@
 """Setting parameters: from new values to the numbers that follow them.
 
 In: Settable, values for some slots. Out: those values, and what the bindings that read them come to, all checked before
-anything is written. What is set often is done by a function of NumPy code made from the typed trees.
+anything is written. What is set often is done by a function of NumPy code made from the typed trees, which calls the
+functions of the library that computes the run.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +19,7 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.events.settable import Binding, ParameterFormula, Settable
 from neurovis_spec.language.expressions.arrays import Value
 from neurovis_spec.language.expressions.emit import defined, emit
+from neurovis_spec.language.expressions.functions import NUMPY, Library
 
 #: What the arrays of a network are called in messages.
 _CALLED: Mapping[str, str] = {
@@ -80,6 +83,7 @@ class Patcher:
     """Makes patches for one network; what is asked for twice is compiled."""
 
     settable: Settable
+    by: Library = NUMPY
     _plans: dict[tuple[tuple[int, ...], bytes], _Plan] = field(default_factory=dict)
 
     def patch(self, parameters: FloatArray, chosen: npt.NDArray[np.bool_], values: Mapping[int, float]) -> Patch:
@@ -117,18 +121,20 @@ class Patcher:
         for slot in plan.following:
             formula = self.settable.slots[slot].formula
             assert formula is not None
-            parameters[slot] = formula.values(parameters)
+            parameters[slot] = formula.values(parameters, self.by)
             self._check_slot(slot, float(parameters[slot]))
         result = []
         for binding in plan.bindings:
-            value = binding.formula.values(parameters)
+            value = binding.formula.values(parameters, self.by)
             self._check(binding, value, parameters)
             result.append(value)
         return tuple(result)
 
     def _compiled(self, plan: _Plan) -> Callable[[FloatArray], tuple[Value, ...]]:
         """The plan as one function; its text holds identifiers of our own only."""
+        by = self.by
         space: dict[str, object] = {"np": np, "isfinite": math.isfinite, "check": self._check, "slot": self._check_slot}
+        space |= {"by": by, **_called_by(by)}
         lines = ["def values(p):"]
         formulas = [self.settable.slots[slot].formula for slot in plan.following]
         read = {
@@ -140,10 +146,10 @@ class Patcher:
         lines += [f"    p{place} = p[{place}]" for place in sorted(read.difference(plan.following))]
         for slot, formula in zip(plan.following, formulas, strict=True):
             assert formula is not None
-            lines.append(f"    p[{slot}] = p{slot} = {_code(formula, space)}")
+            lines.append(f"    p[{slot}] = p{slot} = {_code(formula, space, by)}")
             lines.append(f"    slot({slot}, p{slot})")
         for number, binding in enumerate(plan.bindings):
-            lines.append(f"    b{number} = {_code(binding.formula, space)}")
+            lines.append(f"    b{number} = {_code(binding.formula, space, by)}")
             space[f"t{number}"] = binding
             plain = isinstance(binding.formula, ParameterFormula) and binding.formula.plain
             if plain and binding.low is None and binding.high is None:
@@ -169,7 +175,8 @@ class Patcher:
         """Raise PatchError where a parameter is out of bounds that follow others."""
         entry = self.settable.slots[slot]
         low, high = (
-            bound if isinstance(bound, float) else float(bound.values(parameters)) for bound in (entry.low, entry.high)
+            bound if isinstance(bound, float) else float(bound.values(parameters, self.by))
+            for bound in (entry.low, entry.high)
         )
         self._compare(slot, float(parameters[slot]), low, high)
 
@@ -189,13 +196,30 @@ class Patcher:
         for bound, beyond, word in ((binding.low, np.less, "below"), (binding.high, np.greater, "above")):
             if bound is None:
                 continue
-            edge = bound.values(parameters)
+            edge = bound.values(parameters, self.by)
             if beyond(value, edge).any():
                 message = f"{name} would be {word} its bound of {float(np.max(edge)):g}"
                 raise PatchError(message, binding.slots)
 
 
-def _code(formula: object, space: dict[str, object]) -> str:
+def _called_by(by: Library) -> dict[str, object]:
+    """The functions of a library, by the names that code has for them."""
+    return {f"by_{name}": function for name, function in (*by.calls.items(), *by._asdict().items())}
+
+
+def _calls(by: Library) -> Mapping[str, Callable[..., str]]:
+    """What makes the code of a call of a library's function; for NumPy's there is other code, which is quicker."""
+    if by is NUMPY:
+        return {}
+    names = {name: name for name in by.calls} | {"%": "remainder", "^": "power"}
+    return {name: partial(_call, f"by_{own}") for name, own in names.items()}
+
+
+def _call(name: str, *arguments: str) -> str:
+    return f"{name}({', '.join(arguments)})"
+
+
+def _code(formula: object, space: dict[str, object], by: Library) -> str:
     """A formula as code; where it is more than an expression over parameters, a call."""
     if isinstance(formula, ParameterFormula) and formula.draw is None:
         names = {name: f"p{slot}" for name, slot in formula.places.items()}
@@ -203,10 +227,10 @@ def _code(formula: object, space: dict[str, object]) -> str:
             for name, value in formula.known.items():
                 names[name] = f"c{len(space)}"
                 space[names[name]] = np.float64(value) if isinstance(value, float) else value
-            return emit(formula.tree, names)
+            return emit(formula.tree, names, _calls(by))
     name = f"c{len(space)}"
     space[name] = formula
-    return f"{name}.values(p)"
+    return f"{name}.values(p, by)"
 
 
 def _called(array: str) -> str:

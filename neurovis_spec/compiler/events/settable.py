@@ -17,6 +17,7 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.language.expressions.arrays import Drawing, Value, evaluate_array
+from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.language.expressions.tree import Number, Tree, names
 
 
@@ -28,8 +29,9 @@ class Dependent(Protocol):
         """The parameters that it reads."""
         ...
 
-    def values(self, parameters: FloatArray) -> Value:
-        """Its value or values with these parameters (one a slot), finite or not."""
+    def values(self, parameters: FloatArray, by: Library = NUMPY) -> Value:
+        """Its value or values with these parameters (one a slot), finite or not; functions are computed ``by`` a
+        library: NumPy's while a network is compiled, in a run that of its backend."""
         ...
 
 
@@ -56,14 +58,14 @@ class ParameterFormula:
         """Whether it is one number, made of parameters and numbers alone."""
         return self.draw is None and all(isinstance(value, float) for value in self.known.values())
 
-    def values(self, parameters: FloatArray) -> Value:
+    def values(self, parameters: FloatArray, by: Library = NUMPY) -> Value:
         """Its value or values with these parameters."""
         if isinstance(self.tree, Number):
             return self.tree.value
         given: dict[str, Value] = {name: float(parameters[slot]) for name, slot in self.places.items()}
         for name, value in self.known.items():
-            given[name] = value if isinstance(value, float | np.ndarray) else value.values(parameters)
-        return evaluate_array(self.tree, given, self.draw)
+            given[name] = value if isinstance(value, float | np.ndarray) else value.values(parameters, by)
+        return evaluate_array(self.tree, given, self.draw, by=by)
 
 
 class Part(NamedTuple):
@@ -101,11 +103,11 @@ class Assembled:
         """The parameters that it reads."""
         return frozenset().union(*(part.formula.slots for part in self.parts))
 
-    def values(self, parameters: FloatArray) -> FloatArray:
+    def values(self, parameters: FloatArray, by: Library = NUMPY) -> FloatArray:
         """The whole array with these parameters."""
         result = np.array(self.base, dtype=np.float64)
         for part in self.parts:
-            result[... if part.places is None else part.places] = part.formula.values(parameters)
+            result[... if part.places is None else part.places] = part.formula.values(parameters, by)
         return result
 
 
@@ -121,9 +123,9 @@ class Subset:
         """The parameters that it reads."""
         return self.whole.slots
 
-    def values(self, parameters: FloatArray) -> Value:
+    def values(self, parameters: FloatArray, by: Library = NUMPY) -> Value:
         """These numbers with these parameters."""
-        whole = self.whole.values(parameters)
+        whole = self.whole.values(parameters, by)
         return whole if np.size(whole) == 1 else np.asarray(whole)[self.places]
 
 
@@ -142,10 +144,11 @@ class Distance:
         parts = self.positions.parts
         return frozenset().union(*(part.formula.slots for part in parts if np.isin(part.within(0) // 2, found).any()))
 
-    def values(self, parameters: FloatArray) -> FloatArray:
+    def values(self, parameters: FloatArray, by: Library = NUMPY) -> FloatArray:
         """The distances with these parameters."""
-        place = self.positions.values(parameters).reshape(-1, 2)
+        place = self.positions.values(parameters, by).reshape(-1, 2)
         apart = place[self.sources] - place[self.targets]
+        # NumPy's is that of the C library
         return np.hypot(apart[:, 0], apart[:, 1])
 
 

@@ -12,7 +12,7 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Neurons
 from neurovis_spec.compiler.program import Block
 from neurovis_spec.language.expressions.arrays import Value, evaluate_array
-from neurovis_spec.language.expressions.functions import CONSTANTS
+from neurovis_spec.language.expressions.functions import CONSTANTS, PLAIN
 
 
 def starts_of(block: Block, neurons: Neurons, dt: float) -> dict[str, FloatArray]:
@@ -20,7 +20,9 @@ def starts_of(block: Block, neurons: Neurons, dt: float) -> dict[str, FloatArray
     known: dict[str, Value] = {**CONSTANTS, "dt": dt, **block.model_parameters}
     result: dict[str, FloatArray] = {}
     for state in block.model.state:
-        values = np.array(np.broadcast_to(evaluate_array(state.initial, known), block.members.shape), dtype=np.float64)
+        # by the functions of the C library, whatever computes the steps: all begin in the same state
+        initial = evaluate_array(state.initial, known, by=PLAIN)
+        values = np.array(np.broadcast_to(initial, block.members.shape), dtype=np.float64)
         if state.name in neurons.starts:
             given = neurons.starts[state.name][block.members]
             values = np.where(np.isnan(given), values, given)

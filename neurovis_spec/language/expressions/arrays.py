@@ -1,7 +1,8 @@
 """The values of an expression on NumPy arrays: many at once.
 
 In: a tree, and what its names mean: floats or arrays that broadcast. Out: a float or an array of float64, the same
-values as ``evaluate`` gives one by one. Both branches of a conditional are computed, and np.where takes from them.
+values as ``evaluate`` gives one by one, to the last bit where the Library is ``PLAIN``. Both branches of a conditional
+are computed, and np.where takes from them.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.language.expressions.functions import FUNCTIONS
+from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.language.expressions.tree import (
     Binary,
     Call,
@@ -39,8 +40,6 @@ _OPERATIONS: Mapping[str, _Operation] = {
     "-": np.subtract,
     "*": np.multiply,
     "/": np.divide,
-    "%": np.remainder,
-    "^": np.float_power,  # not np.power, which takes a root of −∞ where the exponent is a scalar 0.5
     "<": np.less,
     "<=": np.less_equal,
     ">": np.greater,
@@ -58,8 +57,10 @@ def evaluate_array(
     names: Mapping[str, Given],
     draw: Drawing | None = None,
     functions: Mapping[str, Callable[..., Value]] = _NONE,
+    by: Library = NUMPY,
 ) -> Value:
     """The values of ``tree``, of the shape to which the names in it (and the draws) broadcast; a float for shape ().
+    ``functions`` are those of the place, besides the elementary ones, which are computed ``by`` a library.
 
     Raises KeyError for a name or a function that is not given, ValueError for a draw without ``draw`` and for
     shapes that do not broadcast.
@@ -69,7 +70,7 @@ def evaluate_array(
     array([-0.        , -1.        ,  0.5       ,  0.33333333])
     """
     with np.errstate(all="ignore"):
-        result = _Evaluation(names, draw, functions).value(tree)
+        result = _Evaluation(names, draw, functions, by).value(tree)
     return float(result) if np.ndim(result) == 0 else np.asarray(result, dtype=np.float64)
 
 
@@ -77,11 +78,17 @@ class _Evaluation:
     """One evaluation, with the values of the names, the source of random numbers and the functions."""
 
     def __init__(
-        self, names: Mapping[str, Given], draw: Drawing | None, functions: Mapping[str, Callable[..., Value]]
+        self,
+        names: Mapping[str, Given],
+        draw: Drawing | None,
+        functions: Mapping[str, Callable[..., Value]],
+        by: Library,
     ) -> None:
         self.names = names
         self.draw = draw
         self.functions = functions
+        self.calls = by.calls
+        self.operations: Mapping[str, _Operation] = {**_OPERATIONS, "%": by.remainder, "^": by.power}
 
     def value(self, tree: Tree) -> Value:
         if (square := is_square(tree)) is not None:
@@ -97,16 +104,16 @@ class _Evaluation:
                     return np.equal(result, 0).astype(np.float64)
                 return np.negative(result) if sign == "-" else result
             case Binary(operator=symbol, left=left, right=right):
-                return np.asarray(_OPERATIONS[symbol](self.value(left), self.value(right)), dtype=np.float64)
+                return np.asarray(self.operations[symbol](self.value(left), self.value(right)), dtype=np.float64)
             case Chain(operands=operands):
                 result = self.value(operands[0])
                 for joined, operand in tree.steps:
-                    result = np.asarray(_OPERATIONS[joined](result, self.value(operand)), dtype=np.float64)
+                    result = np.asarray(self.operations[joined](result, self.value(operand)), dtype=np.float64)
                 return result
             case Conditional(condition=condition, then=then, otherwise=otherwise):
                 return np.where(np.not_equal(self.value(condition), 0), self.value(then), self.value(otherwise))
             case Call(function=function, arguments=arguments):
-                called = self.functions[function] if function in self.functions else FUNCTIONS[function].array
+                called = self.functions[function] if function in self.functions else self.calls[function]
                 return called(*map(self.value, arguments))
             case Draw(first=first, second=second):
                 if self.draw is None:

@@ -51,8 +51,9 @@ def emit(
 ) -> str:
     """NumPy code for ``tree``.
 
-    ``names`` gives the code of each name, ``functions`` makes that of a call from the codes of the arguments, ``draw``
-    that of a draw. Raises KeyError for a name or a function that is not given, ValueError for a draw without ``draw``.
+    ``names`` gives the code of each name, ``functions`` makes that of a call from the codes of the arguments (``%`` and
+    ``^`` among them, where they are not NumPy's), ``draw`` that of a draw. Raises KeyError for a name or a function
+    that is not given, ValueError for a draw without ``draw``.
 
     >>> from neurovis_spec.language.expressions.parser import parse
     >>> emit(parse("w + rate * pre * (target - post)"), {n: n[0] for n in ("w", "rate", "pre", "target", "post")})
@@ -130,7 +131,8 @@ class _Emitter:
                 return self.value(operand)
             case Binary(operator="^", left=left, right=right):
                 # the operator of Python raises where both operands are Python floats; the function of NumPy never does
-                return f"np.float_power({self.loose(left)}, {self.loose(right)})", _ATOM
+                made = self.functions.get("^", "np.float_power({}, {})".format)
+                return made(self.loose(left), self.loose(right)), _ATOM
             case Chain() if tree.operators[0] not in ("and", "or"):
                 return self.arithmetic(tree)
             case Conditional(condition=condition, then=then, otherwise=otherwise):
@@ -166,13 +168,14 @@ class _Emitter:
                 level = _ARITHMETIC[operator]
                 joined = f" {operator} " if level == _ADD else operator
                 code = f"{wrapped(code, level)}{joined}{self.tight(operand, level + 1)}", level
-            elif by_numpy or (operator == "/" and _divides(operand)):
+            elif (by_numpy and operator not in self.functions) or (operator == "/" and _divides(operand)):
                 code = f"{wrapped(code, _MULTIPLY)}{operator}{self.tight(operand, _SIGN)}", _MULTIPLY
             else:
                 # the operators of Python raise where both operands are Python floats; the functions of NumPy never do,
                 # and what comes of them is no such float
                 name = {"/": "divide", "%": "remainder"}[operator]
-                code, by_numpy = (f"np.{name}({code[0]}, {self.loose(operand)})", _ATOM), True
+                made = self.functions.get(operator, f"np.{name}({{}}, {{}})".format)
+                code, by_numpy = (made(code[0], self.loose(operand)), _ATOM), True
         return code
 
     def square(self, base: Tree) -> _Code:

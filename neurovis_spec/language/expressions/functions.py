@@ -2,7 +2,8 @@
 
 In: floats. Out: floats, by IEEE 754: poles are infinities, undefined values NaN, overflow an infinity; nothing raises.
 Each function stands here three times, side by side: on floats (the reference), on NumPy arrays, and as NumPy code.
-Adding one is adding a row.
+Adding one is adding a row. A Library is what all of them are computed by on arrays: NumPy's own functions, which differ
+from those of the C library in the last bit, or others.
 """
 
 from __future__ import annotations
@@ -190,4 +191,39 @@ FUNCTIONS: Mapping[str, Function] = MappingProxyType(
         "sigmoid": Function("sigmoid(x)", sigmoid, _sigmoid, "np.reciprocal(1.0 + np.exp(-{0}))", signed=True),
         "step": Function("step(x)", step, _step, "np.heaviside({0}, 1.0)"),
     }
+)
+
+
+class Library(NamedTuple):
+    """What computes the functions of formulas on arrays: ``calls`` by their names, and two operators, ``%`` and ``^``.
+    What is left, sums, products and comparisons, is exact to rounding whoever computes it."""
+
+    calls: Mapping[str, Vector]
+    remainder: Vector
+    power: Vector
+
+
+def _each(scalar: Scalar, count: int) -> Vector:
+    """A function on floats, for each number of arrays that broadcast."""
+    called = np.frompyfunc(scalar, count, 1)
+    return lambda *values: np.asarray(called(*values), dtype=np.float64)
+
+
+def _of_numbers(function: Function) -> Vector:
+    """The function on floats, for arrays."""
+    if function.most is None:
+        two = _each(function.scalar, function.least)
+        return lambda *values: reduce(two, values)
+    return _each(function.scalar, function.most)
+
+
+#: NumPy's functions: quick, and their last bits depend on what the processor can do.
+NUMPY = Library(
+    {name: function.array for name, function in FUNCTIONS.items()},
+    np.remainder,
+    np.float_power,  # not np.power, which takes a root of −∞ where the exponent is a scalar 0.5
+)
+#: Python's functions, number by number: they are those of the C library, bit for bit.
+PLAIN = Library(
+    {name: _of_numbers(function) for name, function in FUNCTIONS.items()}, _each(modulo, 2), _each(power, 2)
 )
