@@ -24,6 +24,7 @@ from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.runtime import c_export
 from neurovis_spec.runtime.c_export import Exported
 from neurovis_spec.runtime.c_package import files, size_of_state
+from neurovis_spec.runtime.c_settable import ExportError
 from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.simulation import Simulation
@@ -143,7 +144,7 @@ outputs: {{class: while, errno: k, HUGE_VAL: for}}
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
-@pytest.mark.parametrize("name", ["double", "math", "main", "NULL", "__x", "INT8_MAX"])
+@pytest.mark.parametrize("name", ["double", "math", "main", "NULL", "__x", "INT8_MAX", "nv", "sem", "time"])
 def test_no_name_of_an_author_breaks_the_code(name: str, language: str, tmp_path: Path) -> None:
     network = nv.compile_text(HOSTILE.format(name=name)).network
     controller, simulation = compiled(network, tmp_path, language), Simulation(network, "reference")
@@ -259,6 +260,78 @@ def test_everything_that_follows_a_parameter_follows_it_in_c(tmp_path: Path) -> 
     controller.step()
     simulation.step()
     np.testing.assert_array_equal(controller.activity, simulation.activity)
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_what_never_learns_may_be_lesioned_and_mended(language: str, tmp_path: Path) -> None:
+    """Nothing is there that is not used: compilers warn of it."""
+    head = "neurovis: 1\nname: x\nneurons: {A: {count: 3, bias: i}, B: {}}\n"
+    connected = "connections: {A -> B: {weight: 0.5, delay: 2}}\n"
+    both = "events: [{at: 2, lesion: [A2, A -> B]}, {at: 4, mend: [A2]}, {at: 6, mend: [A -> B]}]\n"
+    alone = "events: [{at: 2, lesion: [A2]}, {at: 4, mend: [A2]}]\n"
+    runs_alike(nv.compile_text(head + connected + both).network, tmp_path / "both", language)
+    runs_alike(nv.compile_text(head + alone).network, tmp_path / "alone", language)
+
+
+@pytest.mark.parametrize("path", SPECS, ids=lambda path: path.stem)
+def test_an_exported_example_is_sound_with_numbers_of_32_bits(path: Path, tmp_path: Path) -> None:
+    compiled(nv.compile(path).network, tmp_path, "C++17", real="float").step()
+
+
+RESERVOIR = """
+neurovis: 1
+name: reservoir
+parameters: {rho: 0.9, gain: 0.5, base: 0.2, twice: 2*base}
+neurons: {R: {count: 5, activation: tanh, bias: gain}, O: {}}
+connections:
+  R -> R: {weight: "uniform(-1, 1)", pattern: all_to_all, scale: {spectral_radius: rho + twice}}
+  R -> O: gain
+"""
+
+
+def test_what_c_cannot_work_out_is_structural_there(tmp_path: Path) -> None:
+    """A scale over parameters: these keep their values, and the export says so; the others can be set."""
+    (tmp_path / "spec.yaml").write_text(RESERVOIR)
+    arguments = ["export", str(tmp_path / "spec.yaml"), "--to", "c", "-o", str(tmp_path / "made")]
+    done = CliRunner().invoke(neurovis, [*arguments, "--set", "rho=0.7"])
+    assert done.exit_code == 0, done.output
+    said = [line for line in done.stderr.splitlines() if line.startswith("note: ")]
+    assert [line.split("'")[1] for line in said] == ["rho", "base", "twice"]
+    assert "keeps its value, 0.7: a scale of weights follows it; export with --set for another" in said[0]
+    readme = (tmp_path / "made" / "README.md").read_text()
+    assert "'rho' is structural in C and keeps its value, 0.7" in readme
+    network = nv.compile(tmp_path / "spec.yaml", rho=0.7).network
+    controller, simulation = built(Exported(network), tmp_path / "made"), Simulation(network, "c")
+    assert controller.made.settable == ["gain"]
+    for k in range(8):
+        if k == 4:
+            assert controller.set("gain", 0.3)
+            simulation.set(gain=0.3)
+        controller.step()
+        simulation.step()
+        np.testing.assert_array_equal(controller.activity, simulation.activity)
+
+
+def test_an_event_that_sets_what_is_structural_in_c_is_refused(tmp_path: Path) -> None:
+    """With the event, its step and what follows."""
+    network = nv.compile_text(RESERVOIR + "events: [{at: 3, set: {base: 0.1}}]\n")
+    with pytest.raises(
+        ExportError, match=r"an event sets 'base' at step 3, .*\(a scale of weights\): export .* without"
+    ):
+        network.export(tmp_path)
+
+
+def test_too_many_numbers_by_positions_are_structural_in_c() -> None:
+    """Each would be written out: there is a bound, and what is beyond it keeps its value."""
+    places = ", ".join(f"[{i}*s, 0]" for i in range(80))
+    group = f"{{count: 80, position: [{places}]}}"
+    text = "neurovis: 1\nname: x\nparameters: {s: 1, g: 1}\n"
+    text += (
+        f"neurons: {{A: {group}, B: {group}}}\nconnections: {{A -> B: {{weight: g*distance, pattern: all_to_all}}}}\n"
+    )
+    made = Exported(nv.compile_text(text).network)
+    assert set(made.fixed) == {"s", "g"}
+    assert "6,400 positions or data" in made.fixed["s"]
 
 
 @settings(max_examples=8, deadline=None, phases=(Phase.explicit, Phase.generate))

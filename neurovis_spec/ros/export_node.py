@@ -12,6 +12,7 @@ from neurovis_spec.language.expressions.emit_c import INEXACT
 from neurovis_spec.ros.definitions import Definition, definition
 from neurovis_spec.ros.templates import render
 from neurovis_spec.runtime.c_export import Exported
+from neurovis_spec.runtime.c_package import tell_fixed
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +58,7 @@ class _Setter:
 def node_files(network: Network, values: dict[str, object]) -> dict[str, str]:
     """The sources. Raises ExportError where C cannot be made of the network."""
     made = Exported(_open(network))
+    tell_fixed(made)
     values = values | _values(made)
     name = made.name
     return {

@@ -8,7 +8,7 @@ that changes is in a struct of the caller's.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +24,7 @@ from neurovis_spec.runtime.c_backend import SMALL
 from neurovis_spec.runtime.c_code import Code, Form, Tables, function, words_of
 from neurovis_spec.runtime.c_draws import drawing
 from neurovis_spec.runtime.c_names import LONGEST_STRING, identifiers, prefix, string, words
-from neurovis_spec.runtime.c_settable import formula, write_follow
+from neurovis_spec.runtime.c_settable import ExportError, fixed, formula, write_follow
 from neurovis_spec.runtime.c_step import StepCode
 from neurovis_spec.runtime.conditions import NOTHING, Controls, Mask
 from neurovis_spec.runtime.signals import signal_layout
@@ -57,7 +57,8 @@ class Exported:
     """The C of one network."""
 
     def __init__(self, network: Network, start: State | None = None, real: str = "double") -> None:
-        self.network, self.real = without_checks(network), real
+        settable, kept = fixed(network.settable)
+        self.network, self.real = replace(without_checks(network), settable=settable), real
         self.name = prefix(network.name)
         self.macro = self.name.upper()
         self.state = (initial_state(network) if start is None else start).copy()
@@ -67,7 +68,11 @@ class Exported:
         self.input_names = identifiers(one.name for one in self.inputs)
         self.output_names = identifiers(one.name for one in network.outputs)
         slots = network.settable.index
-        self.settable = [name for name in network.parameters if name not in network.structural and name in slots]
+        free = [name for name in network.parameters if name not in network.structural and name in slots]
+        self.settable = [name for name in free if slots[name] not in kept]
+        #: parameters that keep their values in C, and could be set in a run; what follows each
+        self.fixed: Mapping[str, str] = {name: kept[slots[name]] for name in free if slots[name] in kept}
+        self._check_events(kept)
         self.settable_names = identifiers(self.settable)
         self.phases = self._phases()
         self.holding = any(any(order >= 0 for order in phase.order) or phase.lesioned.any() for phase in self.phases)
@@ -75,6 +80,15 @@ class Exported:
         self.members = self._members()
 
     # ---- what there is -----------------------------------------------------------------------------------------
+
+    def _check_events(self, kept: Mapping[int, str]) -> None:
+        """Refuse events that set what keeps its value. Raises ExportError."""
+        for change in self.network.changes:
+            for slot, _ in change.parameters:
+                if slot in kept:
+                    name = self.network.settable.slots[slot].name
+                    told = f"an event sets '{name}' at step {change.at}, and C cannot work out what follows it"
+                    raise ExportError(f"{told} ({kept[slot]}): export the network without this event")
 
     def _phases(self) -> list[Phase]:
         """What is held and left out after the events of each step; which that is depends on no parameter."""
@@ -273,23 +287,31 @@ class Exported:
                     start += count
         return taken
 
+    def _left_out(self) -> dict[str, tuple[str, list[npt.NDArray[np.integer]]]]:
+        """What a step has to look at for what events leave out, where they do: its type, and its numbers in each
+        phase."""
+        phases, found = self.phases, dict[str, tuple[str, list[npt.NDArray[np.integer]]]]()
+        for name, masks in (("gone", [phase.gone for phase in phases]), ("still", [phase.still for phase in phases])):
+            if any(mask.any() for mask in masks):
+                found[name] = "unsigned char", [mask.astype(np.uint8) for mask in masks]
+        if any((phase.lost > NOTHING).any() for phase in phases):
+            first = -int(self.network.connections.delays.max())  # nothing is read of before
+            found["lost"] = "int64_t", [np.maximum(phase.lost, first) for phase in phases]
+        return found
+
     def _compute(self) -> list[str]:
         """The step itself."""
         network, code, taken = self.network, self._code(), self._taken()
         small = len(network.neurons) + len(network.connections) <= SMALL
-        before: list[str] = []
-        for name, masks in (("gone", [p.gone for p in self.phases]), ("still", [p.still for p in self.phases])):
-            if any(mask.any() for mask in masks):
-                lines, which = _by_phase(name, "unsigned char", [mask.astype(np.uint8) for mask in masks])
-                before += lines
-                taken[name] = f"const unsigned char *const {name} = {which};"
-        if any((phase.lost > NOTHING).any() for phase in self.phases):
-            first = -int(network.connections.delays.max())  # nothing is read of before
-            lines, which = _by_phase("lost", "int64_t", [np.maximum(phase.lost, first) for phase in self.phases])
-            before += lines
-            taken["lost"] = f"const int64_t *const lost = {which};"
-        form = Form(small, self.first, self.holding, *(name in taken for name in ("gone", "still", "lost")))
+        left = self._left_out()
+        form = Form(small, self.first, self.holding, *(name in left for name in ("gone", "still", "lost")))
         StepCode(network, code, form).write()
+        before: list[str] = []
+        for name in sorted(left.keys() & words_of(code.lines)):  # what never learns asks for none that is still
+            kind, phases = left[name]
+            lines, which = _by_phase(name, kind, phases)
+            before += lines
+            taken[name] = f"const {kind} *const {name} = {which};"
         if self.first:
             code.head["first"] = "const int first = k == 0;"
         return [*before, *self._function(code, "What a step computes.", "void nv_compute", taken)]

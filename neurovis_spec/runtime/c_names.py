@@ -37,8 +37,19 @@ _MACRO = re.compile(
     r"(?:FP|MATH|M|INTPTR|UINTPTR|SIZE|PTRDIFF|WCHAR|WINT|SIG_ATOMIC|INTMAX|UINTMAX)_[A-Z0-9_]+"
     r"|U?INT(?:_LEAST|_FAST)?[0-9]+_(?:MAX|MIN|C)|SEEK_[A-Z]+|L_tmpnam|[A-Z]+_MAX"
 )
-#: Files that stand beside ours, or that other headers mean.
-_FILES = _words("main math string stdint stddef stdio stdlib errno limits float features wchar strings")
+#: What files, targets of CMake and libraries may not be called: headers that others mean, and what is there already.
+_FILES = _words(
+    """alloca alltypes assert complex cpio ctype dirent dlfcn elf endian environ errno error fcntl features fenv float
+    fmtmsg fnmatch ftw getopt glob grp iconv inttypes iso646 langinfo libgen limits link locale main malloc math memory
+    monetary mqueue netdb poll pthread pwd random regex resolv sched search semaphore setjmp signal spawn stdalign
+    stdarg stdatomic stdbool stddef stdint stdio stdlib stdnoreturn string strings syslog tar termios tgmath threads
+    time uchar ucontext ulimit unistd utime values wait wchar wctype wordexp
+    all clean depend edit_cache help install list_install_components package package_source preinstall rebuild_cache
+    test c dl gcc m rt util"""
+)
+#: What functions of ours and of the system begin with, which end as ours do (``sem_init``), so that no network is
+#: called so.
+_TAKEN = re.compile(r"nv|sem|res|mtx|cnd|atomic|pthread(_\w*)?|posix(_\w*)?")
 
 
 def identifier(name: str) -> str:
@@ -77,11 +88,11 @@ def identifiers(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
 def prefix(name: str) -> str:
     """What the files and all that they define begin with.
 
-    >>> prefix("CPG RBF"), prefix("math")
-    ('cpg_rbf', 'math_net')
+    >>> prefix("CPG RBF"), prefix("math"), prefix("nv")
+    ('cpg_rbf', 'math_net', 'nv_net')
     """
     made = identifier(name).lower().rstrip("_") or "unnamed"
-    return f"{made}_net" if made in _FILES else made
+    return f"{made}_net" if made in _FILES or _TAKEN.fullmatch(made) else made
 
 
 def string(text: str) -> str:

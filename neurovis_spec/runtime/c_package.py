@@ -6,6 +6,7 @@ there is left alone: an example and a CMakeLists.txt that are there stay; any ot
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Collection, Iterable
 from pathlib import Path
 
@@ -22,9 +23,16 @@ from neurovis_spec.runtime.state import State
 _MARK = "by neurovis export"
 
 
+class FixedWarning(UserWarning):
+    """Parameters that can be set in a run, and not in what is exported."""
+
+    prefix = "note"
+
+
 def files(network: Network, start: State | None = None, real: str = "double") -> dict[str, str]:
-    """The texts of all files by name. Raises ExportError."""
+    """The texts of all files by name. Warns (FixedWarning) of parameters that keep their values. Raises ExportError."""
     made = Exported(network, start, real)
+    tell_fixed(made)
     return {
         f"{made.name}.h": made.header(),
         f"{made.name}.c": made.source(),
@@ -32,6 +40,20 @@ def files(network: Network, start: State | None = None, real: str = "double") ->
         "main.c": _example(made),
         "CMakeLists.txt": _cmake(made),
     }
+
+
+def tell_fixed(made: Exported) -> None:
+    """Warn of each parameter that keeps its value."""
+    for line in _fixed(made):
+        warnings.warn(f"{line}; export with --set for another", FixedWarning, stacklevel=4)
+
+
+def _fixed(made: Exported) -> list[str]:
+    """For each parameter that could be set in a run, and keeps its value in C, what it is and why."""
+    return [
+        f"'{words(name)}' is structural in C and keeps its value, {made.network.parameters[name]:g}: {why} follows it"
+        for name, why in made.fixed.items()
+    ]
 
 
 def write(
@@ -121,6 +143,7 @@ def _readme(made: Exported) -> str:
         f"- `{name}_set_{own}`: {words(parameter)}"
         for parameter, own in zip(made.settable, made.settable_names, strict=True)
     )
+    kept = "".join(f"\n{line}. `--set` of the export gives it another.\n" for line in _fixed(made))
     inputs = "\n".join(
         f"- `in->{own}`: {entry.size} number{'s' * (entry.size > 1)} for {words(entry.name)}"
         for own, entry in zip(made.input_names, made.inputs, strict=True)
@@ -159,7 +182,7 @@ apply at their steps. A copy of the struct is a copy of all that the run carries
 {sets or "None can be set."}
 
 Each gives 1, or 0 where the value cannot be taken; then nothing has changed.
-
+{kept}
 ## Cost
 
 The state takes {size_of_state(made)} bytes where a pointer has 8. A step takes

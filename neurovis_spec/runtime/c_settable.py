@@ -1,10 +1,14 @@
 """Setting parameters in C: the same formulas as ``compiler/events/patch`` evaluates, over the parameters of a state.
 
 In: Settable. Out: the lines of a function that takes new values for some parameters, follows all that depends on them,
-and writes what this comes to, or nothing where something would not be finite or leave its bounds.
+and writes what this comes to, or nothing where something would not be finite or leave its bounds. What C cannot work
+out keeps its value, and so do the parameters that it follows.
 """
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -66,7 +70,7 @@ def formula(code: Code, dependent: Dependent, place: Place, parameters: str = "p
                 [code.text(formula(code, positions, 2 * end + axis, parameters)) for end in ends] for axis in (0, 1)
             )
             return f"hypot{code.emitter.suffix}(({x[0]}) - ({x[1]}), ({y[0]}) - ({y[1]}))"
-    raise ExportError("a parameter is used in a way that cannot be set in C")
+    raise ExportError("a parameter is used in a way that C cannot work out")
 
 
 def _element(code: Code, value: ArrayValue, place: Place) -> Value:
@@ -77,6 +81,51 @@ def _element(code: Code, value: ArrayValue, place: Place) -> Value:
 def _number(place: Place) -> int:
     assert isinstance(place, int)
     return place
+
+
+def fixed(settable: Settable) -> tuple[Settable, Mapping[int, str]]:
+    """What can be set in C, and the slots that keep their values, each with what follows it and C cannot work out."""
+    reasons: dict[int, str] = {}
+    kept = []
+    for binding in settable.bindings:
+        why = _hinders(binding, settable)
+        if why is None:
+            kept.append(binding)
+        else:
+            reasons.update(dict.fromkeys(binding.slots, why))
+    free = [False] * len(settable.slots)
+    for slot in range(len(settable.slots)):
+        for follower in settable.reached([slot], free):
+            if follower in reasons:
+                reasons.setdefault(slot, reasons[follower])
+    return replace(settable, bindings=tuple(kept)), reasons
+
+
+def _hinders(binding: Binding, settable: Settable) -> str | None:
+    """Why C cannot work out what a formula gives; None where it can."""
+    bounds = [bound for bound in (binding.low, binding.high) if bound is not None]
+    if not all(map(_is_formula, (binding.formula, *bounds))):
+        return "a scale of weights"
+    count = _count(binding, settable)
+    if count > _MOST_WRITTEN_OUT and not all(map(regular, (binding.formula, *bounds))):
+        return f"what is made of {count:,} positions or data (at most {_MOST_WRITTEN_OUT:,})"
+    return None
+
+
+def _is_formula(dependent: Dependent) -> bool:
+    """Whether ``formula`` knows what to make of it."""
+    match dependent:
+        case ParameterFormula(known=known):
+            return all(isinstance(value, float | np.ndarray) or _is_formula(value) for value in known.values())
+        case Assembled(parts=parts):
+            return all(_is_formula(part.formula) for part in parts)
+        case Subset(whole=whole):
+            return _is_formula(whole)
+    return isinstance(dependent, Distance)
+
+
+def _count(binding: Binding, settable: Settable) -> int:
+    return len(binding.indices) or int(np.size(binding.formula.values(settable.parameters)))
 
 
 def regular(dependent: Dependent) -> bool:
@@ -128,7 +177,7 @@ def _outside(code: Code, value: str, low: float | Dependent, high: float | Depen
 def _write_binding(code: Code, binding: Binding, settable: Settable) -> None:
     """What one formula gives, checked in the first round, written in the second; without indices it is only checked."""
     condition = " || ".join(f"changed[{slot}]" for slot in sorted(binding.slots))
-    count = len(binding.indices) or int(np.size(binding.formula.values(settable.parameters)))
+    count = _count(binding, settable)
     array = "weights" if binding.weights else "x"
     bounds = [bound for bound in (binding.low, binding.high) if bound is not None]
     with code.block(f"if ({condition})"):
@@ -136,10 +185,6 @@ def _write_binding(code: Code, binding: Binding, settable: Settable) -> None:
             with code.block(code.loop("i", count)):
                 _write_number(code, binding, "i", array)
             return
-        if count > _MOST_WRITTEN_OUT:
-            raise ExportError(
-                f"{count} numbers follow parameters by positions or data: {_MOST_WRITTEN_OUT} are the most"
-            )
         for place in range(count):
             with code.block(""):
                 _write_number(code, binding, place, array)
