@@ -372,7 +372,7 @@ def formula(chooser: random.Random, names: tuple[str, ...], depth: int = 4) -> s
     return value
 
 
-@settings(max_examples=12, deadline=None, phases=(Phase.explicit, Phase.generate))
+@settings(max_examples=8, deadline=None, phases=(Phase.explicit, Phase.generate))
 @given(seed=st.integers(0, 2**32))
 def test_what_is_computed_beside_the_step_has_the_same_bits(seed: int) -> None:
     """Inputs, noise, clamps, what events set and what follows it: by the functions of the step, exported or not."""
