@@ -328,13 +328,14 @@ class CompiledNetwork(Drawable):
         """Write the network as source code into a folder: ``c`` is C99 that is C++17, too, with numbers of type
         ``real``, double or float. ``start`` is a recording whose last weights and activities it begins with. Gives the
         files written, and those that were there and stay. Raises ExportError, RecordingError, OSError, ValueError."""
+        from neurovis_spec.language.expressions.functions import PLAIN
         from neurovis_spec.runtime.c_package import files, write
         from neurovis_spec.runtime.resume import resumed_state
 
         if to != "c" or real not in ("double", "float"):
             raise ValueError(f"a network is exported to c, of double or float, not to {to} of {real}")
         check(start=start)
-        state = None if start is None else resumed_state(self.network, start)
+        state = None if start is None else resumed_state(self.network, start, PLAIN)
         return write(arguments.path("folder", folder), files(self.network, state, real))
 
     def choose_engine(self) -> tuple[str, str]:

@@ -372,6 +372,21 @@ def formula(chooser: random.Random, names: tuple[str, ...], depth: int = 4) -> s
     return value
 
 
+def test_what_was_set_before_follows_by_the_functions_of_c(tmp_path: Path) -> None:
+    """An export from a recording begins with the numbers with which a run in C goes on from it."""
+    names = [f"G{number}" for number in range(40)]
+    groups = ", ".join(f"{name}: {{bias: tanh(p*{number + 1})}}" for number, name in enumerate(names))
+    network = nv.compile_text(f"neurovis: 1\nname: x\nparameters: {{p: 0.3}}\nneurons: {{{groups}}}\n")
+    with network.simulator("c", record=True) as simulation:
+        simulation.set(p=0.0371)
+        simulation.step()
+    before = simulation.recording
+    network.export(tmp_path, start=before)
+    controller = built(Exported(network.network), tmp_path)
+    controller.step()
+    np.testing.assert_array_equal(controller.activity, network.run(1, start=before).activity[0])
+
+
 @settings(max_examples=8, deadline=None, phases=(Phase.explicit, Phase.generate))
 @given(seed=st.integers(0, 2**32))
 def test_what_is_computed_beside_the_step_has_the_same_bits(seed: int) -> None:
