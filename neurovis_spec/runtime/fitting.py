@@ -49,7 +49,9 @@ def of_table(recording: Recording, network: Network) -> Recording | None:
         outputs=dict(_outputs(held, recording.state_names)),
         sensors=None if recording.sensors is None else recording.sensor_names,
     )
-    return recording_of(network, columns, Numbers(recording.step, rows), network.connections.weights, after)
+    return recording_of(
+        network, columns, Numbers(recording.step, rows), network.connections.weights, after, recording.backend
+    )
 
 
 def _outputs(held: Columns, states: tuple[str, ...]) -> Iterator[tuple[str, tuple[tuple[int, ...], bool]]]:
