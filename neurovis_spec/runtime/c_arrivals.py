@@ -61,54 +61,76 @@ def _in_lanes(ends: IntArray) -> tuple[_Lanes, IntArray]:
     return _Lanes(neurons, begins, rests.astype(np.int64)), order
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Incoming:
+    """The connections that arrive at the neurons of a block, whatever is made of them: neuron by neuron, each neuron's
+    in their order, those of the i-th neuron up to ``ends[i + 1]``."""
+
+    connections: IntArray
+    ends: IntArray
+    #: the number of connections of each neuron, −1 where they differ
+    degree: int
+    #: whether all of it arrives after one step along weights that stay
+    can_be_fused: bool
+    #: whether they are a full matrix, row by row
+    full: bool
+    #: how sums go on beside each other, and the connections as they are read then; None where neurons have few
+    lanes: tuple[_Lanes, IntArray] | None
+
+
+def incoming_of(network: Network, block: Block) -> Incoming:
+    """What arrives at a block: worked out once, read by each form of a step."""
+    connections, count = network.connections, len(block.members)
+    delays, rules = connections.delays[block.incoming], connections.rules[block.incoming]
+    order = np.argsort(block.slots, kind="stable")
+    own, ends = block.incoming[order], np.searchsorted(block.slots[order], np.arange(count + 1)).astype(np.int64)
+    degrees = np.diff(ends)
+    degree = int(degrees[0]) if (degrees == degrees[0]).all() else -1
+    full = block.combine == "sum" and degree > 1 and 1 < count <= _BESIDE and len(_different(delays)) == 1
+    if full:
+        rows, sources = own.reshape(count, degree), connections.sources[own].reshape(count, degree)
+        regular = rows[0, 0] + np.arange(degree) * count + np.arange(count).reshape(-1, 1)
+        full = bool((rows == regular).all() and (sources == sources[0]).all())
+    lanes = None
+    if not 0 <= degree <= _FEW:
+        beside, read = _in_lanes(ends)
+        lanes = beside, own[read]
+    fused = len(delays) > 0 and bool((delays == 1).all() and (rules < 0).all())
+    return Incoming(own, ends, degree, fused, full, lanes)
+
+
+def _different(delays: IntArray) -> list[int]:
+    """The delays that there are, ascending."""
+    return np.flatnonzero(np.bincount(delays)).tolist()
+
+
 class Arrivals:
     """What arrives at the neurons of a block: their connections, in the order in which they are read: neuron by neuron,
     or as ``lanes`` says. What arrives at one neuron is put together in the order of its connections."""
 
-    def __init__(self, network: Network, block: Block, code: Code, form: Form, layout: SignalLayout) -> None:
-        self.network, self.block, self.code, self.form, self.layout = network, block, code, form, layout
+    def __init__(
+        self, network: Network, block: Block, incoming: Incoming, code: Code, form: Form, layout: SignalLayout
+    ) -> None:
+        self.network, self.block, self.code, self.form = network, block, code, form
         #: where the weights begin among those packed
         self.begin = 0
-        delays, rules = network.connections.delays[block.incoming], network.connections.rules[block.incoming]
-        #: whether all of it arrives after one step along weights that stay, and whether it is formed here, not sent
-        self.can_be_fused = len(delays) > 0 and bool((delays == 1).all() and (rules < 0).all())
-        self.fused = form.fused and self.can_be_fused
-        order = np.argsort(block.slots, kind="stable")
-        self._take(block.incoming[order])
-        self.ends = np.searchsorted(block.slots[order], np.arange(len(block.members) + 1)).astype(np.int64)
-        degrees = np.diff(self.ends)
-        #: the number of connections of each neuron, −1 where they differ
-        self.degree = int(degrees[0]) if (degrees == degrees[0]).all() else -1
-        self.dense = self._is_dense()
+        self.can_be_fused, self.ends, self.degree = incoming.can_be_fused, incoming.ends, incoming.degree
+        #: whether it is formed here, not sent
+        self.fused = form.fused and incoming.can_be_fused
+        #: whether the sums of all neurons go on beside each other, each in its own order
+        self.dense = incoming.full and not (form.gone or form.written_out)
         self.lanes: _Lanes | None = None
-        if not (form.written_out or self.dense or 0 <= self.degree <= _FEW):
-            self.lanes, order = _in_lanes(self.ends)
-            self._take(self.connections[order])
+        self.connections = incoming.connections
+        if incoming.lanes is not None and not (form.written_out or self.dense):
+            self.lanes, self.connections = incoming.lanes
+        self.sources = network.connections.sources[self.connections]
+        self.delays = network.connections.delays[self.connections]
+        self.offsets = layout.offsets[self.connections]
 
     @property
     def packed(self) -> IntArray:
         """The connections whose weights are packed; those of a full matrix lie as they are read."""
         return self.connections if self.can_be_fused and not self.dense else self.connections[:0]
-
-    def _take(self, connections: IntArray) -> None:
-        """Read connections in this order."""
-        self.connections = connections
-        self.sources = self.network.connections.sources[connections]
-        self.delays = self.network.connections.delays[connections]
-        self.offsets = self.layout.offsets[connections]
-
-    def _is_dense(self) -> bool:
-        """Whether the connections are a full matrix, row by row: then the sums of all neurons go on beside each other,
-        each in its own order."""
-        count = len(self.block.members)
-        if self.block.combine != "sum" or self.degree <= 1 or not 1 < count <= _BESIDE or self.form.gone:
-            return False
-        if self.form.written_out or len(set(self.delays.tolist())) > 1:
-            return False
-        rows = self.connections.reshape(count, self.degree)
-        sources = self.sources.reshape(count, self.degree)
-        regular = rows[0, 0] + np.arange(self.degree) * count + np.arange(count).reshape(-1, 1)
-        return bool((rows == regular).all() and (sources == sources[0]).all())
 
     @contextmanager
     def beside(self, lanes: _Lanes) -> Iterator[tuple[Place, str]]:
@@ -212,7 +234,7 @@ class Arrivals:
         """w[t−d]·a[t−d] of a connection."""
         code = self.code
         delays = self.delays[column] if not isinstance(edge, int) else self.delays[column][edge : edge + 1]
-        kinds = sorted(set(delays.tolist()))
+        kinds = _different(delays)
         if self.fused:
             places = self.begin + np.arange(len(self.connections))[column]
             return f"packed[{code.at(places, edge)}]*before[{code.at(self.sources[column], edge)}]"

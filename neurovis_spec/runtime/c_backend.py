@@ -22,6 +22,7 @@ from neurovis_spec.language.expressions.emit_c import Emitter
 from neurovis_spec.language.expressions.functions import Library
 from neurovis_spec.runtime import c_functions, c_library
 from neurovis_spec.runtime.backend import Availability, BackendError, Capabilities
+from neurovis_spec.runtime.c_arrivals import incoming_of
 from neurovis_spec.runtime.c_code import Code, Form, Table, Tables, function, words_of
 from neurovis_spec.runtime.c_step import StepCode
 from neurovis_spec.runtime.conditions import Conditions, Mask, Structure
@@ -167,7 +168,8 @@ def _write(network: Network) -> Written:
     taken = _taken(network)
     watched = bool(network.plasticity) and not small
     # a network that is written out is in registers, and nothing is gained
-    whole = StepCode(network, Code(emitter, tables, network.dt, {}), Form())
+    incoming = [incoming_of(network, block) for block in network.blocks]
+    whole = StepCode(network, Code(emitter, tables, network.dt, {}), Form(), incoming)
     fused = not small and bool(whole.fuses.any())
     of_step = ", int64_t k, const double *restrict s"
     for name, form, write, more in (
@@ -184,7 +186,7 @@ def _write(network: Network) -> Written:
     ):
         code = Code(emitter, tables, network.dt, network.settable.variables)
         if fused or name in ("double nv_plain", "void nv_general"):
-            write(StepCode(network, code, form))
+            write(StepCode(network, code, form, incoming))
         if name.startswith("double"):
             code.line("return odd;" if form.watched and code.lines else "return 0.0;")
         bodies += [*function(code, f"static {name}(const nv_state *p{more})", taken | tables.taken()), ""]

@@ -20,6 +20,7 @@ from neurovis_spec.compiler.run_checks import without_checks
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.language.expressions.emit_c import Emitter, Value
 from neurovis_spec.language.expressions.tree import Draw
+from neurovis_spec.runtime.c_arrivals import incoming_of
 from neurovis_spec.runtime.c_backend import SMALL
 from neurovis_spec.runtime.c_code import Code, Form, Tables, function, words_of
 from neurovis_spec.runtime.c_draws import drawing
@@ -305,7 +306,7 @@ class Exported:
         small = len(network.neurons) + len(network.connections) <= SMALL
         left = self._left_out()
         form = Form(small, self.first, self.holding, *(name in left for name in ("gone", "still", "lost")))
-        StepCode(network, code, form).write()
+        StepCode(network, code, form, [incoming_of(network, block) for block in network.blocks]).write()
         before: list[str] = []
         for name in sorted(left.keys() & words_of(code.lines)):  # what never learns asks for none that is still
             kind, phases = left[name]

@@ -18,7 +18,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Block, Gather, Learn, Plasticity, ReadInputs, Send, Update
 from neurovis_spec.language.expressions.emit_c import Value
 from neurovis_spec.language.expressions.tree import Tree, names
-from neurovis_spec.runtime.c_arrivals import Arrivals
+from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming
 from neurovis_spec.runtime.c_code import Code, Form, Place
 from neurovis_spec.runtime.conditions import Mask
 from neurovis_spec.runtime.presynaptic import history_depth, rule_names
@@ -29,13 +29,16 @@ _RULES = 4
 
 
 class StepCode:
-    """Writes the body of a step."""
+    """Writes the body of a step; ``incoming`` is what arrives at each block, which all forms of a step share."""
 
-    def __init__(self, network: Network, code: Code, form: Form) -> None:
+    def __init__(self, network: Network, code: Code, form: Form, incoming: Sequence[Incoming]) -> None:
         self.network, self.code, self.form = network, code, form
         self.layout: SignalLayout = signal_layout(network)
         self.depth = history_depth(network)
-        self.arrivals = [Arrivals(network, block, code, form, self.layout) for block in network.blocks]
+        self.arrivals = [
+            Arrivals(network, block, own, code, form, self.layout)
+            for block, own in zip(network.blocks, incoming, strict=True)
+        ]
         #: connections that are fused, (m,)
         self.fuses = np.zeros(len(network.connections), dtype=np.bool_)
         #: how many weights are packed
