@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,6 +21,7 @@ from neurovis_spec.live.carry import carried
 from neurovis_spec.live.past import Kept
 from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.saving import recording as saved
+from neurovis_spec.live.saving import told_by
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import Reach, Seen, SourceError
 from neurovis_spec.live.turns import Set
@@ -115,25 +115,24 @@ def test_where_a_body_cannot_be_kept_there_is_no_going_back() -> None:
 def test_a_body_that_cannot_go_on_stops_the_live_view_where_it_is() -> None:
     source = SimulatedSource(carted("stuck").simulator())
     first = seen(source, 18)
-    with pytest.warns(RuntimeWarning, match="at step 19: the cart is stuck"):
-        assert not source.advance()
+    with pytest.raises(SourceError, match="at step 19: the cart is stuck"):
+        source.advance()
     assert same(source.seen(), first[18])
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        source.go(18)
-        source.go(5)
-        assert same(source.seen(), first[5])
-        source.go(18)
-        source.turn(Set({"gain": 0.1}))
-        assert not source.advance()
+    source.go(18)
+    source.go(5)
+    assert same(source.seen(), first[5])
+    source.go(18)
+    source.turn(Set({"gain": 0.1}))
+    with pytest.raises(SourceError, match="at step 19: the cart is stuck"):
+        source.advance()
     assert source.step == 18
 
 
 def test_what_is_saved_of_a_live_view_has_the_body(tmp_path: Path) -> None:
-    source, run = SimulatedSource(carted().simulator()), carted().run(30)
+    source, run = SimulatedSource(carted().simulator()), carted().run(31)
     seen(source, 30)
     path = tmp_path / "x.npz"
-    path.write_bytes(saved(carted().network, source.recall(31), source.parameters, source.body))
+    path.write_bytes(saved(carted().network, told_by(source, 31)))
     read = nv.load(path)
     assert read.skeleton == SKELETON
     assert read.pose.tobytes() == run.pose.tobytes()  # type: ignore[union-attr]

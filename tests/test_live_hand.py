@@ -390,7 +390,7 @@ def test_the_owner_has_the_picture_a_film_and_the_recording_as_files(tmp_path: P
             (tmp_path / "cpg_rbf.svg").unlink()
             assert len(await saved("film", "cpg_rbf.svg")) > len(picture)
             await saved("npz", "cpg_rbf.npz")
-            found, run = nv.load(tmp_path / "cpg_rbf.npz"), desk.placed.compiled.run(step)
+            found, run = nv.load(tmp_path / "cpg_rbf.npz"), desk.placed.compiled.run(step + 1)
             assert (found.activity == run.activity).all()
 
     asyncio.run(main())

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -403,3 +406,60 @@ def test_events_that_do_not_go_with_what_was_turned_are_told_and_it_goes_on() ->
     assert source.step == 4
     source.advance()
     assert source.parameters["a"] == 2.5
+
+
+def test_turns_are_gone_back_before_and_taken_again() -> None:
+    source = SimulatedSource(network().simulator())
+    driven(source, 21)
+    assert [entry.step for entry in source.turned] == [20]
+    source.go(3)
+    assert not source.turned
+    source.go(21)
+    assert [entry.step for entry in source.turned] == [20]
+
+
+def test_of_a_recording_what_events_mend_is_seen_whole_again() -> None:
+    compiled = network()
+    source, simulated = RecordedSource(compiled.network, compiled.run(60)), SimulatedSource(compiled.simulator())
+    for step in (35, 55, 29, 59, 30):
+        while simulated.reach.last < step:
+            simulated.go(simulated.reach.last)
+            simulated.advance()
+        simulated.go(step)
+        source.go(step)
+        seen, known = source.seen(), simulated.seen()
+        assert np.array_equal(seen.lesioned_neurons, known.lesioned_neurons)
+        assert np.array_equal(seen.lesioned_connections, known.lesioned_connections)
+        one, other = source.after(), simulated.after()
+        assert one.weights.tobytes() == other.weights.tobytes()
+        assert (one.reached, one.set_parameters) == (other.reached, other.set_parameters)
+        assert np.array_equal(one.lesioned_neurons, other.lesioned_neurons)
+
+
+def test_events_that_do_not_go_with_what_was_turned_are_left_out_of_an_edited_network_too() -> None:
+    spec = (
+        "neurovis: 1\nname: e\ntime: {steps: 9}\nparameters: {a: {value: 1, max: 3}, b: 0}\n"
+        "neurons: {A: {bias: a}}\nevents: [{at: 5, set: {a: a + 1}}]"
+    )
+    source = SimulatedSource(nv.compile_text(spec).simulator())
+    source.turn(Set({"a": 2.5}))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for _ in range(7):
+            source.advance()
+        other = carried(source, nv.compile_text(spec).simulator())
+    assert (other.step, other.parameters["a"]) == (7, 2.5)
+
+
+def test_an_edit_goes_on_where_only_the_newest_state_is_kept() -> None:
+    source = SimulatedSource(network().simulator(), room=1)
+    driven(source, 70)
+    source.turn(Set({"pull": 0.9}))
+    other = carried(source, network().simulator())
+    source = SimulatedSource(network().simulator())
+    driven(source, 70)
+    source.turn(Set({"pull": 0.9}))
+    source.advance()
+    assert other.step == 71
+    assert same(replace(other.seen(), snapshot=replace(other.seen().snapshot, previous_weights=None)),
+                replace(source.seen(), snapshot=replace(source.seen().snapshot, previous_weights=None)))  # fmt: skip

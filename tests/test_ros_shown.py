@@ -92,8 +92,8 @@ def test_what_arrived_is_saved_and_neurons_are_put_by_hand(what: str) -> None:
             content = data[4 + int.from_bytes(data[2:4], "little") :]
             if what == "npz":
                 with np.load(io.BytesIO(content)) as found:
-                    assert found["step"].tolist() == [0, 1, 2, 5]
-                    assert found["weights"][:, 0].tolist() == [0.5, 1.5, 2.5, 5.5]
+                    assert found["step"].tolist() == [0, 1, 2, 5, 6]
+                    assert found["weights"][:, 0].tolist() == [0.5, 1.5, 2.5, 5.5, 6.5]
             else:
                 assert b"<svg" in content
             await eyes.ask("place", neuron="A", at=[1, 9], done=True)
@@ -103,18 +103,22 @@ def test_what_arrived_is_saved_and_neurons_are_put_by_hand(what: str) -> None:
     assert told == []
 
 
-def test_a_page_that_ends_by_itself_is_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_a_source_raises_is_told_in_the_page_which_goes_on(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     source, told = ReceivedSource(COMPILED.network), list[str]()
 
     async def main() -> None:
         async with seen(source, told) as eyes:
             await eyes.until(lambda: bool(eyes.status))
-            monkeypatch.setattr(source, "seen", lambda: 1 / 0)
-            source.hear_activity(0, 0, np.zeros(2))
-            for _ in range(200):
-                if told:
-                    return
-                await asyncio.sleep(0.05)
+            with monkeypatch.context() as broken:
+                broken.setattr(source, "seen", lambda: 1 / 0)
+                source.hear_activity(0, 0, np.zeros(2))
+                await eyes.until(lambda: any("division by zero" in str(one.get("reason")) for one in eyes.told))
+            await eyes.ask("play")
+            source.hear_activity(1, 1, np.zeros(2))
+            await eyes.until(lambda: eyes.step == 1)
 
     asyncio.run(main())
-    assert told == ["the page has ended: division by zero"]
+    assert told == []
+    assert caplog.records

@@ -172,7 +172,7 @@ def _show(
 
     def edits(run: Run, tell: Callable[[str], None], desk: Desk) -> Watch:
         assert again is not None
-        return Edits(show, again, partial(_files, spec), network, run, tell, desk.renew).watch()
+        return Edits(show, again, partial(_files, spec), network, run, tell, desk).watch()
 
     # frames are due 60 times a second: threads must not wait for each other as long as Python lets them
     sys.setswitchinterval(0.0005)

@@ -22,22 +22,25 @@ from neurovis_spec.live.source import SourceError, Turned
 from neurovis_spec.live.turns import Feed, turn
 from neurovis_spec.runtime.conditions import lose
 from neurovis_spec.runtime.signals import signal_layout
-from neurovis_spec.runtime.simulation import Simulation
+from neurovis_spec.runtime.simulation import ParameterError, Simulation
 from neurovis_spec.runtime.state import State
 
 
 def carried(old: SimulatedSource, simulation: Simulation) -> SimulatedSource:
     """A source of the new network at the step of ``old``, or at step 0 where the two have no neuron in common. ``old``
-    must not be used afterwards. Raises SourceError where the body cannot make a step, and then ``old`` goes on."""
+    must not be used afterwards. Raises SourceError where the body cannot make a step; then, and whatever else is
+    raised, ``old`` goes on."""
     try:
         return _carried(old, simulation)
-    except BodyError as error:
+    except Exception as error:
         old.stay()
-        raise SourceError(str(error)) from None
+        if isinstance(error, BodyError):
+            raise SourceError(str(error)) from None
+        raise
 
 
 def _carried(old: SimulatedSource, simulation: Simulation) -> SimulatedSource:
-    was, network, turned, step = old.network, simulation.network, old.turned, old.step
+    was, network, turned = old.network, simulation.network, old.turned
     if not set(was.neurons.names) & set(network.neurons.names):
         return SimulatedSource(simulation)
     origin = simulation.state()
@@ -46,13 +49,13 @@ def _carried(old: SimulatedSource, simulation: Simulation) -> SimulatedSource:
     except BodyError:  # a body that cannot be kept
         return SimulatedSource(simulation)
     sizes = {entry.name: entry.size for entry in network.inputs}
-    done = _replay(simulation, then.k, [entry for entry in turned if entry.step < step], sizes)
+    done = _replay(simulation, then.k, [entry for entry in turned if entry.step < then.k], sizes)
     state = simulation.state()
     _carry(was, then, network, state)
     _restore(simulation, was, then, state)
     kept = {name: values for name, values in old.fed.items() if sizes.get(name) == len(values)}
     source = SimulatedSource(simulation, state, done, kept, origin)
-    for entry in (entry for entry in turned if entry.step == step):
+    for entry in (entry for entry in turned if entry.step >= then.k):
         with suppress(SourceError):  # of what is no longer there
             source.turn(entry.turn)
     return source
@@ -85,7 +88,8 @@ def _replay(simulation: Simulation, k: int, turned: Sequence[Turned], inputs: Ma
     for at, _, entry in sorted([*events, *((entry.step + 1, 1, entry) for entry in turned)], key=lambda item: item[:2]):
         state = simulation.state()
         state.k = at
-        simulation.restore(state)  # the events of this step apply
+        with suppress(ParameterError):  # the events of this step apply, but for those that do not go with what was set
+            simulation.restore(state)
         if entry is None:
             continue
         try:

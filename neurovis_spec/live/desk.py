@@ -24,8 +24,8 @@ from neurovis_spec.live.placing import Placed, placed
 from neurovis_spec.live.protocol import file_message, moved_message, placed_message, refused_message, saving_message
 from neurovis_spec.live.requests import Fetch, PlaceNeuron, Request, Save, Unplace, Write
 from neurovis_spec.live.run import Run, Stage
-from neurovis_spec.live.saving import film, picture, recording, steps_for
-from neurovis_spec.live.source import Drawn, Seen, Source, SourceError
+from neurovis_spec.live.saving import Told, film, picture, recording, steps_for, told_by
+from neurovis_spec.live.source import Source, SourceError
 from neurovis_spec.live.view import View
 
 #: Tells who has asked.
@@ -60,7 +60,7 @@ class Desk:
         spec: Written | None = None,
     ) -> None:
         self._draw, self._run, self._tell, self._spec = draw, run, tell, spec
-        self._placed = placed(compiled, engine)
+        self._placed = self._earlier = placed(compiled, engine)
         self._view: View | None = None
         self._before: deque[Placed] = deque(maxlen=_UNDONE)
         self._saving: Saving | None = None
@@ -100,11 +100,21 @@ class Desk:
     def renew(self, compiled: CompiledNetwork) -> Layout:
         """The layout of an edited network, with what was put by hand. Raises LayoutRefusalError."""
         with self._work_lock:
-            self._placed = self._placed.carried(compiled)
-            self._view, self._saving = None, None
-            self._before.clear()
-            self._say()
+            self._earlier, self._placed = self._placed, self._placed.carried(compiled)
+            self._forget()
             return self._placed.layout
+
+    def unrenew(self) -> None:
+        """What was put by hand is what it was before ``renew``, as the edited network is not shown after all."""
+        with self._work_lock:
+            self._placed = self._earlier
+            self._forget()
+
+    def _forget(self) -> None:
+        """Another network: nothing of the one before can be undone or written."""
+        self._view, self._saving = None, None
+        self._before.clear()
+        self._say()
 
     def _work(self) -> None:
         while True:
@@ -149,21 +159,23 @@ class Desk:
         view, name = self._shown(), self._placed.compiled.name
         network = self._placed.compiled.network
         steps = {"svg": 1, "npz": steps_for(network, None)}.get(request.what, steps_for(network, request.seconds))
-        found: SimpleQueue[tuple[list[Seen], dict[str, float], Drawn]] = SimpleQueue()
+        found: SimpleQueue[Told | str] = SimpleQueue()
 
         def look(source: Source) -> None:
-            if source.network.hash == network.hash:
-                found.put((source.recall(steps), source.parameters, source.body))
+            if source.network.hash != network.hash:
+                raise SourceError("the spec was edited meanwhile")
+            found.put(told_by(source, steps))
 
-        self._run.inquire(look)
+        self._run.inquire(look, found.put)
         try:
-            seen, parameters, body = found.get(timeout=_PATIENCE)
+            told = found.get(timeout=_PATIENCE)
         except Empty:
-            raise SavingError("the steps could not be had: the spec was edited, or the run has ended") from None
+            raise SavingError("the steps could not be had: the run is busy, or has ended") from None
+        if isinstance(told, str):
+            raise SavingError(told)
         if request.what == "npz":
-            return file_message(f"{name}.npz", recording(network, seen, parameters, body))
-        still = request.what == "svg"
-        return file_message(f"{name}.svg", picture(view, seen[-1], body) if still else film(view, seen, body))
+            return file_message(f"{name}.npz", recording(network, told))
+        return file_message(f"{name}.svg", picture(view, told) if request.what == "svg" else film(view, told))
 
     def _written(self) -> Written:
         if self._spec is None:

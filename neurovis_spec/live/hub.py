@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -69,7 +70,7 @@ class Client:
 
 class Hub:
     """The clients of a run. ``takes`` are the messages that are taken besides those that its source takes. All methods
-    but ``show``, ``watched`` and ``refuse`` are called on the event loop."""
+    but ``show``, ``watched``, ``refuse``, ``answer`` and ``tell_soon`` are called on the event loop."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop, takes: frozenset[str] = frozenset()) -> None:
         self._loop, self._takes = loop, takes
@@ -105,7 +106,7 @@ class Hub:
         self._slot = shown
         if not self._scheduled:
             self._scheduled = True
-            self._loop.call_soon_threadsafe(self._take)
+            self._call(self._take)
 
     def join(self, client: Client) -> None:
         """Somebody has come."""
@@ -131,7 +132,16 @@ class Hub:
 
     def answer(self, client: Client, text: str | bytes) -> None:
         """Tell a client something, from any thread."""
-        self._loop.call_soon_threadsafe(client.tell, text)
+        self._call(client.tell, text)
+
+    def tell_soon(self, text: str, keep: str = "") -> None:
+        """``tell``, from any thread."""
+        self._call(self.tell, text, keep)
+
+    def _call(self, what: Callable[..., None], *values: object) -> None:
+        """Have the loop call something, if it still runs."""
+        with suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(what, *values)
 
     def check(self, client: Client, items: tuple[str, ...]) -> None:
         """A client wants values: now, and with each frame."""

@@ -10,21 +10,21 @@ import signal
 import socket
 import sys
 from collections.abc import Callable, Iterable
-from contextlib import suppress
 from pathlib import Path
+from queue import SimpleQueue
 from typing import TypeAlias
 
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.diagnostics import Diagnostic, SpecError
 from neurovis_spec.findings import show_text
 from neurovis_spec.interrupts import ENDING, Ended
-from neurovis_spec.layout.model import Layout, LayoutRefusalError
+from neurovis_spec.layout.model import LayoutRefusalError
 from neurovis_spec.live.access import Access
 from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.hub import Hub
-from neurovis_spec.live.protocol import findings_message
+from neurovis_spec.live.protocol import findings_message, refused_message
 from neurovis_spec.live.requests import REQUESTS
-from neurovis_spec.live.run import Run, Stage
+from neurovis_spec.live.run import Change, Run, Stage
 from neurovis_spec.live.server import Server
 from neurovis_spec.live.show import Show
 from neurovis_spec.live.watch import Watch
@@ -51,7 +51,8 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 class Edits:
-    """Shows a spec anew when one of its files was edited; if it is invalid, reports that and keeps the old network."""
+    """Shows a spec anew when one of its files was edited; if it is invalid, or cannot be shown at this step, reports
+    that and keeps the old network."""
 
     def __init__(
         self,
@@ -61,10 +62,10 @@ class Edits:
         known: CompiledNetwork,
         run: Run,
         tell: Tell,
-        layout: Callable[[CompiledNetwork], Layout],
+        desk: Desk,
     ) -> None:
         self._show, self._compile, self._files, self._run, self._tell = show, compile, files, run, tell
-        self._layout = layout
+        self._desk = desk
         self._watched = set(files(known))
 
     def watch(self) -> Watch:
@@ -74,21 +75,41 @@ class Edits:
     def _edited(self) -> Iterable[Path]:
         try:
             compiled = self._compile()
-            change = self._show.changed(compiled, self._run.appearance, self._layout(compiled))
-        except SpecError as error:
-            self._tell(findings_message(show_text(error.diagnostics, error.sources), errors=True))
-            return self._watched
-        except LayoutRefusalError as error:
-            found: tuple[Diagnostic, ...] = () if error.diagnostic is None else (error.diagnostic,)
-            self._tell(findings_message(show_text(found, error.sources) or str(error), errors=True))
-            return self._watched
-        except (RecordingError, OSError, ValueError) as error:
-            self._tell(findings_message(str(error), errors=True))
-            return self._watched
+            layout = self._desk.renew(compiled)
+        except Exception as error:  # a layout engine, ours or anybody's, may fail
+            return self._refused(_words(error))
+        try:
+            refused = self._changed(self._show.changed(compiled, self._run.appearance, layout))
+        except Exception as error:  # so may a body
+            refused = _words(error)
+        if refused is not None:
+            self._desk.unrenew()
+            return self._refused(refused)
         self._watched = set(self._files(compiled))
-        self._run.change(change)
         self._tell(findings_message(show_text(compiled.warnings, compiled.sources), errors=False))
         return self._watched
+
+    def _refused(self, words: str) -> Iterable[Path]:
+        self._tell(findings_message(words, errors=True))
+        return self._watched
+
+    def _changed(self, change: Change) -> str | None:
+        """Have the run show the edited network; why it does not, None where it does."""
+        answer: SimpleQueue[str | None] = SimpleQueue()
+        self._run.change(change, answer.put, lambda: answer.put(None))
+        return answer.get()
+
+
+def _words(error: Exception) -> str:
+    """What is wrong with an edited spec."""
+    if isinstance(error, SpecError):
+        return show_text(error.diagnostics, error.sources)
+    if isinstance(error, LayoutRefusalError):
+        found: tuple[Diagnostic, ...] = () if error.diagnostic is None else (error.diagnostic,)
+        return show_text(found, error.sources) or str(error)
+    if isinstance(error, RecordingError | OSError | ValueError):
+        return str(error)
+    return f"the edited spec cannot be shown: {type(error).__name__}: {error}"
 
 
 async def serve(
@@ -116,13 +137,13 @@ async def serve_until(
     desk: Callable[[Run, Tell], Desk],
     edits: Callable[[Run, Tell, Desk], Watch] | None = None,
 ) -> None:
-    """Serve until it is at its end. Where the run cannot go on that is now, and what has happened is raised."""
+    """Serve until it is at its end, whatever a source raises."""
     loop = asyncio.get_running_loop()
     hub = Hub(loop, REQUESTS)
-    run = Run(*stage, hub.show, lambda: hub.watched, lambda: loop.call_soon_threadsafe(_fail, ended))
+    run = Run(*stage, hub.show, lambda: hub.watched, lambda reason: hub.tell_soon(refused_message(reason)))
 
     def told(kind: str) -> Tell:
-        return lambda text: _call(loop, hub.tell, text, kind)
+        return lambda text: hub.tell_soon(text, kind)
 
     at_desk = desk(run, told("placed"))
     server = Server(access, hub, run, at_desk)
@@ -139,19 +160,6 @@ async def serve_until(
         for thread in reversed(threads):
             thread.end()
         await server.stop()
-    if run.failure is not None:
-        raise run.failure
-
-
-def _call(loop: asyncio.AbstractEventLoop, what: Callable[[str, str], None], text: str, kind: str) -> None:
-    """Have the loop call something, if it still runs."""
-    with suppress(RuntimeError):
-        loop.call_soon_threadsafe(what, text, kind)
-
-
-def _fail(ended: asyncio.Future[int]) -> None:
-    if not ended.done():
-        ended.set_result(0)
 
 
 def _heed_signals(loop: asyncio.AbstractEventLoop, ended: asyncio.Future[int]) -> None:

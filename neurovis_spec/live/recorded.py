@@ -7,18 +7,21 @@ lesioned is what the spec's events say.
 from __future__ import annotations
 
 from bisect import bisect_left
+from dataclasses import replace
 
 import numpy as np
 
-from neurovis_spec.compiler.events.changes import Clamp
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.history import Recorded
-from neurovis_spec.live.source import Capabilities, Mask, Reach, Seen, SourceError, Turned, drawn, recalled
+from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned, drawn, recalled
 from neurovis_spec.live.turns import Turn
+from neurovis_spec.runtime.columns import columns_of
+from neurovis_spec.runtime.conditions import Controls
 from neurovis_spec.runtime.fitting import fitted
-from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.record import after
+from neurovis_spec.runtime.recording import After, Recording, RecordingError
+from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.scene.fading import snapshots_of
-from neurovis_spec.scene.lesions import lesions_of
 
 
 class RecordedSource:
@@ -35,8 +38,12 @@ class RecordedSource:
         first = None if recording.pose is None else recording.pose[0]
         self.body = drawn(recording.skeleton, recording.sensor_names, first)
         self._steps: list[int] = recording.step.tolist()
-        self._lesions = lesions_of(network)
         self._row = 0
+        #: the columns of the states that outputs name; None where the recording has not all of them
+        names = columns_of(network).probe.names
+        known = {name: column for column, name in enumerate(recording.state_names)}
+        self._states = [known[name] for name in names] if names and known.keys() >= set(names) else None
+        self._controls, self._state, self._applied = Controls(network), initial_state(network), 0
         self.history = Recorded(self._recording)
 
     @property
@@ -69,25 +76,56 @@ class RecordedSource:
         """No rule can be stopped."""
         return {}
 
+    @property
+    def backend(self) -> str:
+        """The name of the backend that made its steps, "" where that is not known."""
+        return self._recording.backend
+
     def seen(self) -> Seen:
         """What a picture of the current step is made from."""
-        neurons, connections = np.zeros(len(self.network.neurons), bool), np.zeros(len(self.network.connections), bool)
-        for mask, lesions in ((neurons, self._lesions.neurons), (connections, self._lesions.connections)):
-            mask[[index for index, step in lesions.items() if step <= self.step]] = True
         (snapshot,) = snapshots_of(self.network, self._recording, [self.step])
-        return Seen(snapshot, neurons, connections, self._clamped())
+        now = self._by_events().conditions
+        states = None if self._states is None else self._recording.states[self._row, self._states]
+        lesioned = now.lesioned_neurons.copy(), now.structure.gone.copy()
+        return Seen(snapshot, *lesioned, now.held.order >= 0, states)
 
-    def _clamped(self) -> Mask:
-        """Which neurons events clamp at this step; clamps by hand are no part of a recording."""
-        held: dict[int, Clamp] = {}
-        for change in self.network.changes:
-            if change.at <= self.step:
-                held = {order: clamp for order, clamp in held.items() if clamp.event not in change.released}
-                held |= {clamp.order: clamp for clamp in change.clamps}
-        clamped = np.zeros(len(self.network.neurons), bool)
-        for clamp in held.values():
-            clamped[clamp.neurons] = True
-        return clamped
+    def after(self) -> After:
+        """What is true after the current step, as far as the rows and the spec's events tell; weights of all
+        connections (m,)."""
+        recording, row, steps = self._recording, self._row, self._steps
+        weights, state = recording.all_weights(row), self._by_events()
+        if row == len(steps) - 1:
+            weights[recording.plastic] = recording.weights_after
+            lesioned = recording.lesioned_neurons, recording.lesioned_connections
+            return After(weights, recording.reached, recording.set_parameters, *lesioned)
+        if steps[row + 1] == steps[row] + 1:
+            learn = self.network.connections.rules >= 0
+            weights[learn] = recording.all_weights(row + 1)[learn]
+        found, events = (
+            after(self.network, state),
+            {slot for change in self.network.changes for slot, _ in change.parameters},
+        )
+        slots = self.network.settable.index
+        before = {name: value for name, value in recording.set_parameters.items() if slots.get(name) not in events}
+        return replace(
+            found,
+            weights=weights,
+            reached=recording.reached - (steps[-1] - steps[row]),
+            set_parameters={**found.set_parameters, **before},
+        )
+
+    def _by_events(self) -> State:
+        """What events have changed by the current step; what was done by hand is no part of a recording."""
+        if self._applied and self.network.changes[self._applied - 1].at > self.step:
+            self._state, self._applied = initial_state(self.network), 0
+        for change in self.network.changes[self._applied :]:
+            if change.at > self.step:
+                break
+            self._state.k = change.at
+            with np.errstate(all="ignore"):
+                self._controls.apply(self._state, change)
+            self._applied += 1
+        return self._state
 
     def advance(self) -> bool:
         """Go on by one row; False at the end."""

@@ -6,6 +6,7 @@ on can hold the thread up: commands come in a queue, and what is shown is handed
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from bisect import bisect_left, bisect_right
@@ -13,7 +14,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from threading import Thread
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 from neurovis_spec.live.appearance import Appearance
 from neurovis_spec.live.clock import FRAMES, Clock, Pace
@@ -21,6 +22,8 @@ from neurovis_spec.live.commands import Branch, Command, Draw, Event, Pause, Pla
 from neurovis_spec.live.history import History
 from neurovis_spec.live.source import Capabilities, Drawn, Reach, Seen, Source, SourceError, Turned
 from neurovis_spec.live.view import Look, View
+
+_LOG: Final = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +94,9 @@ def _nothing() -> None:
 
 class Run:
     """A live run; it plays from the start on, or stands still where it is not ``playing``. ``wanted`` says whether
-    anybody looks on: else nothing is shown. ``failed`` is called where it cannot go on; ``failure`` says why."""
+    anybody looks on: else nothing is shown. Whatever a source or a view raises, the run goes on: what was asked is
+    refused, and all is as it was before; where nobody has asked, ``tell`` is called with why it stands still.
+    ``failure`` is the last that was raised which is no SourceError."""
 
     def __init__(
         self,
@@ -99,10 +104,10 @@ class Run:
         view: View,
         show: Show,
         wanted: Callable[[], bool] = lambda: True,
-        failed: Callable[[], object] = lambda: None,
+        tell: Refuse = _ignore,
         playing: bool = True,
     ) -> None:
-        self._source, self._view, self._show, self._wanted, self._failed = source, view, show, wanted, failed
+        self._source, self._view, self._show, self._wanted, self._tell = source, view, show, wanted, tell
         self._asked: SimpleQueue[tuple[Command | Change | _Drawn | _Inquiry | None, Refuse, Done]] = SimpleQueue()
         self._playing, self._ended = playing, False
         #: how the picture is wanted, and whether it is being drawn so
@@ -121,13 +126,13 @@ class Run:
         """Have a command carried out between two steps; ``done`` is called after that, or ``refuse``."""
         self._asked.put((command, refuse, done))
 
-    def change(self, change: Change, refuse: Refuse = _ignore) -> None:
+    def change(self, change: Change, refuse: Refuse = _ignore, done: Done = _nothing) -> None:
         """Have another network shown, from between two steps on."""
-        self._asked.put((change, refuse, _nothing))
+        self._asked.put((change, refuse, done))
 
-    def inquire(self, what: Callable[[Source], object]) -> None:
+    def inquire(self, what: Callable[[Source], object], refuse: Refuse = _ignore) -> None:
         """Have something done with the source between two steps, which afterwards stands where it stood."""
-        self._asked.put((_Inquiry(what), _ignore, _nothing))
+        self._asked.put((_Inquiry(what), refuse, _nothing))
 
     def end(self) -> None:
         """Stop, and wait until it has."""
@@ -140,15 +145,28 @@ class Run:
         return Clock.of(source.network.dt, given, speed)
 
     def _drive(self) -> None:
-        try:
-            self._clock.start(time.perf_counter())
-            self._present()
-            while self._attend():
-                if self._running:
+        self._clock.start(time.perf_counter())
+        self._present()
+        while self._attend():
+            if self._running:
+                try:
                     self._move()
-        except Exception as failure:
-            self.failure = failure
-            self._failed()
+                except Exception as error:
+                    self._stand_still(error)
+                    self._present()
+
+    def _stand_still(self, error: Exception) -> None:
+        """Go no further by itself, and say why."""
+        self._playing, self._target = False, None
+        self._tell(self._why(error))
+
+    def _why(self, error: Exception) -> str:
+        """What is told of something that was raised."""
+        if isinstance(error, SourceError):
+            return str(error)
+        self.failure = error
+        _LOG.error("the live run goes on after an error", exc_info=error)
+        return f"this failed, and the run is as it was before: {type(error).__name__}: {error}"
 
     @property
     def _running(self) -> bool:
@@ -167,11 +185,13 @@ class Run:
                 return True
             if asked is None:
                 return False
+            before = self._source, self._view, self._clock, self._playing, self._ended, self._target
             try:
                 self._carry_out(asked, refuse)
-            except SourceError as error:
+            except Exception as error:
+                self._source, self._view, self._clock, self._playing, self._ended, self._target = before
                 self._present()
-                refuse(str(error))
+                refuse(self._why(error))
             else:
                 self._present()
                 done()
@@ -247,11 +267,15 @@ class Run:
 
     def _step(self, step: int) -> None:
         """To a step nearby, at once, so that of several steps asked for each is made."""
-        source, ends = self._source, self._source.capabilities.ends
+        source, ends, here = self._source, self._source.capabilities.ends, self._source.step
         self._playing, self._target = False, None
         source.go(step if ends else min(step, source.reach.last))
-        while source.step < step and source.advance():
-            pass
+        try:
+            while source.step < step and source.advance():
+                pass
+        except Exception:
+            source.go(here)
+            raise
         self._ended = ends and source.step == source.reach.last
 
     def _event(self, by: int) -> int:
@@ -299,8 +323,14 @@ class Run:
             self._present()
 
     def _present(self) -> None:
+        """Show what is to be seen, where anybody looks on; where that cannot be made, say why, and stand still."""
         if self._wanted():
-            self._show(self.shown())
+            try:
+                shown = self.shown()
+            except Exception as error:
+                self._stand_still(error)
+            else:
+                self._show(shown)
 
     def shown(self) -> Shown:
         """What is to be seen now; to be called by this thread, or before it begins."""

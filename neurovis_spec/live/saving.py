@@ -6,21 +6,24 @@ In: what was seen, step by step, and how it is drawn. Out: the bytes of a file, 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
 
 from neurovis_spec import pipeline
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.live.source import NOTHING, Drawn, Mask, Seen
+from neurovis_spec.live.as_turned import as_turned
+from neurovis_spec.live.source import NOTHING, Drawn, Mask, Seen, Source, Turned
 from neurovis_spec.live.view import View
 from neurovis_spec.runtime.columns import columns_of
 from neurovis_spec.runtime.kinds import Rows
 from neurovis_spec.runtime.recording import After, Numbers, Recording, recording_of
 from neurovis_spec.scene import Film
-from neurovis_spec.scene.figure import with_body
+from neurovis_spec.scene.figure import PAGE, with_body
 from neurovis_spec.scene.film import filmed
 from neurovis_spec.scene.film_size import frames_a_second
 from neurovis_spec.scene.poses import Poses
@@ -36,27 +39,47 @@ def steps_for(network: Network, seconds: float | None) -> int:
     return max(1, min(wanted, room, MOST_STEPS))
 
 
-def picture(view: View, seen: Seen, drawn: Drawn = NOTHING) -> bytes:
-    """A step as SVG, with the body that is drawn."""
-    return pipeline.draw(pipeline.frame(_film(view, [seen], drawn), 0), ".svg")
+@dataclass(frozen=True, slots=True, eq=False)
+class Told:
+    """What a source tells for files, when it stands at the last of the steps that were ``seen``: what is true after it,
+    what was turned until then, the body that is drawn, and what makes the steps."""
+
+    seen: Sequence[Seen]
+    after: After
+    turned: tuple[Turned, ...] = ()
+    body: Drawn = NOTHING
+    backend: str = ""
 
 
-def film(view: View, seen: Sequence[Seen], drawn: Drawn = NOTHING) -> bytes:
+def told_by(source: Source, steps: int) -> Told:
+    """What a source tells of its last steps. Raises SourceError."""
+    return Told(source.recall(steps), source.after(), source.turned, source.body, source.backend)
+
+
+def picture(view: View, told: Told) -> bytes:
+    """The last step as SVG, with the body that is drawn."""
+    return pipeline.draw(pipeline.frame(_film(view, replace(told, seen=told.seen[-1:])), 0), ".svg")
+
+
+def film(view: View, told: Told) -> bytes:
     """Steps as a moving SVG, with the body that is drawn."""
-    return pipeline.animate(_film(view, seen, drawn), ".svg")
+    return pipeline.animate(_film(view, told), ".svg")
 
 
-def _film(view: View, seen: Sequence[Seen], drawn: Drawn) -> Film:
-    network = view.drawn.network
-    made = filmed(view.drawn, view.plan, [one.snapshot for one in seen], view.gains, frames_a_second(network))
+def _film(view: View, told: Told) -> Film:
+    network, seen, body = view.drawn.whole, told.seen, told.body
+    turned, planned, drawn = as_turned(network, told.turned), view.plan, view.drawn
+    if turned is not network or body.skeleton is not None:
+        drawn, planned = view.planned(turned, 0.0 if body.skeleton is None else PAGE)
+    made = filmed(drawn, planned, [one.snapshot for one in seen], view.gains, frames_a_second(network))
     masks = [view.lesioned(one) for one in seen]
     faint = _first("n", [neurons for neurons, _ in masks]) | _first("c", [lines for _, lines in masks])
     made = replace(made, faint=faint)
-    if drawn.skeleton is None:
+    if body.skeleton is None:
         return made
-    unknown = np.full(drawn.skeleton.size, np.nan)
+    unknown = np.full(body.skeleton.size, np.nan)
     poses = [unknown if one.snapshot.pose is None else one.snapshot.pose for one in seen]
-    return with_body(made, Poses(drawn.skeleton, np.array(poses), drawn.start))
+    return with_body(made, Poses(body.skeleton, np.array(poses), body.start))
 
 
 def _first(kind: str, masks: Sequence[Mask]) -> dict[str, int]:
@@ -65,32 +88,32 @@ def _first(kind: str, masks: Sequence[Mask]) -> dict[str, int]:
     return {f"{kind}{index}": int(stays[:, index].argmax()) for index in np.flatnonzero(stays[-1]).tolist()}
 
 
-def recording(network: Network, seen: Sequence[Seen], parameters: Mapping[str, float], drawn: Drawn = NOTHING) -> bytes:
-    """Steps as a recording (``.npz``), but for the last, whose weights are those after it; ``drawn`` is the body."""
-    *rows, last = seen
-    changing = network.changing
-    poses = [one.snapshot.pose for one in rows if one.snapshot.pose is not None]
-    sensed = [one.snapshot.sensors for one in rows if one.snapshot.sensors is not None]
-    numbers = Numbers(
-        np.array([one.snapshot.step for one in rows], np.int64),
-        Rows(
-            np.array([one.snapshot.activity for one in rows]).reshape(len(rows), len(network.neurons)),
-            np.array([one.snapshot.weights[changing] for one in rows]).reshape(len(rows), len(changing)),
-            np.zeros((len(rows), 0)),
-            np.array(sensed).reshape(len(rows), -1 if sensed else 0),
-            np.array(poses).reshape(len(rows), -1 if poses else 0),
-        ),
-    )
-    weights = last.snapshot.weights
-    given = {name: value for name, value in parameters.items() if value != network.parameters[name]}
-    lesioned = np.flatnonzero(last.lesioned_neurons), np.flatnonzero(last.lesioned_connections)
-    after = After(weights[changing], last.snapshot.step, given, *lesioned)
+def recording(network: Network, told: Told) -> bytes:
+    """Steps as a recording (``.npz``), the same as of a run in which events of the spec do what was turned. States that
+    outputs name, sensors and poses are in it where they are known of every step."""
+    seen, turned, body = told.seen, as_turned(network, told.turned), told.body
+    changing = turned.changing
+    states = _known([one.states for one in seen])
+    sensed, poses = (_known([of(one.snapshot) for one in seen]) for of in (attrgetter("sensors"), attrgetter("pose")))
     columns = replace(
-        columns_of(replace(network, outputs=())),
-        sensors=drawn.sensor_names if sensed else None,
-        skeleton=drawn.skeleton if poses else None,
+        columns_of(turned if states else replace(turned, outputs=())),
+        sensors=body.sensor_names if sensed else None,
+        skeleton=body.skeleton if poses else None,
     )
-    return _npz(recording_of(network, columns, numbers, weights, after))
+    rows = Rows(
+        np.array([one.snapshot.activity for one in seen]),
+        np.array([one.snapshot.weights[changing] for one in seen]),
+        *(np.array(several).reshape(len(seen), -1 if several else 0) for several in (states, sensed, poses)),
+    )
+    numbers = Numbers(np.array([one.snapshot.step for one in seen], np.int64), rows)
+    after = replace(told.after, weights=told.after.weights[changing])
+    return _npz(recording_of(turned, columns, numbers, told.after.weights, after, told.backend))
+
+
+def _known(values: Sequence[FloatArray | None]) -> list[FloatArray]:
+    """The values of all steps; none where one of them is not known."""
+    known = [one for one in values if one is not None]
+    return known if len(known) == len(values) else []
 
 
 def _npz(made: Recording) -> bytes:

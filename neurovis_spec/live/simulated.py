@@ -9,9 +9,12 @@ whose state cannot be kept there is no going back.
 from __future__ import annotations
 
 import warnings
-from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from copy import copy
+from dataclasses import replace
+from itertools import zip_longest
 from operator import attrgetter
 
 import numpy as np
@@ -22,8 +25,9 @@ from neurovis_spec.live.history import Ring
 from neurovis_spec.live.past import EVERY, ROOM, Kept, Past
 from neurovis_spec.live.rules import carried_out, rules
 from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned, drawn, recalled
-from neurovis_spec.live.turns import TURNS, Feed, Hold, Set, Turn, fed_by, same_value, turn
-from neurovis_spec.runtime.recording import Snapshot
+from neurovis_spec.live.turns import TURNS, Feed, Hold, Lesion, Mend, Set, Turn, fed_by, same_value, turn
+from neurovis_spec.runtime.columns import columns_of
+from neurovis_spec.runtime.recording import After, Snapshot
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
 from neurovis_spec.runtime.state import State
 from neurovis_spec.scene.fading import Fading
@@ -48,6 +52,7 @@ class SimulatedSource:
         self._rules = rules(self.network)
         self._all_learn: Mapping[str, bool | None] = {rule.connections: True for rule in self._rules}
         self._simulation, self._room = simulation, room
+        self._probe = columns_of(self.network).probe
         self._origin = simulation.state() if origin is None else origin
         self._begin(self._origin if begin is None else begin, turned, fed or {})
         self.body = drawn(simulation.skeleton, tuple(simulation.sensors), self._seen.snapshot.pose)
@@ -57,11 +62,13 @@ class SimulatedSource:
         self.history = Ring(len(self.network.neurons), len(self.network.connections))
         self._fading = Fading(self.network)
         self._fed, self._turned = dict(fed), list(turned)
+        #: what was true after the current step, where events have changed it since
+        self._ended: After | None = None
         self._listed: tuple[list[Turned], tuple[Turned, ...]] = ([], ())
         self._started = self._last = state.k
         self._stuck = False
         self._simulation.restore(state)
-        self._keep()
+        self._keep(self._kept())
         self._seen = self._make(None)
 
     @property
@@ -105,9 +112,14 @@ class SimulatedSource:
             return self._all_learn
         return carried_out(self._rules, stopped)
 
+    @property
+    def backend(self) -> str:
+        """The name of the backend that makes its steps."""
+        return self._simulation.backend
+
     def leave(self) -> State:
-        """The state from which the current step is computed. The source must not be used afterwards. Raises BodyError
-        where the body cannot be kept."""
+        """The state from which the current step is computed, or where none before it is kept, the next one. The source
+        must not be used afterwards, but for ``stay``. Raises BodyError where the body cannot be kept."""
         run, step = self._simulation, self.step
         kept = self._past.before(step)
         if kept is not None:
@@ -117,27 +129,51 @@ class SimulatedSource:
         return run.state()
 
     def stay(self) -> None:
-        """After ``leave``, go on behind the current step all the same."""
-        if self._simulation.k == self.step:
-            self.history.cut(self.step - 1)
-            self._make(None)
+        """After ``leave``, also where it has failed, go on behind the current step all the same."""
+        if self._simulation.k != self.step + 1:
+            with self._whole():
+                self._retake()
 
     def seen(self) -> Seen:
         """What a picture of the current step is made from."""
         return self._seen
 
+    def after(self) -> After:
+        """What is true after the current step, with what was turned at it; weights of all connections (m,)."""
+        turned = self._turned[bisect_left(self._turned, self.step, key=attrgetter("step")) :]
+        by_hand = any(entry.step == self.step and isinstance(entry.turn, Set | Lesion | Mend) for entry in turned)
+        return self._simulation.after() if by_hand or self._ended is None else self._ended
+
     def advance(self) -> bool:
-        """Go on by one step; False, and a warning, where the body cannot."""
-        try:
+        """Go on by one step. Raises SourceError where the body cannot, and then it stands where it stood."""
+        self._check_going()
+        with self._whole():
             self._next(self._seen.snapshot)
-        except BodyError as error:
-            warnings.warn(str(error), RuntimeWarning, stacklevel=2)
-            self._stuck = not self._retake()
-            return False
         return True
 
+    @contextmanager
+    def _whole(self) -> Iterator[None]:
+        """Whatever fails in this block, the source stands where it stood. Its attributes are replaced, and of what they
+        hold nothing is taken away before all that can fail is done. Raises SourceError for what the body cannot do."""
+        before = vars(self).copy()
+        try:
+            yield
+        except Exception as error:
+            vars(self).update(before)
+            try:
+                self._stuck = not self._retake()
+            except Exception:  # nothing leads back
+                self._stuck = True
+            if isinstance(error, BodyError):
+                raise SourceError(str(error)) from None
+            raise
+
+    def _check_going(self) -> None:
+        if self._stuck:
+            raise SourceError("the body cannot go on from here: begin anew")
+
     def _retake(self) -> bool:
-        """Be again behind the current step, where a step after it was begun; False where nothing before it is kept."""
+        """Be again behind the current step, wherever the simulation is; False where nothing before it is kept."""
         kept, run = self._past.before(self.step + 1), self._simulation
         if kept is not None:
             self._take(kept)
@@ -153,7 +189,7 @@ class SimulatedSource:
         if known is not None:  # whatever was turned here is turned again
             self._take(known)
         elif self._simulation.k % EVERY == 0:
-            self._keep()
+            self._keep(self._kept())
         place = bisect_right(self._turned, self.step, key=attrgetter("step"))
         if place and self._turned[place - 1].step == self.step:
             self._seen = self._turned_seen()
@@ -163,30 +199,31 @@ class SimulatedSource:
         return max(self.reach.first, self.step + by)
 
     def go(self, step: int) -> None:
-        """Go to a step within reach, to those of the past by making them again. Raises SourceError."""
+        """Go to a step within reach, to those of the past by making them again. Raises SourceError, also where the body
+        cannot do again what it has done; then it stands where it stood."""
         reach = self.reach
         if not reach.first <= step <= reach.last:
             raise SourceError(f"step {step} is out of reach: the past goes from step {reach.first} to {reach.last}")
-        kept = self._past.before(step - 1) or self._past.before(step)
-        if step != self.step and kept is not None and (step < self.step or kept.state.k > self._simulation.k):
-            self._take(kept)
-            try:
+        if step == self.step:
+            return
+        self._check_going()
+        with self._whole():
+            kept = self._past.before(step - 1) or self._past.before(step)
+            if kept is not None and (step < self.step or kept.state.k > self._simulation.k):
+                self._take(kept)
                 self._next(None)
-            except BodyError as error:  # which went on before: it does not do the same again
-                raise SourceError(str(error)) from None
-        while self.step < step and self.advance():
-            pass
+            while self.step < step:
+                self._next(self._seen.snapshot)
 
     def restart(self) -> None:
         """Begin anew, at step 0. Raises SourceError where the body cannot."""
-        try:
+        with self._whole():
             self._begin(self._origin, (), {})
-        except BodyError as error:
-            raise SourceError(str(error)) from None
 
     def recall(self, steps: int) -> list[Seen]:
         """What was seen of the last steps."""
-        return recalled(self, steps)
+        with self._whole():
+            return recalled(self, steps)
 
     def branch(self) -> None:
         """Forget what came after the current step."""
@@ -198,33 +235,51 @@ class SimulatedSource:
 
     def turn(self, what: Turn) -> None:
         """Take a turn, from the next step on. Raises SourceError."""
-        if self._stuck:
-            raise SourceError("the body cannot go on from here: begin anew")
+        self._check_going()
+        with self._whole():
+            refused = self._turn(what)
+            if not refused:
+                kept = self._kept()
+                self.branch()
+                self._keep(kept)
+                before = self._turned
+                if before and before[-1].step == self.step and same_value(before[-1].turn, what):
+                    before = before[:-1]
+                self._turned = [*before, Turned(self.step, what)]
+                self._seen = self._turned_seen()
+        if refused:
+            raise SourceError(refused)
+
+    def _turn(self, what: Turn) -> str:
+        """Apply a turn; why it cannot be, and then nothing has changed."""
         try:
             if isinstance(what, Feed):
                 self._fed = fed_by(self.network, self._fed, what)
             else:
                 turn(self._simulation, what)
         except (ValueError, KeyError) as error:
-            raise SourceError(str(error)) from None
-        self.branch()
-        self._keep()
-        if self._turned and self._turned[-1].step == self.step and same_value(self._turned[-1].turn, what):
-            self._turned.pop()
-        self._turned.append(Turned(self.step, what))
-        self._seen = self._turned_seen()
+            return str(error)
+        return ""
 
     def _turned_seen(self) -> Seen:
         """What is seen of this step after a turn: what is lesioned and clamped is that of the next one."""
-        return Seen(self._seen.snapshot, *self._simulation.lesioned, self._simulation.held)
+        neurons, connections = self._simulation.lesioned
+        return replace(
+            self._seen, lesioned_neurons=neurons, lesioned_connections=connections, clamped=self._simulation.held
+        )
 
-    def _keep(self) -> None:
+    def _kept(self) -> Kept | None:
+        """All that the run needs to go on from here; None with a body that cannot be kept."""
         try:
-            state = self._simulation.state()
-        except BodyError:  # a body that cannot be kept
+            return Kept(self._simulation.state(), self._fed, copy(self._fading))
+        except BodyError:
+            return None
+
+    def _keep(self, kept: Kept | None) -> None:
+        if kept is None:
             self._past = Past(self._room)
         else:
-            self._past.keep(Kept(state, self._fed, copy(self._fading)))
+            self._past.keep(kept)
 
     def _take(self, kept: Kept) -> None:
         self._simulation.restore(kept.state)
@@ -239,16 +294,18 @@ class SimulatedSource:
             run.step({name: values if len(values) > 1 else values[0] for name, values in self._fed.items()})
         except ParameterError as error:  # what events set does not go with what was turned: the step was made without
             warnings.warn(str(error), RuntimeWarning, stacklevel=2)
+        self._ended = run.ended
         previous = before.weights if before is not None and before.step == step - 1 else None
         activity = run.activity
         self.history.note(step, activity, weights)
         seen = self._fading.follow(np.array([step]), activity[None]) if self._fading else None
-        return Seen(Snapshot(step, activity, weights, previous, seen, pose, run.sensed), *lesioned, held)
+        snapshot = Snapshot(step, activity, weights, previous, seen, pose, run.sensed)
+        return Seen(snapshot, *lesioned, held, run.probed(self._probe))
 
 
 def _without_drags(turned: Sequence[Turned]) -> tuple[Turned, ...]:
     """The turns without the values that a slider only passed while it was dragged."""
-    pairs = zip(turned, [*turned[1:], None], strict=True)
+    pairs = zip_longest(turned, turned[1:])
     return tuple(one for one, after in pairs if after is None or not _dragged_on(one.turn, after.turn))
 
 

@@ -19,7 +19,7 @@ from neurovis_spec.body import Skeleton
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.history import History
 from neurovis_spec.live.turns import Turn
-from neurovis_spec.runtime.recording import Snapshot
+from neurovis_spec.runtime.recording import After, Snapshot
 from neurovis_spec.scene.poses import start_of
 
 Mask: TypeAlias = npt.NDArray[np.bool_]
@@ -51,12 +51,14 @@ class Capabilities:
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
     """What a picture of a step is made from: its snapshot, the lesioned neurons (n,) and connections (m,), and the
-    clamped neurons (n,)."""
+    clamped neurons (n,); and for a recording the states that outputs of the spec name, None where they are not known.
+    """
 
     snapshot: Snapshot
     lesioned_neurons: Mask
     lesioned_connections: Mask
     clamped: Mask
+    states: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +92,8 @@ class Turned:
 
 
 class Source(Protocol):
-    """What a live view shows. It has a current step as soon as it is made."""
+    """What a live view shows. It has a current step as soon as it is made. What raises, a SourceError or anything else,
+    leaves it where it stood."""
 
     network: Network
     capabilities: Capabilities
@@ -132,12 +135,23 @@ class Source(Protocol):
         """The past activities and weights, for traces; another thread may read it."""
         ...
 
+    @property
+    def backend(self) -> str:
+        """The name of the backend that makes its steps, "" where that is not known."""
+        ...
+
     def seen(self) -> Seen:
         """What a picture of the current step is made from."""
         ...
 
+    def after(self) -> After:
+        """What is true after the current step, with what was turned at it; its weights are those of all connections
+        (m,)."""
+        ...
+
     def advance(self) -> bool:
-        """Go on by one step; False, and no change, at the end or where the next step has not arrived."""
+        """Go on by one step; False, and no change, at the end or where the next step has not arrived. Raises
+        SourceError."""
         ...
 
     def number_after(self, by: int) -> int:
@@ -150,7 +164,7 @@ class Source(Protocol):
         ...
 
     def restart(self) -> None:
-        """Begin anew: turns and past steps are forgotten."""
+        """Begin anew: turns and past steps are forgotten. Raises SourceError."""
         ...
 
     def recall(self, steps: int) -> list[Seen]:

@@ -15,6 +15,8 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
+from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.live.appearance import AS_IT_IS, Appearance
 from neurovis_spec.live.declared import declared
@@ -78,6 +80,8 @@ class View:
     appearance: Appearance
     #: the same network, drawn otherwise
     otherwise: Callable[[Appearance], View]
+    #: what stays of a picture of the same network in which more changes, at least so wide (page units)
+    planned: Callable[[Network, float], tuple[Gathered, Plan]]
 
     def look(self, seen: Seen) -> Look:
         """What a step looks like."""
@@ -178,7 +182,15 @@ def view_of(
         drawn.network, scene, rows, constants, {**declared(compiled), "themes": list(THEMES), "themed": themed}
     )
     otherwise = partial(view_of, compiled, gains, theme, engine, layout=layout)
-    return View(drawn, seen, planned, largest, stands, words, appearance, otherwise)
+    anew = partial(_planned, stands, seen, settings)
+    return View(drawn, seen, planned, largest, stands, words, appearance, otherwise, anew)
+
+
+def _planned(
+    stands: Layout, gains: Gains, settings: RenderSettings, network: Network, narrowest: float
+) -> tuple[Gathered, Plan]:
+    drawn = gathered(network, settings.collapse)
+    return drawn, plan(drawn, stands, gains, settings, narrowest=narrowest)
 
 
 def _scene(planned: Plan, gains: Gains) -> Scene:

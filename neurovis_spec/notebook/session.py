@@ -13,7 +13,7 @@ from typing import Final, TypeAlias
 
 from neurovis_spec.live.commands import Command, Pause, Play, Present
 from neurovis_spec.live.hub import AHEAD, Client, Hub
-from neurovis_spec.live.protocol import ProtocolError, findings_message, refused_message
+from neurovis_spec.live.protocol import ProtocolError, refused_message
 from neurovis_spec.live.reception import Reception
 from neurovis_spec.live.run import Done, Refuse, Run, Shown, Stage
 
@@ -40,7 +40,7 @@ class Session:
         self._loop = asyncio.new_event_loop()
         self._thread = Thread(target=self._serve, name="notebook", daemon=True)
         self._hub = Hub(self._loop)
-        self._run = Run(*stage, self._show, failed=self._fail, playing=False)
+        self._run = Run(*stage, self._show, tell=self._tell, playing=False)
         self._reception = Reception(self._hub, self._run)
         self._frames: dict[str, tuple[Client, asyncio.Task[None]]] = {}
         self._ended = False
@@ -149,6 +149,5 @@ class Session:
         self._hub.show(shown)
         self._loop.call_soon_threadsafe(self._follow)
 
-    def _fail(self) -> None:
-        words = findings_message(str(self._run.failure), errors=True)
-        self._loop.call_soon_threadsafe(self._hub.tell, words, "findings")
+    def _tell(self, reason: str) -> None:
+        self._hub.tell_soon(refused_message(reason))

@@ -140,12 +140,18 @@ class LiveWidget(anywidget.AnyWidget):
             raise traitlets.TraitError(str(error)) from None
 
     def _ask(self, command: Command) -> None:
-        """Ask for something, and wait until it is done. Raises ValueError where it is refused."""
+        """Ask for something, and wait until it is done. Raises ValueError where it is refused, TimeoutError where the
+        run does not come to it for long."""
         answer: Future[None] = Future()
         self._session.ask(
             command, lambda reason: answer.set_exception(ValueError(reason)), lambda: answer.set_result(None)
         )
-        answer.result(_PATIENCE)
+        try:
+            answer.result(_PATIENCE)
+        except TimeoutError:
+            what = type(command).__name__.lower()
+            message = f"the run has not come to '{what}' for {_PATIENCE:g} s, as its steps take long: it will later"
+            raise TimeoutError(message) from None
         self._follow_run()
 
     def _follow_run(self) -> None:

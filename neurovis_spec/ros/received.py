@@ -21,7 +21,7 @@ from neurovis_spec.live.clock import FRAMES
 from neurovis_spec.live.history import Ring
 from neurovis_spec.live.source import NOTHING, Capabilities, Mask, Reach, Seen, SourceError, Turned
 from neurovis_spec.live.turns import Turn, same_value
-from neurovis_spec.runtime.recording import Snapshot
+from neurovis_spec.runtime.recording import After, Snapshot
 from neurovis_spec.scene.fading import Fading
 
 #: bytes of the steps that are kept
@@ -202,11 +202,27 @@ class ReceivedSource:
         """Whether connections learn, by the reference that names them; empty where the network accepts no turns."""
         return {} if self._steering is None else self._steering.learning
 
+    @property
+    def backend(self) -> str:
+        """What makes the steps elsewhere is not known."""
+        return ""
+
     def seen(self) -> Seen:
         """What a picture of the current step is made from."""
         if self._steering is not None and self._following:
             return Seen(self._show(self._at), *self._steering.touched)
         return self._untouched(self._show(self._at))
+
+    def after(self) -> After:
+        """What is true after the current step, as far as it is known; weights of all connections (m,)."""
+        given = {name: value for name, value in self.parameters.items() if value != self.network.parameters[name]}
+        seen, row = self.seen(), self._at
+        with self._lock:
+            place = bisect_right(self._rows, row.step, key=attrgetter("step"))
+            following = self._rows[place] if place < len(self._rows) else row
+        weights = self._all_weights(following if following.step == row.step + 1 else row)
+        lesioned = np.flatnonzero(seen.lesioned_neurons), np.flatnonzero(seen.lesioned_connections)
+        return After(weights, row.step + 1, given, *lesioned)
 
     def _untouched(self, snapshot: Snapshot) -> Seen:
         """A step without lesions and clamps, as these are not known of it."""

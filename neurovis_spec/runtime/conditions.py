@@ -136,12 +136,15 @@ class Controls:
         self._patcher = Patcher(self.network.settable, self.by)
         self._changes = {change.at: change for change in self.network.changes}
 
+    def due(self, state: State) -> bool:
+        """Whether events change something at the step to come, and have not yet."""
+        return state.k in self._changes and state.begun != state.k
+
     def begin(self, state: State) -> bool:
         """What events change at the step to come, once; whether they do. Raises PatchError."""
-        change = self._changes.get(state.k)
-        if change is None or state.begun == state.k:
+        if not self.due(state):
             return False
-        state.begun = state.k
+        change, state.begun = self._changes[state.k], state.k
         with np.errstate(all="ignore"):
             self.apply(state, change)
         return True

@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import reprlib
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
@@ -29,12 +30,13 @@ from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.expressions.tree import Number
 from neurovis_spec.language.references import Sum, parse
 from neurovis_spec.runtime.backend import Backend, Ready, ready
-from neurovis_spec.runtime.columns import ALL, Keep, probe_of
+from neurovis_spec.runtime.columns import ALL, Keep, Probe, probe_of
 from neurovis_spec.runtime.conditions import Controls
 from neurovis_spec.runtime.embodied import Embodied, embodied
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.names import Names, names_of
-from neurovis_spec.runtime.recording import Recording, RecordingError, UnknownNameError, unknown
+from neurovis_spec.runtime.record import after
+from neurovis_spec.runtime.recording import After, Recording, RecordingError, UnknownNameError, unknown
 from neurovis_spec.runtime.references import find_connections, find_neurons
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.state import State, initial_state
@@ -75,6 +77,7 @@ class Simulation:
         self._begin.backend = self._made.name
         self._apply(self._begin)
         self._recorder: Recorder | None = None
+        self._ended: After | None = None
         self.reset()
 
     def _made_by(self, before: str) -> None:
@@ -265,9 +268,25 @@ class Simulation:
             recorder.end(state)
         if body is not None:
             body.move(state)
+        self._ended = self.after() if self._controls.due(state) else None
         if self._apply(state):  # events of the next step apply now, so that ``weights`` are those of the next step
             self._reader.use(state)
         return self.outputs
+
+    @property
+    def ended(self) -> After | None:
+        """What was true after the last step, where events of the step to come have changed something since; None where
+        ``after`` is that. Its weights are those of all connections (m,)."""
+        return self._ended
+
+    def after(self) -> After:
+        """What is true now, after the last step, with what events of the step to come and the caller have changed
+        since. Its weights are those of all connections (m,)."""
+        return replace(after(self.network, self._state), weights=self.connection_weights)
+
+    def probed(self, probe: Probe) -> FloatArray | None:
+        """The states of models and rules that a probe reads, (columns,); None where it reads none."""
+        return probe.now(self._state) if probe.names else None
 
     @property
     def outputs(self) -> Mapping[str, np.float64 | FloatArray]:
@@ -368,7 +387,7 @@ class Simulation:
         """Go on from this state, with its backend unless another is asked for."""
         if state.backend not in ("", self._made.name):
             self._made_by(state.backend)
-        state.backend, self._state = self._made.name, state
+        state.backend, self._state, self._ended = self._made.name, state, None
         self._reader.use(state)
 
     def state(self) -> State:

@@ -28,7 +28,7 @@ from neurovis_spec.scene.themes import theme_of
 from neurovis_spec.scene.views import AXIS, Block, BlockSpace, Drawing, Maker, span_of
 
 #: How wide a page without a picture of the network is, and the least with one (user units).
-_WIDTH = 760.0
+PAGE = 760.0
 #: User units above the first view without a heading, between views, and beneath the last.
 _TOP, _GAP, _FOOT = 8.0, 14.0, 12.0
 #: Beside a network, other views take at most this share of a stated height.
@@ -73,7 +73,7 @@ def figure(
         if settings.size is not None:
             size = settings.size[0], _height_left(list(others.values()), head, settings.size)
         own = replace(settings, size=size, title=False)
-        picture = film(network, layout, maker.snapshots(), seen, own, fps, _WIDTH if others else 0.0)
+        picture = film(network, layout, maker.snapshots(), seen, own, fps, PAGE if others else 0.0)
         blocks: list[Block] = [others.get(number, Drawing(picture)) for number in range(len(panels))]
         scene = picture.scene
         height = None if settings.size is None else settings.size[1] / scene.density
@@ -134,8 +134,8 @@ def _title(network: Network, settings: RenderSettings) -> str | None:
 def _sheet(settings: RenderSettings) -> _Sheet:
     """A page without a picture of the network."""
     if settings.size is None:
-        return _Sheet(_WIDTH, None, next(d for d in DENSITIES if d == 1 or d * _WIDTH <= MOST[0]))
-    density = min(max(1.0, settings.size[0] / _WIDTH), DENSEST)
+        return _Sheet(PAGE, None, next(d for d in DENSITIES if d == 1 or d * PAGE <= MOST[0]))
+    density = min(max(1.0, settings.size[0] / PAGE), DENSEST)
     return _Sheet(settings.size[0] / density, settings.size[1] / density, density)
 
 
@@ -152,7 +152,7 @@ def _needed(blocks: Sequence[Block], width: float) -> tuple[float, float]:
 
 def _height_left(others: Sequence[Block], head: float, size: tuple[int, int]) -> int:
     """How many pixels of a page's height the picture of the network has."""
-    density = min(max(1.0, size[0] / _WIDTH), DENSEST)
+    density = min(max(1.0, size[0] / PAGE), DENSEST)
     fixed, free = _needed(others, size[0] / density)
     taken = (fixed + free + head + _FOOT + _GAP) * density
     return max(round(size[1] - min(taken, _SHARE * size[1])), 16)
