@@ -43,8 +43,9 @@ import neurovis_spec as nv
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.language.format.canonical import format_read
 from neurovis_spec.live.saving import recording as saved
+from neurovis_spec.live.saving import told_by
 from neurovis_spec.live.simulated import SimulatedSource
-from neurovis_spec.live.source import Seen, SourceError, Turned
+from neurovis_spec.live.source import SourceError, Turned
 from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn
 from neurovis_spec.runtime.recording import Recording
 
@@ -150,14 +151,12 @@ def live(compiled: CompiledNetwork, author: Author, choose: random.Random, folde
     for one in seen:
         if not np.array_equal(one.snapshot.activity, run.activity[one.snapshot.step], equal_nan=True):
             raise BrokenError(f"step {one.snapshot.step} of {last}: activity; {told} {events}")
-    _compare_saved(compiled, source, seen, run, f"{told} {events}", folder)
+    _compare_saved(compiled, source, run, f"{told} {events}", folder)
 
 
-def _compare_saved(
-    compiled: CompiledNetwork, source: SimulatedSource, seen: Sequence[Seen], run: Recording, told: str, folder: Path
-) -> None:
+def _compare_saved(compiled: CompiledNetwork, source: SimulatedSource, run: Recording, told: str, folder: Path) -> None:
     path = folder / "saved.npz"
-    path.write_bytes(saved(compiled.network, seen, source.parameters))
+    path.write_bytes(saved(compiled.network, told_by(source, 10_000)))
     found = nv.load(path)
     names = compiled.network.connection_names
     for step in found.step.tolist():
