@@ -7,6 +7,7 @@ import json
 import struct
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -22,9 +23,9 @@ from neurovis_spec.live.hub import Client, Hub
 from neurovis_spec.live.protocol import FRAME, SCENE, body_message
 from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.run import Run, Shown
-from neurovis_spec.live.saving import film, picture
+from neurovis_spec.live.saving import film, picture, told_by
 from neurovis_spec.live.simulated import SimulatedSource
-from neurovis_spec.live.source import Drawn, Source
+from neurovis_spec.live.source import NOTHING, Drawn, Source
 from neurovis_spec.live.view import View, view_of
 
 
@@ -153,16 +154,18 @@ def test_a_body_of_more_numbers_than_a_frame_holds_is_not_drawn() -> None:
     assert json.loads(body_message(replace(Drawn(vast))))["skeleton"] is None
 
 
-def test_a_picture_and_a_film_that_are_saved_have_the_body_below_the_network() -> None:
+def test_a_picture_and_a_film_that_are_saved_have_the_body_below_the_network(tmp_path: Path) -> None:
     network = carted()
     source, view = SimulatedSource(network.simulator()), view_of(network, network.gains)
     for _ in range(20):
         source.advance()
-    seen = source.recall(10)
-    plain = ET.fromstring(picture(view, seen[-1]))
-    for made in (picture(view, seen[-1], source.body), film(view, seen, source.body)):
+    told = told_by(source, 10)
+    plain = ET.fromstring(picture(view, replace(told, body=NOTHING)))
+    network.render(tmp_path / "x.svg", step=19, view=["network", "body"])
+    rendered = ET.parse(tmp_path / "x.svg").getroot()
+    for made in (picture(view, told), film(view, told)):
         root = ET.fromstring(made)
         assert [group for group in root.iter(f"{NS}g") if group.attrib.get("data-view") == "body"]
         assert float(root.attrib["height"]) > float(plain.attrib["height"]) + 200
-        assert root.attrib["width"] == plain.attrib["width"]
+        assert root.attrib["width"] == rendered.attrib["width"]
         assert len([one for one in root.iter() if "data-neuron" in one.attrib]) == len(network.network.neurons)
