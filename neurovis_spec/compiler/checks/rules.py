@@ -1,4 +1,5 @@
-"""Rules in use that change no weight: with a rate of 0, without episodes, or because a signal is the own target.
+"""Rules in use that change no weight, with a rate of 0, without episodes, or because a signal is the own target; and
+signals that are each connection's own target where another neuron may be meant.
 
 In: what a spec without errors became. Out: warnings. Whether a rule changes weights is found by trial: it is carried
 out for several steps and episodes at a few arbitrary points. So ``A -> O`` that learns by ``delta`` from the target O
@@ -16,7 +17,7 @@ from neurovis_spec.compiler.checks.compiled import Compiled, WrittenEntry
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Rule
-from neurovis_spec.diagnostics import Findings, shorten
+from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.expressions.arrays import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.grammar import ACTIVITIES
@@ -27,7 +28,7 @@ _STEPS = 6
 
 
 def check_rules(compiled: Compiled, findings: Findings) -> None:
-    """Warn of every entry whose rule changes no weight."""
+    """Warn of every entry whose rule changes no weight, or has each target for its own signal."""
     watched = _watched(compiled.network)
     for entry in compiled.entries.values():
         learning, choice = entry.learning, entry.body.plasticity
@@ -35,7 +36,7 @@ def check_rules(compiled: Compiled, findings: Findings) -> None:
             continue
         for signal in learning.rule.signals:
             if all(_is_own(bundle, signal) for bundle in entry.bundles):
-                _check_signal(entry, signal, findings)
+                _check_signal(entry, signal, compiled.network, findings)
         if watched.isdisjoint(bundle.name for bundle in entry.bundles):  # else it is there for its states
             _check_rate(entry, findings)
             _check_bounds(entry, findings)
@@ -85,19 +86,44 @@ def _is_own(bundle: Bundle, signal: str) -> bool:
     return bundle.learning is not None and np.array_equal(bundle.learning.signals[signal], bundle.targets)
 
 
-def _check_signal(entry: WrittenEntry, signal: str, findings: Findings) -> None:
+def _check_signal(entry: WrittenEntry, signal: str, network: Network, findings: Findings) -> None:
     learning, choice = entry.learning, entry.body.plasticity
     assert learning is not None
     assert choice is not None
     rule = learning.rule
-    if changes(rule, learning.parameters, (signal,)) or not changes(rule, learning.parameters):
-        return
     span = next(setting.value.span for setting in choice.settings.entries if setting.name == signal)
+    if changes(rule, learning.parameters, (signal,)) or not changes(rule, learning.parameters):
+        if any(_is_of_others(bundle) for bundle in entry.bundles):
+            _tell_own(entry, signal, span, network, findings)
+        return
     message = (
         f"'{shorten(learning.texts[signal])}' is this connection's own end: '{signal}' is then always 'post', and "
         f"'{rule.name}' changes no weight"
     )
     findings.warning("no-effect", span, message, "name a neuron or an input that says what 'post' should be")
+
+
+def _is_of_others(bundle: Bundle) -> bool:
+    """Whether a name of all targets may be meant for others than the one of each connection: of several targets one has
+    several connections, or one from another of them."""
+    targets, counts = np.unique(bundle.targets, return_counts=True)
+    among = np.isin(bundle.sources, targets) & (bundle.sources != bundle.targets)
+    return len(targets) > 1 and bool((counts > 1).any() or among.any())
+
+
+def _tell_own(entry: WrittenEntry, signal: str, span: Span, network: Network, findings: Findings) -> None:
+    """Of a group that drives itself the source is probably meant, of another one all of its neurons together."""
+    learning = entry.learning
+    assert learning is not None
+    called, names = shorten(learning.texts[signal]), network.neurons.names
+    first = next(bundle for bundle in entry.bundles if _is_of_others(bundle))
+    one = names[int(first.targets[0])]
+    message = f"'{called}' gives each connection its own target as '{signal}', which is 'post' already"
+    if np.isin(first.sources, first.targets).any():
+        hint = "in the rule the source is 'pre' (as it arrives) or 'sent' (as it is now), and the target 'post'"
+    else:
+        hint = f"in the rule the target is 'post'; all of '{called}' as one signal is a neuron that they drive"
+    findings.warning("own-signal", span, message, f"{hint}; one neuron for all connections is named, as in {one}")
 
 
 def _check_bounds(entry: WrittenEntry, findings: Findings) -> None:
