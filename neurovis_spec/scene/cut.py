@@ -6,6 +6,7 @@ beginning of the name and an ellipsis; the end of the name instead, if others be
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterable
 
 from neurovis_spec.scene import texts
@@ -15,10 +16,12 @@ class Cut:
     """Shortens names: to their beginning if that tells a name from the others, else to their end."""
 
     def __init__(self, names: Iterable[str]) -> None:
-        self._begins: dict[str, int] = {}
-        for name in set(names):
-            for end in range(1, len(name)):
-                self._begins[name[:end]] = self._begins.get(name[:end], 0) + 1
+        self._names = sorted(set(names))
+
+    def _is_shared(self, begin: str) -> bool:
+        """Whether two names or more go on behind this beginning: in order they stand together, right behind it."""
+        second = bisect_right(self._names, begin) + 1
+        return begin != "" and second < len(self._names) and self._names[second].startswith(begin)
 
     def shorten(self, name: str, size: float, room: float, weight: int = 600) -> str:
         """The name, or what of its beginning (or end) fits into ``room`` with an ellipsis; '' where nothing does.
@@ -28,7 +31,7 @@ class Cut:
         ('…nding_2', 'photore…')
         """
         text = texts.shorten(name, size, room, weight)
-        if text in (name, "") or self._begins.get(text[:-1], 0) < 2:
+        if text in (name, "") or not self._is_shared(text[:-1]):
             return text
         return texts.shorten(name[::-1], size, room, weight)[::-1]
 

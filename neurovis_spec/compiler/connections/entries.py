@@ -21,6 +21,7 @@ from neurovis_spec.compiler.events.settable import Assembled, Distance, Part
 from neurovis_spec.compiler.limits import LONGEST_DELAY, Limits, amount
 from neurovis_spec.compiler.names.references import Directory
 from neurovis_spec.compiler.names.scope import Scope
+from neurovis_spec.compiler.neurons.labels import check_length
 from neurovis_spec.compiler.neurons.populate import Population
 from neurovis_spec.compiler.values.constants import Constants, Randomness, Value
 from neurovis_spec.compiler.values.draws import Stream
@@ -113,6 +114,8 @@ class EntryBuilder:
         """The connections; UNKNOWN where anything of the entry is invalid, which is reported."""
         body, findings = self.body, self.constants.findings
         before = findings.errors
+        if body.label is not None:
+            check_length(body.label, findings)
         delay = 1 if body.delay is None else self.constants.integer(body.delay, "a delay", 0, LONGEST_DELAY)
         sound = findings.errors
         with self.constants.following() as centre_cells:

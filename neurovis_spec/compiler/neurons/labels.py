@@ -8,19 +8,36 @@ An expression knows the parameters, ``i`` and ``n`` (as in ``bias``) and, in a m
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.values.constants import Value
+from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.templates import Hole, pieces
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 
+#: the most characters of a label: it is one line of a picture, and a description may say the rest
+_LONGEST: Final = 1000
+
+
+def check_length(label: Located[str], findings: Findings) -> bool:
+    """Whether a label, as written, is no longer than one may be; a finding if it is."""
+    if len(label.value) <= _LONGEST:
+        return True
+    message = f"this label has {len(label.value):,} characters; {_LONGEST:,} are the most"
+    findings.error("label-too-long", label.span, message, "shorten it, and say the rest under 'description'")
+    return False
+
 
 def labels_of(texts: Sequence[Located[str]], n: int, scope: Scope) -> tuple[str, ...] | Unknown:
     """The labels of n neurons: of one text, or of one each; UNKNOWN where an expression has none."""
+    short = [check_length(text, scope.constants.findings) for text in texts]
+    if not all(short):
+        return UNKNOWN
     parts = [pieces(text.value) for text in texts]
     if all(isinstance(piece, str) for part in parts for piece in part):
         plain = tuple("".join(map(str, part)) for part in parts)

@@ -11,6 +11,7 @@ from typing import Final
 
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.yaml import faults
+from neurovis_spec.language.yaml.crowded import MOST_ENTRIES
 from neurovis_spec.language.yaml.packed import PACK_FROM, Packer, balance
 from neurovis_spec.language.yaml.refusals import DEEPEST, ReadingStoppedError
 from neurovis_spec.language.yaml.scalars import NumberRangeError, resolve
@@ -272,6 +273,11 @@ class Brackets(Scanner):
             return
         if name in entries:
             name = f"{name}\0{len(entries)}"
+        if len(entries) >= MOST_ENTRIES:
+            if self._trial:
+                raise UnsoundError(faults.NOWHERE, self._at)
+            self._refuse.too_many(key.span)
+            raise ReadingStoppedError
         entries[name] = Entry(key, value)
 
     def _simple_entry(self, match: re.Match[str], entries: dict[str, Entry]) -> Scalar | None:
@@ -281,7 +287,7 @@ class Brackets(Scanner):
             value = resolve(match[2])
         except NumberRangeError:
             return None
-        if name in entries or resolve(name) != name or len(name) > LONGEST_KEY:
+        if name in entries or resolve(name) != name or len(name) > LONGEST_KEY or len(entries) >= MOST_ENTRIES:
             return None
         file, line, start = self._file, self._line, self._start - 1
         key = Scalar(name, Span(file, line, match.start() - start, line, match.end(1) - start))

@@ -14,8 +14,10 @@ from typing import Final
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.gc_paused import uncollected
 from neurovis_spec.language.yaml.characters import FORBIDDEN, REPLACEMENT, Lines, character_name
+from neurovis_spec.language.yaml.crowded import crowded
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
 from neurovis_spec.language.yaml.parser import Parser
+from neurovis_spec.language.yaml.refusals import ONE_GROUP, TOO_MANY
 from neurovis_spec.language.yaml.source import Mapping, Node, Scalar, SourceDocument, describe
 
 LARGEST: Final = 64 << 20  # bytes
@@ -52,6 +54,11 @@ def read_text(text: str, file: str, findings: Findings) -> SourceDocument | None
     findings.sources[file] = text
     if len(text) > LARGEST or (4 * len(text) > LARGEST and len(text.encode("utf-8", "replace")) > LARGEST):
         findings.error("too-large", Span(file, 1, 1, 1, 1), f"the text is larger than {LARGEST >> 20} MiB")
+        return None
+    many = crowded(text)
+    if many is not None:
+        line, column = text.count("\n", 0, many) + 1, many - text.rfind("\n", 0, many)
+        findings.error("too-large", Span(file, line, column, line, column + 1), TOO_MANY, ONE_GROUP)
         return None
     lines = Lines(text)
     clean = _without_forbidden(text, file, lines, findings)

@@ -10,6 +10,7 @@ from typing import Final
 
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span
 from neurovis_spec.language.yaml.characters import FORBIDDEN, REPLACEMENT, character_name
+from neurovis_spec.language.yaml.crowded import MOST_ENTRIES
 from neurovis_spec.language.yaml.faults import CODE, Words
 from neurovis_spec.language.yaml.scalars import NumberRangeError
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Scalar, Sequence
@@ -18,6 +19,8 @@ DEEPEST: Final = 64
 _MOST_FINDINGS: Final = 1000
 
 _USE_NAMES = "a constant used in several places belongs in `parameters`, a part used in several places in `modules`"
+TOO_MANY: Final = f"a mapping has at most {MOST_ENTRIES:,} entries; this is one more"
+ONE_GROUP: Final = "neurons that are alike are one group: K: {count: 1000}"
 
 
 class ReadingStoppedError(Exception):
@@ -66,6 +69,10 @@ class Refusals:
     def too_deep(self, span: Span) -> None:
         """Refuse a collection below the deepest level."""
         self._error("too-deep", span, f"lists and mappings are nested more than {DEEPEST} deep")
+
+    def too_many(self, span: Span) -> None:
+        """An entry that its mapping is too large for."""
+        self._error("too-large", span, TOO_MANY, ONE_GROUP)
 
     def number(self, error: NumberRangeError, span: Span) -> None:
         """Refuse a number that cannot be held."""

@@ -1,0 +1,125 @@
+"""Texts that are too much: labels of many characters, mappings of many entries; refused early, or linear in time."""
+
+from __future__ import annotations
+
+import tracemalloc
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import neurovis_spec as nv
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.yaml import brackets, crowded
+from neurovis_spec.language.yaml.reader import read_text
+from neurovis_spec.scene.cut import Cut
+
+HEAD = "neurovis: 1\nname: x\n"
+LONG = "W" * 100_000
+
+
+def found(text: str) -> list[tuple[str, int, int, str]]:
+    with pytest.raises(nv.SpecError) as caught:
+        nv.compile_text(HEAD + text)
+    return [(item.code, item.span.line, item.span.column, item.message) for item in caught.value.diagnostics]
+
+
+# Labels
+
+
+def test_a_label_is_a_line_of_a_picture() -> None:
+    message = "this label has 1,001 characters; 1,000 are the most"
+    most, more = "W" * 1000, "W" * 1001
+    assert found(f"neurons: {{A: {{label: {more}}}}}\n") == [("label-too-long", 3, 22, message)]
+    assert found(f"neurons: {{A: {{count: 2, label: [a, {more}]}}}}\n") == [("label-too-long", 3, 36, message)]
+    entry = f"neurons: {{A: {{bias: 1}}, B: {{}}}}\nconnections: {{A -> B: {{label: {more}}}}}\n"
+    assert found(entry) == [("label-too-long", 4, 31, message)]
+    nv.compile_text(HEAD + f"neurons: {{A: {{label: {most}}}, B: {{}}}}\nconnections: {{A -> B: {{label: {most}}}}}\n")
+
+
+def test_names_of_any_length_are_cut_in_linear_memory() -> None:
+    """The beginnings of one name of 100,000 characters took 5 GB."""
+    tracemalloc.start()
+    try:
+        cut = Cut([LONG, LONG + "1", "V" * 100_000])
+        assert cut.shorten(LONG, 10, 40) == "…" + "W" * len(cut.shorten(LONG, 10, 40)[1:])
+        assert tracemalloc.get_traced_memory()[1] < 10 << 20
+    finally:
+        tracemalloc.stop()
+
+
+@given(
+    names=st.lists(st.text("ab ", max_size=6), max_size=8),
+    name=st.text("ab ", min_size=1, max_size=6),
+    room=st.floats(1, 60),
+)
+def test_an_end_is_shown_where_two_names_begin_alike(names: list[str], name: str, room: float) -> None:
+    """As often as a beginning is that of other names, counted one by one."""
+    cut = Cut([*names, name])
+    shown = cut.shorten(name, 10, room)
+    begins = [one for one in {*names, name} if len(one) > len(shown[:-1]) and one.startswith(shown[:-1])]
+    if shown and shown != name and shown.endswith("…") and shown != "…":
+        assert len(begins) < 2
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "title: {0}\nneurons: {{A: {{bias: 1}}, B: {{}}}}\n",
+        "neurons: {{A: {{bias: 1, box: {0}, description: {0}}}, B: {{}}}}\n",
+        "neurons: {{A: {{bias: 1}}, B: {{}}}}\nrender: {{title: {0}}}\n",
+    ],
+)
+def test_what_else_is_drawn_may_be_long(text: str, tmp_path_factory: pytest.TempPathFactory) -> None:
+    target = tmp_path_factory.mktemp("drawn") / "x.svg"
+    nv.compile_text(HEAD + text.format(LONG) + "connections: {A -> B: 1}\n").render(target, step=1)
+    assert target.stat().st_size < 4 << 20
+
+
+# Entries
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("".join(f"a{i}: 1\n" for i in range(30)), (21, 1)),
+        ("n:\n" + "".join(f"    a{i}: {{}}  # b: c\n" for i in range(30)), (22, 5)),
+        ("n:\n" + "".join(f"  'a{i}':\n    b: 1\n    c: 2\n" for i in range(30)), (62, 3)),
+        ("n: {" + ", ".join(f"a{i}: 1" for i in range(30)) + "}\n", (1, 155)),
+        ("n: {" + ", ".join(f"a{i}: {{b: 1}}" for i in range(30)) + "}\n", (1, 255)),
+    ],
+)
+def test_a_mapping_has_so_many_entries(text: str, place: tuple[int, int], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(brackets, "MOST_ENTRIES", 20)
+    monkeypatch.setattr("neurovis_spec.language.yaml.reader.crowded", lambda text: crowded.crowded(text, 20))
+    findings = Findings()
+    assert read_text(text, "x", findings) is None
+    (item,) = findings.sorted()
+    assert (item.code, item.span.line, item.span.column) == ("too-large", *place)
+
+
+def test_entries_of_several_mappings_are_not_counted_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(brackets, "MOST_ENTRIES", 20)
+    many = "".join(f"- a: 1\n  b: 2\n  c: {{d: 1}}\n- {i}\n" for i in range(30))
+    for text in (
+        "".join(f"a{i}:\n" + "".join(f"  b{k}: 1\n" for k in range(20)) for i in range(20)),
+        f"connections:\n{many}",
+        "m:\n" + "".join(f"  - [A{i}, B: 1]\n" for i in range(30)),
+        "t: |\n" + "".join(f"  a{i}: 1\n" for i in range(20)) + "u: 1\n",
+    ):
+        assert crowded.crowded(text, 20) is None
+
+
+def test_too_many_groups_are_refused_before_memory_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("neurovis_spec.language.yaml.reader.crowded", lambda text: crowded.crowded(text, 20_000))
+    text = HEAD + "neurons:\n" + "".join(f" A{i}: {{}}\n" for i in range(30_000))
+    findings = Findings()
+    tracemalloc.start()
+    try:
+        assert read_text(text, "x", findings) is None
+        assert tracemalloc.get_traced_memory()[1] < 1 << 18
+    finally:
+        tracemalloc.stop()
+    (item,) = findings.sorted()
+    assert (item.span.line, item.span.column) == (20_004, 2)
+    assert item.message == "a mapping has at most 1,000,000 entries; this is one more"
