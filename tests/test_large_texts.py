@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import tracemalloc
+from unittest import mock
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import neurovis_spec as nv
+from neurovis_spec.compiler.neurons import groups
 from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.expressions import undefined
+from neurovis_spec.language.unknown import Names
 from neurovis_spec.language.yaml import brackets, crowded
 from neurovis_spec.language.yaml.reader import read_text
 from neurovis_spec.scene.cut import Cut
@@ -123,3 +127,41 @@ def test_too_many_groups_are_refused_before_memory_is_taken(monkeypatch: pytest.
     (item,) = findings.sorted()
     assert (item.span.line, item.span.column) == (20_004, 2)
     assert item.message == "a mapping has at most 1,000,000 entries; this is one more"
+
+
+# Work: counted, as no clock says whether something is done anew for each of many
+
+
+def test_groups_that_are_alike_are_made_out_once() -> None:
+    plain = "".join(f"  A{i}: {{bias: 1}}\n  B{i}: {{activation: tanh, bias: {i}}}\n" for i in range(50))
+    other = "  C: {activation: {leaky_relu: {slope: 0.5}}, bias: 1}\n  D: {model: leaky_integrator, bias: 1}\n"
+    checks = "neurovis_spec.compiler.checks.undefined_operations.hazards"
+    with (
+        mock.patch.object(groups.Builder, "_made", autospec=True, side_effect=groups.Builder._made) as made,
+        mock.patch(checks, wraps=undefined.hazards) as found_out,
+    ):
+        network = nv.compile_text(f"{HEAD}neurons:\n{plain}{other}").network
+    assert made.call_count == 4
+    assert found_out.call_count <= 10
+    assert [group.activation for group in network.neurons.groups[-4:]] == ["identity", "tanh", "leaky_relu", "identity"]
+
+
+def test_an_unknown_activation_is_told_in_every_group() -> None:
+    rows = "neurons: {A: {activation: tanh}, B: {activation: wrong}, C: {activation: amiss}}\n"
+    assert [(code, line, column) for code, line, column, _ in found(rows)] == [
+        ("unknown-activation", 3, 50),
+        ("unknown-activation", 3, 74),
+    ]
+
+
+def test_a_table_of_names_is_not_gone_through_for_each() -> None:
+    seen, known = [0], Names.known
+
+    def counted(names: Names[object]) -> dict[str, object]:
+        seen[0] += len(names.declared)
+        return known(names)
+
+    text = HEAD + "inputs:\n" + "".join(f"  s{i}: {{size: 1}}\n" for i in range(300)) + "neurons: {A: {bias: 1}}\n"
+    with mock.patch.object(Names, "known", autospec=True, side_effect=counted):
+        assert len(nv.compile_text(text).warnings) == 300
+    assert seen[0] < 20 * 300

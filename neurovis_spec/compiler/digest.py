@@ -58,8 +58,14 @@ class _Writer:
         #: for each kind of record its beginning, and its fields: how each is called, in the hash and by itself
         self._records: dict[type, tuple[bytes, tuple[tuple[bytes, str], ...]]] = {}
 
+        #: texts and numbers that come time and again, as pieces
+        self._known: dict[tuple[type, object], bytes] = {}
+
     def put(self, tag: str, content: bytes = b"") -> None:
-        self._pieces.append(_piece(tag, content))
+        self._add(_piece(tag, content))
+
+    def _add(self, piece: bytes) -> None:
+        self._pieces.append(piece)
         if len(self._pieces) > _MANY:
             self.flush()
 
@@ -68,19 +74,20 @@ class _Writer:
         self._pieces.clear()
 
     def value(self, value: object) -> None:
-        if isinstance(value, str):
+        kind = type(value)
+        if kind is str or kind is int or value is None:
+            self._common(kind, value)
+        elif isinstance(value, str):
             self.put("text", value.encode())
-        elif type(value) in self._records:  # there may be many thousands of a kind
+        elif kind in self._records:  # there may be many thousands of a kind
             self._record(cast("DataclassInstance", value))
-        elif value is None:
-            self.put("none")
         elif isinstance(value, float):
             self.put("number", value.hex().encode())
         elif isinstance(value, (bool, int)):
             self.put("integer", str(int(value)).encode())
         elif isinstance(value, np.ndarray):
-            kind = "<f8" if value.dtype.kind == "f" else "<i8"
-            self.put(f"array{value.shape}{kind}", np.ascontiguousarray(value, dtype=kind).tobytes())
+            form = "<f8" if value.dtype.kind == "f" else "<i8"
+            self.put(f"array{value.shape}{form}", np.ascontiguousarray(value, dtype=form).tobytes())
         elif isinstance(value, (list, tuple)) and not isinstance(value, Located):
             self._list(value)
         elif isinstance(value, Mapping):
@@ -99,6 +106,18 @@ class _Writer:
             self._list(list(value))
         else:  # pragma: no cover - a new kind of value must be given a way here
             raise TypeError(f"no canonical form for {type(value).__name__}")
+
+    def _common(self, kind: type, value: object) -> None:
+        """A text, an integer or nothing, of which a network has very many, most of them alike."""
+        piece = self._known.get((kind, value))
+        if piece is None:
+            if value is None:
+                piece = _piece("none", b"")
+            else:
+                piece = _piece("text" if kind is str else "integer", str(value).encode())
+            if len(self._known) < _MANY:
+                self._known[kind, value] = piece
+        self._add(piece)
 
     def _list(self, items: Sequence[object]) -> None:
         self.put("list", str(len(items)).encode())

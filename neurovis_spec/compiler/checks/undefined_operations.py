@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from neurovis_spec.compiler.checks.compiled import Compiled
+from neurovis_spec.compiler.program import Activation, Model
 from neurovis_spec.compiler.run_checks import through_let
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.expressions.arrays import Value, evaluate_array
@@ -25,14 +26,17 @@ from neurovis_spec.language.values import Choice
 def check_undefined(compiled: Compiled, findings: Findings) -> None:
     """Warn at each choice of a definition with such an operation."""
     clock: dict[str, Value] = {**CONSTANTS, "dt": compiled.network.dt}
+    found: dict[tuple[int, int], tuple[list[Hazard], list[Hazard]]] = {}
     for kind, group in compiled.models:
-        model, activation = kind.model, kind.activation
-        functions = {"f": activation.value}
-        trees = (model.activity, *(state.each_step for state in model.state))
-        made = [hazards(tree, Hidden.ALL, functions=functions) for tree in trees if tree is not None]
-        _tell(group.model, "model", through_let(made, model.let), clock | dict(kind.model_parameters), findings)
-        if any(call.where is None for formula in made for call in formula.calls):
-            inside = hazards(activation.value, Hidden.ALL).found
+        if group.model is None and group.activation is None:
+            continue
+        key = id(kind.model), id(kind.activation)  # there may be very many groups of the same kind
+        if key not in found:
+            found[key] = _of_kind(kind.model, kind.activation)
+        outside, inside = found[key]
+        if outside:
+            _tell(group.model, "model", outside, clock | dict(kind.model_parameters), findings)
+        if inside:
             _tell(group.activation, "activation", inside, clock | dict(kind.activation_parameters), findings)
     for _, body, bundles in compiled.entries.values():
         for learning in (bundle.learning for bundle in bundles if bundle.learning is not None):
@@ -41,6 +45,16 @@ def check_undefined(compiled: Compiled, findings: Findings) -> None:
             made = [hazards(tree, Hidden.ALL) for tree in steps if tree is not None]
             known = clock | dict(learning.parameters)
             _tell(body.plasticity, "rule", through_let(made, rule.let), known, findings)
+
+
+def _of_kind(model: Model, activation: Activation) -> tuple[list[Hazard], list[Hazard]]:
+    """What may be undefined in the formulas of a model, and in an activation that it always computes."""
+    functions = {"f": activation.value}
+    trees = (model.activity, *(state.each_step for state in model.state))
+    made = [hazards(tree, Hidden.ALL, functions=functions) for tree in trees if tree is not None]
+    computed = any(call.where is None for formula in made for call in formula.calls)
+    inside = hazards(activation.value, Hidden.ALL).found if computed else []
+    return list(through_let(made, model.let)), inside
 
 
 def _tell(

@@ -84,8 +84,9 @@ def _inputs(compiled: Compiled, findings: Findings) -> None:
             read.update(place - n for place in set(signal.tolist()))
     for section, scopes in compiled.sections:
         handed = {outer.value for instance in section.instances.values() for outer in instance.inputs.values()}
+        tables = [scope.inputs.known() for scope in scopes]
         for name in section.inputs.keys() - handed:
-            made = [scope.inputs.known()[name] for scope in scopes if name in scope.inputs]
+            made = [table[name] for table in tables if name in table]
             if all(read.isdisjoint(range(entry.start, entry.start + entry.size)) for entry in made):
                 message = f"nothing reads the input '{name}'"
                 findings.warning("unused-input", key_span(section, "inputs", name), message, _READ.format(name))

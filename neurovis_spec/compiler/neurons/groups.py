@@ -82,12 +82,16 @@ class _Unsaid(NamedTuple):
     bias: FloatArray
     initial: FloatArray
     input: IntArray
+    position: FloatArray
 
 
 @lru_cache(maxsize=64)
 def _unsaid(n: int) -> _Unsaid:
     """The default arrays, read-only and shared by all groups of a size: instances make many of these."""
-    return _Unsaid(frozen(np.zeros(n)), frozen(np.full(n, np.nan)), frozen(np.full(n, -1, dtype=np.int64)))
+    nothing = np.full((n, 2), np.nan)
+    return _Unsaid(
+        frozen(np.zeros(n)), frozen(np.full(n, np.nan)), frozen(np.full(n, -1, dtype=np.int64)), frozen(nothing)
+    )
 
 
 #: What groups are that are the same in all instances of a module, by the module, the group and its count.
@@ -123,14 +127,12 @@ class Builder:
         names, first_number = (UNKNOWN, None) if _unsure(model) else self._names(name, model, start)
         n = UNKNOWN if names is UNKNOWN else len(names)
         kind = self._kind(name, model, n)
-        with self.constants.following() as biased:
-            bias = UNKNOWN if model.bias is None else self._drawn(model.bias, n, "bias", name)
-        given = model.initial or Initial(None)
+        bias, biased = self._bias(model, n, name)
+        given = model.initial or _NO_INITIAL
         initial = UNKNOWN if given.activity is None else self._drawn(given.activity, n, "initial", name)
-        starts = self._starts(given, n, name, kind, model)
+        starts = self._starts(given, n, name, kind, model) if given.states else {}
         input_index = self._input(model, n)
-        with self.constants.following() as placed:
-            position = positions_of(model.position, n, self.constants, self.scope.files)
+        position, placed = self._position(model, n)
         noise = UNKNOWN if model.noise is None else noise_of(model.noise, self.constants)
         if names is UNKNOWN or n is UNKNOWN:
             return UNKNOWN
@@ -142,8 +144,8 @@ class Builder:
             activation=kind.activation.name,
             model=kind.model.name,
             combine=said(model.combine, "sum"),
-            activation_parameters={k: tuple(v.tolist()) for k, v in kind.activation_parameters.items()},
-            model_parameters={k: tuple(v.tolist()) for k, v in kind.model_parameters.items()},
+            activation_parameters=_numbers(kind.activation_parameters),
+            model_parameters=_numbers(kind.model_parameters),
             input=self._fed(model),
             box=None if model.box is None else self.scope.called(model.box.value),
             role=None if model.role is None else model.role.value,
@@ -166,12 +168,24 @@ class Builder:
             constants=self.constants,
             starts=starts,
             noise=noise,
-            parts=(
-                *kind.parts,
-                *(part._replace(field="bias") for part in biased),
-                *(part._replace(field="position") for part in placed),
-            ),
+            parts=(*kind.parts, *biased, *placed),
         )
+
+    def _bias(self, model: GroupModel, n: int | Unknown, name: str) -> tuple[FloatArray | Unknown, list[Part]]:
+        """The bias, UNKNOWN without one, and what of it follows parameters."""
+        if model.bias is None:
+            return UNKNOWN, []
+        with self.constants.following() as parts:
+            bias = self._drawn(model.bias, n, "bias", name)
+        return bias, [part._replace(field="bias") for part in parts]
+
+    def _position(self, model: GroupModel, n: int | Unknown) -> tuple[FloatArray | Unknown, list[Part]]:
+        """The positions, NaN without any, and what of them follows parameters."""
+        if model.position is None:
+            return UNKNOWN if n is UNKNOWN else _unsaid(n).position, []
+        with self.constants.following() as parts:
+            position = positions_of(model.position, n, self.constants, self.scope.files)
+        return position, [part._replace(field="position") for part in parts]
 
     def _starts(
         self, given: Initial, n: int | Unknown, name: str, kind: Kind, model: GroupModel
@@ -250,6 +264,9 @@ class Builder:
         """The activation and the model of the neurons; ``identity`` and ``static`` where these are invalid."""
         if n is UNKNOWN or not (_fixed(model.activation) and _fixed(model.model)):
             return self._made(model, n)
+        if _plain(model.activation, self.definitions.activations) and _plain(model.model, self.definitions.models):
+            # what says no more than names is the same in every group: there may be very many of these
+            name = f"{_called(model.activation)} {_called(model.model)}"
         key = self.scope.module, name, n
         if key not in self.kinds:
             self.kinds[key] = self._made(model, n)
@@ -322,6 +339,16 @@ class Builder:
         return UNKNOWN
 
 
+#: the parameters of what has none
+_NO_PARAMETERS: Mapping[str, tuple[float, ...]] = {}
+_NO_INITIAL = Initial(None)
+
+
+def _numbers(parameters: Mapping[str, FloatArray]) -> Mapping[str, tuple[float, ...]]:
+    """The values of parameters as numbers."""
+    return {name: tuple(values.tolist()) for name, values in parameters.items()} if parameters else _NO_PARAMETERS
+
+
 def _spikes(kind: Kind) -> bool:
     """Whether neurons spike: their model does, and what its activity is of is no graded activation."""
     return kind.model.spikes and (kind.activation.name == "step" or not kind.model.reads_activation)
@@ -336,6 +363,15 @@ def _fixed(choice: Choice | None) -> bool:
     return choice is None or not any(
         not isinstance(entry.value, Scalar) or isinstance(entry.value.value, str) for entry in choice.settings.entries
     )
+
+
+def _plain(choice: Choice | None, definitions: Names[tuple[T, Defaults]]) -> bool:
+    """Whether a choice is the name of a definition, or nothing."""
+    return choice is None or (not choice.settings.entries and choice.name.value in definitions.known())
+
+
+def _called(choice: Choice | None) -> str:
+    return "" if choice is None else choice.name.value
 
 
 #: Keys that say which neurons a group has.

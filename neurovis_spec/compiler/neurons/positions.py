@@ -30,13 +30,11 @@ _TWO = "a position is two numbers"
 
 
 def positions_of(
-    node: FileReference | AnyList | None, n: int | Unknown, constants: Constants, files: Files
+    node: FileReference | AnyList, n: int | Unknown, constants: Constants, files: Files
 ) -> FloatArray | Unknown:
     """One position for each of n neurons."""
     if isinstance(node, FileReference):
         return _from_file(node, n, constants.findings, files)
-    if node is None:
-        return UNKNOWN if n is UNKNOWN else np.full((n, 2), np.nan)
     return _written(node, n, constants)
 
 

@@ -209,7 +209,7 @@ class Constants:
         unless its value is ``given`` from outside or it is given another one (``settings``)."""
         own = None if tree is UNKNOWN or not given or self.path else self.bound(tree)
         tree = UNKNOWN if given else tree
-        followed = None if tree is UNKNOWN or names(tree).isdisjoint(self.settable) else self.bound(tree)
+        followed = None if tree is UNKNOWN or self.settable.keys().isdisjoint(names(tree)) else self.bound(tree)
         if self.path and name not in self.settings and followed is None:
             return
         formula = self.settings.get(name, followed)
@@ -291,7 +291,7 @@ class Constants:
         if drawing is not None and drawing.wrong is not None and np.isnan(result).any():
             self.refuse_draw(formula, *drawing.wrong)
             return UNKNOWN
-        if self._parts is not None and not structural and not names(tree).isdisjoint(self.settable):
+        if self._parts is not None and not structural and not self.settable.keys().isdisjoint(names(tree)):
             self._parts.append(Part(self.bound(tree, around, randomness), places))
         return float(result) if np.ndim(result) == 0 else np.asarray(result, dtype=np.float64)
 

@@ -23,6 +23,7 @@ from neurovis_spec.language.yaml.brackets import Brackets
 from neurovis_spec.language.yaml.faults import Words
 from neurovis_spec.language.yaml.packed import PACK_FROM, Packer
 from neurovis_spec.language.yaml.refusals import ReadingStoppedError
+from neurovis_spec.language.yaml.scalars import resolve
 from neurovis_spec.language.yaml.scanner import (
     BLANKS,
     ENDS_TEXT,
@@ -67,6 +68,10 @@ def _line_before_others(column: int) -> re.Pattern[str]:
 def _simple_lines(column: int) -> re.Pattern[str]:
     """A line of a block in a column that holds a name and a number or a short text, behind which neither goes on."""
     return re.compile(rf"{SIMPLE} *(?:\r\n|\n|\r)( {{0,{column}}})(?=[^ \t\r\n#]|\Z)")
+
+
+#: a key that needs no second look
+_NAME = re.compile(r"([A-Za-z_][A-Za-z0-9_]{0,63}):(?=[ \r\n])")
 
 
 class _Cursor(NamedTuple):
@@ -407,6 +412,12 @@ class Parser(Brackets):
 
     def _key(self, column: int, depth: int) -> _Key:
         """A key of a block, to its colon; what is none has a place and no name."""
+        simple = _NAME.match(self._text, self._at, self._end)
+        if simple is not None and resolve(simple[1]) == simple[1]:  # most are no more than a name
+            number, column = self._here()
+            span = Span(self._file, number, column, number, column + len(simple[1]))
+            self._at = simple.end()
+            return _Key(span, Scalar(simple[1], span))
         if self._indicator("?"):
             self._at += 1
             announced = self._entry(column, depth + 1, fresh=True)
