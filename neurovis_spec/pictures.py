@@ -99,7 +99,7 @@ class Drawable(ABC):
         ``collapse`` names groups and instances that are one glyph each in the picture of the network, ``focus``
         neurons that are shown with all they are connected to, ``paths`` (``"A -> B"``) what the shortest paths are
         shown of; connections below ``min_weight`` are left out. Of very many connections, and of those that would make
-        an SVG larger than 5 MB, the thinnest are left out, with a warning, unless it is to be ``full``. Raises
+        an SVG larger than 5 MB, the weakest are left out, with a warning, unless it is to be ``full``. Raises
         OutputError for a kind that nobody draws, for a view, a name to be shown and a path that there is not, KeyError
         for an unknown reference, before anything is run.
         """

@@ -51,17 +51,18 @@ def widths(scene: Scene) -> list[float]:
     return [line(group).width for group in scene.groups if "connection" in group.data]
 
 
-def test_of_too_many_connections_the_thickest_are_drawn_and_the_strong_ones_last() -> None:
+def test_of_too_many_connections_some_are_drawn_the_thick_ones_last_and_the_rest_is_said() -> None:
     scene, whole = scene_of(WORM), WORM.network
     drawn = widths(scene)
     assert len(drawn) == 1000
     assert drawn == sorted(drawn)
-    everything = np.sort(np.maximum(0.6, 5 * np.abs(whole.connections.weights)))
-    assert drawn == everything[-1000:].tolist()
-    assert scene.notes == (
-        "1,600 of 2,600 connections are left out, the thinnest, to keep the rest readable; all: --full",
-    )
-    assert any(isinstance(s, Text) and s.text == scene.notes[0] for group in scene.groups for s in group.shapes)
+    said = "1,600 of 2,600 connections are left out, the weakest that arrive at each neuron, to keep the rest readable"
+    assert scene.notes[0] == f"{said}; all: --full"
+    lost = ", ".join(note.removeprefix("left out: ") for note in scene.notes[1:])
+    assert re.fullmatch(r"(\d+ of \d+ class\d_neuron → class\d_neuron, ){6}\d+ of [\d,]+ in 10 others", lost)
+    assert sum(int(count) for count in re.findall(r"(\d+) of", lost)) == 1600
+    shown = [shape.text for group in scene.groups for shape in group.shapes if isinstance(shape, Text)]
+    assert set(scene.notes) <= set(shown)
     assert len(widths(scene_of(WORM, replace(whole.render, full=True)))) == 2600
     assert not scene_of(WORM, replace(whole.render, full=True)).notes
     assert len(of_kind(scene, "neuron")) == 90
@@ -191,11 +192,13 @@ def test_what_cannot_be_shown_is_said_before_anything_runs(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_large_svg_leaves_out_the_thinnest_and_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.filterwarnings("ignore:left out")
+def test_a_large_svg_leaves_out_the_weakest_and_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("neurovis_spec.pictures._LARGEST_SVG", 60_000)
     path, network = tmp_path / "x.svg", connectome(20, 150, 2, more=LARGE)
     with pytest.warns(
-        LeftOut, match=r"^\d+ of 150 connections are left out, the thinnest, to keep the file below 5 MB"
+        LeftOut,
+        match=r"^\d+ of 150 connections are left out, the weakest that arrive at .*, to keep the file below 5 MB",
     ):
         network.render(path)
     few = path.read_text(encoding="utf-8")

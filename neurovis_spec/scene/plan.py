@@ -38,9 +38,9 @@ from neurovis_spec.scene.lines import Line, routes_of, trimmed
 from neurovis_spec.scene.model import Arrowhead, Group, Rectangle, Shape, Spline, Text, Theme, head_half_width
 from neurovis_spec.scene.obstacles import Obstacles
 from neurovis_spec.scene.scaling import at, scaled_group, scaled_label, scaled_line, scaled_rectangle, scaled_text
-from neurovis_spec.scene.shown import shown
+from neurovis_spec.scene.shown import Shown, shown
 from neurovis_spec.scene.spots import beyond
-from neurovis_spec.scene.teachers import Teacher, dash, dotted, label_of, room_of, teachers_of
+from neurovis_spec.scene.teachers import Teacher, dash, dotted, fewer, label_of, room_of, teachers_of
 from neurovis_spec.scene.themes import theme_of
 from neurovis_spec.scene.tints import tints_of
 from neurovis_spec.scene.titles import Titled, elsewhere, in_one_place, outline
@@ -113,17 +113,16 @@ def plan(
     positions, routes = _in_units(network, layout)
     weights = np.abs(network.connections.weights) if peaks is None else peaks
     widths = encoding.thickness(weights, gains.thickness)
-    seen = shown(network, drawn.asked(settings), weights, widths, _lengths(routes))
+    seen = shown(network, drawn.asked(settings), weights, _lengths(routes))
     factors = np.array([radius_of(size) for size in drawn.sizes.tolist()]) * np.where(seen.focus, 1.0, _UNFOCUSED)
     rooms = _rooms(network, layout) if settings.labels else {}
     boxes = boxes_of(network, positions, routes, rooms)
-    teachers = [one for one in teachers_of(network) if seen.focus[one.source] and seen.focus[one.target]]
-    teachers = teachers[:_MOST_TEACHERS]
+    teachers, notes = _dotted(network, seen)
     beside = room_beside(network, RADIUS * UNIT) if settings.labels else []
     beside = [(index, reach) for index, reach in beside if index not in rooms]
     extent = _extent(positions, factors, routes, boxes, beside, rooms.values())
     smallest = float(factors[seen.focus].min(initial=RADIUS))
-    wanted = _Wanted(network, gains, settings, theme, teachers, seen.notes, extent, narrowest, frozenset(rooms))
+    wanted = _Wanted(network, gains, settings, theme, teachers, notes, extent, narrowest, frozenset(rooms))
     title, items, frame, unit, margin = _framed(wanted, smallest, encoding.clamped(widths[seen.lines]))
     boxes = entitled(boxes, positions, frame.scale, _rooms(network, layout, frame.scale))
     gains = in_pages(gains, unit)
@@ -136,7 +135,7 @@ def plan(
     trim = trimmed([frame.map(routes[index]) for index in kept], ends[kept], gap, head)
     lines, reaches = dict(zip(kept, trim, strict=True)), _reaches(network, gains, frame.widest)
     obstacles = Obstacles(_dots(trim), [reaches[index] for index in kept], centres, radii)
-    top = _top(title is not None, len(seen.notes)) or 4.0
+    top = _top(title is not None, len(notes)) or 4.0
     bottom = frame.height - legend.height(items, frame.width - 2 * MARGIN) - (MARGIN if items else 4.0)
     picture = (6.0, top, frame.width - 6.0, bottom - (8.0 if items else 0.0))
     frames = [(box.members, _mapped(box.rect, frame)) for box in boxes]
@@ -149,7 +148,7 @@ def plan(
         sector = box.sector
         obstacles.add_frame(outline(_mapped(box.rect, frame)) if sector is None else frame.map(sector.border(0.1)))
     header = _header(title, frame, theme) if title is not None else None
-    notes = _noted(seen.notes, title is not None, frame, theme)
+    noted = _noted(notes, title is not None, frame, theme)
     spots: list[Point] = [(x, y) for x, y in centres.tolist()]
     sizes = {unit: size for unit, size in enumerate(drawn.sizes.tolist()) if drawn.glyph[unit]}
     titled = _titled(boxes, frame, picture)
@@ -183,7 +182,7 @@ def plan(
         *(Group((text,), id=f"label:{entry}") for entry, text in named.items()),
         *(Group((titles[index],), id=f"title:{box.path}") for index, box in enumerate(boxes) if index in titles),
         *([header] if header else []),
-        *([notes] if notes else []),
+        *([noted] if noted else []),
     ]
     if items:
         front.append(legend.flow(items, frame.width - 2 * MARGIN, MARGIN, bottom))
@@ -208,9 +207,19 @@ def plan(
         front=tuple(front),
         captioned=header is not None,
         unit=1.0,
-        notes=seen.notes,
+        notes=notes,
     )
     return made if unit == 1 else _in_user_units(made, unit)
+
+
+def _dotted(network: Network, seen: Shown) -> tuple[list[Teacher], tuple[str, ...]]:
+    """The pairs that get dotted lines, and all that the picture says of what it leaves out."""
+    teachers = [one for one in teachers_of(network) if seen.focus[one.source] and seen.focus[one.target]]
+    few = len(teachers) - _MOST_TEACHERS
+    if few <= 0:
+        return teachers, seen.notes
+    note = f"{few:,} of {len(teachers):,} dotted lines of rules are left out"
+    return fewer(network, teachers, _MOST_TEACHERS), (*seen.notes, note)
 
 
 def _in_user_units(made: Plan, unit: float) -> Plan:

@@ -1,6 +1,6 @@
 """Shown: which neurons and connections a picture draws, and what it says of those that it leaves out.
 
-In: a network, what the author or the reader asks to see, the widths of lines. Out: Shown. What is drawn looks the same
+In: a network, what the author or the reader asks to see, how long lines are. Out: Shown. What is drawn looks the same
 as in the whole picture; the rest is left out, and neurons out of focus are small.
 """
 
@@ -15,15 +15,19 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.scene import texts
+from neurovis_spec.scene.heading import CAPTION
 from neurovis_spec.scene.renderers import RendererError
+from neurovis_spec.scene.thinned import bare, losses, thinned
 
 BoolArray = npt.NDArray[np.bool_]
 
-#: With more connections than this nobody can follow one, and the thinnest are left out.
+#: With more connections than this nobody can follow one, and the weakest are left out.
 _ALL = 2500
 #: Then so many are drawn, or so many a neuron where there are many of these; of more than the last a picture shows
 #: nothing.
 _MOST_LINES, _LINES_EACH, _MOST_OF_ALL = 1000, 2, 5000
+#: How wide a note is at most that could be two, in page units.
+_ROOM = 780.0
 
 
 class LeftOut(UserWarning):
@@ -42,11 +46,9 @@ class Shown:
     notes: tuple[str, ...]
 
 
-def shown(
-    network: Network, settings: RenderSettings, weights: FloatArray, widths: FloatArray, lengths: FloatArray
-) -> Shown:
-    """What is drawn of a network. ``weights`` (m,) are the magnitudes of its weights, ``widths`` those of its lines
-    (Eq. 4), each the largest in what is drawn, ``lengths`` those of its routes. Raises RendererError."""
+def shown(network: Network, settings: RenderSettings, weights: FloatArray, lengths: FloatArray) -> Shown:
+    """What is drawn of a network. ``weights`` (m,) are the largest magnitudes of its weights in what is drawn,
+    ``lengths`` those of its routes. Raises RendererError."""
     lines, focus = np.ones(len(network.connections), bool), np.ones(len(network.neurons), bool)
     notes: list[str] = []
     if settings.focus is not None:
@@ -60,14 +62,14 @@ def shown(
     if settings.min_weight is not None:
         few = lines & (weights < settings.min_weight)
         if few.any():
-            notes.append(_left_out(int(few.sum()), int(lines.sum()), f"with |w| < {texts.number(settings.min_weight)}"))
+            least = texts.number(settings.min_weight)
+            notes.append(f"{_left_out(int(few.sum()), int(lines.sum()))}: those with |w| < {least}")
         lines = lines & ~few
     most = _most(network, settings)
     if most is not None and int(lines.sum()) > most:
-        before = int(lines.sum())
-        lines = _thickest(lines, widths, lengths, most)
+        before, lines = lines, thinned(network, lines, weights, lengths, most)
         why = "to keep the file below 5 MB" if settings.most is not None else "to keep the rest readable"
-        notes.append(f"{_left_out(before - most, before, 'the thinnest,')} {why}; all: --full")
+        notes += _thinned_out(network, before, lines, why)
     return Shown(lines, focus, tuple(notes))
 
 
@@ -91,18 +93,24 @@ def _most(network: Network, settings: RenderSettings) -> int | None:
     )
 
 
-def _left_out(count: int, of: int, which: str) -> str:
-    if which.endswith(","):
-        return f"{count:,} of {of:,} connections are left out, {which[:-1]},"
-    return f"{count:,} of {of:,} connections are left out: those {which}"
+def _left_out(count: int, of: int) -> str:
+    return f"{count:,} of {of:,} connections are left out"
 
 
-def _thickest(lines: BoolArray, widths: FloatArray, lengths: FloatArray, most: int) -> BoolArray:
-    """So many of the lines, the thickest; of lines as thick as each other the shortest."""
-    order = np.lexsort((np.arange(len(widths)), lengths, -np.where(lines, np.nan_to_num(widths, nan=0.0), -1.0)))
-    result = np.zeros(len(lines), bool)
-    result[order[:most]] = True
-    return result
+def _thinned_out(network: Network, before: BoolArray, lines: BoolArray, why: str) -> list[str]:
+    """What is said where these lines stay of those before."""
+    few = _left_out(int(before.sum() - lines.sum()), int(before.sum()))
+    bared = zip(bare(network, before, lines), ("neuron", "pathway"), strict=True)
+    gone = " and ".join(_count(number, what) for number, what in bared if number)
+    gone = f", and all of {gone}" if gone else ""
+    notes = [f"{few}, the weakest that arrive at each neuron{gone}, {why}; all: --full"]
+    for lost in losses(network, before, lines):
+        longer = f"{notes[-1]}, {lost}"
+        if len(notes) > 1 and texts.width(longer, CAPTION) <= _ROOM:
+            notes[-1] = longer
+        else:
+            notes.append(f"left out: {lost}")
+    return notes
 
 
 def _focused(network: Network, name: str, members: IntArray) -> tuple[BoolArray, BoolArray, str]:

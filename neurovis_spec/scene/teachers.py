@@ -7,6 +7,7 @@ the neuron whose connections learn by it. Signals that come from inputs alone ha
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -42,6 +43,20 @@ def teachers_of(network: Network) -> list[Teacher]:
                     pair = (int(source), int(target))
                     found.setdefault(pair, Teacher(*pair, signal, plasticity.rule.name))
     return list(found.values())
+
+
+def fewer(network: Network, teachers: Sequence[Teacher], most: int) -> list[Teacher]:
+    """So many of the pairs, in the same order: in turn one of each signal of each rule from one group to another, by
+    the names of the neurons, so that each of these keeps as many as any."""
+    names, group = network.neurons.names, [group.name for group in network.neurons.groups for _ in group.indices]
+    turns: Counter[tuple[object, ...]] = Counter()
+    ranked: list[tuple[int, str, str, int]] = []
+    for source, target, place in sorted((names[one.source], names[one.target], k) for k, one in enumerate(teachers)):
+        one = teachers[place]
+        sort = one.rule, one.signal, group[one.source], group[one.target]
+        ranked.append((turns[sort], source, target, place))
+        turns[sort] += 1
+    return [teachers[place] for place in sorted(place for *_, place in sorted(ranked)[:most])]
 
 
 def room_of(teacher: Teacher, frames: Iterable[tuple[Collection[int], Rect]], picture: Rect) -> Rect:

@@ -143,7 +143,7 @@ class RenderSettings:
     min_weight: float | None = None
     #: whether all connections are drawn, however many there are
     full: bool = False
-    #: the most connections that are drawn, the thinnest left out
+    #: the most connections that are drawn, the weakest left out
     most: int | None = None
     #: what is drawn with all that it is connected to: as written, and its neurons
     focus: tuple[str, tuple[int, ...]] | None = None
