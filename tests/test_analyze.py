@@ -15,7 +15,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 import neurovis_spec as nv
-from neurovis_spec.analysis import cross_correlation, report
+from neurovis_spec.analysis import connection_matrix, cross_correlation, report
 from neurovis_spec.analysis.catalogue import catalogue
 from neurovis_spec.analysis.page import environment
 from neurovis_spec.analysis.report import ReportOptions, analyze, file_names
@@ -96,6 +96,22 @@ def test_tables_hold_the_numbers_that_python_gives(folder: Path) -> None:
     assert [[float(cell) for cell in row[1:]] for row in rows[1:]] == expected.values.tolist()
     table = json.loads((folder / "out" / "correlation.json").read_text(encoding="utf-8"))
     assert table["values"] == expected.values.tolist()
+
+
+def test_neurons_without_connections_among_them_are_shown_with_all_that_they_are_connected_to(folder: Path) -> None:
+    assert call("analyze small.yaml --of K --no-trials -o out").exit_code == 0
+    table = json.loads((folder / "out" / "connections.json").read_text(encoding="utf-8"))
+    run = nv.compile("small.yaml").run()
+    around = connection_matrix(run, ["A", "K", "O"])
+    assert (table["rows"]["labels"], table["values"]) == (list(around.rows.labels), around.values.tolist())
+    assert around.values.any()
+    assert "No connection runs from one of these neurons to another" in (folder / "out" / "index.html").read_text()
+    (folder / "alone.yaml").write_text(
+        "neurovis: 1\nname: alone\nneurons: {A: {bias: 1}, B: {bias: 1}, C: {}}\nconnections: {A -> C: 1}\n"
+    )
+    assert call("analyze alone.yaml --of B --no-trials -o out2").exit_code == 0
+    assert "Left out: nothing is connected to these neurons." in (folder / "out2" / "index.html").read_text()
+    assert not (folder / "out2" / "connections.svg").exists()
 
 
 @pytest.mark.parametrize("theme", sorted(THEMES))

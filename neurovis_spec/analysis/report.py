@@ -27,7 +27,7 @@ from neurovis_spec.analysis.information import mutual_information
 from neurovis_spec.analysis.named import Axis, NamedArray
 from neurovis_spec.analysis.page import PAGE, Shown, page_of
 from neurovis_spec.analysis.sensitivity import sensitivity_by
-from neurovis_spec.analysis.structure import connection_matrix
+from neurovis_spec.analysis.structure import connection_matrix, matrix_around
 from neurovis_spec.analysis.trials import STEPS, Trials
 from neurovis_spec.analysis.weights import updates, weight_changes, weights
 from neurovis_spec.arrays import FloatArray
@@ -178,9 +178,16 @@ class _Report:
         return self._draw(pictures.cells(table, catalogue_title(table.name), caption, self.theme))
 
     def _connections(self) -> Reading:
-        made = connection_matrix(self.recording, self.options.of)
+        made, of, notes = connection_matrix(self.recording, self.options.of), self.options.of, list[str]()
+        if of is not None and not made.values.any():
+            made = matrix_around(self.recording, of)
+            if not made.values.any():
+                raise RecordingError("nothing is connected to these neurons")
+            notes = [
+                "No connection runs from one of these neurons to another: they stand with all they are connected to."
+            ]
         drawn = {"connections": self._pairs(made, "rows send, columns take in")} if len(made.rows.labels) else {}
-        return Reading("connections", {"connections": made}, drawn)
+        return Reading("connections", {"connections": made}, drawn, tuple(notes))
 
     def _traces(self) -> Reading:
         made, part = traces(self.recording, self.options.of), excerpt(self._late, self.options.of)
