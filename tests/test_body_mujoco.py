@@ -143,7 +143,9 @@ def test_the_skeleton_has_links_feet_and_solids(tmp_path: Path) -> None:
         link = skeleton.links[number]
         return places[link.start].round(9).tolist(), places[link.end].round(9).tolist(), round(link.radius, 9)
 
-    assert ends(0) == ([-0.1, 0, 0.5], [0.1, 0, 0.5], 0.1), "a box is its longest axis, as thick as it is wide"
+    assert skeleton.links[0].radius == pytest.approx(0.05), "a box is as thick as it is high"
+    corners = places[list(skeleton.links[0].points)].round(9).tolist()
+    assert corners == [[-0.15, -0.05, 0.5], [0.15, -0.05, 0.5], [-0.15, 0.05, 0.5], [0.15, 0.05, 0.5]]
     assert sorted(ends(1)[:2]) == [[0.2, 0.3, 0.5], [0.3, 0.3, 0.1]]
     assert ends(3) == ([0, 0, 0.5], [0.2, 0.3, 0.5], 0.008), "the leg does not meet the box: a thin link leads there"
     assert len(skeleton.links) == 4, "the prop meets the box, if not the round end of what is drawn of it"
@@ -154,6 +156,57 @@ def test_the_skeleton_has_links_feet_and_solids(tmp_path: Path) -> None:
     assert wall.high == pytest.approx((2, 0.1, 1))
     wave(body, 20)
     assert 1 in body.pose()[-2:], "it has fallen on a foot"
+
+
+@pytest.mark.parametrize(
+    ("geom", "high", "wide"),
+    [
+        ('type="box" size="0.3 0.1 0.02"', (0.3, 0.1, 0.02), 2),
+        ('type="box" size="0.02 0.3 0.1"', (0.02, 0.3, 0.1), 2),
+        ('type="box" size="0.1 0.1 0.1"', (0.1, 0.1, 0.1), 1),
+        ('type="box" size="0.3 0.1 0.1"', (0.3, 0.1, 0.1), 1),
+        ('type="ellipsoid" size="0.3 0.1 0.02"', (0.3, 0.1, 0.02), 2),
+        ('type="cylinder" size="0.1 0.02"', (0.1, 0.1, 0.02), 12),
+        ('type="cylinder" size="0.02 0.3"', (0.02, 0.02, 0.3), 1),
+        ('type="capsule" size="0.02 0.3"', (0.02, 0.02, 0.32), 1),
+        ('type="sphere" size="0.1"', (0.1, 0.1, 0.1), 1),
+    ],
+)
+def test_a_part_reaches_as_far_as_it_does(
+    tmp_path: Path, geom: str, high: tuple[float, float, float], wide: int
+) -> None:
+    body = opened(tmp_path, LEG.replace('<geom type="box" size="0.2 0.1 0.05"/>', f"<geom {geom}/>"))
+    skeleton = body.skeleton
+    assert skeleton is not None
+    link, places = skeleton.links[0], body.pose()[: 3 * len(skeleton.points)].reshape(-1, 3)
+    assert len(link.lines) == wide
+    far = np.abs(places[list(link.points)] - (0, 0, 0.5)).max(axis=0) + link.radius
+    assert far == pytest.approx(np.array(high), rel=0.01)
+
+
+@pytest.mark.parametrize(
+    "foot",
+    [
+        '<geom name="left_foot" size="0.03" pos="0 0 -0.45" contype="0" conaffinity="0"/>'
+        '<geom size="0.03" pos="0 0 -0.45"/>',
+        '<body name="left_foot" pos="0 0 -0.45"><geom size="0.03"/></body>',
+        '<body name="left_foot" pos="0 0 -0.45"><body name="sole"><geom size="0.03"/></body></body>',
+        '<body name="left_foot" pos="0 0 -0.45"><geom size="0.03" contype="0" conaffinity="0"/>'
+        '<geom size="0.03"/></body>',
+    ],
+    ids=["seen alone", "body", "body around", "body with a shell"],
+)
+def test_a_foot_that_stands_touches_whatever_of_it_has_the_name(tmp_path: Path, foot: str) -> None:
+    text = LEG.replace('<geom name="left_foot" type="capsule" fromto="0 0 0 0 0 -0.45" size="0.02"/>', foot)
+    text = text.replace('<touch name="touch" site="tip"/>', "")
+    body = opened(tmp_path, text.replace('pos="0 0 0.5">', 'pos="0 0 0.499">'))
+    assert body.skeleton is not None
+    assert len(body.skeleton.feet) == 1
+    assert body.pose()[-1] == 1
+    state = body.state()
+    assert isinstance(state, np.ndarray)
+    body.restore(np.where(np.arange(len(state)) == 3, 1.0, state))  # half a metre up
+    assert body.pose()[-1] == 0
 
 
 def test_steps_of_the_model_make_a_step_of_the_network(tmp_path: Path) -> None:

@@ -21,11 +21,12 @@ from toy_bodies import carted, registered
 
 import neurovis_spec as nv
 from neurovis_spec import pipeline
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.body.model import Link, Skeleton, Solid
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiler.drawing.drawing_settings import Panel
 from neurovis_spec.runtime.recording import Recording
-from neurovis_spec.scene import THEMES, Disc, Film, Polyline, Rectangle, Scene, Shape, Text, still
+from neurovis_spec.scene import THEMES, Disc, Film, Point, Polyline, Rectangle, Scene, Shape, Text, still
 from neurovis_spec.scene.figure import figure
 from neurovis_spec.scene.panels import ViewError
 from neurovis_spec.scene.shots import Shots
@@ -121,6 +122,49 @@ def test_points_lie_where_the_pose_says_in_metres_of_the_scale_bar(side: str) ->
     assert sorted(line.width / metre / 2 for line in links(scene, side)) == pytest.approx(
         sorted(link.radius for link in run.skeleton.links)
     )
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_a_wide_link_covers_what_lies_between_its_lines_and_no_more(side: str) -> None:
+    """A box of 30 by 10 by 2 cm, turned: as wide and as high on the page, without a gap."""
+    run = walked(1.5)
+    assert run.pose is not None
+    assert run.skeleton is not None
+    box = np.array([[x, y, 0.0] for y in (-0.04, 0.04) for x in (-0.14, 0.14)])
+    turns = 1.5 * 0.05 * np.arange(len(run))
+    turned = np.stack([[np.cos(turns), np.sin(turns), 0 * turns], [-np.sin(turns), np.cos(turns), 0 * turns]])
+    corners = np.einsum("ci,ixr->rcx", box[:, :2], turned)
+    middles = run.pose[:, :3]
+    skeleton = replace(
+        run.skeleton,
+        points=(*run.skeleton.points, "a", "b", "c", "d"),
+        links=(Link(27, 28, 0.01, ((29, 30),)),),
+        feet=(),
+    )
+    pose = np.concatenate([run.pose[:, :81], (corners + middles[:, None]).reshape(len(run), -1)], axis=1)
+    scene = still(film(replace(run, pose=pose, skeleton=skeleton)), 20)
+    metre, (casing, around, rows) = scale(scene), shapes(scene, f"p0:{side}:links")
+    assert isinstance(casing, Polyline)
+    assert isinstance(around, Polyline)
+    assert isinstance(rows, Polyline)
+    assert casing.points == around.points
+    assert around.width == rows.width == pytest.approx(0.02 * metre)
+    drawn = np.array(around.points)
+    wanted = (corners[20] + middles[20])[:, [0, 1 if side == "above" else 2]] * (1, -1) * metre
+    assert np.ptp(drawn, axis=0) == pytest.approx(np.ptp(wanted, axis=0), abs=1e-6)
+    grid = np.array([(1 - s) * drawn[0] + s * drawn[1] + t * (drawn[3] - drawn[0]) for s in SHARES for t in SHARES])
+    edges = [*pairwise(around.points), *pairwise(rows.points)]
+    assert max(min(_distance(point, *edge) for edge in edges) for point in grid) <= around.width / 2
+
+
+SHARES = np.linspace(0, 1, 21)
+
+
+def _distance(point: FloatArray, start: Point, end: Point) -> float:
+    """How far a point is from a segment."""
+    along = np.subtract(end, start)
+    share = np.clip((point - start) @ along / max(along @ along, 1e-12), 0, 1)
+    return float(np.hypot(*(point - start - share * along)))
 
 
 def test_from_the_side_the_ground_is_where_feet_that_touch_are() -> None:

@@ -165,7 +165,7 @@ def test_what_a_file_says_of_a_body_is_checked(
 def test_a_skeleton_reads_back_from_its_text() -> None:
     bare = Skeleton((), ())
     solid = Skeleton(("a",), (), (0, 0), 0, (Solid((0.1, 0, -1e9), (1, 2, 3)),))
-    for skeleton in (SKELETON, bare, solid, Skeleton(("a", "b"), (Link(1, 1, 0.25),), middle=1)):
+    for skeleton in (SKELETON, bare, solid, Skeleton(("a", "b"), (Link(1, 1, 0.25, ((0, 1), (1, 0))),), middle=1)):
         assert skeleton_of(text_of(skeleton)) == skeleton
 
 
@@ -175,6 +175,8 @@ def test_a_skeleton_reads_back_from_its_text() -> None:
         {"points": [1]},
         {"points": "ab"},
         {"links": [[0, 1]]},
+        {"links": [[0, 1, 0.1, 1]]},
+        {"links": [[0, 1, 0.1, 1, 9]]},
         {"links": [[0, True, 0.1]]},
         {"links": [[0, 1, 1e999]]},
         {"feet": [2]},

@@ -1,12 +1,14 @@
 """How a model of MuJoCo is drawn: links, feet, what stands in the world.
 
-In: a model. Out: a Figure: its Skeleton, and the pose of some data of it. A link is the axis of a part that moves: of a
-capsule its own, of a box or a mesh its longest. Where the parts of two bodies do not meet, a thin link leads from the
-origin of one to that of the other. Feet are where there are touch sensors, and parts that are called feet.
+In: a model. Out: a Figure: its Skeleton, and the pose of some data of it. A link is a part that moves, as large as it
+is: as thick as it is along its shortest edge, with lines along its longest as far apart as it is wide. Where the parts
+of two bodies do not meet, a thin link leads from the origin of one to that of the other. Feet are where there are touch
+sensors, and parts that are called feet.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Final, NamedTuple
 
@@ -20,14 +22,40 @@ _SHOWN: Final = 2
 #: of a thin link, as a share of the thinnest other, or in metres
 _THIN: Final = 0.4
 _THINNEST: Final = 0.005
+#: what is wider than thick by so little is a line
+_NARROW: Final = 0.01
+#: lines through a disc, between the corners of a regular polygon: how far aside, and how long, as shares of its radius
+_CHORDS: Final = tuple((math.sin(a), math.cos(a)) for a in (math.pi * (k - 5.5) / 12 for k in range(12)))
 
 
-class _Axis(NamedTuple):
-    """A part of a body in the frame of the body: two ends, and how thick it is."""
+class _Part(NamedTuple):
+    """A part of a body in the frame of the body: all that lies within ``radius`` of a flat core, which reaches ``half``
+    to either side of its ``centre`` along the columns of ``turned`` (3, 3); ``round``: the core is a disc."""
 
-    start: FloatArray
-    end: FloatArray
+    centre: FloatArray
+    turned: FloatArray
+    half: FloatArray
     radius: float
+    round: bool = False
+
+    def lines(self) -> list[tuple[FloatArray, FloatArray]]:
+        """Lines along the longest edge of the core that it lies between: their ends."""
+        across, along = np.argsort(self.half, kind="stable")[1:].tolist()
+        wide = float(self.half[across])
+        if wide <= _NARROW * self.radius:
+            off = self.turned[:, along] * self.half[along]
+            return [(self.centre - off, self.centre + off)]
+        found = []
+        for at, share in _CHORDS if self.round else ((-1.0, 1.0), (1.0, 1.0)):
+            middle = self.centre + self.turned[:, across] * (at * wide)
+            off = self.turned[:, along] * (self.half[along] * share)
+            found.append((middle - off, middle + off))
+        return found
+
+    def distance(self, point: FloatArray) -> float:
+        """How far a point is from the core."""
+        local = self.turned.T @ (point - self.centre)
+        return float(np.linalg.norm(local - np.clip(local, -self.half, self.half)))
 
 
 class _Foot(NamedTuple):
@@ -48,18 +76,14 @@ class Figure:
         self._names: list[str] = []
         self._at: dict[tuple[object, ...], int] = {}
         moving = [body for body in range(1, model.nbody) if model.body_weldid[body] != 0]
-        axes = {body: list(_axes(model, body)) for body in moving}
-        bones = [body for body in moving if _is_apart(model, body, axes)]
-        found = min((axis.radius for several in axes.values() for axis in several), default=_THINNEST / _THIN)
+        parts = {body: list(_parts(model, body)) for body in moving}
+        bones = [body for body in moving if _is_apart(model, body, parts)]
+        found = min((part.radius for several in parts.values() for part in several), default=_THINNEST / _THIN)
         middle = 0
         if moving:
             free = [int(model.jnt_bodyid[j]) for j in range(model.njnt) if int(model.jnt_type[j]) == _FREE]
             middle = self._point(model, (free or moving)[0], np.zeros(3))
-        links = [
-            Link(self._point(model, body, axis.start), self._point(model, body, axis.end), axis.radius)
-            for body in moving
-            for axis in axes[body]
-        ]
+        links = [self._link(model, body, part) for body in moving for part in parts[body]]
         for body in bones:
             parent = int(model.body_parentid[body])
             ends = self._point(model, parent, np.zeros(3)), self._point(model, body, np.zeros(3))
@@ -89,6 +113,12 @@ class Figure:
             else:
                 yield float(np.isin(touching, geoms).any())
 
+    def _link(self, model: mujoco.MjModel, body: int, part: _Part) -> Link:
+        (start, end), *beside = [
+            (self._point(model, body, start), self._point(model, body, end)) for start, end in part.lines()
+        ]
+        return Link(start, end, part.radius, tuple(beside))
+
     def _point(self, model: mujoco.MjModel, body: int, place: FloatArray) -> int:
         """The index of a point of a body; those at one place are one."""
         mark = (body, *np.round(place, 9).tolist())
@@ -105,8 +135,10 @@ class Figure:
 _FREE: Final = int(mujoco.mjtJoint.mjJNT_FREE)
 _TOUCH: Final = int(mujoco.mjtSensor.mjSENS_TOUCH)
 _SPHERE: Final = int(mujoco.mjtGeom.mjGEOM_SPHERE)
+_CAPSULE: Final = int(mujoco.mjtGeom.mjGEOM_CAPSULE)
+_CYLINDER: Final = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
 #: what is long along its own z
-_LONG: Final = (int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER))
+_LONG: Final = (_CAPSULE, _CYLINDER)
 _GROUND: Final = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
 
 
@@ -129,59 +161,54 @@ def _shown(model: mujoco.MjModel, body: int) -> list[int]:
     return seen or own
 
 
-def _axes(model: mujoco.MjModel, body: int) -> Iterator[_Axis]:
+def _parts(model: mujoco.MjModel, body: int) -> Iterator[_Part]:
     """The parts of a body."""
     for geom in _shown(model, body):
         kind, size = int(model.geom_type[geom]), model.geom_size[geom]
         centre, turned = np.array(model.geom_pos[geom]), _turned(model.geom_quat[geom])
         if kind in _GROUND:
             continue
+        box = np.array([size[0], size[0], size[1]])
         if kind == _SPHERE:
             half, radius = np.zeros(3), float(size[0])
-        elif kind in _LONG:
-            half, radius = turned[:, 2] * size[1], float(size[0])
+        elif kind == _CAPSULE:
+            half, radius = np.array([0, 0, size[1]]), float(size[0])
         else:
-            box = model.geom_aabb[geom]  # in the frame of the geom: its centre, and half of each edge
-            longest = int(np.argmax(box[3:]))
-            radius = float(np.sort(box[3:])[1])
-            centre = centre + turned @ box[:3]
-            half = turned[:, longest] * (box[3 + longest] - radius)
+            if kind != _CYLINDER:
+                centre = centre + turned @ model.geom_aabb[geom][:3]  # in the frame of the geom: its centre, half edges
+                box = np.array(model.geom_aabb[geom][3:])
+            radius = float(box.min())
+            half = box - radius
         if np.isfinite([*centre, *half, radius]).all():
-            yield _Axis(centre - half, centre + half, radius)
+            yield _Part(centre, turned, half, radius, kind == _CYLINDER)
 
 
-def _is_apart(model: mujoco.MjModel, body: int, axes: dict[int, list[_Axis]]) -> bool:
+def _is_apart(model: mujoco.MjModel, body: int, parts: dict[int, list[_Part]]) -> bool:
     """Whether nothing that is drawn of its parent meets what is drawn at the origin of a body."""
     parent = int(model.body_parentid[body])
-    if parent not in axes or not _is_drawn(model, body, axes):
+    if parent not in parts or not _is_drawn(model, body, parts):
         return False
     origin = np.array(model.body_pos[body])
-    reach = max((axis.radius for axis in axes[body] if _distance(np.zeros(3), axis) <= axis.radius), default=0.0)
-    return all(_distance(origin, axis) > (axis.radius + reach) * 1.01 for axis in axes[parent])
+    reach = max((part.radius for part in parts[body] if part.distance(np.zeros(3)) <= part.radius), default=0.0)
+    return all(part.distance(origin) > (part.radius + reach) * 1.01 for part in parts[parent])
 
 
-def _is_drawn(model: mujoco.MjModel, body: int, axes: dict[int, list[_Axis]]) -> bool:
+def _is_drawn(model: mujoco.MjModel, body: int, parts: dict[int, list[_Part]]) -> bool:
     """Whether there is something to be drawn of a body or of those that hang on it."""
     below = {body}
     for other in range(body, model.nbody):  # parents come first
         if other == body or int(model.body_parentid[other]) in below:
             below.add(other)
-            if axes.get(other):
+            if parts.get(other):
                 return True
     return False
 
 
-def _distance(point: FloatArray, axis: _Axis) -> float:
-    """How far a point is from the axis of a part."""
-    along = axis.end - axis.start
-    length = float(along @ along)
-    share = 0.0 if length == 0 else float(np.clip((point - axis.start) @ along / length, 0, 1))
-    return float(np.linalg.norm(point - axis.start - share * along))
-
-
 def _feet(model: mujoco.MjModel, moving: list[int]) -> Iterator[_Foot]:
     """Touch sensors, in their order, of a body that has several the one furthest from its joint (a shin may feel, too);
-    then bodies without one that are called feet, or have geoms that are."""
+    then bodies without one that are called feet, or have geoms that are. Whether such a foot touches something say
+    these geoms; where nothing can touch them (they are there to be seen), others of the body, or what is fixed to it.
+    """
     felt: dict[int, _Foot] = {}
     for sensor in np.flatnonzero(np.asarray(model.sensor_type) == _TOUCH).tolist():
         site = int(model.sensor_objid[sensor])
@@ -191,13 +218,33 @@ def _feet(model: mujoco.MjModel, moving: list[int]) -> Iterator[_Foot]:
             felt[body] = foot
     yield from felt.values()
     for body in moving:
-        start = int(model.body_geomadr[body])
-        own = range(start, start + int(model.body_geomnum[body])) if start >= 0 else range(0)
-        named = [geom for geom in own if _is_foot(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom))]
-        if not named and _is_foot(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, body)):
-            named = [*own]
-        if named and body not in felt:
-            yield _Foot(body, _tip(model, named[0]), -1, tuple(named))
+        own = _geoms(model, [body])
+        called = [geom for geom in own if _is_foot(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom))]
+        if not called and _is_foot(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, body)):
+            called = own or _rigid(model, body)
+        if called and body not in felt:
+            solid = _solid(model, called) or _solid(model, own) or _rigid(model, body)
+            yield _Foot(int(model.geom_bodyid[called[0]]), _tip(model, called[0]), -1, tuple(solid))
+
+
+def _geoms(model: mujoco.MjModel, bodies: list[int]) -> list[int]:
+    """The geoms of bodies."""
+    return np.flatnonzero(np.isin(model.geom_bodyid, bodies)).tolist()
+
+
+def _solid(model: mujoco.MjModel, geoms: list[int]) -> list[int]:
+    """Those geoms that something can touch."""
+    return [geom for geom in geoms if model.geom_contype[geom] or model.geom_conaffinity[geom]]
+
+
+def _rigid(model: mujoco.MjModel, body: int) -> list[int]:
+    """The geoms that something can touch of what is fixed to a body and hangs on it, else of what it hangs on."""
+    below = [body]
+    for other in range(body + 1, model.nbody):  # parents come first
+        if model.body_weldid[other] == model.body_weldid[body] and int(model.body_parentid[other]) in below:
+            below.append(other)
+    above = [int(model.body_parentid[body])]
+    return _solid(model, _geoms(model, below[1:])) or _solid(model, _geoms(model, above))
 
 
 def _is_foot(name: str | None) -> bool:

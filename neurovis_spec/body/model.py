@@ -52,11 +52,24 @@ class Port:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A rigid part, drawn as a line with round ends between two points of the skeleton; the radius in metres."""
+    """A rigid part, drawn as a line with round ends between two points of the skeleton; the radius in metres. A part
+    that is wide and flat is several such lines beside each other, and what lies between them: ``beside`` are the ends
+    of the others, in their order."""
 
     start: int
     end: int
     radius: float
+    beside: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def lines(self) -> tuple[tuple[int, int], ...]:
+        """The ends of all its lines."""
+        return ((self.start, self.end), *self.beside)
+
+    @property
+    def points(self) -> tuple[int, ...]:
+        """The points of the skeleton that it lies between."""
+        return tuple(point for line in self.lines for point in line)
 
 
 @dataclass(frozen=True, slots=True)

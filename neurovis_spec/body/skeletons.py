@@ -20,7 +20,7 @@ def text_of(skeleton: Skeleton) -> str:
     return json.dumps(
         {
             "points": list(skeleton.points),
-            "links": [[link.start, link.end, link.radius] for link in skeleton.links],
+            "links": [[link.start, link.end, link.radius, *link.points[2:]] for link in skeleton.links],
             "feet": list(skeleton.feet),
             "middle": skeleton.middle,
             "solids": [[list(solid.low), list(solid.high)] for solid in skeleton.solids],
@@ -46,10 +46,7 @@ def skeleton_of(text: str) -> Skeleton:
     names = tuple(name for name in points if isinstance(name, str))
     if len(names) < len(points):
         raise BodyError("not a skeleton: a point has no name")
-    links = tuple(
-        Link(_index(start, indices), _index(end, indices), _number(radius))
-        for start, end, radius in _several(found, "links", 3)
-    )
+    links = tuple(_link(values, indices) for values in _several(found, "links", 3, more=True))
     solids = tuple(Solid(_corner(low), _corner(high)) for low, high in _several(found, "solids", 2))
     feet = tuple(_index(foot, indices) for foot in _list(found, "feet"))
     middle = found.get("middle", 0)
@@ -65,10 +62,21 @@ def _list(found: Mapping[str, object], key: str) -> list[object]:
     return values
 
 
-def _several(found: Mapping[str, object], key: str, size: int) -> list[list[object]]:
+def _link(values: list[object], indices: range) -> Link:
+    """Two ends, a radius, then the ends of further lines."""
+    start, end, radius, *more = values
+    ends = [_index(value, indices) for value in more]
+    if len(ends) % 2:
+        raise BodyError("not a skeleton: a line of a link has one end")
+    beside = tuple(zip(ends[::2], ends[1::2], strict=True))
+    return Link(_index(start, indices), _index(end, indices), _number(radius), beside)
+
+
+def _several(found: Mapping[str, object], key: str, size: int, *, more: bool = False) -> list[list[object]]:
+    """Lists of so many values, or of that many and ``more``."""
     result = []
     for value in _list(found, key):
-        if not isinstance(value, list) or len(value) != size:
+        if not isinstance(value, list) or len(value) < size or (len(value) > size and not more):
             raise BodyError(f"not a skeleton: in '{key}' there are not {size} values each")
         result.append(value)
     return result

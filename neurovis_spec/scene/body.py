@@ -36,6 +36,8 @@ _APART, _BAR = 46.0, 50.0
 #: Lines around links, the least thickness of these; the radius of a foot in those of its links, at least and at most.
 _CASING, _THIN = 1.3, 2.2
 _FOOT, _LEAST, _LARGEST = 1.25, 3.4, 9.0
+#: How far apart rows are that cover a wide link, and how far within it they turn, in its thickness.
+_ROW, _WITHIN = 0.9, 0.25
 #: Lines that lie on the ground, and how much of a link's colour is left on the far side.
 _LINE, _FAR = 0.8, 0.45
 #: What lies so far aside of the middle, as a share of what the body reaches aside, is on the near or the far side.
@@ -182,9 +184,17 @@ class _Drawn:
         order = self._order(frame)
         for number in np.argsort(order, kind="stable").tolist():
             link = skeleton.links[number]
-            line, thick = (places[link.start], places[link.end]), max(2 * link.radius * self.scale, _THIN)
-            shapes.append(Polyline(line, theme.box_fill, thick + 2 * _CASING, round=True))
-            shapes.append(Polyline(line, self._seen(theme.zero, order[number]), thick, round=True))
+            thick = max(2 * link.radius * self.scale, _THIN)
+            lines, colour = (
+                [(places[start], places[end]) for start, end in link.lines],
+                self._seen(theme.zero, order[number]),
+            )
+            shapes.append(Polyline(_around(lines), theme.box_fill, thick + 2 * _CASING, round=True))
+            shapes.append(Polyline(_around(lines), colour, thick, round=True))
+            if link.beside:
+                shapes.append(
+                    Polyline(_to_and_fro(lines, self._rows[number], _WITHIN * thick), colour, thick, round=True)
+                )
         order = self._layers([(foot,) for foot in skeleton.feet], frame) * (self.side == "side")
         for number in np.lexsort((poses.touching[frame], order)).tolist():
             touches = poses.touching[frame, number]
@@ -192,6 +202,19 @@ class _Drawn:
             fill, edge = (self._seen(colour, order[number]) for colour in (fill, edge))
             shapes.append(Disc(places[skeleton.feet[number]], self._feet[number], fill, edge, 1.4))
         return tuple(shapes)
+
+    @cached_property
+    def _rows(self) -> list[list[int]]:
+        """Of each link, into how many rows what lies between two of its lines is cut, so that these leave no gap."""
+        points = self.poses.points[self.poses.known]
+        rows = []
+        for link in self.poses.skeleton.links:
+            thick = max(2 * link.radius * self.scale, _THIN)
+            starts, ends = (points[:, [line[side] for line in link.lines]] for side in (0, 1))
+            gaps = np.maximum(*(np.linalg.norm(np.diff(some, axis=1), axis=2) for some in (starts, ends)))
+            far = self.scale * gaps.max(axis=0, initial=0.0)
+            rows.append([max(1, math.ceil(gap / (_ROW * thick))) for gap in far.tolist()])
+        return rows
 
     def _seen(self, colour: str, order: float) -> str:
         """A colour, paler on the far side."""
@@ -203,8 +226,7 @@ class _Drawn:
         """The radius of each foot: a little more than that of the links that end there."""
         skeleton = self.poses.skeleton
         thick = [
-            max((link.radius for link in skeleton.links if foot in (link.start, link.end)), default=0.0)
-            for foot in skeleton.feet
+            max((link.radius for link in skeleton.links if foot in link.points), default=0.0) for foot in skeleton.feet
         ]
         return [min(max(_FOOT * radius * self.scale, _LEAST), _LARGEST) for radius in thick]
 
@@ -223,9 +245,9 @@ class _Drawn:
         radii = np.array([link.radius for link in links])
         if self.side == "above":
             heights = points[:, :, 2].mean(axis=0)
-            tops: FloatArray = np.array([(heights[link.start] + heights[link.end]) / 2 for link in links]) + radii
+            tops: FloatArray = np.array([heights[list(link.points)].mean() for link in links]) + radii
             return tops.round(6)
-        layers = self._layers([(link.start, link.end) for link in links], frame)
+        layers = self._layers([link.points for link in links], frame)
         thick: FloatArray = 0.5 * radii / max(float(radii.max(initial=0.0)), 1e-300)
         order: FloatArray = np.where(layers == 0, thick, layers)
         return order
@@ -256,6 +278,42 @@ class _Drawn:
         line = ((left, y - 4.0), (left, y), (right, y), (right, y - 4.0))
         middle = ((left + right) / 2, y - 6.0)
         return Polyline(line, theme.ink, 1.4), Text(middle, said, SMALL, theme.ink, "middle", halo=theme.box_fill)
+
+
+def _around(lines: Sequence[tuple[Point, Point]]) -> tuple[Point, ...]:
+    """A line around lines that lie beside each other; a single line is itself.
+
+    >>> _around([((0.0, 0.0), (4.0, 0.0)), ((0.0, 2.0), (4.0, 2.0))])
+    ((0.0, 0.0), (0.0, 2.0), (4.0, 2.0), (4.0, 0.0), (0.0, 0.0))
+    """
+    if len(lines) == 1:
+        return lines[0]
+    return (*(start for start, _ in lines), *(end for _, end in reversed(lines)), lines[0][0])
+
+
+def _to_and_fro(lines: Sequence[tuple[Point, Point]], rows: Sequence[int], within: float) -> tuple[Point, ...]:
+    """A line that covers what lies between lines: along so many rows from each to the next, turning so far within.
+
+    >>> _to_and_fro([((0.0, 0.0), (8.0, 0.0)), ((0.0, 2.0), (8.0, 2.0))], [2], 0.5)
+    ((0.5, 0.0), (7.5, 0.0), (7.5, 1.0), (0.5, 1.0), (0.5, 2.0), (7.5, 2.0))
+    """
+    made = [lines[0]]
+    for one, other, count in zip(lines, lines[1:], rows, strict=False):
+        made += [
+            (_between(one[0], other[0], k / count), _between(one[1], other[1], k / count)) for k in range(1, count)
+        ]
+        made.append(other)
+    points: list[Point] = []
+    for number, (start, end) in enumerate(made):
+        share = min(0.5, within / max(math.dist(start, end), 1e-9))
+        ends = _between(start, end, share), _between(start, end, 1 - share)
+        points += ends[::-1] if number % 2 else ends
+    return tuple(points)
+
+
+def _between(one: Point, other: Point, share: float) -> Point:
+    """The point so far on the way from one to the other."""
+    return one[0] + share * (other[0] - one[0]), one[1] + share * (other[1] - one[1])
 
 
 def _ground(drawn: _Drawn) -> list[Shape]:

@@ -60,6 +60,20 @@ function mixed(colour, other, share) {
   return `rgb(${one.map((value, at) => Math.round(share * value + (1 - share) * two[at])).join(',')})`;
 }
 
+/** The points of a link: the ends of its line, then of those beside it. @param {number[]} link @returns {number[]} */
+function endsOf([start, end, , ...beside]) {
+  return [start, end, ...beside];
+}
+
+/** The ends of lines as one way around them; of a single line it is the line. @param {number[]} ends
+ * @returns {number[]} */
+function around(ends) {
+  if (ends.length === 2) return ends;
+  const starts = ends.filter((_, at) => at % 2 === 0),
+    others = ends.filter((_, at) => at % 2 === 1);
+  return [...starts, ...others.reverse(), starts[0]];
+}
+
 /** The panel of the body. */
 export class Body {
   /** @param {HTMLElement} panel @param {HTMLCanvasElement} canvas @param {HTMLButtonElement} button
@@ -180,7 +194,10 @@ export class Body {
     const high = Math.max(...points.map(([, , z]) => z)) + thick;
     if (high > reach.high) reach.high = MORE * high;
     if (!this.tops.length)
-      this.tops = skeleton.links.map(([start, end, radius]) => (points[start][2] + points[end][2]) / 2 + radius);
+      this.tops = skeleton.links.map((link) => {
+        const ends = endsOf(link);
+        return ends.reduce((sum, at) => sum + points[at][2], 0) / ends.length + link[2];
+      });
   }
 
   /** Both drawings, by the same scale: beside each other, or below in a panel that is higher than wide.
@@ -285,19 +302,23 @@ export class Body {
   links(context, frame, theme, points) {
     const links = this.skeleton?.links ?? [],
       thickest = Math.max(1e-300, ...links.map(([, , radius]) => radius));
-    const ordered = links.map(([start, end, radius], at) => {
-      const layer = this.layer(points, [start, end]);
-      return { start, end, radius, order: frame.up === 1 ? this.tops[at] : layer || (0.5 * radius) / thickest };
+    const ordered = links.map((link, at) => {
+      const ends = endsOf(link),
+        radius = link[2],
+        layer = this.layer(points, ends);
+      return { ends, radius, order: frame.up === 1 ? this.tops[at] : layer || (0.5 * radius) / thickest };
     });
     ordered.sort((one, other) => one.order - other.order);
-    for (const { start, end, radius, order } of ordered) {
+    for (const { ends, radius, order } of ordered) {
       const width = Math.max(2 * radius * frame.scale, THIN),
         isFar = frame.up === 2 && order < 0;
       context.beginPath();
-      for (const one of [start, end]) context.lineTo(...this.spot(frame, points[one]));
+      for (const one of around(ends)) context.lineTo(...this.spot(frame, points[one]));
       [context.strokeStyle, context.lineWidth] = [theme.box_fill, width + 2 * CASING];
       context.stroke();
-      [context.strokeStyle, context.lineWidth] = [isFar ? mixed(theme.zero, theme.box_fill, FAR) : theme.zero, width];
+      context.fillStyle = isFar ? mixed(theme.zero, theme.box_fill, FAR) : theme.zero;
+      [context.strokeStyle, context.lineWidth] = [context.fillStyle, width];
+      context.fill();
       context.stroke();
     }
   }
@@ -315,10 +336,7 @@ export class Body {
     const ordered = feet.map((point, at) => ({ point, at, order: frame.up === 1 ? 0 : this.layer(points, [point]) }));
     ordered.sort((one, other) => one.order - other.order || Number(touching[one.at]) - Number(touching[other.at]));
     for (const { point, at, order } of ordered) {
-      const thick = Math.max(
-        0,
-        ...links.filter(([one, other]) => one === point || other === point).map((link) => link[2]),
-      );
+      const thick = Math.max(0, ...links.filter((link) => endsOf(link).includes(point)).map((link) => link[2]));
       const colours = touching[at] ? [theme.positive, theme.ink] : [theme.box_fill, theme.muted];
       const [fill, edge] = order < 0 ? colours.map((one) => mixed(one, theme.box_fill, FAR)) : colours;
       this.disc(

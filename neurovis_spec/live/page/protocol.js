@@ -28,7 +28,7 @@ import { isStill } from './camera.js';
 /** @typedef {{serial: number, step: number, first: number, last: number, caption: string, discs: Int8Array,
  *   lines: Int8Array, widths: Uint16Array, glows: Uint16Array, kinds: Uint8Array, pose: Float32Array}} Look */
 /** How the pose of a body is drawn: links are two points and a radius in metres, solids the lowest and the highest corner.
- * @typedef {{points: string[], links: [number, number, number][], feet: number[], middle: number,
+ * @typedef {{points: string[], links: number[][], feet: number[], middle: number,
  *   solids: [number[], number[]][]}} Skeleton */
 /** @typedef {{type: 'status', playing: boolean, speed: string, ended: boolean, owner: boolean,
  *   can: {takes: string[], ends: boolean, arrives: boolean}, parameters: Object<string, number>, fed: Object<string, number[]>,
