@@ -126,7 +126,7 @@ def test_hostile_messages_are_counted_and_survived(ros: World, spec: Path, tmp_p
     assert view.stop() == 0
     counts = view.json()["topics"]["activity"]
     assert counts["received"] == 5000
-    assert counts["rejected"] == {"type": 0, "parse": 1000, "hash": 1000, "length": 1000}
+    assert counts["rejected"] == {"type": 0, "parse": 1000, "hash": 1000, "length": 1000, "publisher": 0}
     assert (counts["recorded"], counts["unlabelled"], counts["not_finite"]) == (2000, 1000, 1000)
     assert len(arrays_in(out)) == 2000
 
@@ -180,6 +180,33 @@ def test_of_several_networks_the_one_that_is_named_is_viewed(spec: Path, tmp_pat
         view.wait_for("ready: small")
         assert view.stop() == 0
         assert view.json()["network"] == "small"
+
+
+def test_publishers_of_one_network_are_told_apart(ros: World, spec: Path, tmp_path: Path) -> None:
+    """One that begins anew with a higher number has lost nothing; of two at once the second one is left out."""
+    first, second = ([step(number) for number in range(begin, begin + 200)] for begin in (0, 5000))
+    files = [recording(tmp_path / f"{k}.mcap", one, rate=200) for k, one in enumerate((first, second))]
+    view = ros.neurovis("ros", "view", spec, "--record", tmp_path / "x.mcap", "--format", "json")
+    view.wait_for("ready")
+    for file in files:
+        assert ros.neurovis("ros", "play", file, "--wait", "20").end() == 0
+    view.wait_for(f"{BIG_ACTIVITY}: another publisher goes on")
+    steady = ros.neurovis("ros", "play", files[0], "--wait", "20", "--loop")
+    deadline = time.monotonic() + PATIENCE
+    while sum("goes on" in line for line in view.err) < 2:
+        assert time.monotonic() < deadline, view.err
+        time.sleep(0.05)
+    assert ros.neurovis("ros", "play", files[1], "--wait", "20").end() == 0
+    time.sleep(0.5)
+    assert view.stop() == 0
+    assert steady.stop() == 0
+    counts = view.json()["topics"]["activity"]
+    assert (counts["lost"], counts["rejected"]["publisher"]) == (0, 200), "\n".join(view.err)
+    assert counts["received"] == counts["recorded"] + 200
+    assert any("sends at the same time: its messages are left out" in line for line in view.err)
+    found = arrays_in(tmp_path / "x.mcap")
+    assert found[:400] == first + second
+    assert set(found[400:]) <= set(first)
 
 
 def test_kill_9_of_the_recorder_and_of_the_publisher(ros: World, spec: Path, tmp_path: Path) -> None:

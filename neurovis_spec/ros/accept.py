@@ -7,7 +7,7 @@ rejected. A Stream does so for one topic, and counts.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Final, TypeAlias
 
@@ -17,6 +17,7 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.language.ros_types import plain
 from neurovis_spec.ros.counts import REASONS, Counts, Reason, Teller
 from neurovis_spec.ros.middleware import Arrival
+from neurovis_spec.ros.publishers import OnePublisher
 from neurovis_spec.runtime.ros_messages import label_of
 from neurovis_spec.runtime.wire import Encoding, WireError, array_of, stamp_of, text_of
 
@@ -24,6 +25,8 @@ ARRAY: Final = "std_msgs/Float64MultiArray"
 STRING: Final = "std_msgs/String"
 _LIMIT: Final = 1 << 64
 _NOTHING: Final = np.zeros(0)
+#: messages of a topic that wait at most
+_MOST_HELD: Final = 10_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,6 +90,10 @@ def headed(data: bytes, encoding: Encoding) -> Accepted | Reason:
     return Accepted(stamp=stamp_of(data, encoding))
 
 
+#: A message as it came, and what of it is accepted.
+Taken: TypeAlias = tuple[Arrival, Accepted]
+
+
 @dataclass(eq=False)
 class Stream:
     """The messages of one topic. ``name`` is what the summary calls it."""
@@ -96,23 +103,50 @@ class Stream:
     type: str
     encoding: Encoding
     judge: Judge
+    #: of a network's topics: which publisher is heard
+    publishers: OnePublisher | None = None
     counts: Counts = field(default_factory=Counts)
     _last: int | None = None
     #: messages that have gone missing here since the last that was accepted
     _missed: int = 0
+    #: those of a publisher of which it is not sure yet whether it is the one that is heard
+    _held: list[Taken] = field(default_factory=list)
 
-    def take(self, arrival: Arrival, teller: Teller) -> Accepted | None:
-        """Count a message; None where it is rejected."""
+    def take(self, arrival: Arrival, teller: Teller) -> Sequence[Taken]:
+        """Count a message; gives those that are accepted by now: none where it is rejected or has to wait, and before
+        it those that have waited."""
         self.counts.received += 1
         found = self._judged(arrival)
         if not isinstance(found, Accepted):
-            self.counts.rejected[found] += 1
-            teller.note(f"{REASONS[found]} on {self.topic}")
-            return None
-        self._follow(found.seq, teller)
-        self.counts.unlabelled += not found.labelled
-        self.counts.not_finite += not found.finite
-        return found
+            return self._reject(found, 1, teller)
+        whose = "same" if self.publishers is None else self.publishers.whose(self.topic, arrival)
+        if whose == "unsure" and len(self._held) < _MOST_HELD:
+            self._held.append((arrival, found))
+            return ()
+        if whose in ("other", "unsure"):
+            return self._reject("publisher", 1, teller)
+        if whose == "same":
+            self._reject("publisher", len(self._held), teller)
+            self._held = []
+        else:
+            self.anew()
+        self._held.append((arrival, found))
+        return self._accepted(teller)
+
+    def _accepted(self, teller: Teller) -> Sequence[Taken]:
+        """Those that have waited."""
+        taken, self._held = self._held, []
+        for _, found in taken:
+            self._follow(found.seq, teller)
+            self.counts.unlabelled += not found.labelled
+            self.counts.not_finite += not found.finite
+        return taken
+
+    def _reject(self, reason: Reason, count: int, teller: Teller) -> Sequence[Taken]:
+        if count:
+            self.counts.rejected[reason] += count
+            teller.note(f"{REASONS[reason]} on {self.topic}", count)
+        return ()
 
     def _judged(self, arrival: Arrival) -> Accepted | Reason:
         if arrival.type and plain(arrival.type) != self.type:
@@ -136,10 +170,17 @@ class Stream:
         """The publisher is another from here on, or a connection was made anew: that is no loss."""
         self._last = None
 
-    def end(self, teller: Teller) -> None:
-        """No more messages come."""
+    def end(self, teller: Teller) -> Sequence[Taken]:
+        """No more messages come; gives those that have waited, if nothing came since of the publisher that was heard
+        before."""
         missed, self._missed = self._missed, 0
         self.lose(missed, teller)
+        if self._held and self.publishers is not None and self.publishers.may_follow(self._held[0][0]):
+            self.anew()
+            return self._accepted(teller)
+        self._reject("publisher", len(self._held), teller)
+        self._held = []
+        return ()
 
     def lose(self, count: int, teller: Teller) -> None:
         """So many messages are lost."""

@@ -11,12 +11,13 @@ from time import monotonic
 from typing import Final, Literal, TypeAlias
 
 #: Why a message is rejected, the first that applies.
-Reason: TypeAlias = Literal["type", "parse", "hash", "length"]
+Reason: TypeAlias = Literal["type", "parse", "hash", "length", "publisher"]
 REASONS: Final[Mapping[Reason, str]] = {
     "type": "of another type",
     "parse": "that cannot be read",
     "hash": "of another network, or another version of its spec,",
     "length": "of another length",
+    "publisher": "of another publisher",
 }
 
 

@@ -63,7 +63,7 @@ class LegacyListener:
         #: whether it counts as known
         self.known = False
         #: those that have been judged, and go on as soon as it is known where to
-        self._ready: list[tuple[str, FloatArray, int]] = []
+        self._ready: list[tuple[str, FloatArray, Arrival]] = []
         self._wanted = wanted
         #: how many messages of each topic of this version there were
         self._made = {ACTIVITY: 0, WEIGHTS: 0}
@@ -144,7 +144,7 @@ class LegacyListener:
                 self._tell_of_change()
             return "length"
         self.counts[kind].not_finite += not np.isfinite(found).all()
-        self._hand_on(name, found, arrival.received)
+        self._hand_on(name, found, arrival)
         return None
 
     def _tell_of_change(self) -> None:
@@ -179,15 +179,15 @@ class LegacyListener:
             self._hand_on(*one)
         self._ready.clear()
 
-    def _hand_on(self, name: str, numbers: FloatArray, received: int) -> None:
+    def _hand_on(self, name: str, numbers: FloatArray, arrival: Arrival) -> None:
         if self._to is None:
             if self._wanted:
-                self._ready.append((name, numbers, received))
+                self._ready.append((name, numbers, arrival._replace(data=b"")))
             return
         topic, form = self._forms[name]
-        data = form.message(self._made[name], received / 1e9, numbers)
+        data = form.message(self._made[name], arrival.received / 1e9, numbers)
         self._made[name] += 1
-        self._to.put(topic, Arrival(data, received, None, ARRAY))
+        self._to.put(topic, Arrival(data, arrival.received, None, ARRAY, arrival.origin))
 
     def end(self) -> None:
         """What was recorded, and entries that were left out, which count as not to be read."""
@@ -198,6 +198,7 @@ class LegacyListener:
                 if name in there:
                     self.counts[kind].recorded = there[name].recorded
                     self.counts[kind].lost += there[name].lost
+                    self.counts[kind].rejected["publisher"] += there[name].rejected["publisher"]
         for kind, count in self.legacy.left_out.items():
             if count:
                 self.counts[kind].rejected["parse"] += count

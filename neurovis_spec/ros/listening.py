@@ -18,6 +18,7 @@ from neurovis_spec.ros.definitions import definition
 from neurovis_spec.ros.files import Files, Rotation
 from neurovis_spec.ros.logs import topic_of
 from neurovis_spec.ros.middleware import Arrival, Ros
+from neurovis_spec.ros.publishers import OnePublisher
 from neurovis_spec.ros.received import ReceivedSource
 from neurovis_spec.ros.recorder import Recorder
 from neurovis_spec.ros.video import Video
@@ -81,12 +82,10 @@ class Listening:
         #: the film that is made of it, where there is one
         self.video: Video | None = None
         self.recorder = Recorder(self._files, self._definitions, tell, self._heard)
-        self.activity = self._add(
-            ACTIVITY, f"{self.base}/{ACTIVITY}", ARRAY, arrays(network.hash, len(network.neurons))
-        )
-        changing = len(network.changing)
-        if changing:
-            self._add(WEIGHTS, f"{self.base}/{WEIGHTS}", ARRAY, arrays(network.hash, changing))
+        publishers = OnePublisher(tell)
+        self.activity = self._array(ACTIVITY, len(network.neurons), publishers)
+        if len(network.changing):
+            self._array(WEIGHTS, len(network.changing), publishers)
 
     def _recording(self, path: Path, wanted: Wanted) -> Files:
         network = self.compiled.network
@@ -110,6 +109,12 @@ class Listening:
     def _add(self, name: str, topic: str, type_: str, judge: Judge) -> Stream:
         self._definitions[type_] = self._definition(type_)
         made = self.streams[topic] = Stream(name, topic, type_, ENCODINGS[self.ros], judge)
+        return made
+
+    def _array(self, name: str, size: int, publishers: OnePublisher) -> Stream:
+        """A topic of the network's own."""
+        made = self._add(name, f"{self.base}/{name}", ARRAY, arrays(self.compiled.network.hash, size))
+        made.publishers = publishers
         return made
 
     def start(self) -> None:

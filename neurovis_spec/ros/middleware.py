@@ -28,14 +28,27 @@ class MiddlewareError(ValueError):
         self.hint = hint
 
 
+class Origin(NamedTuple):
+    """Who has sent a message. ``who`` is the same on all topics of a publisher, "" where ROS does not say;
+    ``connection`` is another one where it begins anew; ``name`` is its node's. ``alone`` asks whether it is the only
+    one that is there by now."""
+
+    who: str
+    connection: str
+    name: str
+    alone: Callable[[], bool]
+
+
 class Arrival(NamedTuple):
     """A message as it came; times in nanoseconds since 1970. ``type`` is what its publisher says that it is
-    (``package/Name``), ``sent`` the time at which it was sent, where the middleware knows."""
+    (``package/Name``), ``sent`` the time at which it was sent, and ``origin`` who has sent it, where the middleware
+    knows."""
 
     data: bytes
     received: int
     sent: int | None
     type: str
+    origin: Origin | None = None
 
 
 #: Called with each message, in a thread of the middleware: it must not wait. What it raises is reported

@@ -8,12 +8,12 @@ does not take is counted as lost.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from threading import Condition, Thread
 from time import monotonic
 from typing import Final, TypeAlias
 
-from neurovis_spec.ros.accept import Accepted, Stream, time_of
+from neurovis_spec.ros.accept import Accepted, Stream, Taken, time_of
 from neurovis_spec.ros.counts import Teller
 from neurovis_spec.ros.files import Files
 from neurovis_spec.ros.logs import Stored, Topic
@@ -58,6 +58,8 @@ class Recorder:
         self._missed: dict[Stream, int] = {}
         self._ending = False
         self._streams: dict[Stream, Topic] = {}
+        #: those of which something came
+        self._seen = set[Stream]()
         self._chunk: list[tuple[Stream, Stored]] = []
         self._size, self._begun, self._synced = 0, 0.0, monotonic()
         self._full = False
@@ -127,12 +129,14 @@ class Recorder:
         return max(0.0, self._begun + _CHUNK_TIME - monotonic()) if self._chunk else _SYNC_TIME
 
     def _take(self, stream: Stream, arrival: Arrival) -> None:
-        accepted = stream.take(arrival, self._teller)
-        if accepted is None:
-            return
-        if self._files is not None:
-            self._keep(stream, arrival, accepted)
-        self._heard(stream, arrival, accepted)
+        self._seen.add(stream)
+        self._hand_on(stream, stream.take(arrival, self._teller))
+
+    def _hand_on(self, stream: Stream, taken: Sequence[Taken]) -> None:
+        for arrival, accepted in taken:
+            if self._files is not None:
+                self._keep(stream, arrival, accepted)
+            self._heard(stream, arrival, accepted)
 
     def _keep(self, stream: Stream, arrival: Arrival, accepted: Accepted) -> None:
         size = len(arrival.data) + 32
@@ -185,13 +189,14 @@ class Recorder:
         return True
 
     def _close(self) -> None:
-        if self._chunk:
-            self._write()
         with self._waiting:
             missed, self._missed = self._missed, {}
         for stream, count in missed.items():
             stream.miss(count)
-            stream.end(self._teller)
+        for stream in self._seen.union(missed):
+            self._hand_on(stream, stream.end(self._teller))
+        if self._chunk:
+            self._write()
         if self._files is not None:
             self._try(self._files.close)
         self._teller.rest()

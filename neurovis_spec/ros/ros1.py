@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from http.client import HTTPConnection
+from itertools import count
 from threading import Event, Lock, Thread
 from typing import IO, Final, cast
 from urllib.parse import urlsplit
@@ -29,6 +30,7 @@ from neurovis_spec.ros.middleware import (
     MiddlewareError,
     Node,
     NodeOptions,
+    Origin,
     Parameter,
     Publisher,
     Quality,
@@ -130,6 +132,9 @@ class Ros1Subscription:
 
     def __init__(self, node: Ros1Node, topic: str, quality: Quality, arrived: Arrived) -> None:
         self.type, self._node, self._arrived, self._closed = "*", node, arrived, False
+        #: who has sent on each connection, by its header, of which each connection has one of its own
+        self._origins: list[tuple[Mapping[str, str], Origin]] = []
+        self._made = count()
         self.handle = rospy.Subscriber(topic, rospy.AnyMsg, self._take, buff_size=_BUFFER, tcp_nodelay=True)
         self.topic = str(self.handle.resolved_name)
 
@@ -139,9 +144,28 @@ class Ros1Subscription:
         received = time.time_ns()
         header: Mapping[str, str] = getattr(message, "_connection_header", None) or {}
         try:
-            self._arrived(Arrival(bytes(message._buff), received, None, header.get("type", "")))
+            origin = self._origin(header)
+            self._arrived(Arrival(bytes(message._buff), received, None, header.get("type", ""), origin))
         except Exception as error:  # one message must not end the node
             self._node.tell(f"{self.topic}: {error}")
+
+    def _origin(self, header: Mapping[str, str]) -> Origin:
+        """Who has sent a message: a caller's new connection is one that has begun anew."""
+        for known, origin in self._origins:
+            if known is header:
+                return origin
+        who = header.get("callerid", "")
+        made = Origin(who, f"{who} {next(self._made)}", who, lambda: self._callers() <= {who})
+        there = {id(one.header) for one in self._connections()}
+        self._origins = [*(one for one in self._origins if id(one[0]) in there), (header, made)]
+        return made
+
+    def _connections(self) -> list[rospy.impl.transport.Transport]:
+        return list(self.handle.impl.connections)
+
+    def _callers(self) -> set[str]:
+        """Who publishes here by now; a connection that is being made does not say it yet."""
+        return {one.header.get("callerid", "") for one in self._connections() if one.header}
 
     @property
     def publishers(self) -> int:

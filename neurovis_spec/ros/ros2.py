@@ -13,7 +13,7 @@ from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from threading import Event, Lock, Thread
-from typing import Final, cast
+from typing import Final, TypedDict, cast
 
 import rclpy
 from rclpy.client import Client
@@ -31,6 +31,7 @@ from neurovis_spec.ros.middleware import (
     MiddlewareError,
     Node,
     NodeOptions,
+    Origin,
     Parameter,
     Publisher,
     Quality,
@@ -39,17 +40,38 @@ from neurovis_spec.ros.middleware import (
     Subscription,
     Tell,
 )
+from neurovis_spec.ros.publishers import Numbered
 from neurovis_spec.ros.reach import Carrier, reach_2
 from neurovis_spec.runtime.wire import Encoding
 
 #: seconds that another node has to answer
 _ANSWER: Final = 1.0
 _HUGE: Final = 1.7976931348623157e308
+#: middlewares whose publishers' identifiers begin with that of their program, in so many digits
+_DDS, _PARTICIPANT = ("rmw_fastrtps", "rmw_cyclonedds", "rmw_connextdds"), 24
+#: the name of a node of which nothing is known yet but its publisher
+_UNKNOWN: Final = "_NODE_NAME_UNKNOWN_"
+#: publishers of a topic that are kept in mind
+_MOST: Final = 100
 #: the version of Jazzy's rclpy
 _JAZZY: Final = 7
 #: names of primitives in interfaces, where they are others than in messages
 _PRIMITIVE: Final[Mapping[str, str]] = {"boolean": "bool", "octet": "byte", "double": "float64", "float": "float32"}
 _ARRAY: Final = re.compile(r"(?:sequence<(.+?)(?:, (\d+))?>|(.+)\[(\d+)\])")
+
+
+class _Gid(TypedDict):
+    """The identifier of a publisher."""
+
+    data: bytes
+
+
+class _Info(TypedDict, total=False):
+    """What rclpy says of a message besides."""
+
+    source_timestamp: int
+    publication_sequence_number: int | None
+    publisher_gid: _Gid
 
 
 def open_node(options: NodeOptions, tell: Tell) -> Node:
@@ -147,6 +169,8 @@ class Ros2Subscription:
         self.topic = node.rcl.resolve_topic_name(topic)
         self._type, self._node, self._quality, self._arrived = type_, node, quality, arrived
         self._class, self._closed, self._told = _message(type_), False, set[str]()
+        self._origins: dict[str, Origin] = {}
+        self._numbered = Numbered(lambda: list(self._names()))
         self._make(self._reliable())
 
     def _reliable(self) -> bool:
@@ -178,7 +202,7 @@ class Ros2Subscription:
             self._make(False)
             self._node.rcl.destroy_subscription(old)
 
-    def _take(self, data: bytes, info: Mapping[str, int]) -> None:
+    def _take(self, data: bytes, info: _Info) -> None:
         handle, class_ = self._handle.handle, self._class
         self._hand_on(data, info)
         while not self._closed:  # what is there besides
@@ -187,14 +211,48 @@ class Ros2Subscription:
                 return
             self._hand_on(*taken)
 
-    def _hand_on(self, data: bytes, info: Mapping[str, int]) -> None:
+    def _hand_on(self, data: bytes, info: _Info) -> None:
         if self._closed:
             return
         sent = info.get("source_timestamp") or None
         try:
-            self._arrived(Arrival(data, time.time_ns(), sent, self._type))
+            self._arrived(Arrival(data, time.time_ns(), sent, self._type, self._origin(info)))
         except Exception as error:  # one message must not end the node
             self._node.tell(f"{self.topic}: {error}")
+
+    def _origin(self, info: _Info) -> Origin | None:
+        """Who has sent a message. Jazzy does not say it, but numbers the messages of each publisher."""
+        gid, number = info.get("publisher_gid"), info.get("publication_sequence_number")
+        if gid:
+            connection = gid["data"].hex()
+        elif number:
+            connection = self._numbered.of(number)
+        else:
+            return None
+        origin = self._origins.get(connection)
+        if origin is None:
+            if len(self._origins) >= _MOST:
+                self._origins.clear()
+            name = self._names().get(connection, "")
+            who = self._node.participant(connection, name)
+            origin = self._origins[connection] = Origin(who, connection, name, lambda: self._alone(who))
+        return origin
+
+    def _names(self) -> dict[str, str]:
+        """The nodes that publish here by now, by the identifiers of their publishers; "" before one is known."""
+        offers = self._node.rcl.get_publishers_info_by_topic(self.topic)
+        return {
+            bytes(offer.endpoint_gid).hex(): ""
+            if offer.node_name == _UNKNOWN
+            else f"{offer.node_namespace.rstrip('/')}/{offer.node_name}"
+            for offer in offers
+        }
+
+    def _alone(self, who: str) -> bool:
+        with suppress(Exception):  # the node has ended
+            there = self._names()
+            return all(self._node.participant(*one) == who for one in there.items()) if who else len(there) <= 1
+        return False
 
     def look(self) -> None:
         """Tell of publishers of another type, of which ROS 2 delivers nothing."""
@@ -232,6 +290,7 @@ class Ros2Node:
         self._declared: set[str] = set()
         self._clients: dict[str, Client] = {}
         self._context = Context()
+        self._dds = get_rmw_implementation_identifier().startswith(_DDS)
         if options.arguments and options.arguments[0] != "--ros-args":
             raise MiddlewareError(f"ROS 2 does not take '{options.arguments[0]}'", "write --ros-args -r /from:=/to")
         no_signals = rclpy.SignalHandlerOptions.NO
@@ -266,6 +325,10 @@ class Ros2Node:
                     self.tell(f"ROS 2: {error}")
             while self._later:
                 self._later.pop(0)()
+
+    def participant(self, publisher: str, name: str) -> str:
+        """What all publishers of a program have in common, of which one has this identifier and a node of this name."""
+        return publisher[:_PARTICIPANT] if self._dds and not publisher.startswith("#") else name
 
     def later(self, what: Callable[[], None]) -> None:
         """Have something done by the node's thread, between two turns."""
