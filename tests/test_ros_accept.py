@@ -102,7 +102,7 @@ def test_what_is_rejected_is_counted_by_the_first_reason(encoding: Encoding) -> 
     assert take(one, message(encoding, [0, 0, 1, 2], "neurovis/1:other")) is None
     assert take(one, message(encoding, [0, 0, 1, 2])) is None
     assert take(one, message(encoding, [1, 2, 3], offset=2)) is None
-    assert one.counts.rejected == {"type": 1, "parse": 3, "hash": 1, "length": 2, "publisher": 0}
+    assert one.counts.rejected == {"type": 1, "parse": 3, "hash": 1, "length": 2, "names": 0, "publisher": 0}
     assert one.counts.received == 7
 
 

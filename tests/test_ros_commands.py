@@ -78,7 +78,7 @@ def test_the_summary_in_json_is_one_object_on_one_line(quiet: Quiet, tmp_path: P
     assert summary.pop("seconds") > 0
     nothing = {
         **dict.fromkeys(("received", "recorded", "lost", "unlabelled", "not_finite"), 0),
-        "rejected": dict.fromkeys(("length", "hash", "type", "parse", "publisher"), 0),
+        "rejected": dict.fromkeys(("length", "hash", "type", "parse", "names", "publisher"), 0),
     }
     assert summary == {
         **{"network": "a", "hash": nv.compile(spec).hash, "ros": 2, "steps": 0, "late": 0, "reconnects": 0},

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from test_ros_recorder import ENCODINGS, HASH, LABEL, START, TOPIC, N, arrays_in, files, text_of_type
+from test_ros_recorder import HASH, LABEL, START, TOPIC, N, arrays_in, files, text_of_type
 
 from neurovis_spec.ros.accept import ARRAY, Stream, arrays
 from neurovis_spec.ros.counts import Teller
 from neurovis_spec.ros.middleware import Arrival, Origin
 from neurovis_spec.ros.publishers import Numbered, OnePublisher
 from neurovis_spec.ros.recorder import Recorder
-from neurovis_spec.runtime.wire import ArrayForm
+from neurovis_spec.runtime.wire import ENCODINGS, ArrayForm
 
 MS = 1_000_000
 FORM = ArrayForm.of(LABEL, N, ENCODINGS[2])

@@ -143,10 +143,13 @@ def test_messages_that_cannot_be_used_are_counted_and_survived(ros: World, arm: 
     assert (1.0, 2.0) in motors
     topics = run.json()["topics"]
     assert topics["/neurovis/joints"]["received"] == 11
-    assert topics["/neurovis/joints"]["rejected"]["length"] == 6
+    rejected = topics["/neurovis/joints"]["rejected"]
+    assert (rejected["length"], rejected["names"]) == (4, 2)
     assert topics["/neurovis/joints"]["not_finite"] == 4
     assert topics["/target"]["not_finite"] == 5
     assert any("of another length on /neurovis/joints" in line for line in run.err)
+    told = "the input 'torque': there is no 'knee' in a message on /neurovis/joints; its names are 'ankle', 'hip'"
+    assert told in run.err
 
 
 @pytest.mark.parametrize(("on_timeout", "after"), [("hold", 0.75), ("zero", 0.0)])

@@ -4,24 +4,34 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
+from ros_alone import Alone
 
+import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiler.ros_settings import Subscription
 from neurovis_spec.ros import middleware
+from neurovis_spec.ros import pace as pace_module
+from neurovis_spec.ros.bags import Bag
 from neurovis_spec.ros.counts import Teller
 from neurovis_spec.ros.definitions import Definition
+from neurovis_spec.ros.definitions import definition as text_of
+from neurovis_spec.ros.fields import encode
 from neurovis_spec.ros.inputs import Inputs
 from neurovis_spec.ros.middleware import Arrival, MiddlewareError, choose
-from neurovis_spec.ros.pace import Pace
+from neurovis_spec.ros.pace import NO_CLOCK, Pace, clock_begins
+from neurovis_spec.ros.play import Course as Playing
+from neurovis_spec.ros.play import Player
+from neurovis_spec.ros.run import Course, NodeRun
 
-FLOAT = "std_msgs/Float64"
+FLOAT, JOINTS = "std_msgs/Float64", "sensor_msgs/JointState"
 TEXT = "float64 data"
 
 
@@ -65,6 +75,32 @@ def test_a_simulated_clock_may_begin_late_and_anew() -> None:
     assert pace.wait(3, lambda: False)
     assert clock.time == pytest.approx(0.12)
     assert pace.late == 0
+
+
+def test_a_simulated_clock_that_nobody_sends_is_told_of_once() -> None:
+    told, times = list[str](), iter([0.0, 0.5, 0.99, 1.0, 1.5, 2.0])
+    clock = Hands(begin=0.0)
+    clock.longest = 0.0
+    stopped = iter([False] * 4 + [True])
+    assert not clock_begins(clock, lambda: next(stopped), lambda: told.append("late"), lambda: next(times))
+    assert (told, clock.naps) == (["late"], 4)
+    assert clock_begins(Hands(begin=0.0), lambda: False, lambda: told.append("never"), lambda: 0.0)
+    assert told == ["late"]
+
+
+def test_a_run_and_a_player_tell_of_a_clock_that_nobody_sends(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(pace_module, "_PATIENCE", 0.0)
+    node, told = Alone("/neurovis/a"), list[str]()
+    node.simulated = True
+    monkeypatch.setattr(node, "now", lambda: 0)
+    asked = iter([False, False, False, True, True, True])
+    network = nv.compile_text("neurovis: 1\nname: a\nneurons: {A: {}}\n")
+    NodeRun(network, node, Course(100, backend="reference"), told.append).run(lambda: next(asked))
+    assert told == [NO_CLOCK]
+    player = Player(Bag(()), node, Playing(sim_time=True), told.append)
+    asked = iter([False, False, False, True, True, True])
+    player.run(lambda: next(asked))
+    assert told == [NO_CLOCK] * 2
 
 
 def test_a_wait_ends_when_it_is_asked_to() -> None:
@@ -117,6 +153,82 @@ def test_an_input_grows_old(on_timeout: str, after: float) -> None:
     inputs.topics[0].take(arrival(3.0))
     assert inputs.values(clock.now()) == {"target": 3.0}
     assert not inputs.silent
+
+
+def test_the_silence_of_an_input_is_told_and_that_it_is_heard_again() -> None:
+    clock = Hands()
+    inputs = inputs_of(clock, [], Subscription("target", "/t", FLOAT, timeout=0.5))
+
+    def step(after: float, heard: bool = False) -> list[str]:
+        if heard:
+            inputs.topics[0].take(arrival(2.0))
+        clock.time += after
+        inputs.values(clock.now())
+        return inputs.news()
+
+    fallen, again = (
+        "the input 'target' has fallen silent: no message on /t for 0.5 s",
+        "the input 'target' is heard again",
+    )
+    assert step(10) == []
+    assert step(0.1, heard=True) == []
+    assert step(0.5) == [fallen]
+    assert step(0.5) == []
+    assert step(0.1, heard=True) == [again]
+    inputs.values(clock.now() + 9)
+    inputs.values(clock.now())
+    assert step(9) == [fallen.replace("silent:", "silent (2 times):")]
+    assert step(0.1, heard=True) == [again]
+    inputs.values(clock.now() + 9)
+    assert step(0.1) == [f"{fallen}; {again}"]
+
+
+def test_the_silence_that_ends_a_run_is_told_by_its_end() -> None:
+    clock = Hands()
+    inputs = inputs_of(clock, [], Subscription("target", "/t", FLOAT, timeout=0.5, on_timeout="stop"))
+    inputs.topics[0].take(arrival(2.0))
+    inputs.values(clock.now() + 1)
+    assert inputs.silent
+    assert inputs.news() == []
+
+
+def test_a_run_tells_of_an_input_that_falls_silent() -> None:
+    node, told = Alone("/neurovis/a"), list[str]()
+    text = "neurovis: 1\nname: a\ninputs: {aim: {}}\nneurons: {A: {input: aim}}\n"
+    text += "ros: {subscribe: {aim: {topic: /aim, timeout: 0.001}}}\n"
+    run = NodeRun(nv.compile_text(text), node, Course(100, steps=3, backend="reference"), told.append)
+    node.arrived["/aim"](arrival(1.5))
+    run.run(lambda: False)
+    assert told == ["the input 'aim' has fallen silent: no message on /aim for 0.001 s"]
+
+
+def joints(names: Sequence[str], efforts: Sequence[float]) -> Arrival:
+    definition = Definition.parse(JOINTS, str(text_of(JOINTS, 1)))
+    return Arrival(encode(definition, {"name": names, "effort": efforts}, "ros1"), 0, None, JOINTS)
+
+
+def test_a_joint_that_does_not_come_is_named_with_those_that_do() -> None:
+    clock, told = Hands(), list[str]()
+    teller = Teller(told.append, clock.now)
+    legs = Subscription("legs", "/joints", JOINTS, "effort", ("left_knee", "hip"))
+    types = {JOINTS: Definition.parse(JOINTS, str(text_of(JOINTS, 1)))}
+    inputs = Inputs.of([legs], {"legs": 2}, types, "ros1", clock.now, teller)
+    (topic,) = inputs.topics
+    for _ in range(3):
+        topic.take(joints(["ankle", "hip", "left_knie"], [1, 2, 3]))
+    topic.take(joints(["left_knee", "hip"], [1]))
+    topic.take(joints([], []))
+    topic.take(joints([f"\33[2J{k}" * 99 for k in range(500)], [0] * 500))
+    counts = topic.counts.rejected
+    assert (counts["names"], counts["length"]) == (5, 1)
+    assert told[0] == (
+        "the input 'legs': there is no 'left_knee' in a message on /joints; its names are 'left_knie', 'ankle', 'hip'"
+    )
+    assert told[1] == "1 without a name that is picked on /joints"
+    assert not any("\33" in line for line in told)
+    assert sum(map(len, told)) < 2000
+    topic.take(joints(["hip", "left_knee"], [1, 2]))
+    np.testing.assert_array_equal(inputs.values(clock.now())["legs"], [2, 1])
 
 
 def test_what_cannot_be_used_leaves_the_input_as_it_was() -> None:

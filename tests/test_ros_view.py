@@ -126,7 +126,7 @@ def test_hostile_messages_are_counted_and_survived(ros: World, spec: Path, tmp_p
     assert view.stop() == 0
     counts = view.json()["topics"]["activity"]
     assert counts["received"] == 5000
-    assert counts["rejected"] == {"type": 0, "parse": 1000, "hash": 1000, "length": 1000, "publisher": 0}
+    assert counts["rejected"] == {"type": 0, "parse": 1000, "hash": 1000, "length": 1000, "names": 0, "publisher": 0}
     assert (counts["recorded"], counts["unlabelled"], counts["not_finite"]) == (2000, 1000, 1000)
     assert len(arrays_in(out)) == 2000
 

@@ -11,12 +11,13 @@ from time import monotonic
 from typing import Final, Literal, TypeAlias
 
 #: Why a message is rejected, the first that applies.
-Reason: TypeAlias = Literal["type", "parse", "hash", "length", "publisher"]
+Reason: TypeAlias = Literal["type", "parse", "hash", "length", "names", "publisher"]
 REASONS: Final[Mapping[Reason, str]] = {
     "type": "of another type",
     "parse": "that cannot be read",
     "hash": "of another network, or another version of its spec,",
     "length": "of another length",
+    "names": "without a name that is picked",
     "publisher": "of another publisher",
 }
 
@@ -56,6 +57,10 @@ class Teller:
         """So many messages more, of which ``news`` says what became."""
         self._news[news] = self._news.get(news, 0) + count
         self.look()
+
+    def say(self, line: str) -> None:
+        """Tell something that is told once."""
+        self._tell(line)
 
     def look(self) -> None:
         """Tell what there is, unless a line was just told."""

@@ -14,33 +14,82 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.ros_settings import Subscription as Settings
+from neurovis_spec.diagnostics import nearest
 from neurovis_spec.ros.counts import REASONS, Counts, Reason, Teller
 from neurovis_spec.ros.definitions import Definition
 from neurovis_spec.ros.fields import numbers_at, texts_at
 from neurovis_spec.ros.middleware import Arrival, Arrived
 from neurovis_spec.runtime.wire import Encoding, WireError
 
+#: names of a message that are listed, and characters of each
+_LISTED, _LONGEST = 12, 40
+
+
+@dataclass(slots=True)
+class _Silence:
+    """Whether an input is silent, and what there is to tell of that; of one that ends the run the end tells."""
+
+    settings: Settings
+    silent: bool = False
+    _falls: int = 0
+    _told: tuple[int, bool] = 0, False
+
+    def follow(self, silent: bool) -> None:
+        """Whether it is silent at a step."""
+        self._falls += silent and not self.silent
+        self.silent = silent
+
+    def news(self) -> str | None:
+        """What there is to tell since this was asked last."""
+        one, (before, was_silent) = self.settings, self._told
+        self._told = falls, silent = self._falls, self.silent
+        again = f"the input '{one.input}' is heard again"
+        if one.on_timeout == "stop" or falls == before:
+            return again if was_silent and not silent else None
+        often = f" ({falls - before} times)" if falls - before > 1 else ""
+        fallen = f"the input '{one.input}' has fallen silent{often}: no message on {one.topic} for {one.timeout:g} s"
+        return fallen if silent else f"{fallen}; {again}"
+
 
 class _Reading:
     """One input: what of a message it takes, and what it was last."""
 
-    def __init__(self, settings: Settings, size: int, definition: Definition, encoding: Encoding) -> None:
-        self.settings, self.size = settings, size
+    def __init__(
+        self, settings: Settings, size: int, definition: Definition, encoding: Encoding, teller: Teller
+    ) -> None:
+        self.settings, self.size, self.silence, self._teller = settings, size, _Silence(settings), teller
         self._numbers = numbers_at(definition, settings.field, encoding)
         self._names = texts_at(definition, "name", encoding) if settings.names else None
         #: the last message's values, and when it came; one value, so that no step sees half of it
         self.last: tuple[FloatArray, float] | None = None
-        self.silent = False
+        #: names that are picked and did not come, of which it was told
+        self._missed = set[str]()
 
     def values(self, data: bytes) -> FloatArray | Reason:
         """The values of a message, or why it has none. Raises WireError."""
         numbers = np.array(self._numbers(data), dtype=np.float64)
         if self._names is not None:
             names = list(self._names(data))
-            if len(names) != len(numbers) or any(name not in names for name in self.settings.names):
+            if len(names) != len(numbers):
                 return "length"
+            if missing := [name for name in self.settings.names if name not in names]:
+                self._miss(missing[0], names)
+                return "names"
             return numbers[[names.index(name) for name in self.settings.names]]
         return numbers if len(numbers) == self.size else "length"
+
+    def _miss(self, name: str, names: Sequence[str]) -> None:
+        """Tell, once of each, of a name that a message lacks, and of those that it has, the nearest first."""
+        if name in self._missed:
+            return
+        self._missed.add(name)
+        came = [one[:_LONGEST] for one in names[: 10 * _LISTED]]
+        near = nearest(name, came)
+        listed = [*near, *(one for one in came if one not in near)]
+        more = ", …" if len(names) > _LISTED else ""
+        said = ", ".join(map(repr, listed[:_LISTED])) + more if names else "none"
+        where = f"the input '{self.settings.input}': there is no '{name}' in a message on {self.settings.topic}"
+        self._teller.say(f"{where}; its names are {said}")
 
 
 def _ignore(arrival: Arrival) -> None:
@@ -122,7 +171,7 @@ class Inputs:
         no such numbers."""
         found = dict[tuple[str, str], list[_Reading]]()
         for one in settings:
-            reading = _Reading(one, sizes[one.input], definitions[one.type], encoding)
+            reading = _Reading(one, sizes[one.input], definitions[one.type], encoding, teller)
             found.setdefault((one.topic, one.type), []).append(reading)
         return cls(tuple(InputTopic(*key, readings, clock, teller) for key, readings in found.items()))
 
@@ -134,13 +183,18 @@ class Inputs:
                 values, last = np.zeros(reading.size), reading.last
                 if last is not None:
                     timeout = reading.settings.timeout
-                    reading.silent = timeout is not None and now - last[1] > timeout
-                    if not reading.silent or reading.settings.on_timeout != "zero":
+                    reading.silence.follow(timeout is not None and now - last[1] > timeout)
+                    if not reading.silence.silent or reading.settings.on_timeout != "zero":
                         values = last[0]
                 result[reading.settings.input] = float(values[0]) if reading.size == 1 else values
         return result
 
+    def news(self) -> list[str]:
+        """Which inputs have fallen silent, or are heard again, since this was asked last."""
+        told = [one.silence.news() for topic in self.topics for one in topic.readings]
+        return [line for line in told if line is not None]
+
     @property
     def silent(self) -> tuple[Settings, ...]:
         """The inputs of the last step that had fallen silent."""
-        return tuple(one.settings for topic in self.topics for one in topic.readings if one.silent)
+        return tuple(one.settings for topic in self.topics for one in topic.readings if one.silence.silent)

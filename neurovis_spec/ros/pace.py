@@ -11,6 +11,9 @@ from typing import Final, Protocol
 
 #: seconds of a sleep, so that an end is soon noticed; and between two looks at a simulated clock
 _NAP, _LOOK = 0.05, 0.0005
+#: seconds after which somebody should have sent a simulated clock, and what is told then
+_PATIENCE: Final = 1.0
+NO_CLOCK: Final = "waiting for /clock, on which nothing comes: the time is taken from it (--sim-time, use_sim_time)"
 #: a clock that falls back by more seconds than this has begun anew
 _BACK: Final = 1e-3
 
@@ -54,6 +57,22 @@ class SimulatedClock:
         time.sleep(_LOOK)
 
 
+def clock_begins(
+    clock: Clock, stopped: Callable[[], bool], late: Callable[[], None], steady: Callable[[], float] = time.monotonic
+) -> bool:
+    """Wait until a clock has begun, as a steady one has; where that takes long, ``late`` is called once. False where it
+    was stopped before."""
+    due: float | None = steady() + _PATIENCE
+    while not clock.now():
+        if stopped():
+            return False
+        if due is not None and steady() >= due:
+            due = None
+            late()
+        clock.nap(_NAP)
+    return not stopped()
+
+
 class Pace:
     """Steps at a rate. ``late`` counts those that began more than half a period late."""
 
@@ -62,14 +81,12 @@ class Pace:
         self._start, self._first, self._last = 0.0, 0, 0.0
         self.late = 0
 
-    def begin(self, stopped: Callable[[], bool]) -> bool:
-        """Step 0 is due now, with a simulated clock when that has begun; False where it was stopped before."""
-        while not self._clock.now():
-            if stopped():
-                return False
-            self._clock.nap(_NAP)
+    def begin(self, stopped: Callable[[], bool], late: Callable[[], None] = lambda: None) -> bool:
+        """Step 0 is due now, with a simulated clock when that has begun; False where it was stopped before. See
+        ``clock_begins``."""
+        going = clock_begins(self._clock, stopped, late)
         self._start = self._last = self._clock.now()
-        return not stopped()
+        return going
 
     def wait(self, step: int, stopped: Callable[[], bool]) -> bool:
         """Wait until a step is due; False where it was stopped before."""

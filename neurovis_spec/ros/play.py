@@ -16,7 +16,7 @@ from neurovis_spec.ros.convert import ConversionError, Converter
 from neurovis_spec.ros.counts import Counts, Teller
 from neurovis_spec.ros.logs import Stored, Topic
 from neurovis_spec.ros.middleware import Arrival, Node, Publisher, Quality, Tell
-from neurovis_spec.ros.pace import Clock, SimulatedClock, SteadyClock
+from neurovis_spec.ros.pace import NO_CLOCK, Clock, SimulatedClock, SteadyClock, clock_begins
 from neurovis_spec.runtime.wire import WireError, text_of
 
 #: Called with what is sent; must not wait.
@@ -115,7 +115,7 @@ class Player:
         def stopped() -> bool:
             return asked() or self._node.ended or (seconds is not None and time.monotonic() - begun >= seconds)
 
-        again = True
+        again = clock_begins(self._clock, stopped, lambda: self._teller.say(NO_CLOCK))
         while again and not stopped():
             sent = False
             for way, data in self._due(stopped):

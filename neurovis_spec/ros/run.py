@@ -28,7 +28,7 @@ from neurovis_spec.ros.fields import Form
 from neurovis_spec.ros.inputs import Inputs
 from neurovis_spec.ros.listening import ACTIVITY, SPEC, WEIGHTS, Listening, base_of
 from neurovis_spec.ros.middleware import LATCHED, Arrival, MiddlewareError, Node, Parameter, Publisher, Quality, Tell
-from neurovis_spec.ros.pace import Clock, Pace, SimulatedClock, SteadyClock
+from neurovis_spec.ros.pace import NO_CLOCK, Clock, Pace, SimulatedClock, SteadyClock
 from neurovis_spec.ros.steering import RunSteering
 from neurovis_spec.ros.summary import Summary
 from neurovis_spec.runtime.backend import Ready
@@ -208,7 +208,7 @@ class NodeRun:
         watch = Thread(target=self._watch, name="ros diagnostics", daemon=True)
         watch.start()
         try:
-            going = self._pace.begin(stopped)
+            going = self._pace.begin(stopped, lambda: self._tell(NO_CLOCK))
             while going and (course.steps is None or step < course.steps) and self._pace.wait(step, stopped):
                 going = self._step(step)
                 step += 1
@@ -220,6 +220,7 @@ class NodeRun:
                 self._over = time.monotonic()
                 self._end.set()
                 watch.join(2.0)
+                self._tell_of_inputs()
                 self._teller.rest()
 
     def _make_safe(self) -> None:
@@ -264,9 +265,14 @@ class NodeRun:
             try:
                 self.node.follow(self._steering.parameters)
                 self._teller.look()
+                self._tell_of_inputs()
                 self._diagnostics.say(self.summary(), [one.input for one in self._inputs.silent], self._course.rate)
             except Exception as error:
                 self._tell(f"diagnostics: {error}")
+
+    def _tell_of_inputs(self) -> None:
+        for line in self._inputs.news():
+            self._tell(line)
 
     def summary(self) -> Summary:
         """How it has gone so far. What was withheld of outputs counts as not finite."""
