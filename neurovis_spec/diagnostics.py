@@ -161,6 +161,10 @@ class Findings:
         """Forget warnings that the author has allowed; errors stay."""
         self._told = {mark: item for mark, item in self._told.items() if item.severity == "error" or not unwanted(item)}
 
+    def retell(self, word: Callable[[Diagnostic], Diagnostic]) -> None:
+        """Tell each finding in other words."""
+        self._told = {mark: word(item) for mark, item in self._told.items()}
+
     @property
     def failed(self) -> bool:
         """Whether there is an error among the findings."""
@@ -227,8 +231,10 @@ def nearest(name: str, known: Iterable[str], most: int = 3) -> tuple[str, ...]:
     (('kernel', 'keel'), ('tanh',))
     """
     from neurovis_spec.likeness import alike  # only here: most specs have no mistake
+    from neurovis_spec.lookalikes import in_ascii
 
-    return alike(name, tuple(dict.fromkeys(known)))[:most]
+    names, seen = tuple(dict.fromkeys(known)), in_ascii(name)
+    return (seen,) if seen != name and seen in names else alike(seen, names)[:most]
 
 
 def meant(name: str, known: Iterable[str]) -> str | None:
@@ -240,8 +246,12 @@ def meant(name: str, known: Iterable[str]) -> str | None:
     >>> meant("fomr", ["from", "to"]), meant("size", ["file"])
     ('from', None)
     """
-    most = 1 if len(name) < 4 else 2
     close = nearest(name, known, 6)  # few: a distance takes a while to find
+    if not name.isascii():
+        from neurovis_spec.lookalikes import in_ascii
+
+        name = in_ascii(name)
+    most = 1 if len(name) < 4 else 2
     far = sorted((slips(name, other), other) for other in close if abs(len(name) - len(other)) <= most)
     if not far or far[0][0] > most or (len(far) > 1 and far[1][0] == far[0][0]):
         return None

@@ -88,6 +88,7 @@ def compile(document: SourceDocument | None, request: Request, findings: Finding
             memory = remember(spec, request, network, findings)
             foresee(spec, network, findings)
         gather(spec, request, findings)
+    explain(findings)
     allow(findings)
     return Outcome(spec, request, network, memory)
 
@@ -99,6 +100,14 @@ def gather(spec: Spec, request: Request, findings: Findings) -> None:
 
         files = (included.model.source for included in request.includes.files)
         gather_undeclared((spec.source, *files), findings)
+
+
+def explain(findings: Findings) -> None:
+    """Name characters that look like others, or like nothing, in what is invalid."""
+    if findings.failed and not all(map(str.isascii, findings.sources.values())):
+        from neurovis_spec.language.strange import name_characters
+
+        name_characters(findings)
 
 
 def allow(findings: Findings) -> None:

@@ -223,7 +223,7 @@ ERRORS = [
     ("x + ‹'abc'›", "no-strings", None),
     ('‹"abc›', "no-strings", None),
     ("‹0x1f›", "malformed-number", "decimal"),
-    ("‹1_000›", "malformed-number", "underscores"),
+    ("‹1_000›", "malformed-number", "write 1000"),
     ("2 * ‹010›", "malformed-number", "write 10"),
     ("‹00›", "malformed-number", "write 0"),
     ("‹2024-01-01›", "malformed-number", "2024 - 1 - 1"),

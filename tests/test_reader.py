@@ -294,8 +294,8 @@ def test_the_deepest_level() -> None:
 SYNTAX = [
     ("a: 1\n\tb: 2\n", "2:1", "a tab in the indentation"),
     ("a:\n  b: 1\n \tc: 2\n", "3:2", "a tab in the indentation"),
-    ("name x\nfoo: 1\n", "1:1", "':' is missing after 'name x'"),
-    ("a: 1\nname x\nfoo: 1\n", "2:1", "':' is missing after 'name x'"),
+    ("name x\nfoo: 1\n", "1:1", "':' is missing after 'name'"),
+    ("a: 1\nname x\nfoo: 1\n", "2:1", "':' is missing after 'name'"),
     ("a:\n  name:x\n  b: 1\n", "2:7", "a blank is missing after ':'"),
     ("K: [1, 2\nO: {}\n", "1:4", "'[' is not closed"),
     ("K: {count: 2\nO: {}\n", "1:4", "'{' is not closed"),

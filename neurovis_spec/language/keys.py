@@ -6,12 +6,22 @@ meant for; so its value is checked as well, and what it declares is not reported
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Iterator
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from neurovis_spec.diagnostics import Findings, Home, Undeclared, did_you_mean, meant, nearest, shorten, slips, suggest
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
-from neurovis_spec.language.yaml.source import Entry, Mapping
+from neurovis_spec.language.yaml.source import Entry, Mapping, Scalar
+
+_NAMES: Final = r"[A-Za-z_][\w.]*(?: *(?:->|\+) *[A-Za-z_][\w.]*)*"
+_APART: Final = re.compile(
+    rf"(?P<key>{_NAMES})"
+    r"(?: *(?P<sign>=(?!=)|:(?=\S)) *(?P<value>.+)| +(?P<word>[^\s\[{+*/%^<>=!-]\S*)| *(?P<more>[\[{].*|- .*))",
+    re.ASCII | re.DOTALL,
+)
+#: A key behind which a bracket opens.
+_OPENED: Final = re.compile(rf"(?P<key>{_NAMES}) *(?P<sign>:?)(?P<rest>[\[{{].*)", re.ASCII | re.DOTALL)
 
 
 class Keys(NamedTuple):
@@ -30,12 +40,13 @@ class Words(NamedTuple):
     """What is said of an unknown key. ``foreign``: the message and the hint for one that is no misspelling; ``home``: a
     hint for one that is like none of the known ones."""
 
-    foreign: Callable[[str], tuple[str, str] | None] = lambda name: None
+    foreign: Callable[[str], tuple[str, str | None] | None] = lambda name: None
     home: Callable[[str], str | None] = lambda name: None
 
 
 def read_keys(data: Mapping, known: Collection[str], findings: Findings, words: Words | None = None) -> Keys:
     """Report the unknown keys of a mapping."""
+    data = mend_torn(data, "unknown-key", findings)
     unknown = {name for name in known if data.entry(name) is None} if data.is_open else set[str]()
     if all(entry.name in known for entry in data.entries):
         return Keys(data, frozenset(unknown))
@@ -53,7 +64,7 @@ def _read(
         right = None
         if foreign is not None:
             findings.error("unknown-key", span, *foreign)
-            unknown.update({name.partition(":")[0]} & set(known))
+            unknown.update({name if (parts := apart(name)) is None else parts.key} & set(known))
         elif name not in known and findings.many:
             findings.error("unknown-key", span, _unknown(name))
         elif name not in known:
@@ -96,12 +107,76 @@ def settings_of(
     return Names(found, settings.is_open)
 
 
-def _joined(name: str, known: Collection[str]) -> tuple[str, str] | None:
-    """What is said of ``key:value``, which YAML reads as one word: a message and a hint."""
-    key, colon, value = name.partition(":")
-    if not colon or key not in known:
+class Apart(NamedTuple):
+    """A key and its value that YAML reads otherwise, what is wrong between them, and what to write."""
+
+    key: str
+    value: str
+    message: str
+    hint: str | None
+
+    @property
+    def told(self) -> str:
+        """Both in one."""
+        return self.message if self.hint is None else f"{self.message}: {self.hint}"
+
+
+def apart(text: str) -> Apart | None:
+    """A text that is a key and a value all the same: ``bias:1``, ``bias = 1``, ``bias 1``, ``A -> B [1]``.
+
+    >>> print(apart("bias:1").told, "|", apart("A -> B 1").told, "|", apart("a text of words"))
+    a blank is missing after 'bias:': write bias: 1 | ':' is missing after 'A -> B': write A -> B: 1 | None
+    """
+    match = _APART.fullmatch(text)
+    if match is None:
         return None
-    return _unknown(name), f"a blank belongs behind the colon: {shorten(key)}: {shorten(value)}"
+    key, sign, value = match["key"], match["sign"], match["value"] or match["word"] or match["more"]
+    return _apart(key, sign or "", value)
+
+
+def _apart(key: str, sign: str, value: str) -> Apart:
+    name = shorten(key)
+    message = f"':' is missing after '{name}'"
+    if sign:
+        message = f"a blank is missing after '{name}:'" if sign == ":" else f"'=' stands behind '{name}' for ':'"
+    hint = None if value.startswith("- ") else f"write {shorten(f'{key}: {value}', 60)}"
+    return Apart(key, value, message, hint)
+
+
+def mend_torn(data: Mapping, code: str, findings: Findings) -> Mapping:
+    """A mapping in which an entry without a colon behind its key is that key: of ``A {bias: 1}`` YAML makes the key
+    ``A {bias`` and the text ``1}``. It is reported, and its value unread."""
+    found = [(entry, _torn(entry)) for entry in data.entries]
+    if all(parts is None for _, parts in found):
+        return data
+    entries = []
+    for entry, parts in found:
+        if parts is not None:
+            findings.error(code, entry.key.span, parts.message, parts.hint)
+            findings.unread(entry.value.span)
+            key = entry.key._replace(value=parts.key, inner=None)
+            entry = Entry(key, Scalar(True, entry.value.span, None))
+        entries.append(entry)
+    return Mapping(tuple(entries), data.span, data.is_open)
+
+
+def _torn(entry: Entry) -> Apart | None:
+    """The key and the value of an entry whose key, as YAML takes it, opens a bracket that its value closes."""
+    value, match = entry.value, _OPENED.fullmatch(entry.name) if entry.key.inner == 0 else None
+    if match is None or not isinstance(value, Scalar) or not isinstance(value.value, str) or value.inner != 0:
+        return None
+    opening, closing = match["rest"][0], "}" if match["rest"][0] == "{" else "]"
+    if entry.name.count(opening) <= entry.name.count(closing) or value.value.count(opening) >= value.value.count(
+        closing
+    ):
+        return None
+    return _apart(match["key"], match["sign"], f"{match['rest']}: {value.value}")
+
+
+def _joined(name: str, known: Collection[str]) -> tuple[str, str | None] | None:
+    """What is said of a key and a value that YAML reads as one word: a message and a hint."""
+    found = apart(name)
+    return None if found is None or found.key not in known else (_unknown(name), found.told)
 
 
 def _unknown(name: str) -> str:

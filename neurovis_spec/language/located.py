@@ -18,13 +18,15 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import PydanticCustomError, core_schema
 
-from neurovis_spec.diagnostics import Findings, Span, meant, nearest, shorten, suggest
+from neurovis_spec.diagnostics import Findings, Span, did_you_mean, meant, nearest, shorten, suggest
 from neurovis_spec.language import grammar
+from neurovis_spec.language.expressions.habits import ungrouped_hint
 from neurovis_spec.language.expressions.lexer import decimal_hint
 from neurovis_spec.language.grammar import FORMULA, REFERENCE, TEXT, TEXTS, Either, ListOf, Plain, Shape
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.yaml.scalars import INTEGER_HIGH, INTEGER_LOW
 from neurovis_spec.language.yaml.source import AnyList, Node, Scalar, describe, one_or_more
+from neurovis_spec.lookalikes import in_ascii
 
 T = TypeVar("T")
 M = TypeVar("M")
@@ -130,12 +132,18 @@ def as_identifier(node: Node, info: ValidationInfo) -> Located[str]:
     """A name: an ASCII letter or underscore, then letters, digits, underscores, at most 64."""
     text = as_text(node, info)
     if not IDENTIFIER.fullmatch(text.value):
-        findings_of(info).error("bad-name", node.span, bad_name(text.value), NAME_RULE)
+        findings_of(info).error("bad-name", node.span, bad_name(text.value), name_hint(text.value))
         give_up()
     return text
 
 
 NAME_RULE = "a name is a letter or underscore, then letters, digits and underscores, 64 at most"
+
+
+def name_hint(name: str) -> str:
+    """The help line for a name that is none: what it looks like, where that is a name, else the rule."""
+    seen = in_ascii(name)
+    return did_you_mean([seen]) if seen != name and IDENTIFIER.fullmatch(seen) else NAME_RULE
 
 
 def too_long(name: str) -> str:
@@ -189,7 +197,8 @@ def as_number(node: Node, info: ValidationInfo) -> Located[float]:
     """A finite number as such, no expression."""
     if not isinstance(node, Scalar) or isinstance(node.value, (str, bool)) or node.value is None:
         text = node.value if isinstance(node, Scalar) else None
-        refuse(info, node, "a number", decimal_hint(text) if isinstance(text, str) else None)
+        hint = decimal_hint(text) or ungrouped_hint(text) if isinstance(text, str) else None
+        refuse(info, node, "a number", hint)
     formula = as_formula(node, info)
     assert formula.value is not UNKNOWN
     return Located(float(formula.value), formula.node)

@@ -34,20 +34,21 @@ from neurovis_spec.diagnostics import Findings, Span, listed
 from neurovis_spec.language.exclusions import Rules, check_rules, contradictory, schema_of
 from neurovis_spec.language.expressions.given import RESERVED
 from neurovis_spec.language.grammar import Needs, NotWith, OneOf
-from neurovis_spec.language.keys import Keys, Words, read_keys
+from neurovis_spec.language.keys import Keys, Words, apart, mend_torn, read_keys
 from neurovis_spec.language.located import (
     IDENTIFIER,
-    NAME_RULE,
     Leaf,
     Located,
     bad_name,
     findings_of,
     give_up,
+    name_hint,
     refuse,
     unknown_at,
 )
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Scalar, Sequence
+from neurovis_spec.lookalikes import in_ascii
 
 V = TypeVar("V")
 
@@ -82,7 +83,10 @@ class Model(BaseModel):
         if not isinstance(data, Mapping):
             assert not isinstance(data, (str, int, float, dict))
             nothing = isinstance(data, Scalar) and data.value is None
+            parts = apart(data.value) if isinstance(data, Scalar) and isinstance(data.value, str) else None
             hint = "write {} where there is nothing to say" if nothing else f"its keys are {listed(cls._fields())}"
+            if parts is not None and parts.key in cls._fields():
+                hint = parts.told
             refuse(info, data, "a mapping", hint)  # type: ignore[arg-type]
         keys = read_keys(data, cls._fields(), findings_of(info), Words(cls._foreign, _home))
         data = keys.mapping
@@ -255,20 +259,38 @@ def unread(model: Model, key: str) -> dict[str, Unknown]:
     return {entry.name.partition(":")[0]: UNKNOWN for entry in entries if entry.name not in kept}
 
 
+def entry_hint(node: Node) -> str | None:
+    """What to do about a text in the place of a mapping, if it is an entry of one."""
+    parts = apart(node.value) if isinstance(node, Scalar) and isinstance(node.value, str) else None
+    return None if parts is None else parts.told
+
+
 def _named(node: Node, handler: Callable[[object], dict[str, V]], info: ValidationInfo) -> dict[str, V]:
     if not isinstance(node, Mapping):
-        refuse(info, node, "a mapping", "write NAME: … for each")
-    for entry in node.entries:
-        if not IDENTIFIER.fullmatch(entry.name):
-            tight = entry.name.partition(":")[0]
-            hint = f"a blank is missing after '{tight}:'" if IDENTIFIER.fullmatch(tight) else NAME_RULE
-            findings_of(info).error("bad-name", entry.key.span, bad_name(entry.name), hint)
-    return _keyed(node, handler, info)
+        refuse(info, node, "a mapping", entry_hint(node) or "write NAME: … for each")
+    node = mend_torn(node, "bad-name", findings_of(info))
+    entries = tuple(
+        entry if IDENTIFIER.fullmatch(entry.name) else _renamed(entry, node, findings_of(info))
+        for entry in node.entries
+    )
+    return _keyed(Mapping(entries, node.span, node.is_open), handler, info)
+
+
+def _renamed(entry: Entry, node: Mapping, findings: Findings) -> Entry:
+    """An entry whose key is no name, which is reported: with the name that the key looks like, where there is one."""
+    parts = apart(entry.name)
+    hint = name_hint(entry.name) if parts is None else parts.told
+    findings.error("bad-name", entry.key.span, bad_name(entry.name), hint)
+    if parts is not None and isinstance(entry.value, Scalar) and entry.value.value is None:
+        findings.unread(entry.value.span)  # the value is in what is read as the key
+    seen = in_ascii(entry.name)
+    meant = IDENTIFIER.fullmatch(seen) and node.entry(seen) is None
+    return Entry(entry.key._replace(value=seen, inner=None, written=None), entry.value) if meant else entry
 
 
 def _keyed(node: Node, handler: Callable[[object], dict[str, V]], info: ValidationInfo) -> dict[str, V]:
     if not isinstance(node, Mapping):
-        refuse(info, node, "a mapping")
+        refuse(info, node, "a mapping", entry_hint(node))
     values = {entry.name: entry.value for entry in node.entries}
     try:
         return handler(values)

@@ -35,6 +35,7 @@ from neurovis_spec.language.grammar import (
     declaring,
     naming,
 )
+from neurovis_spec.language.keys import apart, mend_torn
 from neurovis_spec.language.located import (
     BoolField,
     FormulaField,
@@ -50,7 +51,7 @@ from neurovis_spec.language.located import (
     valid,
     words,
 )
-from neurovis_spec.language.model import Filled, Keyed, KeysAreNames, Model, Named, Short
+from neurovis_spec.language.model import Filled, Keyed, KeysAreNames, Model, Named, Short, entry_hint
 from neurovis_spec.language.patterns import PATTERNS, PatternField
 from neurovis_spec.language.values import (
     FILE,
@@ -116,7 +117,7 @@ def _position(node: Node, info: ValidationInfo) -> FileReference | AnyList:
     if isinstance(node, Mapping):
         return as_file(node, info)
     wanted = "a position [x, y], a list of them, or {file: …}"
-    return node if isinstance(node, AnyList) else refuse(info, node, wanted)
+    return node if isinstance(node, AnyList) else refuse(info, node, wanted, entry_hint(node))
 
 
 class GroupModel(Model):
@@ -316,7 +317,7 @@ def _mappings(items: Iterable[Node], info: ValidationInfo, wanted: str) -> tuple
     """Those of some items that are mappings; the others are reported."""
 
     def read(node: Node, info: ValidationInfo) -> Mapping:
-        return node if isinstance(node, Mapping) else refuse(info, node, wanted)
+        return node if isinstance(node, Mapping) else refuse(info, node, wanted, entry_hint(node))
 
     return tuple(valid(items, read, info))
 
@@ -338,7 +339,7 @@ def _connections(node: Node, info: ValidationInfo) -> list[tuple[Located[str], o
         if _in_parts(mapping, info):
             continue
         first: dict[str, Entry] = {}
-        for entry in mapping.entries:
+        for entry in mend_torn(mapping, "bad-connection", findings_of(info)).entries:
             same = first.setdefault("".join(entry.name.split()), entry)
             if same is not entry:  # two spellings of one key
                 place = f"{same.key.span.line}:{same.key.span.column}"
@@ -381,6 +382,9 @@ def _body(entry: Entry, info: ValidationInfo) -> Mapping:
         refuse(info, node, "a weight or a mapping", hint)
     if node.value is None:
         return Mapping((), entry.key.span)
+    parts = apart(node.value) if isinstance(node.value, str) else None
+    if parts is not None and parts.key in ConnectionModel.model_fields:
+        refuse(info, node, "a weight or a mapping", parts.told)
     return Mapping((Entry(Scalar("weight", node.span, None), node),), node.span)
 
 

@@ -29,7 +29,7 @@ from neurovis_spec.compiler.values.definitions import Defaults, Definitions
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import meant, nearest, shorten
 from neurovis_spec.language.expressions.tree import Tree
-from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, said, too_long
+from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, name_hint, said, too_long
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown, known
@@ -243,7 +243,7 @@ class Builder:
         before = findings.errors
         for item in model.names:
             if not IDENTIFIER.fullmatch(item.value):
-                findings.error("bad-name", item.span, bad_name(item.value), NAME_RULE)
+                findings.error("bad-name", item.span, bad_name(item.value), name_hint(item.value))
             elif item.value in seen:
                 line = seen[item.value].span.line
                 findings.error("duplicate-neuron", item.span, f"'{item.value}' is named before (line {line})")

@@ -7,6 +7,7 @@ arrays, or findings at the very character. ``used`` notes on which parameters so
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -22,6 +23,7 @@ from neurovis_spec.diagnostics import Findings, Home, Undeclared, shorten, sugge
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS, FUNCTIONS
 from neurovis_spec.language.expressions.given import GIVEN, meaning
+from neurovis_spec.language.expressions.habits import UNITS, unit_hint
 from neurovis_spec.language.expressions.parser import DRAWS, ExpressionError, parse, unknown_names
 from neurovis_spec.language.expressions.tree import Draw, Number, Tree, draws, names
 from neurovis_spec.language.grammar import PLAIN, Role
@@ -33,6 +35,8 @@ V = TypeVar("V")
 
 #: Names that an expression may always use.
 ALWAYS = (*CONSTANTS, "dt")
+#: A number before a unit: ``10*ms``.
+_FACTOR = re.compile(r"((?:^\s*[+-])?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*\*\s*$")
 #: A number this close to an integer is that integer.
 NEAR_INTEGER = 1e-9
 _NOT_FINITE = "look for a division by zero, an overflow, or a root or logarithm of a negative number"
@@ -115,6 +119,8 @@ def parse_formula(
             message, hint = f"'{name}' comes later", "a parameter sees those that are declared before it"
         elif name in outside.names:
             hint = outside.hint.format(name)
+        elif name in UNITS and (factor := _FACTOR.search(formula.value, 0, start)):
+            hint = unit_hint(factor[1].strip(), name)
         lost = Undeclared(name, home)
         findings.error("unknown-name", formula.node.at(start, end), message, hint, undeclared=lost)
     return UNKNOWN

@@ -31,7 +31,7 @@ from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.given import meaning
 from neurovis_spec.language.expressions.tree import Name, Number, Tree, substitute
 from neurovis_spec.language.library import ActivationModel, Library, ModelModel, RuleModel, StateModel
-from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, bad_name
+from neurovis_spec.language.located import IDENTIFIER, Formula, bad_name, name_hint
 from neurovis_spec.language.model import Model as LanguageModel
 from neurovis_spec.language.model import names_of
 from neurovis_spec.language.places import formula_at
@@ -285,7 +285,7 @@ def _rule(name: str, model: RuleModel, findings: Findings, around: Around) -> tu
     before = findings.errors
     for signal in model.signals:
         if not IDENTIFIER.fullmatch(signal.value):
-            findings.error("bad-name", signal.span, bad_name(signal.value), NAME_RULE)
+            findings.error("bad-name", signal.span, bad_name(signal.value), name_hint(signal.value))
         elif signal.value in checker.known.declared:
             findings.error("duplicate-name", signal.span, checker.taken(signal.value), "choose another name")
         checker.known.declared[signal.value] = signal.span

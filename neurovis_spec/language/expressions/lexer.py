@@ -15,6 +15,8 @@ from typing import Literal, NamedTuple
 
 from neurovis_spec.diagnostics import shorten
 from neurovis_spec.language.expressions.errors import ExpressionError
+from neurovis_spec.language.expressions.habits import UNITS, ungrouped, ungrouped_hint, unit_hint
+from neurovis_spec.language.yaml.characters import character_name
 
 Kind = Literal["number", "name", "operator", "end"]
 
@@ -48,6 +50,10 @@ _TAIL = re.compile(r"[A-Za-z0-9_.]+")
 _ZEROS = re.compile(r"0+[0-9]+")
 _DATE = re.compile(r"\s*([0-9]{4}-[0-9]{1,2}-[0-9]{1,2})\s*")
 _QUOTED = re.compile(r"(?P<quote>['\"`“”‘’]).*?(?:['\"`“”‘’]|$)", re.DOTALL)
+#: A number and what may be its unit.
+_WITH_UNIT = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*([^\W\d]\w*|[°%])\s*")
+#: A unit that begins with no letter of ASCII.
+_UNIT = re.compile(r"[µμ°Ω]\w*")
 _OPERATOR = re.compile(r"\*\*|<=|>=|==|!=|[-+*/%^<>(),]")
 
 _FOREIGN: Mapping[str, str] = {
@@ -95,6 +101,7 @@ def tokens(text: str, *, references: bool = False, subscripts: bool = False) -> 
     if date := _DATE.fullmatch(text):
         hint = f"for the difference write {' - '.join(part.lstrip('0') or '0' for part in date[1].split('-'))}"
         raise ExpressionError("malformed-number", f"'{date[1]}' is a date, no number", *date.span(1), hint)
+    _check_habits(text)
     found: list[Token] = []
     at = 0
     while at < len(text):
@@ -107,6 +114,18 @@ def tokens(text: str, *, references: bool = False, subscripts: bool = False) -> 
         at = token.end
     found.append(Token("end", "", len(text), len(text)))
     return tuple(found)
+
+
+def _check_habits(text: str) -> None:
+    """Refuse a text that is a number with thousands apart, or with a unit."""
+    whole = len(text) - len(text.lstrip()), len(text.rstrip())
+    shown = shorten(text.strip())
+    if hint := ungrouped_hint(text):
+        message = f"'{shown}' is no number: nothing stands between thousands"
+        raise ExpressionError("malformed-number", message, *whole, hint)
+    unit = _WITH_UNIT.fullmatch(text)
+    if unit and (hint := unit_hint(unit[1], unit[2])):
+        raise ExpressionError("malformed-number", f"'{shown}' is no number: it has a unit", *whole, hint)
 
 
 def is_operand(token: Token | None) -> bool:
@@ -186,7 +205,11 @@ def decimal_hint(text: str) -> str | None:
 
 def _number_hint(number: str, tail: str) -> str | None:
     if tail.startswith("_"):
-        return "write the digits without underscores"
+        return ungrouped_hint(number + tail) or "write the digits without underscores"
+    if tail in UNITS:
+        return unit_hint(number, tail)
+    if (digits := ungrouped(number + tail)) is not None:
+        return f"write {digits}"
     if number == "0" and re.fullmatch(r"[xXoObB][0-9a-fA-F]+", tail):
         return "numbers are decimal here"
     if re.fullmatch(r"[eE]", tail):
@@ -194,6 +217,11 @@ def _number_hint(number: str, tail: str) -> str | None:
     if _NAME.fullmatch(tail):
         return f"for a product write {shorten(number)} * {shorten(tail)}"
     return None
+
+
+def _unit_at(text: str, at: int) -> str:
+    match = _UNIT.match(text, at)
+    return "" if match is None else match[0]
 
 
 def _no_token(text: str, at: int, after: Token | None) -> ExpressionError:
@@ -214,7 +242,9 @@ def _no_token(text: str, at: int, after: Token | None) -> ExpressionError:
     if character in "[]{}":
         message = "an expression is one number; there are no lists, sets and mappings in it"
         return ExpressionError("no-collections", message, at, at + 1, "use ( ) to group" if character in "[]" else None)
-    shown = f"'{character}'" if character.isprintable() else f"the character U+{ord(character):04X}"
+    if after is not None and after.kind == "number" and (unit := unit_hint(after.text, _unit_at(text, at))):
+        return ExpressionError("malformed-number", f"a unit stands behind {after.text}", at, at + 1, unit)
+    shown = f"'{character}'" if character.isprintable() else f"the character {character_name(character)}"
     return ExpressionError("unexpected-character", f"{shown} has no meaning here", at, at + 1, _lookalike(character))
 
 

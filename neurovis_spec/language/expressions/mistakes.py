@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 
 from neurovis_spec.diagnostics import nearest, shorten
 from neurovis_spec.language.expressions.errors import ExpressionError
+from neurovis_spec.language.expressions.habits import unit_hint
 from neurovis_spec.language.expressions.lexer import Token, is_operand
 
 _INSTEAD: Mapping[str, str] = {
@@ -56,6 +57,10 @@ def missing(previous: Token | None, token: Token, opened: bool) -> ExpressionErr
         return _closes_nothing(token)
     if previous is None:
         return _at("missing-operand", f"'{token.text}' has no value before it", token)
+    if token.kind == "end" and previous.text == "%":
+        return _at(
+            "missing-operand", "a value is missing after '%'", previous, "a % b is the remainder; write 50% as 0.5"
+        )
     if token.kind == "end":
         return _at("missing-operand", f"a value is missing after '{previous.text}'", previous)
     hint = f"write '{token.text}' once" if token.text == previous.text and token.text in "*^<>" else None
@@ -81,6 +86,9 @@ def unexpected(previous: Token | None, token: Token) -> ExpressionError:
     if token.text == "else":
         return _at("missing-if", "'else' without 'if'", token, "write 'a if condition else b'")
     before = "" if previous is None else shorten(previous.text)
+    unit = None if previous is None or previous.kind != "number" else unit_hint(previous.text, token.text)
+    if unit is not None:
+        return _at("missing-operator", f"a unit, '{token.text}', stands behind the number {before}", token, unit)
     product = f"{before} * {shorten(token.text)}" if is_operand(token) else "*"
     message = f"an operator is missing between '{before}' and '{shorten(token.text)}'"
     return _at("missing-operator", message, token, f"for a product write '{product}'")

@@ -12,6 +12,7 @@ from typing import Final
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.yaml import faults
 from neurovis_spec.language.yaml.crowded import MOST_ENTRIES
+from neurovis_spec.language.yaml.faults import Words
 from neurovis_spec.language.yaml.packed import PACK_FROM, Packer, balance
 from neurovis_spec.language.yaml.refusals import DEEPEST, ReadingStoppedError
 from neurovis_spec.language.yaml.scalars import NumberRangeError, resolve
@@ -34,6 +35,9 @@ _FLOW_TEXT: Final = Unquoted(
     re.compile(rf":(?=[\s,\[\]{{}}]|\Z)|{ENDS_TEXT}|,|\[|\]|\{{|\}}", re.ASCII),
 )
 _COMMA: Final = re.compile(r"\s*,\s*", re.ASCII)
+#: Digits, and further ones that commas set apart.
+_DIGITS: Final = re.compile(r"[0-9]+")
+_THOUSANDS: Final = re.compile(r"(?:,[0-9]{3})+(?![\w.])")
 _FLOW_COLON: Final = re.compile(r"[ \t]*:")
 _TIGHT: Final = re.compile(r":[,\[\]{}]")
 #: A list of texts and numbers that need no second look.
@@ -63,13 +67,27 @@ class Brackets(Scanner):
         self._at += bool(character)
         return True
 
-    def _comma(self, opening: str) -> None:
-        """Pass the comma between two items; none is wanted before a closing bracket."""
+    def _comma(self, opening: str, *, behind_key: bool = False) -> None:
+        """Pass the comma between two items; none is wanted before a closing bracket. ``behind_key``: the last item was
+        a key without a colon."""
         character = self._gap()
         if character and character not in ",]}":
-            tight = self._text[self._at - 1 : self._at].strip() and _TIGHT.match(self._text, self._at)
-            self._report(faults.NO_BLANK if tight else faults.no_comma(_CLOSING[opening]))
+            self._report(*self._apart(character, opening, behind_key))
         self._at += character in (",", ":")
+
+    def _apart(self, character: str, opening: str, behind_key: bool) -> tuple[Words, int]:
+        """What is wrong where no comma stands between two items, and where."""
+        before = self._plain
+        if character == ":" and self._text[self._at - 1 : self._at].strip() and _TIGHT.match(self._text, self._at):
+            return faults.NO_BLANK, self._at
+        if character == ":" and before is not None and len(self._text[before.begin : before.end].split()) == 1:
+            return faults.SECOND_COLON, self._at
+        if before is None or character not in "[{" or self._line != before.scalar.span.line:
+            return faults.no_comma(_CLOSING[opening]), self._at
+        written = self._text[before.begin : before.end]
+        if behind_key:
+            return faults.no_colon(f"{written} {character}…{_CLOSING[character]}"), before.begin
+        return faults.settings_apart(written), self._at
 
     def _list(self, depth: int) -> Node:
         place, begin = self._here(), self._at
@@ -160,7 +178,7 @@ class Brackets(Scanner):
                 before = self._plain if colon else None
                 if key is not None:
                     self._put(entries, key, value)
-            self._comma("{")
+            self._comma("{", behind_key=not colon)
         self._plain = None
         return self._made(entries, self._from(*place), empty=empty)
 
@@ -236,10 +254,13 @@ class Brackets(Scanner):
         if before is None or key is None or self._partial:
             return False
         one, other = before.scalar, key.scalar
-        if _is_number(one) and _is_number(other):
+        if _is_number(one) and (_is_number(other) or _DIGITS.fullmatch(self._text, key.begin, key.end)):
             if self._text[before.end : key.begin] != ",":
                 return False
-            self._refuse.decimal_comma(one, other, self._text[before.begin : key.end])
+            more = _THOUSANDS.match(self._text, key.end, self._end)
+            self._at = key.end if more is None else more.end()
+            span = self._from(one.span.line, one.span.column)
+            self._refuse.number_with_commas(self._text[before.begin : self._at], span)
             return True
         if isinstance(one.value, str) and isinstance(other.value, str) and "->" not in other.value:
             self._refuse.stray_text(one, other)

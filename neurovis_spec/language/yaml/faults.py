@@ -5,6 +5,7 @@ In: nothing, or the characters that were met. Out: Words.
 
 from __future__ import annotations
 
+import re
 from typing import Final, NamedTuple
 
 
@@ -16,12 +17,18 @@ class Words(NamedTuple):
 
 
 CODE: Final = "yaml-syntax"
+_NAMES: Final = r"[A-Za-z_][\w.]*(?: *(?:->|\+) *[A-Za-z_][\w.]*)*"
+#: A key and its value with no more than blanks between them; a longer text may be anything.
+_ENTRY: Final = re.compile(rf"({_NAMES})[ \t]+((?:[^\s\[{{'\"+>-]|[-+](?=[\w.]))\S*|[\[{{'\"].*)", re.ASCII | re.DOTALL)
 TAB: Final = Words("a tab in the indentation", "indent with blanks: YAML allows no tabs there")
 TAB_BEFORE: Final = Words("a tab where a value begins", "use blanks")
 NO_KEY: Final = Words("there is no key before ':'")
 NO_BLANK: Final = Words("a blank is missing after ':'")
 NO_START: Final = Words("a line '---' is missing behind the directive")
-SECOND_COLON: Final = Words("a second ':' in one line", "a text with ': ' in it needs quotes")
+SECOND_COLON: Final = Words(
+    "a second ':' in one line",
+    "keys below a key stand in braces, A: {bias: 1}, or on lines of their own; a text with ': ' in it needs quotes",
+)
 LONG_KEY: Final = Words("a key is longer than 1,000 characters")
 KEY_OF_LINES: Final = Words("a key of several lines needs '? ' before it")
 LATE_KEY: Final = Words(
@@ -79,9 +86,22 @@ def no_comma(closing: str) -> Words:
 
 
 def no_colon(written: str) -> Words:
-    """A line that should hold 'key: value', and does not."""
-    shown = written if len(written) <= 40 else written[:38] + "…"
-    return Words(f"':' is missing after '{shown}'", "an entry is written 'key: value'")
+    """Something that should be 'key: value', and has no colon."""
+    entry = _ENTRY.fullmatch(written)
+    if entry is None:
+        return Words(f"':' is missing after '{_short(written)}'", "an entry is written 'key: value'")
+    key, value = entry.groups()
+    return Words(f"':' is missing after '{_short(key)}'", f"write {_short(f'{key}: {value}')}")
+
+
+def settings_apart(name: str) -> Words:
+    """A value in brackets behind another one, that may be a name with its settings."""
+    message = f"'{_short(name)}' is complete; ',' or a closing bracket is missing before this"
+    return Words(message, f"a name with settings is written {{{_short(name)}: {{…}}}}")
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 40 else text[:38] + "…"
 
 
 def indentation(columns: set[int]) -> Words:

@@ -35,6 +35,7 @@ from neurovis_spec.language.yaml.scanner import (
     UnsoundError,
 )
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Scalar, Sequence
+from neurovis_spec.lookalikes import unseen
 
 _END: Final = r"(?=[ \t\r\n]|\Z)"
 _TEXT: Final = Unquoted(
@@ -48,6 +49,8 @@ _COMMENT: Final = re.compile(r"[ \t]#.*")
 #: What a line without a colon begins with that seems to be meant for its key.
 _WORD: Final = re.compile(r"[A-Za-z_][\w.]*(?: (?:->|\+) [\w.]+)*(?=[ \t]|\Z)", re.ASCII)
 _TIGHT_COLON: Final = re.compile(r"[A-Za-z_][\w.]*:(?=\S)")
+#: A line that is no more than a name, or names joined as the ends of a connection are.
+_HEAD: Final = re.compile(r"[A-Za-z_][\w.]*(?: *(?:->|\+) *[\w.]+)*", re.ASCII)
 #: A line that has a key and a colon.
 _KEYED: Final = re.compile(r":(?:\s|\Z)")
 #: Where a value has begun within what looks like its key: without a blank before it, or without a colon.
@@ -255,6 +258,11 @@ class Parser(Brackets):
         self._at, self._line, self._start = cursor[:3]
         return self._mapping(column, depth, key)
 
+    def _heads(self, cursor: _Cursor) -> bool:
+        """Whether the line at the cursor is a name alone, which lines indented further belong to."""
+        line = self._lines.line(cursor.line)[cursor.at - cursor.start :]
+        return not self._partial and _HEAD.fullmatch(_COMMENT.sub("", line).rstrip()) is not None
+
     def _inline(self, depth: int, indent: int | None) -> Node:
         """A scalar, or a collection in brackets. A text goes on in lines that are indented further than ``indent``;
         with None it ends with its line."""
@@ -290,10 +298,19 @@ class Parser(Brackets):
         may be indented further: what is may be meant for the last of them."""
         if self._at < self._end and self._at - self._start > column:
             self._further_in(column)
-            if entries:
-                name, entry = entries.popitem()
-                entries[name] = entry._replace(value=self._opened(entry.value))
+            self._open_last(entries)
+        while self._at < self._end and self._at - self._start == column and unseen(self._text[self._at]):
+            self._refuse.indentation(self._text[self._at], self._span(self._at + 1))
+            self._open = True
+            self._leave_out(column)
+            self._open_last(entries)
         return self._at < self._end and self._at - self._start == column
+
+    def _open_last(self, entries: dict[str, Entry] | None) -> None:
+        """Lines that are left out may be meant for the last entry."""
+        if entries:
+            name, entry = entries.popitem()
+            entries[name] = entry._replace(value=self._opened(entry.value))
 
     def _further_in(self, column: int) -> None:
         """Leave out lines between two entries that are indented further than these."""
@@ -359,8 +376,10 @@ class Parser(Brackets):
 
     def _opened(self, node: Node) -> Node:
         """A value to which lines may belong that could not be read."""
+        if isinstance(node, Scalar):
+            return self._lost_node(node) if node.value is None else node
         begin = self._lines.starts[node.span.line - 1] + node.span.column - 1
-        if isinstance(node, Scalar) or self._text[begin] in "[{":
+        if self._text[begin] in "[{":
             return node
         if isinstance(node, Mapping):
             last = tuple(entry._replace(value=self._opened(entry.value)) for entry in node.entries[-1:])
@@ -407,7 +426,9 @@ class Parser(Brackets):
         at = self._lines.starts[key.span.line - 1] + key.span.column - 1
         del self._refuse.found[found:]
         tight = soon[0].startswith(":")
-        self._note(faults.NO_BLANK if tight else faults.no_colon(name), at + soon.start() if tight else at)
+        rest = self._lines.line(key.span.line)[key.span.column - 1 :]
+        words = faults.NO_BLANK if tight else faults.no_colon(_COMMENT.sub("", rest).rstrip())
+        self._note(words, at + soon.start() if tight else at)
         return Scalar(name, key.at(0, soon.start()))
 
     def _key(self, column: int, depth: int) -> _Key:
@@ -460,7 +481,7 @@ class Parser(Brackets):
         blanks = BLANKS.match(self._text, self._start)
         assert blanks is not None
         here = blanks.end() - self._start
-        if fresh and here == column and self._plain is not None:
+        if fresh and self._plain is not None and (here == column or self._heads(cursor)):
             return self._without_colon(self._no_colon(cursor.at), cursor, column, depth)
         number, above = self._above(node.span.line)
         begin = len(above) - len(above.lstrip())

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Final
 
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span
+from neurovis_spec.language.expressions.habits import ungrouped_hint
 from neurovis_spec.language.yaml.characters import FORBIDDEN, REPLACEMENT, character_name
 from neurovis_spec.language.yaml.crowded import MOST_ENTRIES
 from neurovis_spec.language.yaml.faults import CODE, Words
@@ -87,6 +88,11 @@ class Refusals:
         self._error("control-character", span, f"this text holds {what}, written as an escape")
         return FORBIDDEN.sub(REPLACEMENT, text)
 
+    def indentation(self, character: str, span: Span) -> None:
+        """Refuse a line that begins with a character that is no blank and not seen."""
+        message = f"the line begins with {character_name(character)}, which is no indentation"
+        self._error("control-character", span, message, "indent with ordinary blanks")
+
     def duplicate(self, key: Scalar, first: Entry) -> None:
         """Refuse a key that is there already."""
         here, there = key.span, first.key.span
@@ -138,12 +144,11 @@ class Refusals:
         hint = f'if the comma is part of the text, put it in quotes: "{_short(f"{value.value}, {key.value}")}"'
         self._error("flow-comma", span, message, hint)
 
-    def decimal_comma(self, value: Scalar, key: Scalar, written: str) -> None:
-        """Refuse a number with a decimal comma."""
-        begin, end = value.span, key.span
-        span = Span(begin.file, begin.line, begin.column, end.end_line, end.end_column)
+    def number_with_commas(self, written: str, span: Span) -> None:
+        """Refuse a number with a decimal comma, or with commas between thousands."""
         message = f"a comma separates entries: '{_short(written)}' is not one number"
-        self._error("flow-comma", span, message, f"numbers have a decimal point: {_short(written.replace(',', '.'))}")
+        decimal = f"numbers have a decimal point: {_short(written.replace(',', '.'))}"
+        self._error("flow-comma", span, message, ungrouped_hint(written) or decimal)
 
 
 def _short(text: str) -> str:

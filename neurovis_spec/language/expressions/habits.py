@@ -1,0 +1,76 @@
+"""Numbers as they are written elsewhere: with thousands apart, with units. What to write instead.
+
+In: what stands where a number is wanted. Out: a help line with the number worked out, or None.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Final
+
+from neurovis_spec.diagnostics import shorten
+
+_GROUPED: Final = re.compile(r"([+-]?)([1-9][0-9]{0,2}(?:([,_' .\u00a0\u202f’])[0-9]{3})(?:\3[0-9]{3})*)")
+_MILLI, _MICRO, _MINUTE = Fraction(1, 1000), Fraction(1, 1_000_000), Fraction(60)
+#: Seconds.
+_TIMES: Final[Mapping[str, Fraction]] = {
+    "s": Fraction(1), "sec": Fraction(1), "second": Fraction(1), "seconds": Fraction(1), "ms": _MILLI, "msec": _MILLI,
+    "us": _MICRO, "usec": _MICRO, "µs": _MICRO, "μs": _MICRO, "min": _MINUTE,
+}  # fmt: skip
+_DEGREES: Final = frozenset({"deg", "degree", "degrees", "°"})
+_PLAIN: Final = frozenset({
+    "V", "mV", "uV", "µV", "nA", "pA", "uA", "µA", "mA", "nS", "pS", "uS", "µS", "mS", "Hz", "kHz", "pF", "nF", "uF",
+    "µF", "MOhm", "kOhm", "Ohm", "ohm", "Ω", "mm", "um", "µm", "cm", "rad",
+})  # fmt: skip
+#: Units that are no likely names.
+UNITS: Final = frozenset({*_TIMES, *_DEGREES, *_PLAIN})
+
+
+def ungrouped(text: str) -> str | None:
+    """A number without what sets its thousands apart; None where it has no such thing. With points it may be another
+    number, unless there are several.
+
+    >>> ungrouped("10,000"), ungrouped("-1_000_000"), ungrouped("1.000.000"), ungrouped("10.000"), ungrouped("0,500")
+    ('10000', '-1000000', '1000000', None, None)
+    """
+    match = _GROUPED.fullmatch(text.strip())
+    if match is None or (match[3] == "." and match[2].count(".") < 2):
+        return None
+    return match[1] + match[2].replace(match[3], "")
+
+
+def ungrouped_hint(text: str) -> str | None:
+    """The help line for such a number.
+
+    >>> ungrouped_hint("10,000"), ungrouped_hint("1,234")
+    ('write 10000', 'write 1234; if the comma is a decimal one, 1.234')
+    """
+    digits = ungrouped(text)
+    if digits is None:
+        return None
+    decimal = text.count(",") == 1 and not text.strip().endswith("000")
+    return f"write {shorten(digits)}" + (
+        f"; if the comma is a decimal one, {text.strip().replace(',', '.')}" if decimal else ""
+    )
+
+
+def unit_hint(number: str, unit: str) -> str | None:
+    """The help line for a number with a unit behind it.
+
+    >>> unit_hint("0.1", "ms")
+    'numbers have no units: write 0.0001 where seconds are wanted, 0.0001/dt where steps are'
+    >>> unit_hint("-65", "mV"), unit_hint("2", "feet")
+    ('numbers have no units: write -65', None)
+    """
+    if unit in _TIMES:
+        seconds = float(Fraction(number) * _TIMES[unit])
+        return (
+            f"numbers have no units: write {seconds:.15g} where seconds are wanted, {seconds:.15g}/dt where steps are"
+        )
+    if unit in _DEGREES:
+        return f"angles are in radians: write {number}*pi/180"
+    if unit == "%":
+        return f"write {float(Fraction(number) / 100):.15g}"
+    return f"numbers have no units: write {number}" if unit in _PLAIN else None

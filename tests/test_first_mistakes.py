@@ -1,0 +1,151 @@
+"""What those get wrong who write their first specs: each mistake is one finding, which says what to do."""
+
+from __future__ import annotations
+
+import unicodedata
+
+import pytest
+
+import neurovis_spec as nv
+from neurovis_spec.diagnostics import Diagnostic
+
+HEAD = "neurovis: 1\nname: x\n"
+AB = "neurons: {A: {}, B: {}}\n"
+TWO = "neurons: {A: {count: 2}}\n"
+
+
+def findings(text: str) -> tuple[Diagnostic, ...]:
+    """What is said of a text; a head is put before one that has none."""
+    try:
+        return nv.compile_text(text if text.startswith("neurovis") else HEAD + text).warnings
+    except nv.SpecError as error:
+        return error.diagnostics
+
+
+def hold(text: str, place: str, *words: str) -> None:
+    """There is one finding, at this place, which says these words."""
+    found = findings(text)
+    assert [f"{item.span.line}:{item.span.column}" for item in found] == [place], found
+    for word in words:
+        assert word in f"{found[0].message} | {found[0].hint or ''}"
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "words"),
+    [
+        ("neurons:\n  A {bias: 1}\n", "4:3", "':' is missing after 'A' | write A: {bias: 1}"),
+        ("neurons:\n  A {bias:1}\n", "4:3", "':' is missing after 'A'"),
+        ("neurons:\n  A:{bias: 1}\n", "4:3", "a blank is missing after 'A:' | write A: {bias: 1}"),
+        ("neurons:\n  A: {bias:1}\n", "4:7", "a blank is missing after 'bias:': write bias: 1"),
+        ("neurons:\n  A: {bias 1}\n", "4:7", "':' is missing after 'bias': write bias: 1"),
+        ("neurons:\n  A: {bias: 1, count 2}\n", "4:16", "':' is missing after 'count': write count: 2"),
+        ("neurons:\n  A: {count 2, bias: 1}\n", "4:7", "':' is missing after 'count'"),
+        ("neurons: {A {bias: 1}, B: {}}\n", "3:11", "':' is missing after 'A' | write A: {…}"),
+        ("neurons: {A: {bias: 1}, B {}}\n", "3:25", "':' is missing after 'B'"),
+        ("neurons {A: {bias: 1}}\n", "3:1", "':' is missing after 'neurons'"),
+        ("neurons:\n  A\n    bias: 1\n", "4:3", "':' is missing after 'A'"),
+        (AB + "connections:\n  A -> B {weight: 1}\n", "5:3", "':' is missing after 'A -> B'"),
+        (AB + "connections:\n  A -> B 1\n", "5:3", "':' is missing after 'A -> B': write A -> B: 1"),
+        (AB + "connections:\n  A -> B [1]\n", "5:3", "':' is missing after 'A -> B'"),
+        (AB + "connections: {A -> B [[1]]}\n", "4:15", "':' is missing after 'A -> B'"),
+        (AB + "connections:\n  A -> B:\n    weight 2\n", "6:5", "':' is missing after 'weight': write weight: 2"),
+        (TWO + "connections:\n  A -> A:\n    matrix\n      - [1, 2]\n", "6:5", "':' is missing after 'matrix'"),
+        (TWO + "connections:\n  A -> A:\n    matrix [[1, 2], [1, 2]]\n", "6:5", "':' is missing after 'matrix'"),
+        (TWO + "connections:\n  A -> A: {matrix [[1, 2], [1, 2]]}\n", "5:12", "':' is missing after 'matrix'"),
+        (AB + "time {dt: 0.1}\n", "4:1", "':' is missing after 'time' | write time: {dt: 0.1}"),
+        ("neurons:\n  A:\n    count 2\n    bias: 1\n", "5:5", "':' is missing after 'count' | write count: 2"),
+        ("neurons:\n  A:\n    bias:1\n", "5:5", "a blank is missing after 'bias:': write bias: 1"),
+        ("neurons:\n  A: bias: 1\n", "4:10", "a second ':' in one line | keys below a key stand in braces"),
+        ("neurons:\n  A: {activation {gaussian: {sigma: 4}}}\n", "4:7", "':' is missing after 'activation'"),
+        ("neurons:\n  A: {activation: gaussian {sigma: 4}}\n", "4:28", "is written {gaussian: {…}}"),
+        ("neurons:\n  A: {activation: {gaussian: sigma: 4}}\n", "4:35", "a second ':'"),
+        ("neurons:\n  A:\n    activation tanh\n", "5:5", "write activation: tanh"),
+        ("neurons:\n  A:\n    names\n      - a\n      - b\n", "5:5", "':' is missing after 'names'"),
+        ("neurons:\n  A: {names [a, b]}\n", "4:7", "':' is missing after 'names' | write names: […]"),
+        (AB + "outputs: {y A}\n", "4:11", "':' is missing after 'y': write y: A"),
+        (AB + "parameters:\n  a = 1\n", "5:3", "write a: 1"),
+        (AB + "events:\n  - {at 5, clamp: {A: 1}}\n", "5:6", "':' is missing after 'at': write at: 5"),
+        ("neurovis 1\nname: x\nneurons: {A: {}}\n", "1:1", "write neurovis: 1"),
+    ],
+)
+def test_a_colon_that_is_missing(text: str, place: str, words: str) -> None:
+    hold(text, place, words)
+
+
+LOOKALIKES = {"\u0410": "A", "\u0391": "A", "\uff21": "A"}
+UNSEEN = ("\u200b", "\u00a0", "\u2060", "\u3000", "\u00ad")
+
+
+@pytest.mark.parametrize("character", [*LOOKALIKES, *UNSEEN])
+def test_a_character_that_looks_like_another_is_named(character: str) -> None:
+    """As a name, a reference, a key, a word, in an expression."""
+    name = f"U+{ord(character):04X} ({unicodedata.name(character).lower()})"
+    seen = f"{LOOKALIKES[character]}" if character in LOOKALIKES else f"{character}A"
+    wrong = character if character in LOOKALIKES else seen
+    for text, place in (
+        (f"neurons: {{{wrong}: {{}}}}\nconnections: {{A -> A: 1}}\n", "3:11"),
+        (f"{AB}connections: {{{wrong} -> B: 1}}\n", "4:15"),
+        (f"{AB}outputs: {{y: B + {wrong}}}\n", "4:18"),
+        (f"neurons: {{A: {{bias: 2*{wrong}}}}}\nparameters: {{A: 1}}\n", "3:23"),
+        (f"{AB}parameters: {{{wrong}: 1, b: 2 * A}}\n", "4:14"),
+    ):
+        if (
+            place not in ("4:15", "4:18") or unicodedata.category(character) != "Zs"
+        ):  # blanks of all kinds part references
+            hold(text, place, name)
+
+
+def test_words_and_keys_that_look_right_are_told_apart() -> None:
+    hold("neurons: {A: {b\u0456as: 1}}\n", "3:15", "did you mean 'bias'?", "U+0456")
+    hold("neurons: {A: {activation: t\u0430nh}}\n", "3:27", "did you mean 'tanh'?", "U+0430 (cyrillic small letter a)")
+    hold("neurons: {A: {combine: \u0455um}}\n", "3:24", "did you mean 'sum'?", "U+0455")
+    hold(AB + "connections: {A \u2192 B: 1}\n", "4:15", "U+2192 (rightwards arrow), not '->'")
+    hold("neurons: {A: {bias\uff1a 1}}\n", "3:15", "U+FF1A (fullwidth colon), not ':'")
+    hold("neurons: {A: {bias: 1\uff0c count: 2}}\n", "3:29", "U+FF0C (fullwidth comma), not ','")
+    hold("neurons: {M\u00fcller: {}}\n", "3:11", "U+00FC (latin small letter u with diaeresis)")
+
+
+@pytest.mark.parametrize("character", ["\u00a0", "\u3000", "\u2003", "\u200b"])
+def test_indentation_that_is_no_blank_is_named(character: str) -> None:
+    name = f"the line begins with U+{ord(character):04X} ({unicodedata.name(character).lower()})"
+    hold(f"neurons:\n{character}{character}A: {{}}\n", "4:1", name, "indent with ordinary blanks")
+    hold(f"neurons:\n  A: {{}}\n{character}{character}B: {{}}\nconnections: {{A -> B: 1}}\n", "5:1", name)
+    hold(f"neurons:\n  A:\n    bias: 1\n{character * 4}count: 2\n", "6:1", name)
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "words"),
+    [
+        ("time: {steps: 10,000}\n", "3:15", "'10,000' is not one number | write 10000"),
+        ("time: {steps: 1,000,000}\n", "3:15", "write 1000000"),
+        ("time:\n  steps: 10,000\n", "4:10", "nothing stands between thousands | write 10000"),
+        ("time:\n  steps: 1,000,000\n", "4:10", "write 1000000"),
+        ("time:\n  steps: 10_000\n", "4:10", "write 10000"),
+        ("time:\n  steps: 10 000\n", "4:10", "write 10000"),
+        ("time:\n  steps: 1.000.000\n", "4:10", "write 1000000"),
+        ("time:\n  steps: 10'000\n", "4:10", "write 10000"),
+        ("time:\n  steps: 10\u00a0000\n", "4:10", "write 10000"),
+        ("seed: 1,234\n", "3:7", "write 1234; if the comma is a decimal one, 1.234"),
+        ("parameters: {a: 0,5}\n", "3:17", "numbers have a decimal point: 0.5"),
+        ("parameters: {a: 2 * 1_000}\n", "3:21", "write 1000"),
+        ("time: {dt: 0.1 ms}\n", "3:12", "'0.1 ms' is no number: it has a unit | numbers have no units: write 0.0001"),
+        ("time: {dt: 0.1ms}\n", "3:12", "write 0.0001 where seconds are wanted, 0.0001/dt where steps are"),
+        ("time: {dt: 0.1*ms}\n", "3:16", "write 0.0001 where seconds are wanted"),
+        ("time: {dt: 20 \u00b5s}\n", "3:12", "write 2e-05 where seconds are wanted"),
+        ("parameters: {tau: 10*ms}\n", "3:22", "write 0.01 where seconds are wanted, 0.01/dt where steps are"),
+        ("parameters: {a: -65 mV}\n", "3:17", "it has a unit | numbers have no units: write -65"),
+        ("parameters: {a: -65*mV}\n", "3:21", "numbers have no units: write -65"),
+        ("parameters: {a: 2 + 5 nS}\n", "3:23", "a unit, 'nS', stands behind the number 5"),
+        ("parameters: {a: 50%}\n", "3:17", "write 0.5"),
+        ("parameters: {a: 90 deg}\n", "3:17", "angles are in radians: write 90*pi/180"),
+        ("parameters: {a: 90\u00b0}\n", "3:17", "angles are in radians: write 90*pi/180"),
+    ],
+)
+def test_numbers_as_they_are_written_elsewhere(text: str, place: str, words: str) -> None:
+    hold(text + "neurons: {A: {bias: 1}}\n", place, words)
+
+
+def test_what_looks_like_a_unit_may_be_a_name() -> None:
+    text = "parameters: {ms: 0.001, tau: 10*ms, s: 2}\nneurons: {A: {bias: tau*s}}\n"
+    assert not findings(text)
+    assert not findings("neurons: {A: {bias: 10.000}}\n")
