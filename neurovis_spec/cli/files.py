@@ -214,13 +214,17 @@ def write_folder(folder: Path, write: Callable[[], tuple[list[Path], list[Path]]
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """A block that writes a file; what the system refuses is said of this path."""
+    """A block that writes a file; what the system refuses is said of this path, or of another one for which there is no
+    room, such as a checkpoint beside it."""
+    from neurovis_spec.runtime.files import FULL
+
     try:
         yield
     except BrokenPipeError:
         raise
     except OSError as error:
-        raise fault(f"{path} cannot be written: {error.strerror or error}") from error
+        full = error.filename if error.errno in FULL else None
+        raise fault(f"{full or path} cannot be written: {error.strerror or error}") from error
 
 
 def count(number: int, word: str) -> str:

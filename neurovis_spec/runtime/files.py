@@ -16,9 +16,23 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Final
 
 from neurovis_spec.runtime.parts import Kind, clear, open_beside
+
+#: What the system says where there is no room: on the disk, for this user, in a file.
+FULL: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
+
+
+@contextmanager
+def named(path: str | os.PathLike[str]) -> Iterator[None]:
+    """A block that writes to a file; where there is no room for it, the error says that it is this one."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno in FULL:
+            error.filename = os.fspath(path)
+        raise
 
 
 @contextmanager
@@ -30,25 +44,26 @@ def replacing(path: str | os.PathLike[str], kind: Kind = "neurovis-new") -> Iter
     regular file nor a character device.
     """
     target = written_to(path)
-    if target.is_char_device():
-        with tempfile.TemporaryFile() as file:
-            yield file
-            copy_to_device(file, target)
-        return
-    clear(target, kind)
-    beside, raw = open_beside(target, kind)
-    try:
-        buffered = io.BufferedRandom(raw)
-        yield buffered
-        buffered.flush()
-        os.fsync(raw.fileno())
-        beside.replace(target)
-    except BaseException:
-        beside.unlink(missing_ok=True)
-        raise
-    finally:
-        with suppress(OSError):  # what could not be written by now cannot be written
-            raw.close()
+    with named(path):
+        if target.is_char_device():
+            with tempfile.TemporaryFile() as file:
+                yield file
+                copy_to_device(file, target)
+            return
+        clear(target, kind)
+        beside, raw = open_beside(target, kind)
+        try:
+            buffered = io.BufferedRandom(raw)
+            yield buffered
+            buffered.flush()
+            os.fsync(raw.fileno())
+            beside.replace(target)
+        except BaseException:
+            beside.unlink(missing_ok=True)
+            raise
+        finally:
+            with suppress(OSError):  # what could not be written by now cannot be written
+                raw.close()
 
 
 def written_to(path: str | os.PathLike[str]) -> Path:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from io import FileIO
 from pathlib import Path
 
-from neurovis_spec.runtime.files import copy_to_device, written_to
+from neurovis_spec.runtime.files import copy_to_device, named, written_to
 from neurovis_spec.runtime.parts import open_beside, shown
 
 
@@ -45,10 +45,15 @@ def part_of(path: Path) -> Iterator[Part]:
     """A part for a recording. It is removed when the block ends; after an exception it stays if it holds a step, and a
     warning says so. Raises OSError."""
     target = written_to(path)
-    if target.is_char_device():
+    with named(path):
+        if not target.is_char_device():
+            yield from _beside(path, target)
+            return
         with tempfile.TemporaryFile(buffering=0) as unnamed, FileIO(os.dup(unnamed.fileno()), "r+") as file:
             yield Part(file, None, target)
-        return
+
+
+def _beside(path: Path, target: Path) -> Iterator[Part]:
     beside, file = open_beside(target, "part")
     part = Part(file, beside, target)
     try:

@@ -8,6 +8,7 @@ brightnesses to a colour (4:2:0), which is what everything plays.
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import shutil
@@ -121,7 +122,16 @@ def _write(films: Iterator[Film], frames: int, suffix: str, path: str, progress:
         if status:
             said.seek(0)
             lines = said.read()[-2000:].decode("utf-8", "replace").strip().splitlines()
-            raise RendererError(f"ffmpeg failed: {lines[-1] if lines else status}", _HINT)
+            raise _failure("\n".join(lines), status)
+
+
+def _failure(said: str, status: int) -> Exception:
+    """What ffmpeg has failed at: there is no room for the film, or this ffmpeg lacks what films of the kind need."""
+    for number in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+        if os.strerror(number) in said:
+            return OSError(number, os.strerror(number))
+    last = said.splitlines()[-1] if said else status
+    return RendererError(f"ffmpeg failed: {last}", _HINT if "nknown encoder" in said else None)
 
 
 def _command(suffix: str, size: tuple[int, int], fps: float, path: str) -> list[str]:
