@@ -269,7 +269,6 @@ def test_patterns() -> None:
         ("{pattern: {all_to_all: {size: 1}}}", "unknown-parameter"),
         ("{pattern: random}", "missing-key"),
         ("{pattern: {random: {probability: 1.5}}}", "out-of-range"),
-        ("{pattern: {random: {probability: 0}}}", "no-connection"),
         ("{pattern: all_to_all, matrix: [[1, 2, 3], [4, 5, 6]]}", "conflicting-keys"),
         ("{weight: 1, matrix: [[1, 2, 3], [4, 5, 6]]}", "conflicting-keys"),
         ("{edges: [[A1, B1]], weight: 1}", "conflicting-keys"),

@@ -39,7 +39,7 @@ class Pattern:
 
 
 def _count(of: str) -> dict[str, Setting]:
-    return {"count": Setting(3, f"How many {of}.", 1)}
+    return {"count": Setting(3, f"How many {of}.", 0)}
 
 
 PATTERNS: Final[Mapping[str, Pattern]] = {

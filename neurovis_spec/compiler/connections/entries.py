@@ -14,7 +14,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.connections.edges import EdgeReader, End
 from neurovis_spec.compiler.connections.ends import Ends
-from neurovis_spec.compiler.connections.patterns import all_to_all, is_drawn, pairs_of
+from neurovis_spec.compiler.connections.patterns import all_to_all, empty_reason, pairs_of
 from neurovis_spec.compiler.connections.plasticity import Learning, Wired, learning_of
 from neurovis_spec.compiler.connections.weight_scale import Scaled, check_scale, scaled
 from neurovis_spec.compiler.events.settable import Assembled, Distance, Part
@@ -60,6 +60,8 @@ class Bundle(NamedTuple):
     #: that is set in a run changes), ``centres``, ``low``, ``high``, ``rule``
     parts: tuple[Part, ...] = ()
     label: str | None = None
+    #: of an entry that makes no connection the neurons of its ends
+    empty: tuple[IntArray, IntArray] | None = None
 
 
 class _Shape(NamedTuple):
@@ -163,16 +165,18 @@ class EntryBuilder:
                 *(part._replace(field="rule") for part in ruled if learning is not None),
             ),
             None if body.label is None else body.label.value,
+            None if len(shape.i) else (self.sources, self.targets),
         )
 
     def _report_empty(self) -> None:
-        """Say that there are no connections: an error but for drawn ones, as validity must not depend on the seed."""
+        """Say that there are no connections: an error, but for those that are drawn or counted, as validity depends on
+        no seed and no parameter."""
         pattern, findings = self.body.pattern, self.constants.findings
-        if pattern is not None and is_drawn(pattern, self.constants):
-            message, hint = "this entry draws no connection at all", "another seed, or a larger probability, draws some"
-            findings.warning("nothing-drawn", self.key.span, message, hint)
-        else:
+        reason = None if pattern is None else empty_reason(pattern, self.constants)
+        if reason is None:
             findings.error("no-connection", self.key.span, "this entry makes no connection at all")
+        else:
+            findings.warning("nothing-drawn", self.key.span, *reason)
 
     def _fits(self, count: int) -> bool:
         """Whether there is room for so many connections; a finding where there is not."""

@@ -18,11 +18,11 @@ from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.values.arguments import check_settings
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.draws import Stream
-from neurovis_spec.diagnostics import Findings, meant, shorten, suggest
+from neurovis_spec.diagnostics import Findings, did_you_mean, meant, shorten, suggest
 from neurovis_spec.language.keys import settings_of
 from neurovis_spec.language.located import Formula, formula_of
 from neurovis_spec.language.patterns import PATTERNS
-from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.values import Choice
 
 
@@ -148,6 +148,15 @@ RECIPES: Final[Mapping[str, _Recipe]] = {
 }
 
 
+#: What other languages call patterns.
+_ELSEWHERE: Final[Mapping[str, str]] = {
+    **dict.fromkeys(("full", "fully_connected", "dense", "complete"), "all_to_all"),
+    **dict.fromkeys(("identity", "diagonal", "pairwise"), "one_to_one"),
+    **dict.fromkeys(("bernoulli", "sparse", "erdos_renyi"), "random"),
+    "watts_strogatz": "small_world",
+}
+
+
 def pairs_of(
     choice: Choice, ends: Ends | Unknown, constants: Constants, stream: Stream, fits: Callable[[int], bool]
 ) -> Pairs | Unknown:
@@ -160,7 +169,8 @@ def pairs_of(
     written, span = choice.name.value, choice.name.span
     name = written if written in PATTERNS else meant(written, PATTERNS)
     if written not in PATTERNS:
-        hint = suggest(written, PATTERNS, "patterns")
+        elsewhere = _ELSEWHERE.get(written.casefold())
+        hint = suggest(written, PATTERNS, "patterns") if elsewhere is None else did_you_mean([elsewhere])
         findings.error("unknown-pattern", span, f"there is no pattern '{shorten(written)}'", hint)
     if name is None:
         check_settings(choice, constants)
@@ -182,15 +192,22 @@ def pairs_of(
         place = span if misfit.setting is None else formulas[misfit.setting].span
         findings.error(misfit.code, place, misfit.message, misfit.hint)
         return UNKNOWN
+    if values.get("count") == 0:
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     return recipe.make(ends, values, stream) if fits(recipe.least(n, m, values)) else UNKNOWN
 
 
-def is_drawn(choice: Choice, constants: Constants) -> bool:
-    """Whether chance decides which pairs a valid pattern makes."""
-    if choice.name.value != "random":
-        return False
-    formulas = [formula_of(entry.value, constants.findings) for entry in choice.settings.entries]
-    return any(formula is not UNKNOWN and known(constants.scalar(formula), 0.0) for formula in formulas)
+def empty_reason(choice: Choice, constants: Constants) -> tuple[str, str] | None:
+    """Why a valid pattern may make no pair at all, and what to do: chance decides, or it is told to make none. None
+    where that follows from the ends alone."""
+    for entry in choice.settings.entries:
+        formula = formula_of(entry.value, constants.findings)
+        value = UNKNOWN if formula is UNKNOWN else constants.scalar(formula)
+        if entry.name == "probability" and value is not UNKNOWN and value > 0:
+            return "this entry draws no connection at all", "another seed, or a larger probability, draws some"
+        if entry.name in ("probability", "count") and value is not UNKNOWN:
+            return f"with a {entry.name} of 0 this entry makes no connection at all", f"give it a larger {entry.name}"
+    return None
 
 
 def _settings(name: str, choice: Choice, findings: Findings) -> dict[str, Formula]:

@@ -118,7 +118,7 @@ class EventReader:
         found = self.finder.connections(name)
         if found is UNKNOWN:
             return []
-        if not self.finder.learns(found):
+        if len(found) and not self.finder.learns(found):
             message = f"nothing learns at '{shorten(name.value)}'"
             self.findings.error("no-rule", name.span, message, "name a connection that has a 'plasticity'")
         return [(found, on)]

@@ -50,13 +50,17 @@ class Finder:
         return self.known_neurons[text.value]
 
     def connections(self, text: Located[str]) -> IntArray | Unknown:
-        """The connections between two ends; UNKNOWN, and a finding, where there is none."""
+        """The connections between two ends; UNKNOWN, and a finding, where there is none. There may be none between the
+        ends of an entry that has drawn none with this seed, which is a warning."""
         if text.value not in self.known_connections:
             arrow = arrow_of(text, self.findings)
             found = UNKNOWN if arrow is UNKNOWN else self._between(arrow, text)
             if arrow is UNKNOWN or found is UNKNOWN or not self.wiring.complete:
                 return UNKNOWN
-            if not len(found):
+            if not len(found) and self._drew_nothing(arrow, text):
+                message = f"this has no effect: the entry of '{shorten(text.value)}' makes no connection at all"
+                self.findings.warning("nothing-drawn", text.span, message)
+            elif not len(found):
                 message = f"there is no connection '{shorten(text.value)}'"
                 self.findings.error("no-connection", text.span, message, lambda: self._other(arrow, text))
                 return UNKNOWN
@@ -69,6 +73,11 @@ class Finder:
         if sources is UNKNOWN or targets is UNKNOWN:
             return UNKNOWN
         return self.wiring.between(targets, sources) if back else self.wiring.between(sources, targets)
+
+    def _drew_nothing(self, arrow: Arrow, text: Located[str]) -> bool:
+        ends = [resolve_sum(end, text, self.directory, self.findings) for end in (arrow.sources, arrow.targets)]
+        sources, targets = (() if end is UNKNOWN else end for end in ends)
+        return self.wiring.nothing_between(sources, targets)
 
     def learns(self, connections: IntArray) -> bool:
         """Whether any of these connections has a rule."""
@@ -120,7 +129,8 @@ def finder_of(population: Population, made: Connected, findings: Findings) -> Fi
             rule = bundle.learning.rule
             rules.append(Holder(members, rule.name, tuple(quantity.name for quantity in rule.state)))
     names = tuple(bundle.name for bundle in made.bundles)
-    wiring = Wiring(made.sources, made.targets, names, tuple(rules), made.complete)
+    empty = tuple(bundle.empty for bundle in made.bundles if bundle.empty is not None)
+    wiring = Wiring(made.sources, made.targets, names, tuple(rules), made.complete, empty)
     return Finder(population.directory, _models(population), wiring, findings)
 
 

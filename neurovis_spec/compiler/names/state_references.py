@@ -53,13 +53,18 @@ class Holder(NamedTuple):
 
 class Wiring(NamedTuple):
     """The ends of all connections, what the entries are called, and the states of the rules. ``complete``: there are no
-    others."""
+    others. ``empty`` are the ends of the entries that make no connection."""
 
     sources: IntArray
     targets: IntArray
     names: tuple[str, ...]
     rules: tuple[Holder, ...]
     complete: bool = True
+    empty: tuple[tuple[IntArray, IntArray], ...] = ()
+
+    def nothing_between(self, sources: Sequence[int], targets: Sequence[int]) -> bool:
+        """Whether an entry from any of some neurons to any of others makes no connection."""
+        return any(np.isin(own[0], sources).any() and np.isin(own[1], targets).any() for own in self.empty)
 
     def between(self, sources: Sequence[int], targets: Sequence[int]) -> IntArray:
         """The connections from any of some neurons to any of others."""
