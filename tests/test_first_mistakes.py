@@ -149,3 +149,94 @@ def test_what_looks_like_a_unit_may_be_a_name() -> None:
     text = "parameters: {ms: 0.001, tau: 10*ms, s: 2}\nneurons: {A: {bias: tau*s}}\n"
     assert not findings(text)
     assert not findings("neurons: {A: {bias: 10.000}}\n")
+
+
+G = "inputs: {g: {values: [[1]]}}\n"
+STATE = "models: {m: {state: {v: {initial: 0, each_step: v + drive}}, activity: f(v)}}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "words"),
+    [
+        (G + AB + "connections: {A -> B: g}\n", "5:23", "'g' is an input"),
+        (G + AB + "connections: {A -> B: {weight: 2*g}}\n", "5:34", "(combine: product), or a rule"),
+        (G + "neurons: {A: {bias: g}}\n", "4:21", "neurons take in with input: g"),
+        ("neurons: {A: {bias: 1}, B: {bias: A}}\n", "3:35", "what 'A' does arrives by a connection"),
+        (STATE + "neurons: {A: {model: m}, B: {}}\nconnections: {A.v -> B: 1}\n", "5:15", "can be an output"),
+        (
+            STATE + "neurons: {A: {model: m}, B: {}}\nconnections: {A -> B: {plasticity: {delta: {target: A.v}}}}\n",
+            "5:53",
+            "a state of its model can be an output",
+        ),
+        (STATE + "neurons: {A: {model: m}, B: {input: A.v}}\n", "4:37", "an input is declared under 'inputs'"),
+        (
+            "neurons: {A: {input: 1}}\n",
+            "3:22",
+            "the name of an input, found the number 1 | what is added at every step",
+        ),
+        ("neurons: {A: {input: [1, 2]}}\n", "3:22", "declare it under 'inputs', and name it here"),
+        ("neurons: {A: {input: {expression: sin(t)}}}\n", "3:22", "declare it under 'inputs', and name it here"),
+        ("inputs: {g: 1}\nneurons: {A: {input: g}}\n", "3:13", "write {expression: 1}"),
+        ("inputs: {g: sin(t)}\nneurons: {A: {input: g}}\n", "3:13", "write {expression: sin(t)}"),
+        ("inputs: {g: [1, 2]}\nneurons: {A: {input: g}}\n", "3:13", "write {values: …}, one row a step"),
+        ("neurovis: 1\nname: NULL\n" + AB, "2:7", "found null | YAML reads this as null: put it in quotes"),
+        ("neurovis: 1\nname: true\n" + AB, "2:7", "YAML reads this as true or false: put it in quotes"),
+        ("neurovis: 1\nname: 3\n" + AB, "2:7", "expected a name, found the number 3 | a name is a letter"),
+        ("neurons: {NULL: {bias: 1}}\n", "3:11", "YAML reads 'NULL' as null | take another name, or put it in quotes"),
+        ("neurons: {A: {bias: 1, box: NULL}}\n", "3:24", "'box' has no value: YAML reads this as null"),
+        ("neurons: {A: {names: [a, Null]}}\n", "3:26", "found null | YAML reads this as null"),
+        (AB + "outputs: {y: ~}\n", "4:14", "found null | YAML reads this as null"),
+    ],
+)
+def test_what_is_meant_by_it_is_said(text: str, place: str, words: str) -> None:
+    hold(text, place, words)
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "words"),
+    [
+        ("neurons: {A: 3}\n", "3:14", "write {count: 3} for so many neurons, {bias: 3} for a bias"),
+        ("neurons: {A: tanh}\n", "3:14", "write {activation: tanh}"),
+        ("groups: {A: {bias: 1}}\n", "3:1", "did you mean 'neurons'?"),
+        ("neurons: {A: {n: 3}}\n", "3:15", "did you mean 'count'?"),
+        ("neurons: {left leg: {}}\n", "3:11", "did you mean 'left_leg'?"),
+        ("neurons: {A: {activation: logistic}}\n", "3:27", "did you mean 'sigmoid'?"),
+        ("neurons: {A: {model: LIF}}\n", "3:22", "did you mean 'integrate_and_fire'?"),
+        ("neurons: {A: {activation: [tanh, relu]}}\n", "3:27", "give each its own group"),
+        ("neurons: {A: {activation: {name: gaussian, sigma: 4}}}\n", "3:44", "write {gaussian: {sigma: …}}"),
+        ("neurons: {A: {activation: {gaussian: 4}}}\n", "3:38", "write {gaussian: {SETTING: 4}}"),
+        ("neurons: {A: {initial: random}}\n", "3:24", "did you mean 'uniform(low, high)'?"),
+        ("neurons:\n  A: {bias: 1}  // one\n", "4:17", "a comment begins with '#'"),
+        ("// one\nneurons: {A: {bias: 1}}\n", "3:1", "a comment begins with '#'"),
+        (AB + "connections: {A: B}\n", "4:15", "write A -> B: WEIGHT"),
+        (AB + "connections: [A -> B]\n", "4:15", "write A -> B: WEIGHT"),
+        (AB + "connections: [[A, B, 0.5]]\n", "4:15", "write A -> B: 0.5"),
+        (AB + "connections: {A => B: 1}\n", "4:15", "write A -> B"),
+        (AB + "connections: {A to B: 1}\n", "4:15", "write A -> B"),
+        (AB + "connections: {A <- B: 1}\n", "4:15", "write B -> A"),
+        (AB + "connections: {A -> [A, B]: 1}\n", "4:20", "joined with '+', as in A -> B + C"),
+        (AB + "connections: {A[1] -> B: 1}\n", "4:16", "has its number behind it, as in A1"),
+        (TWO + "connections: {A1-A2 -> A: 1}\n", "4:15", "a range is written A1..A2"),
+        (TWO + "connections: {A -> A: {pattern: full}}\n", "4:33", "did you mean 'all_to_all'?"),
+        (AB + "connections: {A -> B: weights.csv}\n", "4:23", "write {matrix: {file: weights.csv}}"),
+        (AB + "connections: {A -> B: {plasticity: hebbian, rate: 1}}\n", "4:45", "plasticity: {RULE: {rate: …}}"),
+        (AB + "outputs: {y: 2*A}\n", "4:14", "a name is wanted here"),
+        (AB + "time: 100\n", "4:7", "write {steps: 100}"),
+        (AB + "time: {duration: 10}\n", "4:8", "steps: SECONDS/dt"),
+        (AB + "layout: layered\n", "4:9", "write {engine: layered}"),
+        (AB + "render: dark\n", "4:9", "write {theme: dark}"),
+        ("modules: {leg: {neurons: {K: {}}}}\ninstances: {left: leg}\n", "4:19", "write {module: leg}"),
+        ("activations: {f: tanh(x)}\n" + AB, "3:18", "write {value: tanh(x)}"),
+        (AB + "events: [{at: 5, kill: A}]\n", "4:18", "did you mean 'lesion'?"),
+        (AB + "events: [{at: 5, set: {A: 1}}]\n", "4:24", "neurons are clamped, with clamp: {A: …}"),
+        (G + AB + "events: [{at: 5, set: {g: 1}}]\n", "5:24", "let its expression use a parameter"),
+        (
+            "modules: {leg: {neurons: {K: {}}}}\ninstances: {left: {module: leg}}\noutputs: {y: left/K}\n",
+            "5:14",
+            "parts of instances are named with points: left.K",
+        ),
+        (AB + "parameters: {a: {default: 1}}\n", "4:18", "did you mean 'value'?"),
+    ],
+)
+def test_habits_from_elsewhere(text: str, place: str, words: str) -> None:
+    hold(text, place, words)

@@ -165,6 +165,9 @@ def test_references_of_a_caller(view: object, names: list[str]) -> None:
     [
         ("rastr", ViewError, "there is no view 'rastr'"),
         ("network: A", ViewError, "takes no references"),
+        ("traces: [A, S]", ViewError, "brackets and quotes belong to no view: 'traces: [A, S]'"),
+        ("traces: 'A'", ViewError, "brackets and quotes belong to no view"),
+        ("traces=A", ViewError, "there is no view 'traces=A'"),
         ("traces: A7", KeyError, "no neuron, group or output 'A7'"),
         ("weights: A", ViewError, "'A' is no connection"),
         ("weights: B -> A", KeyError, "no connection 'B -> A'"),

@@ -149,6 +149,7 @@ class LayoutModel(Model):
     """How the network is laid out."""
 
     PLACE: ClassVar[str] = "'layout'"
+    BARE: ClassVar[str] = "engine"
 
     engine: Annotated[TextField, Role("engine")] | None = Field(
         None,
@@ -312,6 +313,7 @@ class RenderModel(Model):
     """How the network is drawn."""
 
     PLACE: ClassVar[str] = "'render'"
+    BARE: ClassVar[str] = "theme"
 
     gain: Gain | None = Field(None, description="The scaling factors γ of Eqs. 2–5.")
     trace: Annotated[Keyed[FormulaField], REFERENCES] = Field(

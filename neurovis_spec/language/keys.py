@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterator
+from collections.abc import Mapping as AnyMapping
+from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from neurovis_spec.diagnostics import Findings, Home, Undeclared, did_you_mean, meant, nearest, shorten, slips, suggest
@@ -38,10 +40,11 @@ class Keys(NamedTuple):
 
 class Words(NamedTuple):
     """What is said of an unknown key. ``foreign``: the message and the hint for one that is no misspelling; ``home``: a
-    hint for one that is like none of the known ones."""
+    hint for one that is like none of the known ones; ``elsewhere``: what other languages call the known ones."""
 
     foreign: Callable[[str], tuple[str, str | None] | None] = lambda name: None
     home: Callable[[str], str | None] = lambda name: None
+    elsewhere: AnyMapping[str, str] = MappingProxyType({})
 
 
 def read_keys(data: Mapping, known: Collection[str], findings: Findings, words: Words | None = None) -> Keys:
@@ -60,13 +63,16 @@ def _read(
     free = {name: None for name in known if data.entry(name) is None}  # what is there already is not meant
     for entry in data.entries:
         name, span = entry.name, entry.key.span
-        foreign = None if name in known else words.foreign(name) or _joined(name, known)
+        foreign = None if name in known else words.foreign(name) or _joined(entry, known)
         right = None
         if foreign is not None:
             findings.error("unknown-key", span, *foreign)
             unknown.update({name if (parts := apart(name)) is None else parts.key} & set(known))
         elif name not in known and findings.many:
             findings.error("unknown-key", span, _unknown(name))
+        elif words.elsewhere.get(name.casefold()) in free and name not in known:
+            right = words.elsewhere[name.casefold()]
+            findings.error("unknown-key", span, _unknown(name), did_you_mean([right]))
         elif name not in known:
             close = nearest(name, known)
             # a key of another place is hardly a misspelling by two slips
@@ -173,10 +179,16 @@ def _torn(entry: Entry) -> Apart | None:
     return _apart(match["key"], match["sign"], f"{match['rest']}: {value.value}")
 
 
-def _joined(name: str, known: Collection[str]) -> tuple[str, str | None] | None:
+def joined(entry: Entry) -> Apart | None:
+    """The key and the value that YAML reads as a key without a value."""
+    value = entry.value
+    return apart(entry.name) if isinstance(value, Scalar) and value.value is None else None
+
+
+def _joined(entry: Entry, known: Collection[str]) -> tuple[str, str | None] | None:
     """What is said of a key and a value that YAML reads as one word: a message and a hint."""
-    found = apart(name)
-    return None if found is None or found.key not in known else (_unknown(name), found.told)
+    found = joined(entry)
+    return None if found is None or found.key not in known else (_unknown(entry.name), found.told)
 
 
 def _unknown(name: str) -> str:

@@ -57,6 +57,8 @@ def version_field(node: Node, info: ValidationInfo) -> Located[int]:
 class StateModel(Model):
     """A state of a model or of a rule."""
 
+    BARE: ClassVar[str] = "initial"
+
     initial: Annotated[FormulaField, PLAIN] | None = Field(None, description="Its value before step 0 (default 0).")
     each_step: FormulaField | None = Field(None, description="Its new value at each step.")
     each_episode: FormulaField | None = Field(None, description="Its new value at an episode's end.")
@@ -64,6 +66,8 @@ class StateModel(Model):
 
 class ActivationModel(Model):
     """An activation function of one's own."""
+
+    BARE: ClassVar[str] = "value"
 
     parameters: Annotated[Named[ParameterField], LOCAL] = Field(default_factory=dict, description="Names and defaults.")
     let: Annotated[Named[Annotated[FormulaField, IN_ACTIVATION]], LOCAL] = Field(

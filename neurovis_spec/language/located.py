@@ -125,11 +125,15 @@ def as_text(node: Node, info: ValidationInfo) -> Located[str]:
     if hint and isinstance(node, Scalar) and node.value is None:
         written = node.span.end_column > node.span.column
         hint = "YAML reads this as null: put it in quotes, or take another name" if written else None
+    elif hint and isinstance(node, Scalar) and isinstance(node.value, bool):
+        hint = "YAML reads this as true or false: put it in quotes"
     refuse(info, node, "a text", hint)
 
 
 def as_identifier(node: Node, info: ValidationInfo) -> Located[str]:
     """A name: an ASCII letter or underscore, then letters, digits, underscores, at most 64."""
+    if isinstance(node, Scalar) and isinstance(node.value, (int, float)) and not isinstance(node.value, bool):
+        refuse(info, node, "a name", NAME_RULE)
     text = as_text(node, info)
     if not IDENTIFIER.fullmatch(text.value):
         findings_of(info).error("bad-name", node.span, bad_name(text.value), name_hint(text.value))
@@ -137,12 +141,19 @@ def as_identifier(node: Node, info: ValidationInfo) -> Located[str]:
     return text
 
 
+_PARTING = re.compile(r"(?<=\w)[ -]+(?=\w)")
 NAME_RULE = "a name is a letter or underscore, then letters, digits and underscores, 64 at most"
 
 
 def name_hint(name: str) -> str:
-    """The help line for a name that is none: what it looks like, where that is a name, else the rule."""
+    """The help line for a name that is none: what it looks like, where that is a name, else the rule.
+
+    >>> name_hint("left-leg"), name_hint("2nd")[:16]
+    ("did you mean 'left_leg'?", 'a name is a lett')
+    """
     seen = in_ascii(name)
+    if seen == name:  # with blanks or signs within it
+        seen = _PARTING.sub("_", name)
     return did_you_mean([seen]) if seen != name and IDENTIFIER.fullmatch(seen) else NAME_RULE
 
 

@@ -30,11 +30,11 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue, SkipJsonSchema
 from pydantic_core import core_schema
 
-from neurovis_spec.diagnostics import Findings, Span, listed
+from neurovis_spec.diagnostics import Findings, Span, listed, shorten
 from neurovis_spec.language.exclusions import Rules, check_rules, contradictory, schema_of
 from neurovis_spec.language.expressions.given import RESERVED
 from neurovis_spec.language.grammar import Needs, NotWith, OneOf
-from neurovis_spec.language.keys import Keys, Words, apart, mend_torn, read_keys
+from neurovis_spec.language.keys import Keys, Words, apart, joined, mend_torn, read_keys
 from neurovis_spec.language.located import (
     IDENTIFIER,
     Leaf,
@@ -66,6 +66,10 @@ class Model(BaseModel):
     PLACE: ClassVar[str] = ""
     #: keys of which there has to be one
     ONE_OF: ClassVar[OneOf | None] = None
+    #: what other languages call keys, in small letters
+    ELSEWHERE: ClassVar[AnyMapping[str, str]] = {}
+    #: the key for which a text or a number stands that is written in the place of the mapping
+    BARE: ClassVar[str] = ""
     #: what is said of a key without a value
     UNSAID: ClassVar[str] = "leave the key out, or give it a value"
 
@@ -82,13 +86,8 @@ class Model(BaseModel):
             return result
         if not isinstance(data, Mapping):
             assert not isinstance(data, (str, int, float, dict))
-            nothing = isinstance(data, Scalar) and data.value is None
-            parts = apart(data.value) if isinstance(data, Scalar) and isinstance(data.value, str) else None
-            hint = "write {} where there is nothing to say" if nothing else f"its keys are {listed(cls._fields())}"
-            if parts is not None and parts.key in cls._fields():
-                hint = parts.told
-            refuse(info, data, "a mapping", hint)  # type: ignore[arg-type]
-        keys = read_keys(data, cls._fields(), findings_of(info), Words(cls._foreign, _home))
+            refuse(info, data, "a mapping", cls._no_mapping(data))  # type: ignore[arg-type]
+        keys = read_keys(data, cls._fields(), findings_of(info), Words(cls._foreign, _home, cls.ELSEWHERE))
         data = keys.mapping
         cls._check_rules(data, keys.unknown, findings_of(info))
         values = cls._keys(keys, findings_of(info))
@@ -154,6 +153,25 @@ class Model(BaseModel):
         return {name: field.alias or name for name, field in cls.model_fields.items()}
 
     @classmethod
+    def _no_mapping(cls, node: Node) -> str:
+        """What to do about something that is no mapping."""
+        value = node.value if isinstance(node, Scalar) else ""
+        if value is None:
+            return "write {} where there is nothing to say"
+        parts = apart(value) if isinstance(value, str) else None
+        if parts is not None and parts.key in cls._fields():
+            return parts.told
+        return cls._instead(node) or f"its keys are {listed(cls._fields())}"
+
+    @classmethod
+    def _instead(cls, node: Node) -> str | None:
+        """What to write for something that is no mapping, where it is clear what it is meant to be."""
+        value = node.value if isinstance(node, Scalar) and not isinstance(node.value, bool) else None
+        if not cls.BARE or value is None or (isinstance(value, str) and not value.strip()):
+            return None
+        return f"write {{{cls.BARE}: {shorten(str(value).strip())}}}"
+
+    @classmethod
     def _keys(cls, keys: Keys, findings: Findings) -> dict[str, object]:
         """The values by key, under ``$`` the Mapping itself; what is missing is reported."""
         fields, data = cls._fields(), keys.mapping
@@ -164,7 +182,8 @@ class Model(BaseModel):
                 continue
             if isinstance(entry.value, Scalar) and entry.value.value is None and not field.is_required():
                 if not findings.is_invalid(entry.value.span):  # such as an alias, which is refused and read as nothing
-                    message = f"'{entry.name}' has no value"
+                    null = entry.value.span.column < entry.value.span.end_column
+                    message = f"'{entry.name}' has no value{': YAML reads this as null' if null else ''}"
                     findings.error("no-value", entry.key.span, message, cls.UNSAID)
             else:
                 result[entry.name] = entry.value
@@ -278,10 +297,10 @@ def _named(node: Node, handler: Callable[[object], dict[str, V]], info: Validati
 
 def _renamed(entry: Entry, node: Mapping, findings: Findings) -> Entry:
     """An entry whose key is no name, which is reported: with the name that the key looks like, where there is one."""
-    parts = apart(entry.name)
+    parts = joined(entry)
     hint = name_hint(entry.name) if parts is None else parts.told
     findings.error("bad-name", entry.key.span, bad_name(entry.name), hint)
-    if parts is not None and isinstance(entry.value, Scalar) and entry.value.value is None:
+    if parts is not None:
         findings.unread(entry.value.span)  # the value is in what is read as the key
     seen = in_ascii(entry.name)
     meant = IDENTIFIER.fullmatch(seen) and node.entry(seen) is None

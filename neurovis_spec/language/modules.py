@@ -6,6 +6,7 @@ the sections of a spec that say what there is, and none that says how it is run,
 
 from __future__ import annotations
 
+from collections.abc import Mapping as AnyMapping
 from typing import Annotated, ClassVar
 
 from pydantic import Field
@@ -25,6 +26,12 @@ class InstanceModel(Model):
     """A use of a module, or several of them."""
 
     PLACE: ClassVar[str] = "an instance"
+    BARE: ClassVar[str] = "module"
+    ELSEWHERE: ClassVar[AnyMapping[str, str]] = {
+        **dict.fromkeys(("parameters", "params", "with"), "set"),
+        **dict.fromkeys(("type", "of"), "module"),
+        **dict.fromkeys(("n", "number"), "count"),
+    }
 
     module: Annotated[IdentifierField, naming("module")] = Field(description="The module that it is an instance of.")
     count: FormulaField | None = Field(

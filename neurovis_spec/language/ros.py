@@ -125,6 +125,7 @@ class SubscribeModel(TopicModel):
     """Where an input comes from."""
 
     PLACE: ClassVar[str] = "'ros: subscribe'"
+    BARE: ClassVar[str] = "topic"
 
     names: TextsField | None = Field(
         None, description="The joints whose numbers are taken, in the order of the input; they are found by name."
@@ -141,6 +142,7 @@ class PublishModel(TopicModel):
     """Where an output goes to."""
 
     PLACE: ClassVar[str] = "'ros: publish'"
+    BARE: ClassVar[str] = "topic"
 
     safe: FormulaField | None = Field(None, description="What is sent when the run ends or stops.")
 

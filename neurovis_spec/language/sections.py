@@ -5,7 +5,9 @@ In: nodes. Out: frozen models whose leaves know their places. A spec has these s
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
+from collections.abc import Mapping as AnyMapping
 from contextlib import suppress
 from typing import Annotated, ClassVar
 
@@ -37,6 +39,7 @@ from neurovis_spec.language.grammar import (
 )
 from neurovis_spec.language.keys import apart, mend_torn
 from neurovis_spec.language.located import (
+    IDENTIFIER,
     BoolField,
     FormulaField,
     Leaf,
@@ -76,10 +79,22 @@ class Time(Model):
     """The clock of a run."""
 
     PLACE: ClassVar[str] = "'time'"
+    ELSEWHERE: ClassVar[AnyMapping[str, str]] = dict.fromkeys(("timestep", "time_step", "h"), "dt")
 
     dt: FormulaField | None = Field(None, description="Seconds a step (default 1).")
     steps: FormulaField | None = Field(None, description="Default run length in steps (default 1000).")
     episode: FormulaField | None = Field(None, description="Steps of an episode; it ends after every m steps.")
+
+    @classmethod
+    def _foreign(cls, name: str) -> tuple[str, str] | None:
+        if name not in ("duration", "length", "seconds", "t_end", "tmax", "T"):
+            return None
+        return f"unknown key '{name}'", "how long a run is, is counted in steps: steps: SECONDS/dt"
+
+    @classmethod
+    def _instead(cls, node: Node) -> str | None:
+        value = node.value if isinstance(node, Scalar) and not isinstance(node.value, bool) else None
+        return f"write {{steps: {value}}}" if isinstance(value, int) else None
 
 
 def _table(node: Node, info: ValidationInfo) -> FileReference | AnyList:
@@ -94,6 +109,8 @@ class InputModel(Model):
     """A signal that comes from outside the network."""
 
     PLACE: ClassVar[str] = "an input"
+    BARE: ClassVar[str] = "expression"
+    ELSEWHERE: ClassVar[AnyMapping[str, str]] = {"value": "expression", "formula": "expression", "data": "values"}
 
     expression: Annotated[FormulaField, RUN] | None = Field(
         None, description="A formula of k (the step), t (seconds) and parameters."
@@ -109,6 +126,10 @@ class InputModel(Model):
     )
     description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
 
+    @classmethod
+    def _instead(cls, node: Node) -> str | None:
+        return "write {values: …}, one row a step" if isinstance(node, AnyList) else super()._instead(node)
+
 
 InputsField = Annotated[Named[InputModel], declaring("input")]
 
@@ -117,13 +138,28 @@ def _position(node: Node, info: ValidationInfo) -> FileReference | AnyList:
     if isinstance(node, Mapping):
         return as_file(node, info)
     wanted = "a position [x, y], a list of them, or {file: …}"
-    return node if isinstance(node, AnyList) else refuse(info, node, wanted, entry_hint(node))
+    return node if isinstance(node, AnyList) else refuse(info, node, wanted)
+
+
+def _as_input(node: Node, info: ValidationInfo) -> Located[str]:
+    """The name of an input."""
+    if isinstance(node, Scalar) and isinstance(node.value, str):
+        return Located(node.value, node)
+    hint = "declare it under 'inputs', and name it here"
+    if isinstance(node, Scalar) and isinstance(node.value, (int, float)) and not isinstance(node.value, bool):
+        hint = f"what is added at every step is a bias: write bias: {node.value}"
+    refuse(info, node, "the name of an input", hint)
 
 
 class GroupModel(Model):
     """A group of neurons, or a single one."""
 
     PLACE: ClassVar[str] = "a group of neurons"
+    ELSEWHERE: ClassVar[AnyMapping[str, str]] = {
+        **dict.fromkeys(("n", "number", "num"), "count"),
+        **dict.fromkeys(("function", "transfer", "nonlinearity"), "activation"),
+        **dict.fromkeys(("init", "start"), "initial"),
+    }
 
     count: FormulaField | None = Field(None, description="How many neurons; K with count 3 makes K1, K2, K3.")
     first: Annotated[
@@ -150,7 +186,7 @@ class GroupModel(Model):
         None,
         description="The activity at step 0, else computed; or states of the model, too: {v: -65, activity: 0.5}.",
     )
-    input: Annotated[TextField, naming("input")] | None = Field(
+    input: Annotated[Located[str], Leaf(_as_input, TEXT), naming("input")] | None = Field(
         None, description="An entry of inputs, added to the combined input."
     )
     noise: Annotated[FormulaField, NOISE] | None = Field(
@@ -167,6 +203,13 @@ class GroupModel(Model):
         None, description="What the picture and the layout take it for: input, hidden or output."
     )
     description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
+
+    @classmethod
+    def _instead(cls, node: Node) -> str | None:
+        value = node.value if isinstance(node, Scalar) else None
+        if isinstance(value, int) and not isinstance(value, bool):
+            return f"write {{count: {value}}} for so many neurons, {{bias: {value}}} for a bias"
+        return f"write {{activation: {value}}}" if isinstance(value, str) and IDENTIFIER.fullmatch(value) else None
 
 
 GroupsField = Annotated[Named[GroupModel], declaring("neuron")]
@@ -208,6 +251,12 @@ class ConnectionModel(Model):
     """The body of a connection; a bare weight is read as ``{weight: …}``."""
 
     PLACE: ClassVar[str] = "a connection"
+    ELSEWHERE: ClassVar[AnyMapping[str, str]] = {
+        **dict.fromkeys(("w", "strength"), "weight"),
+        **dict.fromkeys(("rule", "learning"), "plasticity"),
+        **dict.fromkeys(("lag", "latency"), "delay"),
+        "topology": "pattern",
+    }
 
     weight: Annotated[FormulaField | None, PAIR, NotWith(("matrix", "edges"))] = Field(
         None, description="One number, or an expression of i, j, n_from, n_to (default 1)."
@@ -250,6 +299,8 @@ class ConnectionModel(Model):
     @classmethod
     def _foreign(cls, name: str) -> tuple[str, str] | None:
         taken_by = [one.name for one in PATTERNS.values() if name in one.settings]
+        if name in ("rate", "target", "learning_rate", "eta"):
+            return f"'{name}' belongs to a rule, and stands with it", f"write plasticity: {{RULE: {{{name}: …}}}}"
         if not taken_by:
             return None
         hint = f"write pattern: {{{taken_by[0]}: {{{name}: …}}}}"
@@ -263,6 +314,13 @@ class EventModel(Model):
     """Something that changes during a run."""
 
     PLACE: ClassVar[str] = "an event"
+    ELSEWHERE: ClassVar[AnyMapping[str, str]] = {
+        **dict.fromkeys(("step", "time", "when", "t"), "at"),
+        **dict.fromkeys(("kill", "remove", "cut", "delete"), "lesion"),
+        **dict.fromkeys(("hold", "fix"), "clamp"),
+        **dict.fromkeys(("restore", "heal", "repair"), "mend"),
+        **dict.fromkeys(("until", "end"), "to"),
+    }
     ONE_OF: ClassVar[OneOf | None] = OneOf(
         ("set", "clamp", "lesion", "mend", "learning"),
         "this event does nothing",
@@ -317,9 +375,22 @@ def _mappings(items: Iterable[Node], info: ValidationInfo, wanted: str) -> tuple
     """Those of some items that are mappings; the others are reported."""
 
     def read(node: Node, info: ValidationInfo) -> Mapping:
-        return node if isinstance(node, Mapping) else refuse(info, node, wanted, entry_hint(node))
+        return node if isinstance(node, Mapping) else refuse(info, node, wanted, entry_hint(node) or _as_entry(node))
 
     return tuple(valid(items, read, info))
+
+
+def _as_entry(node: Node) -> str | None:
+    """What to write for a connection without a weight, or for an edge, in a list of connections."""
+    if isinstance(node, Scalar) and isinstance(node.value, str) and _ARROW.fullmatch(node.value):
+        return f"write {shorten(node.value)}: WEIGHT"
+    cells = [str(item.value) for item in node.items if isinstance(item, Scalar)] if isinstance(node, AnyList) else []
+    if not 2 <= len(cells) <= 3 or not all(map(IDENTIFIER.fullmatch, cells[:2])):
+        return None
+    return f"write {cells[0]} -> {cells[1]}: {cells[2] if len(cells) > 2 else 'WEIGHT'}"
+
+
+_ARROW = re.compile(r"[\w.+ ]+->[\w.+ ]*[\w.]")
 
 
 def _events(node: Node, info: ValidationInfo) -> tuple[Mapping, ...]:
@@ -340,6 +411,11 @@ def _connections(node: Node, info: ValidationInfo) -> list[tuple[Located[str], o
             continue
         first: dict[str, Entry] = {}
         for entry in mend_torn(mapping, "bad-connection", findings_of(info)).entries:
+            if (target := _target(entry)) is not None:
+                message = f"'{shorten(entry.name)}' is no connection"
+                hint = f"write {shorten(entry.name)} -> {shorten(target)}: WEIGHT"
+                findings_of(info).error("bad-connection", entry.key.span, message, hint)
+                continue
             same = first.setdefault("".join(entry.name.split()), entry)
             if same is not entry:  # two spellings of one key
                 place = f"{same.key.span.line}:{same.key.span.column}"
@@ -349,6 +425,12 @@ def _connections(node: Node, info: ValidationInfo) -> list[tuple[Located[str], o
             with suppress(PydanticCustomError):
                 result.append((Located(entry.name, entry.key), _body(entry, info)))
     return result
+
+
+def _target(entry: Entry) -> str | None:
+    """The target of a connection that stands as the value of its source: ``A: B``."""
+    value = entry.value.value if isinstance(entry.value, Scalar) else None
+    return value if isinstance(value, str) and all(map(IDENTIFIER.fullmatch, (entry.name, value))) else None
 
 
 def _in_parts(mapping: Mapping, info: ValidationInfo) -> bool:
@@ -362,6 +444,8 @@ def _in_parts(mapping: Mapping, info: ValidationInfo) -> bool:
     return True
 
 
+#: What the names of data files end with.
+_FILES = (".csv", ".npy", ".npz", ".mtx")
 #: How other languages call the ends of a connection.
 _ENDS = ("from", "to", "source", "target", "pre", "post")
 
@@ -382,6 +466,8 @@ def _body(entry: Entry, info: ValidationInfo) -> Mapping:
         refuse(info, node, "a weight or a mapping", hint)
     if node.value is None:
         return Mapping((), entry.key.span)
+    if isinstance(node.value, str) and node.value.strip().endswith(_FILES):
+        refuse(info, node, "a weight or a mapping", f"write {{matrix: {{file: {shorten(node.value.strip())}}}}}")
     parts = apart(node.value) if isinstance(node.value, str) else None
     if parts is not None and parts.key in ConnectionModel.model_fields:
         refuse(info, node, "a weight or a mapping", parts.told)

@@ -6,6 +6,7 @@ and no expression is parsed here. The descriptions are what an editor shows, and
 
 from __future__ import annotations
 
+from collections.abc import Mapping as AnyMapping
 from typing import Annotated, ClassVar
 
 from pydantic import Field
@@ -28,6 +29,13 @@ class Spec(Library):
     """A whole spec."""
 
     PLACE: ClassVar[str] = "the top level"
+    ELSEWHERE: ClassVar[AnyMapping[str, str]] = {
+        **dict.fromkeys(("groups", "layers", "nodes", "populations", "cells", "units"), "neurons"),
+        **dict.fromkeys(("edges", "synapses", "links", "projections", "weights", "wiring"), "connections"),
+        **dict.fromkeys(("params", "constants", "variables"), "parameters"),
+        **dict.fromkeys(("stimuli", "stimulus", "signals"), "inputs"),
+        **dict.fromkeys(("simulation", "clock"), "time"),
+    }
 
     name: Annotated[Located[str | Unknown], Leaf(as_identifier, NAME, True)] = Field(
         description="The name of the network, an identifier."

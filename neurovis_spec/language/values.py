@@ -5,6 +5,7 @@ In: nodes. Out: one frozen value each, so that nobody behind this module asks ag
 
 from __future__ import annotations
 
+from collections.abc import Mapping as AnyMapping
 from typing import Annotated, ClassVar, Final, NamedTuple, TypeAlias, TypeVar
 
 from pydantic import Field, ValidationInfo
@@ -70,8 +71,8 @@ def as_choice(node: Node, info: ValidationInfo) -> Choice:
             refuse(info, node, "a name, or {name: {parameter: value}}")
         return Choice(as_text(node, info), Mapping((), node.span))
     if not isinstance(node, Mapping):
-        refuse(info, node, "a name, or {name: {parameter: value}}")
-    entry = sole(node, "name", "write name, or {name: {parameter: value}}", info)
+        refuse(info, node, "a name, or {name: {parameter: value}}", "one for all of a group: give each its own group")
+    entry = sole(node, "name", _chosen_by(node) or "write name, or {name: {parameter: value}}", info)
     name = Located(entry.name, entry.key)
     if isinstance(entry.value, Scalar) and entry.value.value is None:
         return Choice(name, Mapping((), entry.value.span))
@@ -80,9 +81,22 @@ def as_choice(node: Node, info: ValidationInfo) -> Choice:
             info,
             entry.value,
             f"a mapping of the settings of '{shorten(entry.name)}'",
-            "write {name: {parameter: value}}",
+            f"write {{{shorten(entry.name)}: {{SETTING: {_shown(entry.value)}}}}}",
         )
     return Choice(name, entry.value)
+
+
+def _shown(node: Node) -> str:
+    return shorten(str(node.value)) if isinstance(node, Scalar) else "…"
+
+
+def _chosen_by(node: Mapping) -> str | None:
+    """What to write for a choice whose name is the value of a key, as other languages have it."""
+    first = node.entries[0] if node.entries else None
+    if first is None or first.name not in ("name", "type", "kind") or not isinstance(first.value, Scalar):
+        return None
+    settings = ", ".join(f"{entry.name}: …" for entry in node.entries[1:])
+    return f"write {{{shorten(str(first.value.value))}: {{{shorten(settings)}}}}}"
 
 
 def sole(node: Mapping, what: str, hint: str, info: ValidationInfo) -> Entry:
@@ -259,6 +273,11 @@ class ParameterModel(Model):
     """A named constant: its value, and the bounds within which it may be set."""
 
     PLACE: ClassVar[str] = "a parameter"
+    ELSEWHERE: ClassVar[AnyMapping[str, str]] = {
+        **dict.fromkeys(("default", "val"), "value"),
+        **dict.fromkeys(("minimum", "low", "lower"), "min"),
+        **dict.fromkeys(("maximum", "high", "upper"), "max"),
+    }
 
     value: FormulaField = Field(description="The value.")
     minimum: FormulaField | None = Field(None, alias="min", description="The least value that it may be given.")

@@ -6,8 +6,9 @@ is compiled (``compiler/drawing/figure``).
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 from neurovis_spec import arguments
 from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
@@ -23,6 +24,8 @@ from neurovis_spec.scene.renderers import RendererError
 #: A view by its name, with ``: `` and references behind it; or {view: references}.
 View: TypeAlias = str | Mapping[str, str | Sequence[str]]
 
+_SIGNS: Final = re.compile(r"[\[\]{}'\"]")
+_APART: Final = re.compile(r"(\w+)[\s=]+(.+)", re.DOTALL)
 _WANTED = "a view, {view: references}, or several"
 
 
@@ -46,7 +49,7 @@ def panels_of(network: Network, wanted: View | Sequence[View] | None) -> tuple[P
 def _one(network: Network, own: Sequence[Panel], wanted: View) -> Iterator[Panel]:
     for name, references in _taken_apart(wanted):
         if name not in VIEWS:
-            raise ViewError(f"there is no view '{name}'", suggest(name, VIEWS, "views"))
+            raise ViewError(f"there is no view '{name}'", _colon(name) or suggest(name, VIEWS, "views"))
         if references and name in WHOLE:
             raise ViewError(f"the view '{name}' shows the whole {name}: it takes no references")
         named = [panel for panel in own if panel.view == name and panel.shown is not None]
@@ -61,6 +64,9 @@ def _taken_apart(wanted: View) -> Iterator[tuple[str, list[str]]]:
     """The name of a view, and its references."""
     if isinstance(wanted, str):
         name, _, rest = wanted.partition(":")
+        if _SIGNS.search(wanted):  # as in a spec: what a reference holds has none of these
+            plain = ": ".join(" ".join(_SIGNS.sub(" ", part).replace(",", ", ").split()) for part in (name, rest))
+            raise ViewError(f"brackets and quotes belong to no view: '{wanted}'", f"write '{plain.replace(' ,', ',')}'")
         yield name.strip(), [part.strip() for part in rest.split(",") if part.strip()]
         return
     if not isinstance(wanted, Mapping):
@@ -68,6 +74,14 @@ def _taken_apart(wanted: View) -> Iterator[tuple[str, list[str]]]:
     for name, references in arguments.mapping("view", wanted).items():
         listed = () if references is None else arguments.texts("view", references)
         yield name, [part.strip() for reference in listed for part in reference.split(",") if part.strip()]
+
+
+def _colon(name: str) -> str | None:
+    """A help line for a view and its references that no colon parts, or for several views in one."""
+    if all(part.strip() in VIEWS for part in name.split(",")):
+        return "give each view by itself"
+    match = _APART.fullmatch(name)
+    return f"write '{match[1]}: {match[2]}'" if match is not None and match[1] in VIEWS else None
 
 
 def curves_of(network: Network, view: str, reference: str) -> list[Curve]:

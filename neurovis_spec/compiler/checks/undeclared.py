@@ -44,12 +44,15 @@ class _Use(NamedTuple):
 
 
 def gather_undeclared(files: Collection[Mapping], findings: Findings) -> None:
-    """Make one finding of those that miss the same name in a file. ``files`` are the spec and those that it
-    includes."""
-    uses = [_Use(mark, told, *lost) for mark, (told, lost) in findings.missing().items()]
-    if len(uses) < 2:
-        return
+    """Make one finding of those that miss the same name in a file; of a name that means something else, say what.
+    ``files`` are the spec and those that it includes."""
     declarations = _Declarations(files, findings)
+    uses = [_Use(mark, told, *lost) for mark, (told, lost) in findings.missing().items()]
+    for number, use in enumerate(uses):
+        told = _explained(use, declarations)
+        if told is not use.told:
+            findings.fold([use.mark], told)
+            uses[number] = use._replace(told=told)
     uses = _without_misspelt(uses, declarations, findings)
     groups: dict[tuple[str, Home, str], list[_Use]] = {}
     for use in uses:
@@ -58,6 +61,25 @@ def gather_undeclared(files: Collection[Mapping], findings: Findings) -> None:
     for group in groups.values():
         if len(group) > 1:
             findings.fold([use.mark for use in group], _at_first_use(group))
+
+
+def _explained(use: _Use, declarations: _Declarations) -> Diagnostic:
+    """The finding; of a name in a formula that is no parameter, but something else, with what that is."""
+    told, name, within = use.told, use.name, use.home.within
+    is_set = told.code == "unknown-parameter"
+    if told.code not in ("unknown-name", "unknown-parameter") or use.home.parts != ("parameters",):
+        return told
+    if any(declared.value == name for declared in declarations.at(Home(within, ("inputs",)), counted=False)):
+        if is_set:
+            return replace(told, hint=f"'{name}' is an input: let its expression use a parameter, and set that one")
+        hint = f"'{name}' is an input, which neurons take in with input: {name}; for a weight that follows it: "
+        return replace(told, hint=f"{hint}a product with a neuron that does (combine: product), or a rule")
+    groups = Home(within, ("neurons", "instances"))
+    if any(declared.value == name for declared in declarations.at(groups, counted=False)):
+        if is_set:
+            return replace(told, hint=f"'{name}' is no parameter: neurons are clamped, with clamp: {{{name}: …}}")
+        return replace(told, hint=f"formulas see no activities: what '{name}' does arrives by a connection")
+    return told
 
 
 def _without_misspelt(uses: list[_Use], declarations: _Declarations, findings: Findings) -> list[_Use]:
@@ -91,10 +113,11 @@ def _at_first_use(uses: Sequence[_Use]) -> Diagnostic:
     """The finding at the first of the uses, in their order, that says where the others are."""
     first, others = uses[0].told, uses[1:]
     names = [f"'{shorten(name)}'" for name in dict.fromkeys(use.name for use in others) if name != uses[0].name]
-    lines = list(dict.fromkeys(use.told.span.seen_from(first.span) for use in others))
+    spans = (use.told.span for use in others)
+    lines = list(dict.fromkeys(span.seen_from(first.span) for span in spans if span != first.span))
     message = first.message + (f", nor {_some(names)}" if names else "")
     count = "one more use" if len(others) == 1 else f"{len(others)} more uses"
-    return replace(first, message=f"{message}; {count}: {_some(lines)}")
+    return replace(first, message=f"{message}; {count}" + (f": {_some(lines)}" if lines else ""))
 
 
 def _some(words: Sequence[str]) -> str:
@@ -110,18 +133,19 @@ class _Declarations:
 
     def stems(self, home: Home) -> frozenset[str]:
         """The names that are declared at a home, without the numbers behind them."""
-        return frozenset(str(declared.value).rstrip(_DIGITS) for declared in self._at(home, counted=False))
+        return frozenset(str(declared.value).rstrip(_DIGITS) for declared in self.at(home, counted=False))
 
     def like(self, name: str, uses: Iterable[_Use], counted: bool) -> Scalar | None:
         """The declaration that is never used and can only be meant for this name. ``counted``: it makes several."""
         homes = dict.fromkeys(use.home for use in uses)
-        declared = dict.fromkeys(one for home in homes for one in self._at(home, counted))
+        declared = dict.fromkeys(one for home in homes for one in self.at(home, counted))
         unused = {str(one.value): one for one in declared if self._unused(one)}
         near = [other for other in unused if len(name) > 1 and slips(name, other) < 2]
         right = near[0] if len(near) == 1 else meant(name, unused) if unused else None
         return None if right is None else unused[right]
 
-    def _at(self, home: Home, counted: bool) -> Iterator[Scalar]:
+    def at(self, home: Home, counted: bool) -> Iterator[Scalar]:
+        """What is declared at a home: all, or what makes several with numbers behind."""
         found = (
             one for file in self.files for part in home.parts for one in _declared(file, home.within, part, counted)
         )

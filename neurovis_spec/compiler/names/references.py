@@ -40,6 +40,12 @@ Section: TypeAlias = Spec | ModuleModel
 _MANY = 10_000
 #: A neuron's number as its name has it: without leading zeros.
 _NUMBER = re.compile(r"0|[1-9][0-9]{0,63}")
+#: Two names with something between them that is no arrow, two neurons of a group, and what no name holds.
+_JOINED = re.compile(r"([\w.]+) *(=>|<-|<=|-->|->>|>|→|–>|\bto\b) *([\w.]+)")
+_FROM_TO = re.compile(r"([A-Za-z_][\w.]*?)([0-9]+) *(?:-|:|–|…|\.\.\.|to) *(?:\1)?([0-9]+)")
+_FORMULA = re.compile(r"[*/^()%]|\d *[-+]|[-+] *\d")
+_PATH = re.compile(r"[A-Za-z_]\w*(?:/[A-Za-z_]\w*)+")
+_DOTTED = re.compile(rf"{IDENTIFIER.pattern}(?:\.{IDENTIFIER.pattern})+")
 _QUOTED = re.compile(r"'([^']*)'")
 
 
@@ -92,7 +98,7 @@ class Directory:
     def _hint_of_instance(self, head: str, rest: str) -> str:
         """What ``head`` in ``head.rest`` may be meant for."""
         if self.holds(head):
-            return f"'{head}' is no instance, nothing is in it"
+            return f"'{head}' is no instance, nothing is in it; a state of its model can be an output, and is recorded"
         if not self.instances:
             return "there are no instances here"
         stem = head.rstrip("0123456789")
@@ -203,6 +209,8 @@ def few(name: str, known: Collection[str]) -> Collection[str]:
 
 def known_inputs(name: str, known: Collection[str]) -> str:
     """A help line for an input that is not declared; ``known`` are those that are."""
+    if _DOTTED.fullmatch(name):
+        return "an input is declared under 'inputs'; activities of neurons arrive by connections"
     if not IDENTIFIER.fullmatch(name):
         return f"name it under 'inputs', as in wave: {{expression: {shorten(name)}}}"
     return suggest(name, few(name, known), "inputs") or "no inputs are declared; add it under 'inputs'"
@@ -295,10 +303,18 @@ def _unknown(name: str, span: Span, directory: Directory, findings: Findings) ->
 
 
 def _several(name: str) -> str | None:
-    """How several references are joined, where a text lists them in another way."""
+    """How several references are joined, or a range is written, where a text has them in another way."""
     parts = [part.strip() for part in name.strip("[]{}() ").split(",")]
     whole = " + ".join(map(shorten, parts))
-    return f"references are joined with '+': {shorten(whole, 200)}" if len(parts) > 1 and all(parts) else None
+    if len(parts) > 1 and all(parts):
+        return f"references are joined with '+': {shorten(whole, 200)}"
+    if match := _FROM_TO.fullmatch(name):
+        return f"a range is written {match[1]}{match[2]}..{match[1]}{match[3]}"
+    if _PATH.fullmatch(name):
+        return f"parts of instances are named with points: {name.replace('/', '.')}"
+    if _FORMULA.search(name) and any(map(str.isalnum, name)):
+        return "a name is wanted here: what is computed of activities is a neuron of its own"
+    return None
 
 
 def resolve(
@@ -324,9 +340,18 @@ def arrow_of(text: Located[str], findings: Findings) -> Arrow | Unknown:
     found = parse(text.value)
     if isinstance(found, Arrow):
         return found
-    hint = found.hint if isinstance(found, NoReference) else "write FROM -> TO"
+    hint = found.hint if isinstance(found, NoReference) else _as_arrow(text.value) or "write FROM -> TO"
     findings.error("bad-connection", text.span, f"'{shorten(text.value)}' is no connection", hint)
     return UNKNOWN
+
+
+def _as_arrow(text: str) -> str | None:
+    """How to write what joins two names in another way."""
+    match = _JOINED.fullmatch(text.strip())
+    if match is None:
+        return None
+    first, sign, second = match.groups()
+    return f"write {second} -> {first}" if sign in ("<-", "<=") else f"write {first} -> {second}"
 
 
 def _resolve(

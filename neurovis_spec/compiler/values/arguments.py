@@ -7,7 +7,8 @@ every parameter, one for each of n neurons or connections (Each), of which the i
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from typing import NamedTuple, TypeVar
+from functools import partial
+from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from neurovis_spec.compiler.program import Quantity
 from neurovis_spec.compiler.values.constants import Constants, Randomness, Value, value_of
 from neurovis_spec.compiler.values.definitions import Default, Defaults, check_bounds
 from neurovis_spec.compiler.values.draws import Stream
-from neurovis_spec.diagnostics import Findings, Home, Undeclared, meant, shorten, suggest
+from neurovis_spec.diagnostics import Findings, Hint, Home, Undeclared, did_you_mean, meant, shorten, suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import Name, Tree, names
@@ -30,6 +31,17 @@ from neurovis_spec.language.yaml.source import AnyList, Entry, Scalar, one_or_mo
 
 T = TypeVar("T")
 
+#: What other languages call activations, models and rules.
+_ELSEWHERE: Final[Mapping[str, str]] = {
+    **dict.fromkeys(("logistic", "logsig", "expit"), "sigmoid"),
+    **dict.fromkeys(("linear", "none", "purelin"), "identity"),
+    **dict.fromkeys(("heaviside", "threshold", "binary"), "step"),
+    **dict.fromkeys(("rectifier", "rectified", "threshold_linear"), "relu"),
+    **dict.fromkeys(("rbf", "gauss"), "gaussian"),
+    **dict.fromkeys(("lif", "if", "spiking"), "integrate_and_fire"),
+    **dict.fromkeys(("ctrnn", "leaky", "leaky_integrate"), "leaky_integrator"),
+    **dict.fromkeys(("hebb", "hebbs"), "hebbian"),
+}
 #: Values of a list that are checked where it is not known how many there should be.
 _MOST_CHECKED = 1000
 
@@ -68,9 +80,9 @@ def choose(
         right = None if findings.many else meant(name.value, known)
         message = f"there is no {what} '{shorten(name.value)}'"
         lost = Undeclared(name.value, Home((), (f"{what}s",)))
-        findings.error(
-            f"unknown-{what}", name.span, message, lambda: suggest(name.value, known, "known"), undeclared=lost
-        )
+        elsewhere = _ELSEWHERE.get(name.value.casefold(), "")
+        hint: Hint = did_you_mean([elsewhere]) if elsewhere in known else partial(suggest, name.value, known, "known")
+        findings.error(f"unknown-{what}", name.span, message, hint, undeclared=lost)
         found = UNKNOWN if right is None else known[right]
     return found
 

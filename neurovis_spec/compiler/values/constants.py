@@ -24,6 +24,7 @@ from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS, FUNCTIONS
 from neurovis_spec.language.expressions.given import GIVEN, meaning
 from neurovis_spec.language.expressions.habits import UNITS, unit_hint
+from neurovis_spec.language.expressions.mistakes import INSTEAD
 from neurovis_spec.language.expressions.parser import DRAWS, ExpressionError, parse, unknown_names
 from neurovis_spec.language.expressions.tree import Draw, Number, Tree, draws, names
 from neurovis_spec.language.grammar import PLAIN, Role
@@ -136,7 +137,10 @@ def _unknown(name: str, known: Collection[str], functions: Mapping[str, int], wh
     message = f"unknown name '{shorten(name)}'"
     if name in GIVEN:
         return message, f"'{name}' is known elsewhere: {meaning(name)}"
-    return message, suggest(name, known, what)
+    close = suggest(name, known, what)
+    if name in INSTEAD and not (close or "").startswith("did you mean"):
+        return message, INSTEAD[name]
+    return message, close
 
 
 def is_constant(tree: Tree, constants: Collection[str] = ALWAYS) -> bool:

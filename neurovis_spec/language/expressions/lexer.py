@@ -73,6 +73,7 @@ _FOREIGN: Mapping[str, str] = {
     "!": "write 'not'",
     "~": "write 'not'",
     "=": "write '==' for 'is equal to'",
+    ";": "nothing stands at the end of a value",
     "?": "write 'a if condition else b' for a choice",
     ":": "write 'a if condition else b' for a choice",
 }

@@ -13,7 +13,7 @@ from neurovis_spec.language.expressions.errors import ExpressionError
 from neurovis_spec.language.expressions.habits import unit_hint
 from neurovis_spec.language.expressions.lexer import Token, is_operand
 
-_INSTEAD: Mapping[str, str] = {
+INSTEAD: Mapping[str, str] = {
     "ln": "write 'log(x)', the natural logarithm",
     "log10": "write 'log(x) / log(10)'",
     "log2": "write 'log(x) / log(2)'",
@@ -99,8 +99,8 @@ def unknown_function(name: Token, functions: Sequence[str], fitting: Sequence[st
     the functions that take as many arguments as are there: they come first."""
     close = nearest(name.text, functions) if len(name.text) > 1 else ()
     close = tuple(sorted(close, key=lambda one: one not in fitting))
-    if name.text in _INSTEAD:
-        hint = _INSTEAD[name.text]
+    if name.text in INSTEAD:
+        hint = INSTEAD[name.text]
     elif close:
         hint = "did you mean " + " or ".join(f"'{other}'" for other in close) + "?"
     else:

@@ -85,6 +85,9 @@ class Brackets(Scanner):
         if before is None or character not in "[{" or self._line != before.scalar.span.line:
             return faults.no_comma(_CLOSING[opening]), self._at
         written = self._text[before.begin : before.end]
+        tight = self._at == before.end
+        if behind_key and character == "[" and (tight or written.rstrip().endswith(("->", "+"))):
+            return faults.bracket_in_key(written), self._at
         if behind_key:
             return faults.no_colon(f"{written} {character}…{_CLOSING[character]}"), before.begin
         return faults.settings_apart(written), self._at

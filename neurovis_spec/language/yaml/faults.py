@@ -17,6 +17,8 @@ class Words(NamedTuple):
 
 
 CODE: Final = "yaml-syntax"
+#: How comments begin elsewhere.
+COMMENTS: Final = ("//", "-- ", "/*", ";", "%")
 _NAMES: Final = r"[A-Za-z_][\w.]*(?: *(?:->|\+) *[A-Za-z_][\w.]*)*"
 #: A key and its value with no more than blanks between them; a longer text may be anything.
 _ENTRY: Final = re.compile(rf"({_NAMES})[ \t]+((?:[^\s\[{{'\"+>-]|[-+](?=[\w.]))\S*|[\[{{'\"].*)", re.ASCII | re.DOTALL)
@@ -38,6 +40,7 @@ LATE_KEY: Final = Words(
 ITEM_IN_MAPPING: Final = Words("a list item where a 'key: value' is wanted")
 LATE_ITEM: Final = Words("a list item cannot stand here", "begin the list on a line of its own")
 KEY_IN_LIST: Final = Words("this line does not fit the lines above", "an item of a list begins with '- '")
+COMMENT: Final = Words("this is no comment", "a comment begins with '#'")
 BEHIND_VALUE: Final = Words("unexpected text behind a value that is complete")
 NOWHERE: Final = Words("this belongs to nothing above it")
 
@@ -87,11 +90,21 @@ def no_comma(closing: str) -> Words:
 
 def no_colon(written: str) -> Words:
     """Something that should be 'key: value', and has no colon."""
+    if written.startswith(COMMENTS):
+        return COMMENT
     entry = _ENTRY.fullmatch(written)
     if entry is None:
         return Words(f"':' is missing after '{_short(written)}'", "an entry is written 'key: value'")
     key, value = entry.groups()
     return Words(f"':' is missing after '{_short(key)}'", f"write {_short(f'{key}: {value}')}")
+
+
+def bracket_in_key(written: str) -> Words:
+    """A bracket in the place of a reference, or at the end of one."""
+    if written.rstrip().endswith(("->", "+")):
+        return Words("no bracket stands in a reference", "several references are joined with '+', as in A -> B + C")
+    hint = f"a neuron of '{_short(written)}' has its number behind it, as in {_short(written)}1; several are a range"
+    return Words("no bracket stands in a reference", hint)
 
 
 def settings_apart(name: str) -> Words:

@@ -291,6 +291,8 @@ class Parser(Brackets):
         character = self._text[self._at]
         if character == ":":
             return faults.SECOND_COLON if _COLON.match(self._text, self._at, self._end) else faults.NO_BLANK
+        if self._text.startswith(faults.COMMENTS, self._at):
+            return faults.COMMENT
         return faults.start(character) if character in "]}" else faults.BEHIND_VALUE
 
     def _goes_on(self, column: int, entries: dict[str, Entry] | None = None) -> bool:

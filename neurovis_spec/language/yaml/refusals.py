@@ -116,7 +116,10 @@ class Refusals:
             return
         kind = "null" if key.value is None else "true or false" if isinstance(key.value, bool) else "a number"
         message = f"a key is a text, but YAML reads '{_short(written)}' as {kind}"
-        self._error("key-not-text", key.span, message, "names begin with a letter or an underscore")
+        hint = "names begin with a letter or an underscore"
+        if key.value is None or isinstance(key.value, bool):
+            hint = "take another name, or put it in quotes"
+        self._error("key-not-text", key.span, message, hint)
 
     def collection_key(self, key: Node) -> None:
         """Refuse a key that is a mapping or a list."""

@@ -186,8 +186,8 @@ def describe(node: Node) -> str:
     'true'
     """
     match node:
-        case Scalar(value=None):
-            return "nothing"
+        case Scalar(value=None, span=span):
+            return "nothing" if span.column == span.end_column else "null"
         case Scalar(value=bool() as truth):
             return "true" if truth else "false"
         case Scalar(value=int() | float() as number):
