@@ -113,7 +113,7 @@ def test_settings_that_make_no_number() -> None:
         ("{gaussian: {sigm: 1}}", "unknown-parameter", "'sigma'"),
         ("{tanh: {a: 1}}", "unknown-parameter", "no parameters"),
         ("{tanh: {}, relu: {}}", "one-key", "{name:"),
-        ("{gaussian: 3}", "wrong-type", "{name:"),
+        ("{gaussian: 3}", "wrong-type", "write {gaussian: {SETTING: 3}}"),
         ("{gaussian: {sigma: [1, 2]}}", "wrong-size", ""),
     ],
 )

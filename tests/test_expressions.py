@@ -244,7 +244,7 @@ ERRORS = [
     ("a‹\u00a0›+ b", "unexpected-character", "blank"),
     ("a‹\u200b›", "unexpected-character", "invisible"),
     ("a ‹@› b", "unexpected-character", None),
-    ("a‹;› b", "unexpected-character", None),
+    ("a‹;› b", "unexpected-character", "nothing ends a value but its line"),
     ("a‹\0›", "unexpected-character", None),
 ]
 

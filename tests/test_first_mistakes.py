@@ -136,6 +136,7 @@ def test_indentation_that_is_no_blank_is_named(character: str) -> None:
         ("parameters: {a: -65 mV}\n", "3:17", "it has a unit | numbers have no units: write -65"),
         ("parameters: {a: -65*mV}\n", "3:21", "numbers have no units: write -65"),
         ("parameters: {a: 2 + 5 nS}\n", "3:23", "a unit, 'nS', stands behind the number 5"),
+        ("parameters: {a: 1e999999999 s}\n", "3:17", "it has a unit"),
         ("parameters: {a: 50%}\n", "3:17", "write 0.5"),
         ("parameters: {a: 90 deg}\n", "3:17", "angles are in radians: write 90*pi/180"),
         ("parameters: {a: 90\u00b0}\n", "3:17", "angles are in radians: write 90*pi/180"),

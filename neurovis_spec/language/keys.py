@@ -152,6 +152,8 @@ def _apart(key: str, sign: str, value: str) -> Apart:
 def mend_torn(data: Mapping, code: str, findings: Findings) -> Mapping:
     """A mapping in which an entry without a colon behind its key is that key: of ``A {bias: 1}`` YAML makes the key
     ``A {bias`` and the text ``1}``. It is reported, and its value unread."""
+    if not any("{" in entry.name or "[" in entry.name for entry in data.entries):
+        return data
     found = [(entry, _torn(entry)) for entry in data.entries]
     if all(parts is None for _, parts in found):
         return data

@@ -7,18 +7,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from fractions import Fraction
 from typing import Final
 
 from neurovis_spec.diagnostics import shorten
 
 _GROUPED: Final = re.compile(r"([+-]?)([1-9][0-9]{0,2}(?:([,_' .\u00a0\u202f’])[0-9]{3})(?:\3[0-9]{3})*)")
-_MILLI, _MICRO, _MINUTE = Fraction(1, 1000), Fraction(1, 1_000_000), Fraction(60)
 #: Seconds.
-_TIMES: Final[Mapping[str, Fraction]] = {
-    "s": Fraction(1), "sec": Fraction(1), "second": Fraction(1), "seconds": Fraction(1), "ms": _MILLI, "msec": _MILLI,
-    "us": _MICRO, "usec": _MICRO, "µs": _MICRO, "μs": _MICRO, "min": _MINUTE,
-}  # fmt: skip
+_TIMES: Final[Mapping[str, float]] = {
+    **dict.fromkeys(("s", "sec", "second", "seconds"), 1.0),
+    **dict.fromkeys(("ms", "msec"), 1e-3),
+    **dict.fromkeys(("us", "usec", "µs", "μs"), 1e-6),
+    "min": 60.0,
+}
 _DEGREES: Final = frozenset({"deg", "degree", "degrees", "°"})
 _PLAIN: Final = frozenset({
     "V", "mV", "uV", "µV", "nA", "pA", "uA", "µA", "mA", "nS", "pS", "uS", "µS", "mS", "Hz", "kHz", "pF", "nF", "uF",
@@ -65,12 +65,10 @@ def unit_hint(number: str, unit: str) -> str | None:
     ('numbers have no units: write -65', None)
     """
     if unit in _TIMES:
-        seconds = float(Fraction(number) * _TIMES[unit])
-        return (
-            f"numbers have no units: write {seconds:.15g} where seconds are wanted, {seconds:.15g}/dt where steps are"
-        )
+        seconds = f"{float(number) * _TIMES[unit]:.12g}"
+        return f"numbers have no units: write {seconds} where seconds are wanted, {seconds}/dt where steps are"
     if unit in _DEGREES:
         return f"angles are in radians: write {number}*pi/180"
     if unit == "%":
-        return f"write {float(Fraction(number) / 100):.15g}"
+        return f"write {float(number) / 100:.12g}"
     return f"numbers have no units: write {number}" if unit in _PLAIN else None

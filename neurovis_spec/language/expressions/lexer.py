@@ -73,7 +73,6 @@ _FOREIGN: Mapping[str, str] = {
     "!": "write 'not'",
     "~": "write 'not'",
     "=": "write '==' for 'is equal to'",
-    ";": "nothing stands at the end of a value",
     "?": "write 'a if condition else b' for a choice",
     ":": "write 'a if condition else b' for a choice",
 }
@@ -254,6 +253,8 @@ def _lookalike(character: str) -> str | None:
         return "write 'pi'"
     if character in _LOOKALIKES:
         return f"write '{_LOOKALIKES[character]}'"
+    if character == ";":
+        return "nothing ends a value but its line"
     if character.isspace() or unicodedata.category(character) in ("Zs", "Cf"):
         return "an invisible character; leave it out, or put an ordinary blank"
     greek = re.fullmatch(r"GREEK (?:SMALL|CAPITAL) LETTER (?:FINAL )?([A-Z]+)", unicodedata.name(character, ""))
