@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 from neurovis_spec.body.kinds import open_body
 from neurovis_spec.body.model import BodyError, Port
-from neurovis_spec.compiler.names.state_references import names_of_states
 from neurovis_spec.compiler.network import Network
 
 
@@ -60,7 +59,7 @@ def describe(network: Network, engine: tuple[str, str]) -> dict[str, object]:
         ],
         "outputs": [
             {"name": entry.name, "neurons": [names[neuron] for neuron in entry.neurons.tolist()]}
-            | ({"states": list(names_of_states(network, entry.states))} if entry.states else {})
+            | ({"states": list(network.state_names(entry.states))} if entry.states else {})
             for entry in network.outputs
         ],
         "engine": {"name": engine[0], "reason": engine[1]},

@@ -13,7 +13,8 @@ import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.progress import Progress
-from neurovis_spec.runtime.record import Course, RowSink, go
+from neurovis_spec.runtime.record import Course, go
+from neurovis_spec.runtime.rows import RowSink
 from neurovis_spec.runtime.state import State
 
 

@@ -33,13 +33,12 @@ from neurovis_spec.compiler.network import Input, Network
 from neurovis_spec.compiler.program import Activation, Model
 from neurovis_spec.language.words import Combine
 from neurovis_spec.runtime.backend import BackendError, Capabilities, listing, load, prepare
-from neurovis_spec.runtime.conditions import first_conditions
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.numpy_backend import NumpyBackend, step_code
 from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.reference import ReferenceBackend
-from neurovis_spec.runtime.state import State, initial_state
+from neurovis_spec.runtime.state import State, first_conditions, initial_state
 
 BOTH = ("reference", "numpy")
 

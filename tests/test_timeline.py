@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import neurovis_spec as nv
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.runtime.conditions import Controls
+from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.state import State, initial_state
 
 HEAD = """

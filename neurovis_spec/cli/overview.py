@@ -13,7 +13,6 @@ import numpy as np
 
 from neurovis_spec.cli.files import count
 from neurovis_spec.cli.tables import number, spread, table
-from neurovis_spec.compiler.names.state_references import names_of_states
 from neurovis_spec.describe import wired
 from neurovis_spec.findings import printable
 
@@ -51,7 +50,7 @@ def _parts(compiled: CompiledNetwork, network: Network) -> Iterator[str]:
     if network.outputs:
         names = network.neurons.names
         outputs = [
-            (o.name, _few([*names_of_states(network, o.states)] or [names[i] for i in o.neurons.tolist()]))
+            (o.name, _few([*network.state_names(o.states)] or [names[i] for i in o.neurons.tolist()]))
             for o in network.outputs
         ]
         yield "outputs\n" + table(outputs, ("name", "of"))

@@ -2,13 +2,13 @@
 
 In: nothing; this is the value that ``compiler`` makes and that ``runtime``, ``layout`` and ``scene`` read. Neurons and
 connections are structures of arrays; all arrays are read-only. What holds arrays is compared by identity: the ``hash``
-of a Network compares content. What a step does is a list of operations (``program``), each of which says what it reads
-and what it writes.
+of a Network compares content. What a step does is a list of operations (``program``), in the order in which they are
+carried out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -296,6 +296,14 @@ class Network:
         name = self.plasticity[rule].rule.name if rule >= 0 else ""
         weights = connections.weights if self.numbering is None else self.numbering
         return (int(connections.delays[index]), name, float(weights[index]), index)
+
+    def state_names(self, states: Iterable[StateOf]) -> tuple[str, ...]:
+        """How each number of these states is called: ``K1.v``, ``(K1 -> O).eligibility``."""
+        result: list[str] = []
+        for one in states:
+            result += [f"{self.neurons.names[index]}.{one.state}" for index in one.neurons.tolist()]
+            result += [f"({self.connection_names[index]}).{one.state}" for index in one.connections.tolist()]
+        return tuple(result)
 
     @cached_property
     def connection_index(self) -> Mapping[str, int]:

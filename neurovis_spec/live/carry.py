@@ -20,7 +20,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import SourceError, Turned
 from neurovis_spec.live.turns import Feed, turn
-from neurovis_spec.runtime.conditions import lose
+from neurovis_spec.runtime.controls import lose
 from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
 from neurovis_spec.runtime.state import State

@@ -12,8 +12,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from neurovis_spec.runtime.conditions import Conditions
-from neurovis_spec.runtime.state import BodyState, State
+from neurovis_spec.runtime.state import BodyState, Conditions, State
 from neurovis_spec.scene.fading import Fading
 
 #: bytes

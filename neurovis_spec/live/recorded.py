@@ -16,7 +16,7 @@ from neurovis_spec.live.history import Recorded
 from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned, drawn, recalled
 from neurovis_spec.live.turns import Turn
 from neurovis_spec.runtime.columns import columns_of
-from neurovis_spec.runtime.conditions import Controls
+from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.fitting import fitted
 from neurovis_spec.runtime.record import after
 from neurovis_spec.runtime.recording import After, Recording, RecordingError

@@ -25,8 +25,7 @@ from neurovis_spec.runtime.backend import Availability, BackendError, Capabiliti
 from neurovis_spec.runtime.c_arrivals import incoming_of
 from neurovis_spec.runtime.c_code import Code, Form, Table, Tables, function, words_of
 from neurovis_spec.runtime.c_step import StepCode
-from neurovis_spec.runtime.conditions import Conditions, Mask, Structure
-from neurovis_spec.runtime.state import State
+from neurovis_spec.runtime.state import Conditions, Mask, State, Structure
 
 #: neurons and connections up to which a network is written out one by one
 SMALL = 600

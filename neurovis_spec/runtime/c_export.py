@@ -27,9 +27,9 @@ from neurovis_spec.runtime.c_draws import drawing
 from neurovis_spec.runtime.c_names import LONGEST_STRING, identifiers, prefix, string, words
 from neurovis_spec.runtime.c_settable import ExportError, fixed, formula, write_follow
 from neurovis_spec.runtime.c_step import StepCode
-from neurovis_spec.runtime.conditions import NOTHING, Controls, Mask
+from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.signals import signal_layout
-from neurovis_spec.runtime.state import State, initial_state
+from neurovis_spec.runtime.state import NOTHING, Mask, State, initial_state
 
 
 @dataclass(frozen=True)

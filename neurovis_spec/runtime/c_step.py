@@ -20,9 +20,9 @@ from neurovis_spec.language.expressions.emit_c import Value
 from neurovis_spec.language.expressions.tree import Tree, names
 from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming
 from neurovis_spec.runtime.c_code import Code, Form, Place
-from neurovis_spec.runtime.conditions import Mask
 from neurovis_spec.runtime.presynaptic import history_depth, rule_names
 from neurovis_spec.runtime.signals import SignalLayout, signal_layout
+from neurovis_spec.runtime.state import Mask
 
 #: connections that learn beside each other: a compiler makes vectors of them
 _RULES = 4

@@ -22,7 +22,7 @@ from neurovis_spec.compiler.events.changes import Clamp
 from neurovis_spec.compiler.events.settable import ParameterFormula
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.expressions.tree import Number
-from neurovis_spec.runtime.conditions import Controls
+from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.files import regular_size, replacing
 from neurovis_spec.runtime.npz_file import Array, put_arrays, read_array, recording_errors
 from neurovis_spec.runtime.recording import RecordingError

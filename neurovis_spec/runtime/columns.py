@@ -13,7 +13,7 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.body import Skeleton
-from neurovis_spec.compiler.names.state_references import StateOf, names_of_states, singles
+from neurovis_spec.compiler.names.state_references import StateOf, singles
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.kinds import Widths
 from neurovis_spec.runtime.names import Names, names_of
@@ -152,7 +152,7 @@ def _probe(network: Network, wanted: list[tuple[str, str, int]]) -> Probe:
     for state, what, index in wanted:
         one = np.array([index], dtype=np.int64)
         neuron = what == "neuron"
-        names += names_of_states(network, [StateOf(state, one if neuron else none, none if neuron else one)])
+        names += network.state_names([StateOf(state, one if neuron else none, none if neuron else one)])
     return Probe(tuple(names), parts)
 
 

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.compiler.names.state_references import StateOf, names_of_states
+from neurovis_spec.compiler.names.state_references import StateOf
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Findings, Span, shorten, suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
@@ -162,7 +162,7 @@ def _resolve_state(
     if sum(one.size for one in found) == 1:
         states[name] = first
     else:
-        (one,) = names_of_states(network, [StateOf(first.state, first.neurons[:1], first.connections[:1])])
+        (one,) = network.state_names([StateOf(first.state, first.neurons[:1], first.connections[:1])])
         message = f"'{shorten(name)}' is {sum(state.size for state in found)} states, and no single one"
         findings.error("not-one-number", span, message, f"name one of them, as in '{one}'")
     return True

@@ -13,13 +13,12 @@ from neurovis_spec.arrays import FloatArray, subscript
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Block, Gather, Learn, ReadInputs, Send, Update
 from neurovis_spec.runtime.backend import Availability, Capabilities
-from neurovis_spec.runtime.conditions import Mask, Structure
 from neurovis_spec.runtime.numpy_blocks import emit_gather, emit_send, emit_update
 from neurovis_spec.runtime.numpy_code import Code
 from neurovis_spec.runtime.numpy_learn import emit_history, emit_learn
 from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import signal_layout
-from neurovis_spec.runtime.state import State
+from neurovis_spec.runtime.state import Mask, State, Structure
 from neurovis_spec.runtime.watch import all_finite, carried_by
 
 #: neurons, connections and steps of one call together, and how many of these an operation takes the time of: some tens

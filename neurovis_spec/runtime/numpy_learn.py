@@ -14,10 +14,10 @@ from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Plasticity
 from neurovis_spec.language.expressions.tree import Tree
-from neurovis_spec.runtime.conditions import NOTHING, Structure
 from neurovis_spec.runtime.numpy_blocks import emit_let
 from neurovis_spec.runtime.numpy_code import Code
 from neurovis_spec.runtime.presynaptic import rule_names
+from neurovis_spec.runtime.state import NOTHING, Structure
 
 
 def emit_history(code: Code, depth: int) -> None:

@@ -25,14 +25,14 @@ from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.backend import Backend, Ready, Runner, Stepper, ready
 from neurovis_spec.runtime.checkpoint import load_state, save_state
 from neurovis_spec.runtime.columns import ALL, Columns, Keep, columns_of
-from neurovis_spec.runtime.conditions import Controls
+from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.embodied import Embodied
 from neurovis_spec.runtime.inputs import STRETCH, InputReader
 from neurovis_spec.runtime.kinds import Rows, Widths
 from neurovis_spec.runtime.memory import check_room
 from neurovis_spec.runtime.recording import After, Numbers, Recording, RecordingError, recording_of
 from neurovis_spec.runtime.resume import resumed_state
-from neurovis_spec.runtime.rows import Steps
+from neurovis_spec.runtime.rows import RowSink, Steps
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.runtime.until import Until, Watched
 from neurovis_spec.runtime.watch import Watch
@@ -138,26 +138,6 @@ def after(network: Network, state: State) -> After:
         np.flatnonzero(now.lesioned_neurons),
         np.flatnonzero(now.lesioned_connections),
     )
-
-
-class RowSink(Protocol):
-    """Where rows go, a stretch of the run at a time."""
-
-    def begin(self, count: int) -> Rows:
-        """Arrays for the next ``count`` rows."""
-        ...
-
-    def end(self, count: int) -> None:
-        """So many rows of the arrays are filled: all, or fewer where they are handed on early."""
-        ...
-
-    def due(self) -> bool:
-        """Whether rows are to be handed on now, asked after each step."""
-        ...
-
-    def over(self) -> bool:
-        """Whether the run is to end here."""
-        ...
 
 
 class InMemory:

@@ -9,12 +9,12 @@ import numpy as np
 
 from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.names.state_references import (
+    Holder,
     Refusal,
     StateOf,
+    Wiring,
     connections_state,
-    holders_of,
     model_state,
-    wiring_of,
 )
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
@@ -49,7 +49,7 @@ def _between(network: Network, arrow: Arrow, names: Names) -> IntArray:
     if arrow.text.endswith(")") and arrow.text in network.connection_index:
         return np.array([network.connection_index[arrow.text]], dtype=np.int64)
     sources, targets = find_neurons(arrow.sources.text, names), find_neurons(arrow.targets.text, names)
-    return wiring_of(network).between(sources, targets)
+    return _wiring_of(network).between(sources, targets)
 
 
 def find_states(network: Network, reference: str, names: Names | None = None) -> tuple[StateOf, ...]:
@@ -67,10 +67,28 @@ def _state(network: Network, part: Part, names: Names) -> StateOf:
     if name is None:
         raise UnknownNameError(f"'{text}' is no state: write K.v for v of K's model, (K -> O).v for that of a rule")
     if isinstance(name.owner, Arrow):
-        one = connections_state(name, _between(network, name.owner, names), wiring_of(network))
+        one = connections_state(name, _between(network, name.owner, names), _wiring_of(network))
     else:
-        one = model_state(name, find_neurons(name.owner.text, names), holders_of(network))
+        one = model_state(name, find_neurons(name.owner.text, names), _holders_of(network))
     assert one is not UNKNOWN  # no connection of a network is invalid
     if isinstance(one, Refusal):
         raise UnknownNameError(f"'{text}': {one.message}" + (f"; {one.hint}" if one.hint else ""))
     return one
+
+
+def _holders_of(network: Network) -> tuple[Holder, ...]:
+    """The states of the models of all neurons."""
+    return tuple(
+        Holder(block.members, block.model.name, tuple(quantity.name for quantity in block.model.state))
+        for block in network.blocks
+    )
+
+
+def _wiring_of(network: Network) -> Wiring:
+    """All connections, with the states of their rules."""
+    rules = tuple(
+        Holder(entry.members, entry.rule.name, tuple(quantity.name for quantity in entry.rule.state))
+        for entry in network.plasticity
+    )
+    connections = network.connections
+    return Wiring(connections.sources, connections.targets, connections.entries, rules)

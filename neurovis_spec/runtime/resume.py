@@ -24,7 +24,7 @@ from neurovis_spec.compiler.events.patch import PatchError
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.expressions.functions import NUMPY, Library
-from neurovis_spec.runtime.conditions import Controls, lose
+from neurovis_spec.runtime.controls import Controls, lose
 from neurovis_spec.runtime.fitting import of_table
 from neurovis_spec.runtime.recording import Recording, RecordingError
 from neurovis_spec.runtime.signals import signal_layout

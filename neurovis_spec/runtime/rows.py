@@ -42,6 +42,26 @@ class Steps:
             yield (rows - -self.first // self.every) * self.every
 
 
+class RowSink(Protocol):
+    """Where rows go, a stretch of the run at a time."""
+
+    def begin(self, count: int) -> Rows:
+        """Arrays for the next ``count`` rows."""
+        ...
+
+    def end(self, count: int) -> None:
+        """So many rows of the arrays are filled: all, or fewer where they are handed on early."""
+        ...
+
+    def due(self) -> bool:
+        """Whether rows are to be handed on now, asked after each step."""
+        ...
+
+    def over(self) -> bool:
+        """Whether the run is to end here."""
+        ...
+
+
 class RowWriter(Protocol):
     """Takes rows in the order of their steps."""
 

@@ -31,7 +31,7 @@ from neurovis_spec.language.expressions.tree import Number
 from neurovis_spec.language.references import Sum, parse
 from neurovis_spec.runtime.backend import Backend, Ready, ready
 from neurovis_spec.runtime.columns import ALL, Keep, Probe, probe_of
-from neurovis_spec.runtime.conditions import Controls
+from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.embodied import Embodied, embodied
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.names import Names, names_of

@@ -9,18 +9,106 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
-from neurovis_spec.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.events.changes import Held
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.initial_states import starts_of
 from neurovis_spec.compiler.program import Quantity
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import PLAIN
-from neurovis_spec.runtime.conditions import Conditions, first_conditions
 from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import signal_layout
+
+Mask = npt.NDArray[np.bool_]
+
+#: a step before all others: nothing that was sent is lost
+NOTHING: Final = -(1 << 62)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Structure:
+    """Which connections a step leaves out: ``gone`` (m,) those that are lesioned, or one of whose ends is, ``since``
+    (m,) the step from which each of them is, and ``still`` (m,) those whose rule is not carried out. ``lost`` (m,): all
+    that a connection has sent before this step never arrives, so that ``pre`` is 0 in its place; only of those whose
+    rule looks there, else NOTHING. A backend that has made code for one structure makes it anew where that of a State
+    is another object."""
+
+    gone: Mask
+    since: IntArray
+    still: Mask
+    lost: IntArray
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing is left out."""
+        return not (self.gone.any() or self.still.any() or self.has_lost)
+
+    @property
+    def has_lost(self) -> bool:
+        """Whether anything that a rule would read of the past never arrives."""
+        return bool((self.lost > NOTHING).any())
+
+
+@dataclass
+class Conditions:
+    """What holds for the step to come: ``parameters`` and ``chosen`` (one a slot: its value, and whether it was set),
+    ``variables`` as in ``Settable``, what is ``held``, ``lesioned_neurons`` (n,), ``lesioned_connections`` (m,) by
+    name, ``paused`` (m,) connections whose rules are stopped. ``holds`` says for each block which neurons are held at
+    what, None where none is; it is None as a whole where nothing is held."""
+
+    parameters: FloatArray
+    chosen: Mask
+    variables: FloatArray
+    held: Held
+    lesioned_neurons: Mask
+    lesioned_connections: Mask
+    paused: Mask
+    structure: Structure
+    holds: tuple[tuple[IntArray, FloatArray] | None, ...] | None = None
+
+    def copy(self) -> Conditions:
+        """The same, of its own; what is replaced as a whole is shared."""
+        return replace(
+            self,
+            parameters=self.parameters.copy(),
+            chosen=self.chosen.copy(),
+            variables=self.variables.copy(),
+            held=self.held.copy(),
+            lesioned_neurons=self.lesioned_neurons.copy(),
+            lesioned_connections=self.lesioned_connections.copy(),
+            paused=self.paused.copy(),
+        )
+
+    def held_at(self, neuron: int) -> float | None:
+        """What a neuron is held at, None where it is not."""
+        if self.lesioned_neurons[neuron]:
+            return 0.0
+        return float(self.held.value[neuron]) if self.held.order[neuron] >= 0 else None
+
+
+def first_conditions(network: Network) -> Conditions:
+    """Before anything has changed."""
+    n, m = len(network.neurons), len(network.connections)
+    settable = network.settable
+    nothing = np.zeros(m, dtype=np.bool_)
+    never = np.zeros(m, dtype=np.int64)
+    lost = np.full(m, NOTHING)
+    nothing.flags.writeable = never.flags.writeable = lost.flags.writeable = False
+    return Conditions(
+        parameters=settable.parameters.copy(),
+        chosen=np.zeros(len(settable.slots), dtype=np.bool_),
+        variables=settable.initial.copy(),
+        held=Held.none(n),
+        lesioned_neurons=np.zeros(n, dtype=np.bool_),
+        lesioned_connections=np.zeros(m, dtype=np.bool_),
+        paused=np.zeros(m, dtype=np.bool_),
+        structure=Structure(nothing, never, nothing, lost),
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,10 +14,8 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.kinds import Rows
 from neurovis_spec.runtime.measures import Measure, Meter, measure_of
+from neurovis_spec.runtime.rows import RowSink
 from neurovis_spec.runtime.state import State
-
-if TYPE_CHECKING:
-    from neurovis_spec.runtime.record import RowSink
 
 LABEL = "<until>"
 

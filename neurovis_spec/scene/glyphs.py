@@ -1,40 +1,24 @@
 """Glyphs: what tells a disc that stands for several neurons from one of a neuron, and says how many they are.
 
-In: discs and labels in page units. Out: a second ring, the number of neurons under the name, and this moved up for it.
+In: discs and labels in page units. Out: a second ring, the number of neurons under the name.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 from neurovis_spec.scene import texts
-from neurovis_spec.scene.labels import Label
 from neurovis_spec.scene.model import Point, Shape, Spline, Text
-
-if TYPE_CHECKING:
-    from neurovis_spec.scene.plan import Plan
+from neurovis_spec.scene.plan import Plan
 
 #: The second ring: its radius in radii, its width in rings.
 _INNER, _WIDTH = 0.87, 0.6
-#: The number beside the label in its sizes: how large it is, how far below, and how much the label moves up.
-_SMALLER, _BELOW, _UP = 0.85, 0.95, 0.3
+#: The number beside the label in its sizes: how large it is, and how far below.
+_SMALLER, _BELOW = 0.85, 0.95
 #: Of a glyph whose label does not stand on it, in radii.
 _ALONE = 0.7
 #: A quarter of a circle as a cubic spline.
 _QUARTER = 0.5522847498
-
-
-def raised(labels: Sequence[Label | None], sizes: Mapping[int, int]) -> list[Label | None]:
-    """The labels, those on glyphs moved up to leave room for their numbers."""
-    return [
-        replace(label, point=(label.point[0], label.point[1] - _UP * label.size))
-        if label is not None and label.on_disc and index in sizes
-        else label
-        for index, label in enumerate(labels)
-    ]
 
 
 def marks_of(planned: Plan, index: int, ink: str) -> tuple[Shape, ...]:

@@ -58,6 +58,8 @@ _SMALLEST_DISC = 7.0
 _SMALLEST_NUMBERED = 16.0
 #: to how much of its width a name is cut beside its disc, if there is no room for it, and how many letters it keeps
 _CUT, _LETTERS = (0.75, 0.5), 3
+#: How much the label of a glyph moves up, for the number beneath it, in its sizes.
+_UP = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,6 +159,16 @@ def labels_of(
         if result[other] is None:
             result[one] = None
     return result
+
+
+def raised(labels: Sequence[Label | None], sizes: Mapping[int, int]) -> list[Label | None]:
+    """The labels, those on glyphs moved up to leave room for their numbers."""
+    return [
+        replace(label, point=(label.point[0], label.point[1] - _UP * label.size))
+        if label is not None and label.on_disc and index in sizes
+        else label
+        for index, label in enumerate(labels)
+    ]
 
 
 def partners_of(network: Network) -> dict[int, int]:

@@ -28,9 +28,17 @@ from neurovis_spec.scene.frame import MARGIN, MOST, Frame, Margins, fit, unit_fo
 from neurovis_spec.scene.gains import Gains, in_pages
 from neurovis_spec.scene.gathered_layout import radius_of
 from neurovis_spec.scene.geometry import batches, bounds, samples
-from neurovis_spec.scene.glyphs import raised
 from neurovis_spec.scene.heading import CAPTION, CAPTION_Y, HEADER, TITLE, caption_text, title_text
-from neurovis_spec.scene.labels import Ground, Label, labels_of, margin_beside, partners_of, room_beside, size_beside
+from neurovis_spec.scene.labels import (
+    Ground,
+    Label,
+    labels_of,
+    margin_beside,
+    partners_of,
+    raised,
+    room_beside,
+    size_beside,
+)
 from neurovis_spec.scene.legend_entry import LegendEntry
 from neurovis_spec.scene.lesions import Lesions, lesions_of
 from neurovis_spec.scene.line_labels import line_labels

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
-from neurovis_spec.compiler.names.state_references import StateOf, names_of_states
+from neurovis_spec.compiler.names.state_references import StateOf
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.labels import names_in_parts, parts_of
 from neurovis_spec.runtime.recording import Recording, RecordingError
@@ -39,7 +39,7 @@ def full_name(curve: Curve, network: Network) -> str:
     if curve.state:
         index = np.array([curve.index], dtype=np.int64)
         own = (index, _NONE) if curve.of == "neuron" else (_NONE, index)
-        return names_of_states(network, [StateOf(curve.state, *own)])[0]
+        return network.state_names([StateOf(curve.state, *own)])[0]
     return network.neurons.names[curve.index] if curve.of == "neuron" else network.connection_names[curve.index]
 
 

@@ -7,7 +7,7 @@ wrong with it. A name that is a neuron's is never a state's.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -15,9 +15,6 @@ from neurovis_spec.arrays import IntArray
 from neurovis_spec.diagnostics import Home, Undeclared, shorten, suggest
 from neurovis_spec.language.references import StateName
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
-
-if TYPE_CHECKING:
-    from neurovis_spec.compiler.network import Network
 
 _NONE: IntArray = np.zeros(0, dtype=np.int64)
 
@@ -105,35 +102,8 @@ def no_state(what: Literal["model", "rule"], name: str, of: str, state: str, sta
     return Refusal(f"{owner} has no state '{shorten(state)}'", suggest(state, states, "its states are"), lost)
 
 
-def holders_of(network: Network) -> tuple[Holder, ...]:
-    """The states of the models of all neurons."""
-    return tuple(
-        Holder(block.members, block.model.name, tuple(quantity.name for quantity in block.model.state))
-        for block in network.blocks
-    )
-
-
-def wiring_of(network: Network) -> Wiring:
-    """All connections, with the states of their rules."""
-    rules = tuple(
-        Holder(entry.members, entry.rule.name, tuple(quantity.name for quantity in entry.rule.state))
-        for entry in network.plasticity
-    )
-    connections = network.connections
-    return Wiring(connections.sources, connections.targets, connections.entries, rules)
-
-
 def singles(states: Iterable[StateOf]) -> Iterator[tuple[str, str, int]]:
     """Each number by itself: the state, what has it (a neuron, a connection), and its index."""
     for one in states:
         yield from ((one.state, "neuron", index) for index in one.neurons.tolist())
         yield from ((one.state, "connection", index) for index in one.connections.tolist())
-
-
-def names_of_states(network: Network, states: Iterable[StateOf]) -> tuple[str, ...]:
-    """How each of these numbers is called: ``K1.v``, ``(K1 -> O).eligibility``."""
-    result: list[str] = []
-    for one in states:
-        result += [f"{network.neurons.names[index]}.{one.state}" for index in one.neurons.tolist()]
-        result += [f"({network.connection_names[index]}).{one.state}" for index in one.connections.tolist()]
-    return tuple(result)

@@ -20,7 +20,6 @@ from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.names.state_references import no_state
 from neurovis_spec.compiler.network import Group, Input
 from neurovis_spec.compiler.neurons.labels import labels_of
-from neurovis_spec.compiler.neurons.noise import noise_of
 from neurovis_spec.compiler.neurons.positions import positions_of
 from neurovis_spec.compiler.program import Activation, Model
 from neurovis_spec.compiler.values.arguments import check_initials, check_settings, choose, parameters, settle, spread
@@ -28,7 +27,7 @@ from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.definitions import Defaults, Definitions
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import meant, nearest, shorten
-from neurovis_spec.language.expressions.tree import Tree
+from neurovis_spec.language.expressions.tree import Tree, draws
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, name_hint, said, too_long
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
@@ -39,6 +38,7 @@ from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 
 T = TypeVar("T", bound=Activation | Model)
 _SETTING = formula_at(GroupModel, "model", "NAME", "SETTING")
+_NOISE = formula_at(GroupModel, "noise")
 
 
 class Kind(NamedTuple):
@@ -133,7 +133,7 @@ class Builder:
         starts = self._starts(given, n, name, kind, model) if given.states else {}
         input_index = self._input(model, n)
         position, placed = self._position(model, n)
-        noise = UNKNOWN if model.noise is None else noise_of(model.noise, self.constants)
+        noise = UNKNOWN if model.noise is None else _noise_of(model.noise, self.constants)
         if names is UNKNOWN or n is UNKNOWN:
             return UNKNOWN
         labels = self._labels(model, names)
@@ -398,3 +398,14 @@ def unread_neurons(model: GroupModel) -> Names[Group]:
     items = node.items if isinstance(node, AnyList) else ()
     texts = {str(item.value): UNKNOWN for item in items if isinstance(item, Scalar)}
     return Names(texts, "names" in model.unknown and not isinstance(node, AnyList))
+
+
+def _noise_of(formula: Formula, constants: Constants) -> Tree | Unknown:
+    """The expression of a noise, which draws something."""
+    tree = constants.tree(formula, _NOISE)
+    if tree is UNKNOWN or draws(tree):
+        return tree
+    message = "this noise draws nothing: it is the same at each run"
+    hint = "use normal(mean, deviation) or uniform(low, high); a constant belongs to 'bias'"
+    constants.findings.error("no-draw", formula.span, message, hint)
+    return UNKNOWN

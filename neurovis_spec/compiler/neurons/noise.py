@@ -6,13 +6,13 @@ In: the ``noise`` of the groups. Out: Noises, each with its place in the vector 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from neurovis_spec.arrays import frozen
 from neurovis_spec.compiler.events.settable import ParameterFormula, places_of
 from neurovis_spec.compiler.network import Noise
+from neurovis_spec.compiler.neurons.populate import Population
 from neurovis_spec.compiler.values.constants import Constants, Value, width_of
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
@@ -20,10 +20,7 @@ from neurovis_spec.language.expressions.tree import Chain, Conditional, Draw, Tr
 from neurovis_spec.language.located import Formula
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
-from neurovis_spec.language.unknown import UNKNOWN, Unknown
-
-if TYPE_CHECKING:
-    from neurovis_spec.compiler.neurons.populate import Population
+from neurovis_spec.language.unknown import UNKNOWN
 
 _NOISE = formula_at(GroupModel, "noise")
 
@@ -42,17 +39,6 @@ def make_noises(population: Population, inputs: int) -> tuple[Noise, ...]:
         result.append(Noise(group.name, members, start, tree, dict(constants.parameters), slots, widths))
         start += group.count
     return tuple(result)
-
-
-def noise_of(formula: Formula, constants: Constants) -> Tree | Unknown:
-    """The expression of a noise, which draws something."""
-    tree = constants.tree(formula, _NOISE)
-    if tree is UNKNOWN or draws(tree):
-        return tree
-    message = "this noise draws nothing: it is the same at each run"
-    hint = "use normal(mean, deviation) or uniform(low, high); a constant belongs to 'bias'"
-    constants.findings.error("no-draw", formula.span, message, hint)
-    return UNKNOWN
 
 
 def _check_deviations(tree: Tree, formula: Formula, count: int, constants: Constants) -> tuple[ParameterFormula, ...]:
