@@ -439,7 +439,7 @@ def test_what_is_no_regular_file_is_never_opened(tmp_path: Path, monkeypatch: py
     for name, code in (
         ("folder.csv", "file-kind"),
         ("pipe.csv", "file-kind"),
-        ("loop.csv", "file-missing"),
+        ("loop.csv", "file-unreadable"),
         ("none.csv", "file-missing"),
         ("pipe.csv/x.csv", "file-missing"),
         ("", "file-format"),

@@ -17,7 +17,8 @@ import click
 
 from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.progress import progress
-from neurovis_spec.cli.targets import refuse_dash
+from neurovis_spec.cli.targets import refuse_circle, refuse_dash
+from neurovis_spec.real_paths import real_path
 
 if TYPE_CHECKING:
     from neurovis_spec.arrays import FloatArray
@@ -172,8 +173,8 @@ def tables(named: Mapping[str, str], network: Network) -> dict[str, FloatArray]:
     arrays: dict[str, FloatArray] = {}
     for name, text in named.items():
         place = Span(text, 1, 1, 1, 1)
-        folder = Path(text).resolve().parent
-        table = read_table(Path(text).resolve().name, folder, folder, place, findings, inside=True, kinds=_INPUTS)
+        path = real_path(text)
+        table = read_table(path.name, path.parent, path.parent, place, findings, inside=True, kinds=_INPUTS)
         if table is UNKNOWN:
             continue
         if table.numbered:
@@ -201,6 +202,7 @@ def write_folder(folder: Path, write: Callable[[], tuple[list[Path], list[Path]]
     from neurovis_spec.runtime.c_settable import ExportError
 
     refuse_dash(folder, "folder")
+    refuse_circle(folder)
     with writing(folder):
         try:
             written, kept = write()

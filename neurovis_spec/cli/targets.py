@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import click
 
 from neurovis_spec.cli.failure import fault
+from neurovis_spec.real_paths import is_circular
 
 if TYPE_CHECKING:
     from neurovis_spec.compiled import CompiledNetwork
@@ -26,6 +27,7 @@ def check_target(path: Path | None, inputs: Iterable[tuple[str, str | None]] = (
     for what, read in inputs:
         if read is not None and read != "-" and (_same(path, Path(read)) or _is_part_of(Path(read), path)):
             raise _refused(path, what, option)
+    refuse_circle(path)
     if path.is_dir():
         raise fault(f"{path} is a folder, not a file")
     if not path.parent.is_dir():
@@ -35,6 +37,7 @@ def check_target(path: Path | None, inputs: Iterable[tuple[str, str | None]] = (
 def check_folder(path: Path, option: str = "-o") -> None:
     """Refuse a folder that is something else, or that could not be made."""
     refuse_dash(path, "folder", option)
+    refuse_circle(path)
     if path.exists() and not path.is_dir():
         raise fault(f"{path} is a file, not a folder", "name a folder; it is made if it is not there")
     if not path.parent.is_dir():
@@ -45,6 +48,12 @@ def refuse_dash(path: Path, kind: str, option: str = "-o") -> None:
     """Refuse what means standard output elsewhere, where a file or a folder is asked for."""
     if str(path) == "-":
         raise click.UsageError(f"{option} takes a {kind}: what is written does not go to standard output ('-')")
+
+
+def refuse_circle(path: Path) -> None:
+    """Refuse a path on which links lead round in a circle."""
+    if is_circular(path):
+        raise fault(f"{path}: its symbolic links lead round in a circle", "remove these links, or choose another name")
 
 
 def files_of(inputs: Mapping[str, str]) -> list[tuple[str, str | None]]:

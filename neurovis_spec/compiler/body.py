@@ -6,7 +6,6 @@ runs read; or findings. Where what a body needs is not installed, its names are 
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -32,6 +31,7 @@ from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.model import names_of
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.yaml.opening import FileFault, fault_of
+from neurovis_spec.real_paths import real_path
 
 #: More steps of a body within one of the network are a mistake.
 MOST_SUBSTEPS: Final = 1_000_000
@@ -104,11 +104,11 @@ def _found(kind: str, given: Located[str], place: Place, findings: Findings) -> 
         where = (given.value, place.root, place.base, given.span, findings)
         if read_data(*where) is UNKNOWN:
             return None, False
-        path = (place.base / given.value).resolve()
-        return path, _all_sound(loaded.files(path), given, place.root.resolve(), findings)
+        path = real_path(place.base / given.value)
+        return path, _all_sound(loaded.files(path), given, real_path(place.root), findings)
     except BodyMissingError as error:
         _warn_unchecked(error, given, findings)
-        return (place.base / given.value).resolve(), False
+        return real_path(place.base / given.value), False
     except BodyError as error:
         findings.error("bad-body", given.span, str(error), error.hint)
     except Exception as error:  # whatever somebody's code raises while it looks at a file
@@ -121,7 +121,7 @@ def _all_sound(parts: Iterable[Path], given: Located[str], inside: Path, finding
     large, each and together. A place is looked at before the next is asked for, as only then a kind may open it."""
     sizes: dict[Path, int] = {}
     for part in parts:
-        real = Path(os.path.realpath(part))
+        real = real_path(part)
         findings.files.add(real)
         fault, hint = fault_of(real, LARGEST), None
         if not real.is_relative_to(inside) and real.exists():

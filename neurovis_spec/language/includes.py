@@ -21,6 +21,7 @@ from neurovis_spec.language.spec import IncludedModel, Spec
 from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
 from neurovis_spec.language.yaml.reader import LARGEST, read_content
+from neurovis_spec.real_paths import real_path
 
 #: The most files that a spec may include, and how deep files may include one another.
 MOST: Final = 1000
@@ -51,7 +52,7 @@ def read_includes(spec: Spec, folder: Path, root: Path, findings: Findings, read
     """
     reader = _Reader(root, findings, read)
     own = folder / Path(spec.source.span.file).name
-    reader.follow(spec.include, spec.source.span.file, folder, (own.resolve(),))
+    reader.follow(spec.include, spec.source.span.file, folder, (real_path(own),))
     return Includes(tuple(reader.found), reader.complete and "include" not in spec.unknown)
 
 

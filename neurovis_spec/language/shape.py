@@ -20,6 +20,7 @@ from neurovis_spec.language.model import Model, opening
 from neurovis_spec.language.spec import IncludedModel, Spec
 from neurovis_spec.language.yaml.reader import read_file
 from neurovis_spec.language.yaml.source import Mapping, SourceDocument
+from neurovis_spec.real_paths import real_path
 
 M = TypeVar("M", bound=Model)
 
@@ -74,7 +75,7 @@ def read_library(document: SourceDocument, findings: Findings) -> Library | None
 def read_body(path: Path, findings: Findings) -> BodyModel | None:
     """The ``body`` section of a file, whatever else it holds: it may be another spec. What is invalid in it is
     reported; None where that is too much."""
-    findings.files.add(path.resolve())
+    findings.files.add(real_path(path))
     document = read_file(path, str(path), findings)
     if document is None:
         return None

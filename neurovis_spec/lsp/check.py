@@ -17,6 +17,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span
 from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.files import Files
+from neurovis_spec.real_paths import real_path
 
 #: The spec within which a file to be included is checked; no file has such a name.
 _STAND_IN = "<stand-in>"
@@ -61,7 +62,7 @@ def _compiled(text: str, file: str, folder: Path, root: Path, files: Files) -> C
 def place_of(file: str, folder: Path) -> Path:
     """The file that findings call by a name, which may be relative to a folder."""
     path = Path(file)
-    return path if path.is_absolute() else (folder / path).resolve()
+    return path if path.is_absolute() else real_path(folder / path)
 
 
 def _library(document: Document) -> Checked:

@@ -19,6 +19,7 @@ from neurovis_spec.lsp.names import Name
 from neurovis_spec.lsp.outline import Item
 from neurovis_spec.lsp.page import Page
 from neurovis_spec.lsp.text import Place, Text, holds
+from neurovis_spec.real_paths import real_path
 
 
 @dataclass(frozen=True)
@@ -52,8 +53,8 @@ class Document:
     def path(self) -> Path:
         """Where the file is, or would be."""
         try:
-            return (self.folder / Path(self.file).name).resolve()
-        except (OSError, RuntimeError, ValueError):  # no name of a file
+            return real_path(self.folder / Path(self.file).name)
+        except ValueError:  # no name of a file
             return self.folder / "document"
 
     @property

@@ -20,6 +20,7 @@ from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
 from neurovis_spec.language.yaml.reader import LARGEST
 from neurovis_spec.lsp.page import Page
+from neurovis_spec.real_paths import real_path
 
 #: How many entries of the folders of a workspace are looked through for specs, and the largest of these.
 _MOST_ENTRIES: Final = 20_000
@@ -135,4 +136,4 @@ class Files:
                         path = Path(folder, name)
                         data = read_bytes(path, _LARGEST_SPEC)
                         if not isinstance(data, FileFault) and b"include" in data:
-                            yield path.resolve()
+                            yield real_path(path)

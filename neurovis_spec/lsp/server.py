@@ -31,6 +31,7 @@ from neurovis_spec.lsp.rename import Edit, RenameError, prepare, rename
 from neurovis_spec.lsp.symbols import symbols
 from neurovis_spec.lsp.text import Text
 from neurovis_spec.lsp.workspace import Desk
+from neurovis_spec.real_paths import real_path
 from neurovis_spec.version import __version__
 
 #: Seconds without a change until findings are looked for.
@@ -171,8 +172,8 @@ def _path_of(uri: str) -> Path | None:
     """The path of a URI; None where it names no file, as of a text that was never saved, or that no file can have."""
     try:
         path = to_fs_path(uri) if uri.startswith("file:") else None
-        return Path(path).resolve() if path else None
-    except (OSError, RuntimeError, ValueError):  # NUL, a lone surrogate, a name too long, links in a circle
+        return real_path(path) if path else None
+    except ValueError:  # NUL, a lone surrogate
         return None
 
 

@@ -20,6 +20,7 @@ from urllib.parse import quote
 import yaml
 
 from neurovis_spec.language.ros_types import plain
+from neurovis_spec.real_paths import is_circular, real_path
 from neurovis_spec.ros import bag1
 from neurovis_spec.ros.definitions import definition
 from neurovis_spec.ros.files import METADATA
@@ -136,7 +137,8 @@ def _named(path: Path) -> list[str]:
 def _part(path: Path) -> Part:
     if not path.is_file():
         if not path.exists():
-            raise RecordingError(f"{path}: there is no such file")
+            what = "its symbolic links lead round in a circle" if is_circular(path) else "there is no such file"
+            raise RecordingError(f"{path}: {what}")
         raise RecordingError(f"{path}: not a regular file")
     with path.open("rb") as file:
         magic = file.read(16)
@@ -306,7 +308,7 @@ class _Database:
         return {str(type_): str(text) for type_, encoding, text in rows if encoding == "ros2msg"}
 
     def _open(self) -> sqlite3.Connection:
-        database = sqlite3.connect(f"file:{quote(str(self.path.resolve()))}?mode=ro", uri=True)
+        database = sqlite3.connect(f"file:{quote(str(real_path(self.path)))}?mode=ro", uri=True)
         database.execute("PRAGMA trusted_schema = OFF")
         return database
 

@@ -18,6 +18,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO, Final
 
+from neurovis_spec.real_paths import is_circular, real_path
 from neurovis_spec.runtime.parts import Kind, clear, open_beside
 
 #: What the system says where there is no room: on the disk, for this user, in a file.
@@ -67,9 +68,11 @@ def replacing(path: str | os.PathLike[str], kind: Kind = "neurovis-new") -> Iter
 
 
 def written_to(path: str | os.PathLike[str]) -> Path:
-    """The file that a path stands for, links followed. Raises OSError for a folder, a pipe, a block device, and where
-    there is no folder to write it into."""
-    target = Path(os.path.realpath(path))
+    """The file that a path stands for, links followed. Raises OSError for a folder, a pipe, a block device, links that
+    lead round in a circle, and where there is no folder to write it into."""
+    target = real_path(path)
+    if is_circular(target):
+        raise OSError(errno.ELOOP, "its symbolic links lead round in a circle", os.fspath(path))
     if not target.parent.is_dir():
         raise FileNotFoundError(errno.ENOENT, "there is no folder", os.path.dirname(path))  # noqa: PTH120
     if target.exists() and not target.is_file() and not target.is_char_device():

@@ -14,6 +14,7 @@ from io import FileIO
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
+from neurovis_spec.real_paths import real_path
 from neurovis_spec.runtime.csv_file import csv_size, finish_csv, held_csv, read_csv, recover_csv, stream_csv, write_csv
 from neurovis_spec.runtime.mcap_file import (
     finish_mcap,
@@ -124,7 +125,7 @@ def load(path: str | os.PathLike[str], run: int | None = None) -> Recording:
             return format_.recover(path)
     found = read_by(path)
     if isinstance(found, StreamingFormat):
-        parts = beside(Path(os.path.realpath(path)), "part")
+        parts = beside(real_path(path), "part")
         if path.exists():
             _tell(path, parts, found)
         elif parts:
@@ -166,7 +167,7 @@ def _tell(path: Path, parts: Sequence[Path], format_: StreamingFormat) -> None:
 def settle(path: Path, format_: StreamingFormat) -> None:
     """Before a run writes a recording: take over what runs that are gone have left beside it, or clear it away, and
     say so. Where the file itself is not there a part becomes it. Raises RecordingError, OSError."""
-    target = Path(os.path.realpath(path))
+    target = real_path(path)
     for part, file in rest(target):
         try:
             last = format_.held(file)

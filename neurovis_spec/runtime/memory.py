@@ -10,6 +10,7 @@ import os
 import shutil
 from pathlib import Path
 
+from neurovis_spec.real_paths import real_path
 from neurovis_spec.runtime.recording import RecordingError
 
 _MEMORY, _GROUPS, _MOUNT = Path("/proc/meminfo"), Path("/proc/self/cgroup"), Path("/sys/fs/cgroup")
@@ -39,7 +40,7 @@ def check_room(steps: int, every: int, columns: int) -> None:
 def check_disk(path: Path, steps: int, every: int, size: int) -> None:
     """Refuse a recording for which the disk has not the room before anything is run. Raises TooLargeError."""
     try:
-        room = shutil.disk_usage(path.resolve().parent).free
+        room = shutil.disk_usage(real_path(path).parent).free
     except OSError:  # what is wrong with the folder is said when the file is opened
         return
     if size > room:

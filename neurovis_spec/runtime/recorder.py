@@ -6,7 +6,6 @@ there is a part in its place, as after a run that broke off; Ctrl-C and ``sys.ex
 
 from __future__ import annotations
 
-import os
 from contextlib import ExitStack
 from pathlib import Path
 from time import monotonic
@@ -15,6 +14,7 @@ import numpy as np
 
 from neurovis_spec.arrays import subscript
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.real_paths import real_path
 from neurovis_spec.runtime.columns import Keep, columns_of
 from neurovis_spec.runtime.embodied import Embodied
 from neurovis_spec.runtime.formats import StreamingFormat, load, settle
@@ -54,7 +54,7 @@ class Recorder:
 
     def _stream(self, format_: StreamingFormat, path: Path) -> None:
         settle(path, format_)
-        target = Path(os.path.realpath(path))
+        target = real_path(path)
         there = set(beside(target, "part"))
         frame = frame_of(self._network, self._columns, self._last)
         self._writer = self._open.enter_context(format_.stream(path, frame, self._steps))

@@ -24,6 +24,7 @@ from neurovis_spec.language.yaml.opening import FileFault, read_bytes
 from neurovis_spec.language.yaml.reader import LARGEST
 from neurovis_spec.plain import text_of
 from neurovis_spec.progress import Progress
+from neurovis_spec.real_paths import real_path
 from neurovis_spec.runtime.backend import BackendError, available, ready
 from neurovis_spec.runtime.backend import load as load_backend
 from neurovis_spec.runtime.embodied import embodied
@@ -143,16 +144,16 @@ def planned(
     job = Job(
         spec.text,
         spec.file,
-        str(spec.folder.resolve()),
+        str(real_path(spec.folder)),
         tuple(one.name for one in grid),
         tuple(named.values()),
         {name: arguments.number(name, value) for name, value in arguments.mapping("parameters", parameters).items()},
         steps,
         {},
         backend,
-        None if root is None else str(Path(root).resolve()),
+        None if root is None else str(real_path(root)),
         limit,
-        body if isinstance(body, bool) else body.resolve(),
+        body if isinstance(body, bool) else real_path(body),
     )
     every = tuple(points(grid))
     return CheckedSweep(job, columns, every, _checked(job, grid, every))

@@ -18,6 +18,7 @@ from neurovis_spec.language.located import Located
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.values import DATA_FILES
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
+from neurovis_spec.real_paths import real_path
 
 if TYPE_CHECKING:
     from neurovis_spec.language.data.edge_list import EdgeTable
@@ -51,9 +52,8 @@ def locate(path_text: str, root: Path, base: Path, span: Span, findings: Finding
         findings.error("path-outside", span, f"the path '{shown}' is absolute", _FROM)
         return UNKNOWN
     try:
-        inside = root.resolve()
-        path = (base / path_text).resolve()
-    except (OSError, RuntimeError, ValueError):  # loops of links, names too long
+        inside, path = real_path(root), real_path(base / path_text)
+    except ValueError:  # a lone surrogate
         findings.error("file-missing", span, f"the file '{shown}' does not exist")
         return UNKNOWN
     if not path.is_relative_to(inside):
