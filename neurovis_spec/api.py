@@ -24,15 +24,6 @@ if TYPE_CHECKING:
 _SEEDS = 1 << 63
 
 
-def __getattr__(name: str) -> object:
-    """``OutputError``, which what draws raises for a kind of file that nobody makes."""
-    if name != "OutputError":
-        raise AttributeError(f"module 'neurovis_spec.api' has no attribute {name!r}")
-    from neurovis_spec.scene.renderers import RendererError
-
-    return RendererError
-
-
 def compile(
     source: str | Path | Mapping[str, object],
     *,

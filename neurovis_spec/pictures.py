@@ -100,8 +100,8 @@ class Drawable(ABC):
         neurons that are shown with all they are connected to, ``paths`` (``"A -> B"``) what the shortest paths are
         shown of; connections below ``min_weight`` are left out. Of very many connections, and of those that would make
         an SVG larger than 5 MB, the weakest are left out, with a warning, unless it is to be ``full``. Raises
-        OutputError for a kind that nobody draws, for a view, a name to be shown and a path that there is not, KeyError
-        for an unknown reference, before anything is run.
+        RendererError for a kind that nobody draws, for a view, a name to be shown and a path that there is not,
+        KeyError for an unknown reference, before anything is run.
         """
         from neurovis_spec.scene.renderers import renderer_for
 
@@ -167,8 +167,8 @@ class Drawable(ABC):
 
         ``fps`` defaults to 1/dt, at most 60, and to 25 where the spec writes no dt. Without ``every`` all steps are
         drawn, of more than 3,000 (or ``frames``) one in so many that no more frames come out; a warning says which.
-        ``inputs``, ``view`` and what is shown as in ``render``; views over time show the steps. Raises OutputError for
-        a kind that nobody makes, for a film that is too long and a view that there is not, KeyError for an unknown
+        ``inputs``, ``view`` and what is shown as in ``render``; views over time show the steps. Raises RendererError
+        for a kind that nobody makes, for a film that is too long and a view that there is not, KeyError for an unknown
         reference, before anything is run.
         """
         from neurovis_spec.runtime.simulation import Simulation
@@ -251,7 +251,7 @@ class Drawable(ABC):
         return replace(self, network=replace(self.network, render=settings)), settings
 
     def settings_for(self, theme: str | None) -> RenderSettings:
-        """How it is drawn, in a theme of this name. Raises OutputError for one that there is not."""
+        """How it is drawn, in a theme of this name. Raises RendererError for one that there is not."""
         from neurovis_spec.scene.renderers import RendererError
         from neurovis_spec.themes import THEMES
 
@@ -406,7 +406,7 @@ def _density(dpi: float) -> float:
 
 
 def _denser(scene: Scene, density: float) -> Scene:
-    """A scene of another density. Raises OutputError for one that is too large."""
+    """A scene of another density. Raises RendererError for one that is too large."""
     from neurovis_spec.scene.renderers import RendererError
 
     result = replace(scene, density=density)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import ast
+import builtins
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -95,3 +98,50 @@ def test_the_public_names_are_there_and_an_unknown_one_is_not() -> None:
         assert getattr(neurovis_spec, name) is not None
     with pytest.raises(AttributeError, match="compil_text"):
         neurovis_spec.compil_text  # noqa: B018
+
+
+def test_every_public_name_is_found_where_it_is_looked_for() -> None:
+    """The names that types are checked with are those that an import gives."""
+    import neurovis_spec
+
+    assert set(neurovis_spec._HOMES) | {"__version__"} == set(neurovis_spec.__all__)
+
+
+#: What an author calls: what it says that it raises can be caught as ``nv.NAME``.
+CALLED = (
+    "api", "compiled", "pictures", "runtime/recorder", "runtime/recording", "runtime/simulation", "snapshots",
+    "sweeps/sweep", "sweeps/table",
+)  # fmt: skip
+
+
+def docstrings(module: str) -> str:
+    """Those of what is public in a module."""
+    tree = ast.parse((ROOT / "neurovis_spec" / f"{module}.py").read_text(encoding="utf-8"))
+    public = [
+        node
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
+        and not (isinstance(node, ast.FunctionDef) and re.match(r"_[^_]", node.name))
+    ]
+    return "\n".join(ast.get_docstring(node) or "" for node in public)
+
+
+def test_every_name_that_the_docs_say_is_there() -> None:
+    import neurovis_spec
+
+    pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "docs").glob("*.ipynb")]
+    texts = {path.name: path.read_text(encoding="utf-8") for path in pages}
+    texts |= {module: docstrings(module) for module in CALLED}
+    missing = {
+        f"{where}: {name}"
+        for where, text in texts.items()
+        for name in re.findall(r"\b(?:nv|neurovis_spec)\.([A-Za-z_]\w*)\b(?![/.])", text)
+        if not hasattr(neurovis_spec, name) and not (ROOT / "neurovis_spec" / name).exists()
+    }
+    missing |= {
+        f"{where}: {name}"
+        for where, text in texts.items()
+        for name in re.findall(r"\b[A-Z]\w*Error\b", text)
+        if not hasattr(neurovis_spec, name) and not hasattr(builtins, name)
+    }
+    assert missing == {"live.md: TraitError"}  # of traitlets
