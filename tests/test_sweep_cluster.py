@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 import shutil
 import subprocess
 import sys
 import time
+from asyncio import CancelledError
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,6 +18,7 @@ from distributed import Client
 
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
+from neurovis_spec.sweeps.cluster import _ended_tasks_untold
 from neurovis_spec.sweeps.grid import SweepError
 
 pytestmark = pytest.mark.cluster
@@ -144,13 +147,48 @@ def test_the_workers_need_none_of_the_files_that_a_spec_reads(cluster: Cluster, 
     assert nv.sweep(folder / "spec.yaml", over, metrics, scheduler=cluster.address, progress=remove) == serial
 
 
-def test_a_scheduler_that_is_lost_ends_the_sweep_and_no_row_is(cluster: Cluster) -> None:
+def test_a_scheduler_that_is_lost_ends_the_sweep_and_no_row_is(
+    cluster: Cluster, capfd: pytest.CaptureFixture[str]
+) -> None:
     def kill(done: int, total: int) -> None:
         if done == 3:
             cluster.kill()
 
-    with pytest.raises(SweepError, match="the cluster gave up"):
+    with pytest.raises(SweepError, match=r"the cluster gave up: .* lost the connection to the scheduler"):
         nv.sweep("noisy.yaml", OVER, METRICS, scheduler=cluster.address, path="x.csv", progress=kill)
+    assert "Traceback" not in capfd.readouterr().err
     rows = Path("x.csv").read_text().splitlines()
     assert set(rows[1:]) <= set(str(nv.sweep("noisy.yaml", OVER, METRICS)).splitlines())
     assert len(rows) > 3
+
+
+def test_what_the_client_logs_is_told_but_for_its_own_tasks_that_it_ends() -> None:
+    logger, told = logging.getLogger("distributed.client"), Told()
+
+    def logged() -> list[str]:
+        told.messages.clear()
+        for error in (CancelledError("ended"), OSError("broken")):
+            try:
+                raise error
+            except (CancelledError, OSError):
+                logger.exception("%r", error)
+        return list(told.messages)
+
+    logger.addHandler(told)
+    try:
+        with _ended_tasks_untold():
+            assert logged() == ["OSError('broken')"]
+        assert logged() == ["CancelledError('ended')", "OSError('broken')"]
+    finally:
+        logger.removeHandler(told)
+
+
+class Told(logging.Handler):
+    """Keeps what is logged."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.messages: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.messages.append(record.getMessage())

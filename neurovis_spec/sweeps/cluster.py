@@ -6,7 +6,10 @@ worker has not finished when it is lost runs on another; a point that ends worke
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+import logging
+from asyncio import CancelledError
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager
 from uuid import uuid4
 
 from neurovis_spec.sweeps.grid import Point, SweepError
@@ -30,26 +33,45 @@ def on_cluster(job: Job, points: Sequence[Point], address: str) -> Generator[tup
         raise SweepError(message, "an address is like tcp://10.0.0.1:8786") from None
     name = f"neurovis-{uuid4().hex}"
     futures: dict[Future, int] = {}
-    try:
-        # the job is a task of its own: what is merely scattered is gone with the worker that has it
-        shared = client.submit(_same, job, key=f"{name}-job")
-        for place, point in enumerate(points):
-            futures[client.submit(run_point, shared, point, key=f"{name}-{place}")] = place
-        for future in as_completed(list(futures), loop=client.loop):
-            try:
-                result = future.result()
-            except KilledWorker:
-                result = failed(job, "worker-died", "one worker after the other ended while it ran this point")
-            yield futures.pop(future), result
-            future.release()
-    except Exception as error:  # of whatever kind: run_point raises nothing, so it is one of the cluster's
-        message = f"the cluster gave up: {error or type(error).__name__}"
-        raise SweepError(message, "the rows until then are kept; do all of its workers have this version?") from None
-    finally:
-        if futures:
-            client.cancel(list(futures))
-        client.close(timeout=5)
+    with _ended_tasks_untold():
+        try:
+            # the job is a task of its own: what is merely scattered is gone with the worker that has it
+            shared = client.submit(_same, job, key=f"{name}-job")
+            for place, point in enumerate(points):
+                futures[client.submit(run_point, shared, point, key=f"{name}-{place}")] = place
+            for future in as_completed(list(futures), loop=client.loop):
+                try:
+                    result = future.result()
+                except KilledWorker:
+                    result = failed(job, "worker-died", "one worker after the other ended while it ran this point")
+                yield futures.pop(future), result
+                future.release()
+        except Exception as error:  # of whatever kind: run_point raises nothing, so it is one of the cluster's
+            message = f"the cluster gave up: {' '.join(str(error).split()) or type(error).__name__}"
+            raise SweepError(
+                message, "the rows until then are kept; do all of its workers have this version?"
+            ) from None
+        finally:
+            if futures:
+                client.cancel(list(futures))
+            client.close(timeout=5)
 
 
 def _same(job: Job) -> Job:
     return job
+
+
+@contextmanager
+def _ended_tasks_untold() -> Iterator[None]:
+    """Where the scheduler is lost, dask's client logs a traceback for each task of its own that it ends, before the
+    points fail and say why. These are dropped meanwhile, and nothing else that it logs."""
+    logger = logging.getLogger("distributed.client")
+    logger.addFilter(_is_no_ended_task)
+    try:
+        yield
+    finally:
+        logger.removeFilter(_is_no_ended_task)
+
+
+def _is_no_ended_task(record: logging.LogRecord) -> bool:
+    return not (record.exc_info and isinstance(record.exc_info[1], CancelledError))
