@@ -6,6 +6,8 @@
 #   make gallery    draws the examples into docs/pictures and writes docs/gallery.md; needs graphviz' dot
 #   make test-all   what needs Chromium, graphviz' dot, gcc and g++, node, or starts a cluster, and test-ros; fails without
 #   make test-ros   the tests with ROS: ROS 1 of Debian, and ROS 2 (Kilted, Jazzy) as wheels, installed into .ros
+#   make test-lowest   every command once, with the oldest packages that pyproject.toml allows, in .pythons/lowest
+#   make test-pythons  every command once with Python 3.13, and the tests of reading with it and /usr/bin/python3
 #   make fuzz       20,000 broken specs and 5,000 expressions (FUZZ_ARGS=... for more), two or three minutes
 #   make layouts    layouts beside dot's, ELK's, sfdp's and networkx' (LAYOUTS_ARGS="--all --graphs FOLDER" for more)
 #   make docs       writes the generated parts of docs/ anew
@@ -24,7 +26,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 NPM := npm --no-audit --no-fund --no-package-lock --loglevel=error
 ELSEWHERE := browser or dot or compiler or cluster or node
 
-.PHONY: help install demo walk gallery test test-all test-elsewhere test-ros needs needs-ros fuzz layouts docs page page-check format clean
+.PHONY: help install demo walk gallery test test-all test-elsewhere test-ros test-lowest test-pythons test-3.13 test-system needs needs-ros fuzz layouts docs page page-check format clean
 .DELETE_ON_ERROR:
 
 help:
@@ -88,6 +90,52 @@ test-ros: needs-ros $(VENV)/tested .ros/one/made .ros/kilted/made .ros/jazzy/mad
 	@PATH="$(CURDIR)/$(BIN):$$PATH" PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 $(BIN)/python tests/ros_page.py $* --install
 	@touch $@
 
+# Other environments, each with a folder in .pythons. uv installs the oldest packages, which pip cannot, and the others
+# as quickly; what tests/smoke.py calls needs every extra.
+
+READING := $(patsubst %,tests/test_%.py,reader contract_yaml contract_includes written_text expressions errors repair fmt fmt_edit)
+NAMES_OF_EXTRAS := import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"], sep=",")
+EXTRAS = $(shell $(PYTHON) -c '$(NAMES_OF_EXTRAS)')
+PYTHON_313 = $(shell for p in python3.13 $$HOME/.pyenv/versions/3.13*/bin/python; do \
+  $$p -c 'import sys; sys.exit(sys.version_info[:2] != (3, 13))' 2>/dev/null && echo $$p && break; done)
+# Debian's own Python, where it is another one than that of .venv and can run NeuroVis
+PYTHON_SYSTEM = $(shell test "$$(/usr/bin/python3 -VV)" != "$$($(BIN)/python -VV)" \
+  && /usr/bin/python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo /usr/bin/python3)
+
+# The oldest packages have no wheels for the newest Pythons.
+PYTHON_OLDEST = $(shell for p in python3.11 python3.12 $(PYTHON); do $$p -c '' 2>/dev/null && echo $$p && break; done)
+
+# $(call environment,NAME,PYTHON,WHAT) makes .pythons/NAME with a Python, and installs WHAT there.
+environment = echo "installing into .pythons/$(1), with $$($(2) --version)" && rm -rf .pythons/$(1) && $(2) -m venv .pythons/$(1) \
+  && .pythons/$(1)/bin/python -m pip install --quiet --disable-pip-version-check uv \
+  && .pythons/$(1)/bin/uv pip install --quiet --python .pythons/$(1)/bin/python $(3) && touch $@
+
+.pythons/lowest/made: pyproject.toml
+	@$(call environment,lowest,$(PYTHON_OLDEST),--resolution lowest-direct --editable '.[$(EXTRAS)]')
+
+.pythons/3.13/made: pyproject.toml
+	@$(call environment,3.13,$(PYTHON_313),--editable '.[$(EXTRAS)]')
+
+.pythons/system/made: pyproject.toml
+	@$(call environment,system,$(PYTHON_SYSTEM),--editable '.[sim]' pytest hypothesis jsonschema)
+
+test-lowest: .pythons/lowest/made
+	.pythons/lowest/bin/python -m pytest tests/smoke.py $(PYTEST_ARGS)
+
+test-pythons: $(VENV)/made
+	@failed=0; \
+	if test -n "$(PYTHON_313)"; then $(MAKE) --no-print-directory test-3.13 || failed=1; \
+	else echo "Python 3.13 is not tried: there is no python3.13 on the PATH, and none that pyenv has made"; fi; \
+	if test -n "$(PYTHON_SYSTEM)"; then $(MAKE) --no-print-directory test-system || failed=1; \
+	else echo "/usr/bin/python3 is not tried: it is that of $(VENV), older than 3.11, or not there"; fi; \
+	exit $$failed
+
+test-3.13: .pythons/3.13/made
+	.pythons/3.13/bin/python -m pytest tests/smoke.py $(READING) $(PYTEST_ARGS)
+
+test-system: .pythons/system/made
+	.pythons/system/bin/python -m pytest $(READING) $(PYTEST_ARGS)
+
 # Skipping would hide that nothing was tested: what is missing is an error.
 needs:
 	@missing=; \
@@ -145,4 +193,4 @@ format: $(VENV)/tested
 	$(BIN)/ruff format .
 
 clean:
-	rm -rf $(VENV) node_modules demo build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) .pythons node_modules demo build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -30,7 +30,7 @@ _FINER = 8
 @lru_cache(maxsize=64)
 def font(size: float, bold: bool) -> ImageFont.FreeTypeFont:
     """The font of this size in pixels."""
-    return ImageFont.truetype(FONTS[bold], size, layout_engine=ImageFont.Layout.BASIC)
+    return ImageFont.truetype(str(FONTS[bold]), size, layout_engine=ImageFont.Layout.BASIC)
 
 
 def warn_of_letters(scene: Scene) -> None:
