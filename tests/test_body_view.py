@@ -143,18 +143,16 @@ def test_a_wide_link_covers_what_lies_between_its_lines_and_no_more(side: str) -
     )
     pose = np.concatenate([run.pose[:, :81], (corners + middles[:, None]).reshape(len(run), -1)], axis=1)
     scene = still(film(replace(run, pose=pose, skeleton=skeleton)), 20)
-    metre, (casing, around, rows) = scale(scene), shapes(scene, f"p0:{side}:links")
-    assert isinstance(casing, Polyline)
-    assert isinstance(around, Polyline)
-    assert isinstance(rows, Polyline)
-    assert casing.points == around.points
-    assert around.width == rows.width == pytest.approx(0.02 * metre)
-    drawn = np.array(around.points)
-    wanted = (corners[20] + middles[20])[:, [0, 1 if side == "above" else 2]] * (1, -1) * metre
+    metre = scale(scene)
+    *sides, inside = [shape for shape in shapes(scene, f"p0:{side}:links") if isinstance(shape, Polyline)]
+    assert [one.points for one in sides[:4]] == [one.points for one in sides[4:]], "casings, then the sides"
+    assert {round(one.width / metre, 9) for one in (*sides[4:], inside)} == {0.02}
+    drawn = np.array([one.points[0] for one in sides[4:]])
+    wanted = (corners[20] + middles[20])[:, [0, 1 if side == "above" else 2]] * metre
     assert np.ptp(drawn, axis=0) == pytest.approx(np.ptp(wanted, axis=0), abs=1e-6)
     grid = np.array([(1 - s) * drawn[0] + s * drawn[1] + t * (drawn[3] - drawn[0]) for s in SHARES for t in SHARES])
-    edges = [*pairwise(around.points), *pairwise(rows.points)]
-    assert max(min(_distance(point, *edge) for edge in edges) for point in grid) <= around.width / 2
+    edges = [edge for one in (*sides[4:], inside) for edge in pairwise(one.points)]
+    assert max(min(_distance(point, *edge) for edge in edges) for point in grid) <= inside.width / 2
 
 
 SHARES = np.linspace(0, 1, 21)

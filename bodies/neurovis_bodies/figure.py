@@ -25,7 +25,7 @@ _THINNEST: Final = 0.005
 #: what is wider than thick by so little is a line
 _NARROW: Final = 0.01
 #: lines through a disc, between the corners of a regular polygon: how far aside, and how long, as shares of its radius
-_CHORDS: Final = tuple((math.sin(a), math.cos(a)) for a in (math.pi * (k - 5.5) / 12 for k in range(12)))
+_CHORDS: Final = tuple((math.sin(a), math.cos(a)) for a in (math.pi * (k - 3.5) / 8 for k in range(8)))
 
 
 class _Part(NamedTuple):

@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -185,16 +186,13 @@ class _Drawn:
         for number in np.argsort(order, kind="stable").tolist():
             link = skeleton.links[number]
             thick = max(2 * link.radius * self.scale, _THIN)
-            lines, colour = (
-                [(places[start], places[end]) for start, end in link.lines],
-                self._seen(theme.zero, order[number]),
-            )
-            shapes.append(Polyline(_around(lines), theme.box_fill, thick + 2 * _CASING, round=True))
-            shapes.append(Polyline(_around(lines), colour, thick, round=True))
+            lines, colour = [(places[a], places[b]) for a, b in link.lines], self._seen(theme.zero, order[number])
+            sides = _around(lines)
+            shapes += [Polyline(side, theme.box_fill, thick + 2 * _CASING, round=True) for side in sides]
+            shapes += [Polyline(side, colour, thick, round=True) for side in sides]
             if link.beside:
-                shapes.append(
-                    Polyline(_to_and_fro(lines, self._rows[number], _WITHIN * thick), colour, thick, round=True)
-                )
+                inside = _to_and_fro(lines, self._rows[number], _WITHIN * thick)
+                shapes.append(Polyline(inside, colour, thick, round=True))
         order = self._layers([(foot,) for foot in skeleton.feet], frame) * (self.side == "side")
         for number in np.lexsort((poses.touching[frame], order)).tolist():
             touches = poses.touching[frame, number]
@@ -280,15 +278,16 @@ class _Drawn:
         return Polyline(line, theme.ink, 1.4), Text(middle, said, SMALL, theme.ink, "middle", halo=theme.box_fill)
 
 
-def _around(lines: Sequence[tuple[Point, Point]]) -> tuple[Point, ...]:
-    """A line around lines that lie beside each other; a single line is itself.
+def _around(lines: Sequence[tuple[Point, Point]]) -> list[tuple[Point, Point]]:
+    """The sides of what lies between lines beside each other; a single line is its only one.
 
-    >>> _around([((0.0, 0.0), (4.0, 0.0)), ((0.0, 2.0), (4.0, 2.0))])
-    ((0.0, 0.0), (0.0, 2.0), (4.0, 2.0), (4.0, 0.0), (0.0, 0.0))
+    >>> _around([((0.0, 0.0), (4.0, 0.0)), ((0.0, 2.0), (4.0, 2.0))])[:2]
+    [((0.0, 0.0), (0.0, 2.0)), ((0.0, 2.0), (4.0, 2.0))]
     """
     if len(lines) == 1:
-        return lines[0]
-    return (*(start for start, _ in lines), *(end for _, end in reversed(lines)), lines[0][0])
+        return [lines[0]]
+    corners = [start for start, _ in lines] + [end for _, end in reversed(lines)]
+    return list(pairwise([*corners, corners[0]]))
 
 
 def _to_and_fro(lines: Sequence[tuple[Point, Point]], rows: Sequence[int], within: float) -> tuple[Point, ...]:
