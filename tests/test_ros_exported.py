@@ -242,6 +242,7 @@ def test_inputs_become_outputs_of_a_node_in_cpp_and_its_end_is_safe(one: World, 
     nan = float("nan")
     joints = [{**name, "effort": [4.0, 9.0, 3.0]}] * 40
     joints += [{**name, "effort": [nan, 1.0, 2.0]}, {**name, "effort": [1.0]}, {"effort": [1.0, 2.0, 3.0]}] * 3
+    joints += [{"name": ["hip", "ankle\33[2J"], "effort": [5.0, 6.0]}, {}] * 2
     sent = {"topic": "/neurovis/joints", "type": "sensor_msgs/JointState", "values": joints}
     target = {"topic": "/target", "type": "std_msgs/Float64", "values": {"data": 1.5}, "count": 50}
     peer = one.peer(listen=[COMMANDS, MOTORS, ON], send=[sent, target], seconds=3.0)
@@ -257,8 +258,16 @@ def test_inputs_become_outputs_of_a_node_in_cpp_and_its_end_is_safe(one: World, 
     assert 0.5 < max(one[0] for one in came["/cmd_vel"]) <= 1.0
     assert [one[0] for one in came["/neurovis/on"]][-1] is False
     assert True in [one[0] for one in came["/neurovis/on"]]
-    assert "/neurovis/joints: 49 received, 3 not finite, 6 rejected for their length" in run.out
+    assert (
+        "/neurovis/joints: 53 received, 3 not finite, 6 rejected for their length, 4 rejected for their names"
+        in run.out
+    )
     assert "/target: 50 received" in run.out
+    told = [line for line in run.err if "there is no" in line]
+    assert len(told) == 2, "each once"
+    for name, came in (("knee", "'hip', 'ankle\\x1b[2J'"), ("hip", "none")):
+        missing = f"the input 'torque': there is no '{name}' in a message on /neurovis/joints; its names are {came}"
+        assert any("WARN" in line and missing in line for line in told), told
 
 
 def test_parameters_of_a_node_in_cpp_are_set_within_their_bounds(one: World, node: Path) -> None:
@@ -318,7 +327,22 @@ def test_an_input_of_a_node_in_cpp_falls_silent(one: World, node: Path) -> None:
     assert set(motors[-len(on) + silent : -1]) == {(3.0, 4.0)}
     assert motors[-1] == (0.0, 0.0)
     assert came["/cmd_vel"][-1] == [-1.0, 0.0]
-    assert run.err[-1] == "the input 'alive' has fallen silent: no message on /alive for 0.4 s"
+    silence = {"target": "/target", "torque": "/neurovis/joints", "alive": "/alive"}
+    for name, topic in silence.items():
+        told = f"the input '{name}' has fallen silent: no message on {topic} for 0.4 s"
+        assert sum(told in line for line in run.err) == 1
+    assert not any("heard again" in line for line in run.err)
+
+
+def test_a_node_in_cpp_warns_of_an_input_that_falls_silent_and_is_heard_again(one: World, node: Path) -> None:
+    run = start(one, node)
+    target = {"topic": "/target", "type": "std_msgs/Float64", "values": {"data": 1.5}}
+    assert one.peer(send=[{**target, "count": 2}], seconds=0.1).end() == 0
+    assert "WARN" in run.wait_for("the input 'target' has fallen silent: no message on /target for 0.4 s")
+    one.peer(send=[{**target, "count": 5000}])
+    assert "WARN" in run.wait_for("the input 'target' is heard again")
+    assert run.stop() == 0
+    assert sum("the input" in line for line in run.err) == 2
 
 
 def test_a_node_in_cpp_says_once_a_second_how_it_goes(one: World, node: Path) -> None:
