@@ -111,6 +111,21 @@ def test_every_second_step_gives_the_same_seconds_and_period(run: Recording) -> 
         np.testing.assert_allclose(seen, whole, rtol=0.1)
 
 
+def test_what_a_recording_lacks_is_no_time_that_is_measured() -> None:
+    """Such as steps that a controller passed over when it began anew with a higher number, or that were lost."""
+    t = np.arange(400)
+    legs = np.stack([(t % 20) < 6, ((t - 5) % 20) < 10], axis=1).astype(float)
+    whole = made(legs, dt=0.1)
+    gap = replace(whole, step=np.where(t < 210, t, t + 4807))
+    for per in PER:
+        np.testing.assert_allclose(gap.coactivation(per=per).values, whole.coactivation(per=per).values, rtol=1e-12)
+    found, expected = (analysis.gait(one, "N") for one in (gap, whole))
+    for quantity in ("onset", "duty", "phase", "period"):
+        np.testing.assert_allclose(found.column(quantity), expected.column(quantity), rtol=1e-12)
+    assert analysis.stretches(gap, "N2", 180, 5040)["N2"] == [(185, 195), (205, 210), (5017, 5022), (5032, 5040)]
+    assert max(after - first for first, after in analysis.stretches(gap, "N2")["N2"]) == 10
+
+
 def test_the_gait_of_made_up_legs() -> None:
     """A period of 20: the second leg a quarter behind the first, the third at its onsets; the fourth never."""
     t = np.arange(200)

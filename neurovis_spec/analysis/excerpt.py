@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
+import numpy.typing as npt
 
 from neurovis_spec import arguments
 from neurovis_spec.arrays import FloatArray, IntArray
@@ -30,8 +31,14 @@ class Excerpt:
 
     @property
     def stride(self) -> float:
-        """The steps that a row stands for."""
-        return float(self.step[-1] - self.step[0]) / (len(self.step) - 1) if len(self.step) > 1 else 1.0
+        """The steps that a row stands for: the usual distance of two, whatever is missing between others."""
+        return float(np.median(np.diff(self.step))) if len(self.step) > 1 else 1.0
+
+    @property
+    def gaps(self) -> npt.NDArray[np.bool_]:
+        """(rows − 1,): whether steps are missing between a row and the next one."""
+        found: npt.NDArray[np.bool_] = np.diff(self.step) > self.stride
+        return found
 
     @property
     def seconds(self) -> float:

@@ -39,18 +39,22 @@ def gait(
 ) -> NamedArray:
     """A row for each neuron: the step of its first ``onset`` (NaN where it has none), its ``duty``, the share of time
     for which it is active, its ``phase``, how far behind the first neuron's onset its own comes (0…1 of that one's
-    period; the mean around the circle), its ``period`` in steps, and how many ``times`` it becomes active."""
+    period; the mean around the circle), its ``period`` in steps, and how many ``times`` it becomes active. What
+    happens where steps are missing is not known: no onset, period or phase is taken from there."""
     part = excerpt(recording, of, start, stop)
-    active = above(part, threshold)
-    begins = [part.step[_onsets(active[:, column])] for column in range(len(part.names))]
+    active, gaps = above(part, threshold), part.gaps
+    begins = [_onsets(active[:, column], gaps) for column in range(len(part.names))]
+    #: how many gaps are before each row
+    before = np.concatenate([[0], np.cumsum(gaps)])
     values = np.full((len(part.names), len(QUANTITIES)), np.nan)
     for row, own in enumerate(begins):
         values[row, 1], values[row, 4] = active[:, row].mean(), len(own)
         if len(own):
-            values[row, 0] = own[0]
-            values[row, 2] = _phase(own, begins[0])
-        if len(own) > 1:
-            values[row, 3] = (own[-1] - own[0]) / (len(own) - 1)
+            values[row, 0] = part.step[own[0]]
+            values[row, 2] = _phase(own, begins[0], part.step, before)
+        whole = np.diff(before[own]) == 0
+        if whole.any():
+            values[row, 3] = np.diff(part.step[own])[whole].mean()
     return NamedArray("gait", values, Axis("neuron", part.names), Axis("quantity", QUANTITIES))
 
 
@@ -63,29 +67,34 @@ def stretches(
 ) -> dict[str, list[tuple[int, int]]]:
     """For each neuron the stretches for which it is active: the first step, and the one after the last."""
     part = excerpt(recording, of, start, stop)
-    active = above(part, threshold)
+    active, gaps = above(part, threshold), part.gaps
     stride = round(part.stride)
     result = {}
     for column, name in enumerate(part.names):
-        edges = np.diff(np.pad(active[:, column].astype(np.int8), 1))
-        first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+        own = active[:, column]
+        first = np.flatnonzero(own & np.append(True, ~own[:-1] | gaps))
+        last = np.flatnonzero(own & np.append(~own[1:] | gaps, True))
         result[name] = list(zip(part.step[first].tolist(), (part.step[last] + stride).tolist(), strict=True))
     return result
 
 
-def _onsets(active: npt.NDArray[np.bool_]) -> IntArray:
+def _onsets(active: npt.NDArray[np.bool_], gaps: npt.NDArray[np.bool_]) -> IntArray:
     """The rows in which a neuron becomes active."""
-    found: IntArray = np.flatnonzero(active[1:] & ~active[:-1]) + 1
+    found: IntArray = np.flatnonzero(active[1:] & ~active[:-1] & ~gaps) + 1
     return found
 
 
-def _phase(own: IntArray, reference: IntArray) -> float:
-    """The mean phase of onsets in the cycles that begin with those of a reference."""
+def _phase(own: IntArray, reference: IntArray, step: IntArray, before: IntArray) -> float:
+    """The mean phase of onsets (rows) in the cycles that begin with those of a reference; ``before`` (rows,) are the
+    gaps before each."""
     if len(reference) < 2:
         return float("nan")
     cycle = np.clip(np.searchsorted(reference, own, "right") - 1, 0, len(reference) - 2)
-    length = (reference[cycle + 1] - reference[cycle]).astype(np.float64)
-    shares: FloatArray = (own - reference[cycle]) / length
+    begin, end = reference[cycle], reference[cycle + 1]
+    whole = (before[begin] == before[end]) & (before[own] == before[begin])
+    if not whole.any():
+        return float("nan")
+    shares: FloatArray = ((step[own] - step[begin]) / (step[end] - step[begin]))[whole]
     turn = np.exp(2j * np.pi * shares).mean()
     phase = float(np.angle(turn) / (2 * np.pi)) % 1.0
     return 0.0 if phase > 1 - 1e-9 else phase
