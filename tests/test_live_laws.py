@@ -436,6 +436,23 @@ def test_what_a_source_raises_is_told_and_the_run_goes_on_as_it_was(
     driven.run.end()
 
 
+def test_whoever_looks_on_may_fail_and_the_run_goes_on(caplog: pytest.LogCaptureFixture) -> None:
+    compiled = compiled_of("plain")
+
+    def gone(*given: object) -> None:
+        raise RuntimeError("this loop is closed")
+
+    source, answer = SimulatedSource(compiled.simulator()), SimpleQueue[int]()
+    run = Run(source, view_of(compiled, compiled.gains), gone, tell=gone, playing=False)
+    run.start()
+    for command in (Step(2), Seek(-1), Step(3)):
+        run.ask(command, gone, gone)
+    run.inquire(lambda source: answer.put(source.step), gone)
+    assert answer.get(timeout=20) == 5
+    run.end()
+    assert "this loop is closed" in caplog.text
+
+
 MESSAGES = st.one_of(
     st.builds(lambda by: {"type": "step", "by": by}, st.integers(-20, 30)),
     st.builds(lambda step: {"type": "seek", "step": step}, st.integers(0, 40)),

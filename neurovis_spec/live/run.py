@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from threading import Thread
-from typing import Final, TypeAlias
+from typing import Final, ParamSpec, TypeAlias
 
 from neurovis_spec.live.appearance import Appearance
 from neurovis_spec.live.clock import FRAMES, Clock, Pace
@@ -24,6 +24,7 @@ from neurovis_spec.live.source import Capabilities, Drawn, Reach, Seen, Source, 
 from neurovis_spec.live.view import Look, View
 
 _LOG: Final = logging.getLogger(__name__)
+P = ParamSpec("P")
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,10 +93,19 @@ def _nothing() -> None:
     """Nobody waits."""
 
 
+def _call(what: Callable[P, object], *given: P.args, **named: P.kwargs) -> None:
+    """Call what another thread gave to be called; what fails there is no failure of the run."""
+    try:
+        what(*given, **named)
+    except Exception:
+        _LOG.exception("whoever looks on at the live run failed, and it goes on")
+
+
 class Run:
     """A live run; it plays from the start on, or stands still where it is not ``playing``. ``wanted`` says whether
     anybody looks on: else nothing is shown. Whatever a source or a view raises, the run goes on: what was asked is
-    refused, and all is as it was before; where nobody has asked, ``tell`` is called with why it stands still.
+    refused, and all is as it was before; where nobody has asked, ``tell`` is called with why it stands still. What
+    ``show``, ``tell`` and those who ask raise themselves is logged.
     ``failure`` is the last that was raised which is no SourceError."""
 
     def __init__(
@@ -158,7 +168,7 @@ class Run:
     def _stand_still(self, error: Exception) -> None:
         """Go no further by itself, and say why."""
         self._playing, self._target = False, None
-        self._tell(self._why(error))
+        _call(self._tell, self._why(error))
 
     def _why(self, error: Exception) -> str:
         """What is told of something that was raised."""
@@ -191,10 +201,10 @@ class Run:
             except Exception as error:
                 self._source, self._view, self._clock, self._playing, self._ended, self._target = before
                 self._present()
-                refuse(self._why(error))
+                _call(refuse, self._why(error))
             else:
                 self._present()
-                done()
+                _call(done)
 
     def _carry_out(self, asked: Command | Change | _Drawn | _Inquiry, refuse: Refuse) -> None:
         source, now = self._source, time.perf_counter()
@@ -324,13 +334,13 @@ class Run:
 
     def _present(self) -> None:
         """Show what is to be seen, where anybody looks on; where that cannot be made, say why, and stand still."""
-        if self._wanted():
-            try:
-                shown = self.shown()
-            except Exception as error:
-                self._stand_still(error)
-            else:
-                self._show(shown)
+        try:
+            shown = self.shown() if self._wanted() else None
+        except Exception as error:
+            self._stand_still(error)
+        else:
+            if shown is not None:
+                _call(self._show, shown)
 
     def shown(self) -> Shown:
         """What is to be seen now; to be called by this thread, or before it begins."""
