@@ -53,7 +53,8 @@ def read_string(text: str, name: str, findings: Findings) -> SourceDocument | No
 
 def shape(document: SourceDocument, findings: Findings) -> Spec | None:
     """The shape as written: known keys, the right kind of value at each."""
-    return read_spec(document, findings)
+    with uncollected():
+        return read_spec(document, findings)
 
 
 def include(spec: Spec, request: Request, findings: Findings) -> Request:

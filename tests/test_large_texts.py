@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import neurovis_spec as nv
+from neurovis_spec.compiler.names import size_estimate
 from neurovis_spec.compiler.neurons import groups
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.expressions import undefined
@@ -91,6 +92,10 @@ def test_what_else_is_drawn_may_be_long(text: str, tmp_path_factory: pytest.Temp
         ("n:\n" + "".join(f"  'a{i}':\n    b: 1\n    c: 2\n" for i in range(30)), (62, 3)),
         ("n: {" + ", ".join(f"a{i}: 1" for i in range(30)) + "}\n", (1, 155)),
         ("n: {" + ", ".join(f"a{i}: {{b: 1}}" for i in range(30)) + "}\n", (1, 255)),
+        ("n:\n" + "".join(f"  - A -> B{i}: 0.1\n" for i in range(30)), (22, 3)),
+        ("n:\n" + "".join(f"- {{A -> B{i}: 0.1}}\n" for i in range(30)), (22, 1)),
+        ("n:\n" + "".join(f"-\n  'A':\n    b: {i}\n" for i in range(30)), (62, 1)),
+        ("n: [" + ", ".join("{b: 1}" for _ in range(30)) + "]\n", (1, 165)),
     ],
 )
 def test_a_mapping_has_so_many_entries(text: str, place: tuple[int, int], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -104,7 +109,7 @@ def test_a_mapping_has_so_many_entries(text: str, place: tuple[int, int], monkey
 
 def test_entries_of_several_mappings_are_not_counted_together(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(brackets, "MOST_ENTRIES", 20)
-    many = "".join(f"- a: 1\n  b: 2\n  c: {{d: 1}}\n- {i}\n" for i in range(30))
+    many = "".join(f"- a: 1\n  b: 2\n  c: {{d: 1}}\n- {i}\n- {i}\n" for i in range(20))
     for text in (
         "".join(f"a{i}:\n" + "".join(f"  b{k}: 1\n" for k in range(20)) for i in range(20)),
         f"connections:\n{many}",
@@ -129,7 +134,50 @@ def test_too_many_groups_are_refused_before_memory_is_taken(monkeypatch: pytest.
     assert item.message == "a mapping has at most 1,000,000 entries; this is one more"
 
 
-# Work: counted, as no clock says whether something is done anew for each of many
+def test_too_many_mappings_of_a_list_are_refused_before_memory_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("neurovis_spec.language.yaml.reader.crowded", lambda text: crowded.crowded(text, 20_000))
+    text = HEAD + "connections:\n" + "".join(f"- A -> B{i}: 1\n" for i in range(30_000))
+    findings = Findings()
+    tracemalloc.start()
+    try:
+        assert read_text(text, "x", findings) is None
+        assert tracemalloc.get_traced_memory()[1] < 1 << 18
+    finally:
+        tracemalloc.stop()
+    (item,) = findings.sorted()
+    assert (item.span.line, item.span.column) == (20_004, 1)
+    assert item.message == "a list has at most 1,000,000 mappings; this is one more"
+
+
+# Memory and work: counted, as no clock says whether something is done anew for each of many
+
+
+@pytest.mark.parametrize(("body", "most"), [("{}", 2_300), ("{activation: tanh, bias: 0.1}", 3_800)])
+def test_a_group_takes_little_memory(body: str, most: int) -> None:
+    def peak(groups: int) -> int:
+        text = HEAD + "neurons:\n" + "".join(f"  A{i}: {body}\n" for i in range(groups))
+        tracemalloc.start()
+        try:
+            assert len(nv.compile_text(text).network.neurons) == groups
+            return tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+
+    peak(10)
+    assert (peak(6_000) - peak(2_000)) / 4_000 < most
+
+
+def test_too_many_instances_are_counted_few_times(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(size_estimate, "MOST_INSTANCES", 100)
+    rows = "".join(f"  i{i}: {{module: m}}\n" for i in range(400))
+    text = f"{HEAD}modules: {{m: {{neurons: {{A: {{bias: 1}}}}}}}}\ninstances:\n{rows}"
+    with (
+        mock.patch.object(size_estimate, "_counted", wraps=size_estimate._counted) as counted,
+        pytest.raises(nv.SpecError) as caught,
+    ):
+        nv.compile_text(text)
+    assert [(item.code, item.span.line) for item in caught.value.diagnostics] == [("too-many", 105)]
+    assert counted.call_count < 150
 
 
 def test_groups_that_are_alike_are_made_out_once() -> None:

@@ -673,3 +673,20 @@ def test_the_search_for_garbage_is_left_as_it_was(text: str) -> None:
         assert not gc.isenabled()
     finally:
         gc.enable()
+
+
+@pytest.mark.parametrize(
+    "braces",
+    [
+        *("{}", "{ }", "{a: 1}", "{ a: 1 , b: tanh }", "{a: 1,}", "{a: 1,b: -2}", "{A -> B: .5}", "{a: 1, a: 2}"),
+        *("{a:1}", "{a: {b: 1}}", "{a: [1]}", "{a: 1e999}", "{a: 1} x", "{a: 1, b}", "{a: '1'}", "{true: 1}", "{a: 1]"),
+    ],
+)
+@pytest.mark.parametrize("key", ["A", "A -> B", "yes", "true", "B", "A" * 70])
+def test_braces_on_a_line_are_the_same_without_a_second_look(braces: str, key: str) -> None:
+    def read(end: str) -> tuple[object, list[tuple[str, object, str]]]:
+        findings = Findings()
+        document = read_text(f"n:\n  B: 1\n  {key}: {braces}{end}\n  C: 2\n", "x", findings)
+        return document, [(item.code, item.span, item.message) for item in findings.sorted()]
+
+    assert read("") == read(" #")

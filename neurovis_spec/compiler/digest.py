@@ -76,11 +76,13 @@ class _Writer:
     def value(self, value: object) -> None:
         kind = type(value)
         if kind is str or kind is int or value is None:
-            self._common(kind, value)
+            self._add(self._common(kind, value))
         elif isinstance(value, str):
             self.put("text", value.encode())
         elif kind in self._records:  # there may be many thousands of a kind
             self._record(cast("DataclassInstance", value))
+        elif kind is dict and not value:
+            self._add(_EMPTY)
         elif isinstance(value, float):
             self.put("number", value.hex().encode())
         elif isinstance(value, (bool, int)):
@@ -107,17 +109,16 @@ class _Writer:
         else:  # pragma: no cover - a new kind of value must be given a way here
             raise TypeError(f"no canonical form for {type(value).__name__}")
 
-    def _common(self, kind: type, value: object) -> None:
-        """A text, an integer or nothing, of which a network has very many, most of them alike."""
-        piece = self._known.get((kind, value))
-        if piece is None:
-            if value is None:
-                piece = _piece("none", b"")
-            else:
-                piece = _piece("text" if kind is str else "integer", str(value).encode())
-            if len(self._known) < _MANY:
-                self._known[kind, value] = piece
-        self._add(piece)
+    def _common(self, kind: type, value: object) -> bytes:
+        """The piece of a text, an integer or nothing, of which a network has very many, most of them alike."""
+        known = self._known.get((kind, value))
+        if known is not None:
+            return known
+        if len(self._known) >= _MANY:  # names fill it; what comes time and again is soon there again
+            self._known.clear()
+        tag = "none" if value is None else "text" if kind is str else "integer"
+        piece = self._known[kind, value] = _piece(tag, b"" if value is None else str(value).encode())
+        return piece
 
     def _list(self, items: Sequence[object]) -> None:
         self.put("list", str(len(items)).encode())
@@ -144,16 +145,23 @@ class _Writer:
             parts = tuple((_piece("text", name.encode()), name) for name in called)
             self._records[kind] = _piece("record", kind.__name__.encode()), parts
         begin, parts = self._records[kind]
-        self._pieces.append(begin)
+        pieces, common = self._pieces, self._known
+        pieces.append(begin)
         for piece, name in parts:
-            self._pieces.append(piece)
-            self.value(getattr(value, name))
+            pieces.append(piece)
+            item = getattr(value, name)
+            kind = type(item)
+            if kind is str or kind is int or item is None:
+                pieces.append(common.get((kind, item)) or self._common(kind, item))
+            else:
+                self.value(item)
 
 
 def _piece(tag: str, content: bytes) -> bytes:
     return b"%b:%d:%b" % (tag.encode(), len(content), content)
 
 
+_EMPTY = _piece("mapping", b"0")
 #: Records whose ``start`` is content (an index), not a place in a text.
 _KEEP_START = frozenset({"Group", "Input", "Noise"})
 

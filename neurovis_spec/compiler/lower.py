@@ -7,15 +7,16 @@ that learn by one rule) and the program, an ordered list of operations.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Final, NamedTuple, TypeAlias
+from collections.abc import Callable, Mapping
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.connections.plasticity import Learning
-from neurovis_spec.compiler.neurons.groups import Kind
+from neurovis_spec.compiler.neurons.groups import Built, Kind
 from neurovis_spec.compiler.neurons.populate import Population
 from neurovis_spec.compiler.program import (
     Block,
@@ -27,12 +28,6 @@ from neurovis_spec.compiler.program import (
     Send,
     Update,
 )
-from neurovis_spec.language.words import Combine
-
-#: What the neurons of a block have in common: level, activation, model, combination.
-_Key: TypeAlias = tuple[int, str, str, Combine]
-#: The row of a group of one; there may be many of these.
-_ONE: Final[IntArray] = np.zeros(1, dtype=np.int64)
 
 
 class Cycle(NamedTuple):
@@ -89,34 +84,30 @@ def _cycle(prompt: list[int], sources: IntArray, targets: IntArray, waiting: lis
 
 def make_blocks(population: Population, sources: IntArray, targets: IntArray, levels: IntArray) -> tuple[Block, ...]:
     """Neurons of the same level, activation, model and combination, in the order of the levels."""
-    parts: dict[_Key, list[_Part]] = {}
-    for group, kind in ((one.group, one.kind) for one in population.groups):
-        own = levels[group.start : group.start + group.count]
-        for level, rows in _by_level(own):
-            key = (level, kind.activation.name, kind.model.name, group.combine)
-            parts.setdefault(key, []).append(_Part(kind, group.start, rows))
-    order = sorted(parts, key=lambda key: (key[0], parts[key][0].members[0]))
-    home = np.full(len(population.neurons), -1, dtype=np.int64)
-    slot = np.zeros(len(population.neurons), dtype=np.int64)
-    members = {key: np.concatenate([part.members for part in parts[key]]) for key in order}
-    for number, key in enumerate(order):
-        home[members[key]] = number
-        slot[members[key]] = np.arange(len(members[key]))
-    owner = home[targets]
-    by_owner = np.argsort(owner, kind="stable")
-    ends = np.searchsorted(owner[by_owner], np.arange(len(order) + 1))
+    groups = population.groups
+    alike: dict[tuple[str, str, str], int] = {}
+    own = [
+        alike.setdefault((one.kind.activation.name, one.kind.model.name, one.group.combine), len(alike))
+        for one in groups
+    ]
+    counts = [one.group.count for one in groups]
+    group = np.repeat(np.arange(len(groups)), counts)
+    home = _numbered(levels, np.repeat(np.array(own, dtype=np.int64), counts), len(alike))
+    members = _split(home, int(home.max(initial=-1)) + 1)
+    slot = np.zeros(len(home), dtype=np.int64)
+    for some in members:
+        slot[some] = np.arange(len(some))
     blocks = []
-    for number, key in enumerate(order):
-        first = parts[key][0].kind
-        incoming = by_owner[ends[number] : ends[number + 1]].astype(np.int64)
+    for some, incoming in zip(members, _split(home[targets], len(members)), strict=True):
+        first = groups[group[some[0]]]
         block = Block(
-            level=key[0],
-            members=members[key],
-            combine=key[3],
-            activation=first.activation,
-            activation_parameters=_column([(p.kind.activation_parameters, p.rows) for p in parts[key]]),
-            model=first.model,
-            model_parameters=_column([(p.kind.model_parameters, p.rows) for p in parts[key]]),
+            level=int(levels[some[0]]),
+            members=some,
+            combine=first.group.combine,
+            activation=first.kind.activation,
+            activation_parameters=_column(some, group, groups, lambda kind: kind.activation_parameters),
+            model=first.kind.model,
+            model_parameters=_column(some, group, groups, lambda kind: kind.model_parameters),
             incoming=incoming,
             slots=slot[targets[incoming]],
         )
@@ -126,36 +117,37 @@ def make_blocks(population: Population, sources: IntArray, targets: IntArray, le
     return tuple(blocks)
 
 
-def _by_level(levels: IntArray) -> Iterator[tuple[int, IntArray]]:
-    """Each level, and the rows that have it, ascending; a chain with delay 0 has as many levels as neurons."""
-    if len(levels) == 1:
-        yield int(levels[0]), _ONE
-        return
-    rows = np.argsort(levels, kind="stable")
-    found, starts = np.unique(levels[rows], return_index=True)
-    ends = [*starts[1:].tolist(), len(rows)]
-    for level, start, end in zip(found.tolist(), starts.tolist(), ends, strict=True):
-        yield level, rows[start:end]
+def _numbered(levels: IntArray, alike: IntArray, kinds: int) -> IntArray:
+    """The number of each neuron's block, by levels, then by first neurons; ``alike`` has what else they have in
+    common, one of so many kinds."""
+    _, first, block = np.unique(levels * kinds + alike, return_index=True, return_inverse=True)
+    number = np.empty_like(first)
+    number[np.lexsort((first, levels[first]))] = np.arange(len(first))
+    return np.asarray(number[block], dtype=np.int64)
 
 
-class _Part(NamedTuple):
-    """The neurons of one group that belong to one block, by their rows within the group."""
-
-    kind: Kind
-    start: int
-    rows: IntArray
-
-    @property
-    def members(self) -> IntArray:
-        return self.start + self.rows
+def _split(blocks: IntArray, number: int) -> list[IntArray]:
+    """The places of each block, ascending."""
+    order = np.argsort(blocks, kind="stable")
+    ends = np.searchsorted(blocks[order], np.arange(number + 1)).tolist()
+    return [order[start:end].astype(np.int64) for start, end in pairwise(ends)]
 
 
-def _column(parts: list[tuple[Mapping[str, FloatArray], IntArray]]) -> Mapping[str, FloatArray]:
-    """The parameters of a block, each from rows of its groups' arrays."""
-    result: dict[str, FloatArray] = {}
-    for name in parts[0][0]:
-        result[name] = frozen(np.concatenate([parameters[name][rows] for parameters, rows in parts]))
-    return result
+def _column(
+    members: IntArray, owners: IntArray, groups: tuple[Built, ...], of: Callable[[Kind], Mapping[str, FloatArray]]
+) -> Mapping[str, FloatArray]:
+    """The parameters of a block, each from rows of its groups' arrays; ``owners`` are the groups of all neurons."""
+    own = owners[members]
+    names = tuple(of(groups[own[0]].kind))
+    if not names:
+        return {}
+    starts = np.flatnonzero(np.diff(own, prepend=-1))
+    ends = pairwise((*starts.tolist(), len(own)))
+    parts = [
+        (of(one.kind), members[start:end] - one.group.start)
+        for one, (start, end) in zip((groups[place] for place in own[starts].tolist()), ends, strict=True)
+    ]
+    return {name: frozen(np.concatenate([values[name][rows] for values, rows in parts])) for name in names}
 
 
 def make_plasticity(bundles: tuple[Bundle, ...]) -> tuple[tuple[Plasticity, ...], IntArray]:

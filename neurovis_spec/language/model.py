@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterator
 from collections.abc import Mapping as AnyMapping
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Annotated, ClassVar, TypeVar
+from typing import Annotated, ClassVar, Final, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -20,7 +20,6 @@ from pydantic import (
     Field,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
-    PrivateAttr,
     ValidationError,
     ValidationInfo,
     WrapValidator,
@@ -52,8 +51,12 @@ from neurovis_spec.lookalikes import in_ascii
 
 V = TypeVar("V")
 
+_NONE: frozenset[str] = frozenset()
+#: fields that are no keys
+OWN: Final = ("source", "meant")
 
-def _as_it_is(value: Node, info: ValidationInfo) -> Node:
+
+def _as_it_is(value: V, info: ValidationInfo) -> V:
     return value
 
 
@@ -73,17 +76,18 @@ class Model(BaseModel):
     #: what is said of a key without a value
     UNSAID: ClassVar[str] = "leave the key out, or give it a value"
 
-    #: the keys that an unknown one may be meant for
-    _meant: frozenset[str] = PrivateAttr(frozenset())
     source: SkipJsonSchema[Annotated[Mapping, Leaf(_as_it_is, {})]] = Field(alias="$", exclude=True, repr=False)
+    #: the keys that an unknown one may be meant for, and those that are missing or invalid and needed
+    meant: SkipJsonSchema[Annotated[frozenset[str], Leaf(_as_it_is, {})]] = Field(
+        _NONE, alias="$meant", exclude=True, repr=False
+    )
 
     @model_validator(mode="wrap")
     @classmethod
     def _read(cls, data: object, handler: Callable[[object], Model], info: ValidationInfo) -> Model:
         if isinstance(data, Located):  # all of it is unknown
-            result = handler({"$": Mapping((), data.span), **dict.fromkeys(cls._fields(), data)})
-            result._meant = frozenset(cls._fields())
-            return result
+            every = dict.fromkeys(cls._fields(), data)
+            return handler({"$": Mapping((), data.span), "$meant": frozenset(every), **every})
         if not isinstance(data, Mapping):
             assert not isinstance(data, (str, int, float, dict))
             refuse(info, data, "a mapping", cls._no_mapping(data))  # type: ignore[arg-type]
@@ -92,12 +96,11 @@ class Model(BaseModel):
         cls._check_rules(data, keys.unknown, findings_of(info))
         values = cls._keys(keys, findings_of(info))
         for _ in range(2):
+            meant = [key for key, node in values.items() if type(node) is Located]
+            if meant or keys.unknown:
+                values["$meant"] = keys.unknown.union(meant)
             try:
-                result = handler(values)
-                result._meant = keys.unknown.union(
-                    key for key, node in values.items() if key != "$" and node is not data.get(key)
-                )
-                return result
+                return handler(values)
             except ValidationError as error:
                 faulty = _first_parts(error)
                 for key in map(str, faulty):
@@ -144,13 +147,18 @@ class Model(BaseModel):
     @classmethod
     @cache
     def _fields(cls) -> dict[str, FieldInfo]:
-        return {field.alias or name: field for name, field in cls.model_fields.items() if name != "source"}
+        return {field.alias or name: field for name, field in cls.model_fields.items() if name not in OWN}
+
+    @classmethod
+    @cache
+    def _required(cls) -> tuple[str, ...]:
+        return tuple(name for name, field in cls._fields().items() if field.is_required())
 
     @classmethod
     @cache
     def _written(cls) -> dict[str, str]:
-        """How each field is called in a spec."""
-        return {name: field.alias or name for name, field in cls.model_fields.items()}
+        """The field of each key of a spec."""
+        return {field.alias or name: name for name, field in cls.model_fields.items()}
 
     @classmethod
     def _no_mapping(cls, node: Node) -> str:
@@ -187,13 +195,13 @@ class Model(BaseModel):
                     findings.error("no-value", entry.key.span, message, cls.UNSAID)
             else:
                 result[entry.name] = entry.value
-        told = findings.is_invalid(opening(data))
-        for name, field in fields.items():
-            if field.is_required() and name not in result:
-                if keys.lack(name) and not told:
-                    message = f"the key '{name}' is missing"
-                    findings.error("missing-key", opening(data), message, cls._without(name, data), key=name)
-                result[name] = cls._unknown(name, opening(data))
+        missing = [name for name in cls._required() if name not in result]
+        told = bool(missing) and findings.is_invalid(opening(data))
+        for name in missing:
+            if keys.lack(name) and not told:
+                message = f"the key '{name}' is missing"
+                findings.error("missing-key", opening(data), message, cls._without(name, data), key=name)
+            result[name] = cls._unknown(name, opening(data))
         return result
 
     @classmethod
@@ -218,22 +226,26 @@ class Model(BaseModel):
         """What is said of an unknown key that is no misspelling of a known one: a message and a hint."""
         return None
 
-    @cached_property
+    @property
     def _left_out(self) -> frozenset[str]:
         """The keys of the source that are not in the model: unknown ones, and those whose value is invalid."""
-        read = {self._written().get(name, name) for name in self.model_fields_set}
-        return frozenset(entry.name for entry in self.source.entries if entry.name not in read)
+        if not self.source.entries:
+            return _NONE
+        read, written = self.model_fields_set, self._written()
+        left = [entry.name for entry in self.source.entries if written.get(entry.name) not in read]
+        return frozenset(left) if left else _NONE
 
     @property
     def sound(self) -> bool:
         """Whether all that stands there is in the model, and nothing is missing."""
-        return not (self._left_out or self.unknown)
+        return not (self._left_out or self.meant)
 
-    @cached_property
+    @property
     def unknown(self) -> frozenset[str]:
         """The keys of which it is not known what they say: invalid ones, and those that an unknown key may be meant
         for."""
-        return self._meant | self._left_out.intersection(self._fields())
+        left = self._left_out
+        return self.meant | left.intersection(self._fields()) if left else self.meant
 
 
 def _home(name: str) -> str | None:

@@ -15,7 +15,7 @@ from pydantic.fields import FieldInfo
 
 from neurovis_spec.language.grammar import Either, Map, Plain, Role, Shape, below
 from neurovis_spec.language.located import Leaf
-from neurovis_spec.language.model import Model, Short
+from neurovis_spec.language.model import OWN, Model, Short
 from neurovis_spec.language.modules import INCLUDED
 from neurovis_spec.language.spec import IncludedModel, Spec
 from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
@@ -114,11 +114,16 @@ class Written(NamedTuple):
 
 def formulas_of(model: Model, seen: Collection[str]) -> Iterator[Written]:
     """The formulas of a model that are texts, hold any of some names and see them."""
-    wanted = re.compile(rf"\b(?:{'|'.join(seen)})\b", re.ASCII)
-    for node, path in _texts(model.source, (), wanted):
+    for node, path in _texts(model.source, (), _any_of(tuple(seen))):
         role = role_at(type(model), *path)
         if role is not None and role.use in ("formula", "setting value") and not set(seen).isdisjoint(role.sees):
             yield Written(str(node.value), node, tuple(part for part in path if isinstance(part, str)))
+
+
+@lru_cache(maxsize=64)
+def _any_of(names: tuple[str, ...]) -> re.Pattern[str]:
+    """Any of some names in a text."""
+    return re.compile(rf"\b(?:{'|'.join(names)})\b", re.ASCII)
 
 
 def _texts(node: Node, path: Path, wanted: re.Pattern[str]) -> Iterator[tuple[Scalar, Path]]:
@@ -209,7 +214,7 @@ def _step(place: _Place, part: str | int) -> Iterator[_Place]:
 def fields_of(model: type[Model]) -> Iterator[tuple[str, FieldInfo]]:
     """The keys of a model and their fields."""
     for name, field in model.model_fields.items():
-        if name != "source":
+        if name not in OWN:
             yield field.alias or name, field
 
 

@@ -19,7 +19,11 @@ from neurovis_spec.language.places import Written, formulas_of
 from neurovis_spec.language.references import Arrow
 from neurovis_spec.language.references import parse as parse_reference
 from neurovis_spec.language.sections import ConnectionModel, GroupModel
+from neurovis_spec.language.unknown import known
 from neurovis_spec.language.yaml.source import Scalar
+
+#: what counts the ends of a connection
+_PAIR = ("i", "j")
 
 
 def check_lone_indices(compiled: Compiled, findings: Findings) -> None:
@@ -31,6 +35,8 @@ def check_lone_indices(compiled: Compiled, findings: Findings) -> None:
                 _group(name, group, findings)
         place = compiled.scopes.index(scopes[0])
         for key, body in section.connections:
+            if next(formulas_of(body, _PAIR), None) is None:  # as in most
+                continue
             alone, learning = _alone(key, compiled, place), compiled.entries[key.span].learning
             if alone:
                 _connection(body, alone, () if learning is None else learning.rule.signals, findings)
@@ -76,7 +82,7 @@ def _is_one(name: str, compiled: Compiled, place: int) -> bool:
     if not dot:
         return name in compiled.population.directories[place].neurons
     scope = compiled.scopes[place]
-    inside = scope.children.known().get(head, ())
+    inside = known(scope.children.get(head, ()), ())
     counted = head in scope.section.instances and scope.section.instances[head].count is not None
     return len(inside) == 1 and not counted and _is_one(rest, compiled, inside[0])
 

@@ -10,6 +10,7 @@ without a single connection is a sketch: of its neurons only those are reported 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -36,8 +37,10 @@ _DRIVING = ("input", "bias", "noise", "combine")
 def check_neurons(compiled: Compiled, findings: Findings) -> None:
     """Warn of idle neurons, once for each group as it is written, and of what a model leaves out of account."""
     told: set[Span] = set()
+    reads: dict[int, _Reads] = {}
     for kind, written in compiled.models:
-        for span, message, hint in _ignored(kind.model, written):
+        read = reads.get(id(kind.model)) or reads.setdefault(id(kind.model), _reads(kind.model))
+        for span, message, hint in _ignored(kind.model, read, written):
             if span not in told:
                 told.add(span)
                 findings.warning("no-effect", span, message, hint)
@@ -47,8 +50,10 @@ def check_neurons(compiled: Compiled, findings: Findings) -> None:
     idle = _idle(network)
     driven = np.zeros(len(network.neurons), dtype=np.bool_)
     driven[network.connections.targets] = True
+    if not idle.any():
+        return
     origin = {scope.called(name): (scope, name) for scope in compiled.scopes for name in scope.section.neurons}
-    for group in network.neurons.groups if idle.any() else ():
+    for group in network.neurons.groups:
         members = [member for member in group.indices if idle[member]]
         scope, own = origin[group.name]
         model, span = scope.section.neurons[own], key_span(scope.section, "neurons", own)
@@ -67,13 +72,24 @@ def check_neurons(compiled: Compiled, findings: Findings) -> None:
         findings.warning("idle-neuron", span, message, hint)
 
 
-def _ignored(model: Model, group: GroupModel) -> Iterator[tuple[Span, str, str]]:
+class _Reads(NamedTuple):
+    """What a model reads of a neuron."""
+
+    activation: bool
+    drive: bool
+
+
+def _reads(model: Model) -> _Reads:
+    return _Reads(model.reads_activation, any("drive" in names(tree) for tree in model.formulas))
+
+
+def _ignored(model: Model, reads: _Reads, group: GroupModel) -> Iterator[tuple[Span, str, str]]:
     """The place of each key that the model does not read, and what to say there."""
     activation = group.activation
-    if activation is not None and not model.reads_activation:
+    if activation is not None and not reads.activation:
         message = f"the model '{model.name}' does not use the activation '{activation.name.value}'"
         yield activation.name.span, message, "remove it, or take a model whose activity is f(…)"
-    if any("drive" in names(tree) for tree in model.formulas):
+    if reads.drive:
         return
     for key in _DRIVING:
         entry = group.source.entry(key)

@@ -7,6 +7,7 @@ names. References that are written alike share one array.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import chain
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from neurovis_spec.compiler.names.state_references import (
     model_state,
 )
 from neurovis_spec.compiler.neurons.populate import Population
+from neurovis_spec.compiler.program import Model
 from neurovis_spec.diagnostics import Findings, shorten, suggest
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.references import Arrow, Part, StateName, state_of
@@ -135,12 +137,22 @@ def finder_of(population: Population, made: Connected, findings: Findings) -> Fi
 
 
 def _models(population: Population) -> tuple[Holder, ...]:
-    """The states of the models of groups; nothing is known of a group whose model is invalid."""
-    result = []
+    """The states of the models of groups, by models; nothing is known of a group whose model is invalid."""
+    members: dict[int, list[range]] = {}
+    models: dict[int, Model] = {}
     for one in population.groups:
         written, model = one.model, one.kind.model
-        if "model" in written.unknown or (written.model is not None and written.model.name.value != model.name):
+        if (not written.sound and "model" in written.unknown) or (
+            written.model is not None and written.model.name.value != model.name
+        ):
             continue
-        states = tuple(quantity.name for quantity in model.state)
-        result.append(Holder(np.array(one.group.indices, dtype=np.int64), model.name, states))
-    return tuple(result)
+        models[id(model)] = model
+        members.setdefault(id(model), []).append(one.group.indices)
+    return tuple(
+        Holder(
+            np.fromiter(chain.from_iterable(members[key]), np.int64),
+            model.name,
+            tuple(quantity.name for quantity in model.state),
+        )
+        for key, model in models.items()
+    )

@@ -9,9 +9,9 @@ invalid counts as nothing here, and is found where the instances are made.
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from graphlib import TopologicalSorter
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -28,6 +28,14 @@ from neurovis_spec.language.unknown import UNKNOWN, Names
 
 #: The instances of one module: for each entry that makes some how many these are, and what is set in each of them.
 _Made: TypeAlias = list[tuple[int, Mapping[str, FloatArray]]]
+
+
+class _Entered(NamedTuple):
+    """What an entry makes: how many instances of a module, and what is set in each of them."""
+
+    module: str
+    instances: int
+    given: Mapping[str, FloatArray]
 
 
 class _LargeGroupError(Exception):
@@ -60,10 +68,11 @@ class SizeEstimate:
         if own > self._most:
             return None
         entries = tuple(section.instances.items())
+        entered = tuple(self._entered((model for _, model in entries), constants, {}, 1))
 
         def made(some: int) -> tuple[int, int]:
             """Instances and neurons with so many entries."""
-            instances, neurons = self._count([model for _, model in entries[:some]], constants)
+            instances, neurons = self._count(entered[:some])
             return instances, int(own) + neurons
 
         def excessive(some: int) -> bool:
@@ -71,10 +80,11 @@ class SizeEstimate:
             return instances > MOST_INSTANCES or neurons > self._most
 
         try:
-            instances, neurons = made(len(entries))
+            instances, neurons = made(len(entered))
             if instances <= MOST_INSTANCES and neurons <= self._most:
                 return instances
-            some = 1 + bisect_left(range(1, len(entries)), True, key=excessive)
+            few = len(entered) - 1  # where entries are too many by themselves, the last that was counted is the first
+            some = 1 + few if not excessive(few) else 1 + bisect_left(range(1, few), True, key=excessive)
             name, model = entries[some - 1]
             span = key_span(section, "instances", name) if model.count is None else model.count.span
             instances, neurons = made(some)
@@ -88,11 +98,11 @@ class SizeEstimate:
             findings.error("too-many", span, message, "raise it with --limit")
         return None
 
-    def _count(self, entries: Iterable[InstanceModel], constants: Constants) -> tuple[int, int]:
+    def _count(self, entered: Iterable[_Entered]) -> tuple[int, int]:
         """The instances that entries make, with all that is within, and their neurons; beyond MOST_INSTANCES nothing is
         counted. Raises _LargeGroupError."""
         waiting: dict[str, _Made] = {name: [] for name in self._order}
-        instances = self._enter(entries, constants, {}, 1, waiting)
+        instances = _wait(entered, waiting)
         neurons = 0
         for name in self._order:
             model, made = self._modules[name].model, waiting[name]
@@ -112,28 +122,24 @@ class SizeEstimate:
                 if group.count is not None and sizes.max() > self._most:
                     raise _LargeGroupError(group.count, int(sizes.max()))
                 neurons += int(sizes.sum())
-            instances += self._enter(model.instances.values(), own, known, rows, waiting)
+            instances += _wait(self._entered(model.instances.values(), own, known, rows), waiting)
         return instances, neurons
 
-    def _enter(
-        self,
-        entries: Iterable[InstanceModel],
-        constants: Constants,
-        known: Mapping[str, FloatArray],
-        rows: int,
-        waiting: Mapping[str, _Made],
-    ) -> int:
-        """How many instances entries make in so many scopes; up to MOST_INSTANCES these wait until their module's turn
-        comes."""
+    def _entered(
+        self, entries: Iterable[InstanceModel], constants: Constants, known: Mapping[str, FloatArray], rows: int
+    ) -> Iterator[_Entered]:
+        """What entries make in so many scopes, up to the one that makes more than MOST_INSTANCES."""
         instances = 0
         for model in entries:
-            made = waiting.get(model.module.value)
-            if made is None:
+            module = model.module.value
+            if module not in self._modules:
+                yield _Entered(module, 0, {})
                 continue
             counts = _counted(model.count, constants, known, rows)
             instances += int(counts.sum())
             if instances > MOST_INSTANCES:
-                break
+                yield _Entered(module, int(counts.sum()), {})
+                return
             scopes = np.repeat(np.arange(rows), counts.astype(np.int64))
             first = np.cumsum(counts) - counts
             around = {key: value[scopes] for key, value in known.items()}
@@ -142,8 +148,19 @@ class SizeEstimate:
             for key, formula in model.set.items():
                 value = constants.unchecked(formula, around)
                 given[key] = np.broadcast_to(np.nan if value is UNKNOWN else value, scopes.shape)
-            made.append((len(scopes), given))
-        return instances
+            yield _Entered(module, len(scopes), given)
+
+
+def _wait(entered: Iterable[_Entered], waiting: Mapping[str, _Made]) -> int:
+    """How many instances entries make; up to MOST_INSTANCES these wait until their module's turn comes."""
+    instances = 0
+    for entry in entered:
+        instances += entry.instances
+        if instances > MOST_INSTANCES:
+            break
+        if entry.instances:
+            waiting[entry.module].append((entry.instances, entry.given))
+    return instances
 
 
 def size_of(group: GroupModel, constants: Constants, known: Mapping[str, FloatArray], rows: int) -> FloatArray:

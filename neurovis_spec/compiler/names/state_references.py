@@ -71,9 +71,14 @@ class Wiring(NamedTuple):
 def model_state(name: StateName, neurons: Sequence[int], models: Iterable[Holder]) -> StateOf | Refusal:
     """A state of these neurons, all of whose models must have it."""
     wanted = np.array(neurons, dtype=np.int64)
-    for holder in models:
-        if name.state not in holder.states and np.isin(wanted, holder.members).any():
-            return no_state("model", holder.kind, f"of '{shorten(name.owner.text)}'", name.state, holder.states)
+    lacking = {
+        int(found.min()): holder
+        for holder in models
+        if name.state not in holder.states and len(found := wanted[np.isin(wanted, holder.members)])
+    }
+    if lacking:
+        holder = lacking[min(lacking)]
+        return no_state("model", holder.kind, f"of '{shorten(name.owner.text)}'", name.state, holder.states)
     return StateOf(name.state, wanted, _NONE)
 
 

@@ -130,7 +130,7 @@ class Builder:
         bias, biased = self._bias(model, n, name)
         given = model.initial or _NO_INITIAL
         initial = UNKNOWN if given.activity is None else self._drawn(given.activity, n, "initial", name)
-        starts = self._starts(given, n, name, kind, model) if given.states else {}
+        starts = self._starts(given, n, name, kind, model) if given.states else _NO_STARTS
         input_index = self._input(model, n)
         position, placed = self._position(model, n)
         noise = UNKNOWN if model.noise is None else _noise_of(model.noise, self.constants)
@@ -217,9 +217,9 @@ class Builder:
         count = None if model.count is None else self.constants.integer(model.count, "'count'", 1)
         if count is UNKNOWN:
             return UNKNOWN, None
-        span = key_span(self.scope.section, "neurons", name) if model.count is None else model.count.span
         total = start + (count or len(model.names or ()) or 1)
         if total > self.limits.neurons:
+            span = key_span(self.scope.section, "neurons", name) if model.count is None else model.count.span
             message = f"this makes {amount(total)} neurons; the limit is {self.limits.neurons:,}"
             findings.error("too-many", span, message, "raise it with --limit")
             return UNKNOWN, None
@@ -342,6 +342,7 @@ class Builder:
 #: the parameters of what has none
 _NO_PARAMETERS: Mapping[str, tuple[float, ...]] = {}
 _NO_INITIAL = Initial(None)
+_NO_STARTS: Mapping[str, FloatArray] = {}
 
 
 def _numbers(parameters: Mapping[str, FloatArray]) -> Mapping[str, tuple[float, ...]]:
@@ -380,6 +381,8 @@ _NAMING = frozenset({"count", "first", "names"})
 
 def _unsure(model: GroupModel) -> bool:
     """Whether what could not be read of a group may have said which neurons there are."""
+    if model.sound:
+        return False
     if not model.unknown.isdisjoint(_NAMING):
         return True
     if model.count is not None or model.names is not None:

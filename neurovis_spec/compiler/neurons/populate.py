@@ -26,7 +26,7 @@ from neurovis_spec.compiler.neurons.groups import Builder, Built, Kinds, unread_
 from neurovis_spec.compiler.neurons.positions import depend_on_positions
 from neurovis_spec.language.located import IDENTIFIER
 from neurovis_spec.language.model import names_of
-from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown, known
+from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 
 #: Characters that no name has.
 _NO_LETTERS = re.compile(r"[^A-Za-z0-9_]+")
@@ -167,8 +167,9 @@ def _instances(scope: Scope, owners: Mapping[str, str]) -> None:
     """An instance may be called like nothing else in its scope."""
     section, findings = scope.section, scope.constants.findings
     taken: dict[str, str] = {}
+    children = scope.children.known()
     for name, model in section.instances.items():
-        count = 0 if model.count is None else len(scope.children.known().get(name, ()))
+        count = 0 if model.count is None else len(children.get(name, ()))
         for called in (name, *(f"{name}{number}" for number in range(1, count + 1))):
             other = taken.setdefault(called, name)
             what = None
@@ -218,7 +219,7 @@ def _starts(built: list[Built], total: int) -> dict[str, FloatArray]:
 
 def _placed(item: Built) -> FloatArray:
     """The positions of a group's neurons, NaN where there is none."""
-    return known(item.position, np.full((item.group.count, 2), np.nan))
+    return np.full((item.group.count, 2), np.nan) if item.position is UNKNOWN else item.position
 
 
 def _directories(settled: list[_Settled], total: int) -> tuple[Directory, ...]:

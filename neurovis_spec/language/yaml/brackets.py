@@ -42,7 +42,7 @@ _FLOW_COLON: Final = re.compile(r"[ \t]*:")
 _TIGHT: Final = re.compile(r":[,\[\]{}]")
 #: A list of texts and numbers that need no second look.
 _SIMPLE_ROW: Final = re.compile(r"\[([^\[\]{}'\"#&*!|>%@`?:\r\n]*)\]")
-_SIMPLE_PAIR: Final = re.compile(SIMPLE + r" *(?:, *|(?=\}))")
+SIMPLE_PAIR: Final = re.compile(SIMPLE + r" *(?:, *|(?=\}))")
 _FLOW_SIGNS: Final = frozenset(",[]{}")
 _CLOSING: Final = {"[": "]", "{": "}"}
 
@@ -102,7 +102,7 @@ class Brackets(Scanner):
         self._at += 1
         items: list[Node] = []
         while not self._closed("[", begin):
-            items.append(self._item(depth + 1))
+            self._append(items, self._item(depth + 1))
             self._comma("[")
         self._plain = None
         span = self._from(*place)
@@ -162,7 +162,7 @@ class Brackets(Scanner):
         empty, before = True, None
         while not self._closed("{", begin):
             empty = False
-            match = _SIMPLE_PAIR.match(self._text, self._at, self._end)
+            match = SIMPLE_PAIR.match(self._text, self._at, self._end)
             if match is not None and (simple := self._simple_entry(match, entries)) is not None:
                 before = Plain(match.start(2), match.end(2), simple)
                 self._at = match.end()
@@ -311,13 +311,28 @@ class Brackets(Scanner):
             value = resolve(match[2])
         except NumberRangeError:
             return None
-        if name in entries or resolve(name) != name or len(name) > LONGEST_KEY or len(entries) >= MOST_ENTRIES:
+        if not self._is_new(name, entries):
             return None
         file, line, start = self._file, self._line, self._start - 1
         key = Scalar(name, Span(file, line, match.start() - start, line, match.end(1) - start))
         scalar = Scalar(value, Span(file, line, match.start(2) - start, line, match.end(2) - start))
         entries[name] = Entry(key, scalar)
         return scalar
+
+    def _append(self, items: list[Node], item: Node) -> None:
+        """Put an item into a list, which may not hold more mappings than a mapping may hold entries."""
+        if len(items) >= MOST_ENTRIES and isinstance(item, Mapping):
+            if self._trial:
+                raise UnsoundError(faults.NOWHERE, self._at)
+            self._refuse.too_long(item.span)
+            raise ReadingStoppedError
+        items.append(item)
+
+    def _is_new(self, name: str, entries: dict[str, Entry]) -> bool:
+        """Whether a name can be put into a mapping as a key without a second look."""
+        return (
+            name not in entries and resolve(name) == name and len(name) <= LONGEST_KEY and len(entries) < MOST_ENTRIES
+        )
 
     def _made(self, entries: dict[str, Entry], span: Span, *, empty: bool = False, is_open: bool = False) -> Mapping:
         """A mapping. That it has no entries though it is not ``empty`` follows from what was refused."""

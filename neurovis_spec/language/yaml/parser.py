@@ -19,10 +19,10 @@ from typing import Final, NamedTuple
 
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.yaml import faults
-from neurovis_spec.language.yaml.brackets import Brackets
+from neurovis_spec.language.yaml.brackets import SIMPLE_PAIR, Brackets
 from neurovis_spec.language.yaml.faults import Words
 from neurovis_spec.language.yaml.packed import PACK_FROM, Packer
-from neurovis_spec.language.yaml.refusals import ReadingStoppedError
+from neurovis_spec.language.yaml.refusals import DEEPEST, ReadingStoppedError
 from neurovis_spec.language.yaml.scalars import resolve
 from neurovis_spec.language.yaml.scanner import (
     BLANKS,
@@ -31,6 +31,7 @@ from neurovis_spec.language.yaml.scanner import (
     LONGEST_KEY,
     REST,
     SIMPLE,
+    SIMPLE_NAME,
     Unquoted,
     UnsoundError,
 )
@@ -70,9 +71,22 @@ def _line_before_others(column: int) -> re.Pattern[str]:
 @cache
 def _simple_lines(column: int) -> re.Pattern[str]:
     """A line of a block in a column that holds a name and a number or a short text, behind which neither goes on."""
-    return re.compile(rf"{SIMPLE} *(?:\r\n|\n|\r)( {{0,{column}}})(?=[^ \t\r\n#]|\Z)")
+    return re.compile(rf"{SIMPLE}{_ends_line(column)}")
 
 
+@cache
+def _braces_end(column: int) -> re.Pattern[str]:
+    """The end of such a line that holds a name and pairs in braces."""
+    return re.compile(rf"\}}{_ends_line(column)}")
+
+
+def _ends_line(column: int) -> str:
+    """The end of a line, and the indentation of one behind it that is no part of its value."""
+    return rf" *(?:\r\n|\n|\r)(?P<indent> {{0,{column}}})(?=[^ \t\r\n#]|\Z)"
+
+
+#: a name and a brace that opens
+_BRACES = re.compile(rf"{SIMPLE_NAME} *: +(\{{) *")
 #: a key that needs no second look
 _NAME = re.compile(r"([A-Za-z_][A-Za-z0-9_]{0,63}):(?=[ \r\n])")
 
@@ -368,7 +382,7 @@ class Parser(Brackets):
         last = line, first
         outer, self._open = self._open, key is not None and not key.colon and key.name is None
         while key is not None or self._goes_on(column, entries):
-            if key is None and (passed := self._simple_entries(column, entries)):
+            if key is None and (passed := self._simple_entries(column, depth, entries)):
                 last = passed
                 continue
             last = self._mapping_entry(key or self._key(column, depth), column, depth, entries)
@@ -392,16 +406,42 @@ class Parser(Brackets):
         """What stands for a value of which nobody knows what it was meant to be."""
         return node if self._partial else self._loss(self._lines.starts[node.span.line - 1] + node.span.column - 1)
 
-    def _simple_entries(self, column: int, entries: dict[str, Entry]) -> tuple[int, int] | None:
-        """Take up lines that hold no more than a name and a value. Returns where the last of these values ends."""
+    def _simple_entries(self, column: int, depth: int, entries: dict[str, Entry]) -> tuple[int, int] | None:
+        """Take up lines that hold no more than a name and a value, or such pairs in braces. Returns where the last of
+        these values ends."""
         pattern, last = _simple_lines(column), None
-        while self._at - self._start == column and (match := pattern.match(self._text, self._at, self._end)):
-            value = self._simple_entry(match, entries)
-            if value is None:
+        while self._at - self._start == column:
+            match = pattern.match(self._text, self._at, self._end)
+            value: Node | None = None if match is None else self._simple_entry(match, entries)
+            if match is None and depth < DEEPEST and (braces := self._simple_braces(column, entries)):
+                match, value = braces
+            if match is None or value is None:
                 break
             last = value.span[3:]
-            self._at, self._start, self._line = match.end(), match.start(3), self._line + 1
+            self._at, self._line = match.end(), self._line + 1
+            self._start = self._at - len(match["indent"])
         return last
+
+    def _simple_braces(self, column: int, entries: dict[str, Entry]) -> tuple[re.Match[str], Mapping] | None:
+        """Take up a line that holds a name and pairs of names and values in braces. Returns its end and the mapping;
+        None, and nothing taken, where it needs a second look."""
+        head = _BRACES.match(self._text, self._at, self._end)
+        if head is None or not self._is_new(head[1], entries):
+            return None
+        pairs: dict[str, Entry] = {}
+        at = head.end()
+        while pair := SIMPLE_PAIR.match(self._text, at, self._end):
+            if self._simple_entry(pair, pairs) is None:
+                return None
+            at = pair.end()
+        tail = _braces_end(column).match(self._text, at, self._end)
+        if tail is None:
+            return None
+        file, line, start = self._file, self._line, self._start - 1
+        key = Scalar(head[1], Span(file, line, head.start() - start, line, head.end(1) - start))
+        mapping = Mapping(tuple(pairs.values()), Span(file, line, head.start(2) - start, line, at + 1 - start))
+        entries[head[1]] = Entry(key, mapping)
+        return tail, mapping
 
     def _mapping_entry(self, key: _Key, column: int, depth: int, entries: dict[str, Entry]) -> tuple[int, int]:
         """Read the value of a key. Returns where the entry ends."""

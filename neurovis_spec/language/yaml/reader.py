@@ -17,7 +17,7 @@ from neurovis_spec.language.yaml.characters import FORBIDDEN, REPLACEMENT, Lines
 from neurovis_spec.language.yaml.crowded import crowded
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
 from neurovis_spec.language.yaml.parser import Parser
-from neurovis_spec.language.yaml.refusals import ONE_GROUP, TOO_MANY
+from neurovis_spec.language.yaml.refusals import ONE_GROUP, TABLE, TOO_LONG, TOO_MANY
 from neurovis_spec.language.yaml.source import Mapping, Node, Scalar, SourceDocument, describe
 
 LARGEST: Final = 64 << 20  # bytes
@@ -58,7 +58,8 @@ def read_text(text: str, file: str, findings: Findings) -> SourceDocument | None
     many = crowded(text)
     if many is not None:
         line, column = text.count("\n", 0, many) + 1, many - text.rfind("\n", 0, many)
-        findings.error("too-large", Span(file, line, column, line, column + 1), TOO_MANY, ONE_GROUP)
+        words = (TOO_LONG, TABLE) if text[many] == "-" else (TOO_MANY, ONE_GROUP)
+        findings.error("too-large", Span(file, line, column, line, column + 1), *words)
         return None
     lines = Lines(text)
     clean = _without_forbidden(text, file, lines, findings)

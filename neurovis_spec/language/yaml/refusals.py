@@ -21,7 +21,9 @@ _MOST_FINDINGS: Final = 1000
 
 _USE_NAMES = "a constant used in several places belongs in `parameters`, a part used in several places in `modules`"
 TOO_MANY: Final = f"a mapping has at most {MOST_ENTRIES:,} entries; this is one more"
+TOO_LONG: Final = f"a list has at most {MOST_ENTRIES:,} mappings; this is one more"
 ONE_GROUP: Final = "neurons that are alike are one group: K: {count: 1000}"
+TABLE: Final = "very many connections are one entry, with 'edges' from a file"
 
 
 class ReadingStoppedError(Exception):
@@ -74,6 +76,10 @@ class Refusals:
     def too_many(self, span: Span) -> None:
         """An entry that its mapping is too large for."""
         self._error("too-large", span, TOO_MANY, ONE_GROUP)
+
+    def too_long(self, span: Span) -> None:
+        """A mapping that the list around it is too long for."""
+        self._error("too-large", span, TOO_LONG, TABLE)
 
     def number(self, error: NumberRangeError, span: Span) -> None:
         """Refuse a number that cannot be held."""

@@ -38,8 +38,10 @@ _TAB: Final = re.compile(r"(?<![^\r\n]) *\t")
 VISIBLE: Final = re.compile(r"[^\s]")
 #: A line end, the blanks that begin the next line, and the rest of it.
 _LINE: Final = re.compile(r"(?:\r\n|\n|\r)( *)[^\r\n]*")
-#: A name, and a number or a short text.
-SIMPLE: Final = r"([A-Za-z_][\w.]*(?: (?:->|\+) [\w.]+)*) *: +((?:[A-Za-z0-9_.]|[-+](?![ \t\r\n,\[\]{}]))[\w.+*/^-]*)"
+#: A name, or a sum of names with an arrow.
+SIMPLE_NAME: Final = r"([A-Za-z_][\w.]*(?: (?:->|\+) [\w.]+)*)"
+#: Such a name, and a number or a short text.
+SIMPLE: Final = SIMPLE_NAME + r" *: +((?:[A-Za-z0-9_.]|[-+](?![ \t\r\n,\[\]{}]))[\w.+*/^-]*)"
 
 
 class UnsoundError(Exception):

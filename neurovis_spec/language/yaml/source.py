@@ -10,8 +10,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import NamedTuple, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.yaml.written_text import Written
@@ -69,7 +68,11 @@ class Entry(NamedTuple):
         return str(self.key.value)
 
 
-@dataclass(frozen=True)
+#: Mappings of more entries have a table of them; there may be very many small ones.
+_FEW: Final = 8
+
+
+@dataclass(frozen=True, slots=True)
 class Mapping:
     """Entries in the order written, keys unique. Where lines of it could not be read it ``is_open``: nobody knows which
     other entries it has."""
@@ -77,22 +80,27 @@ class Mapping:
     entries: tuple[Entry, ...]
     span: Span
     is_open: bool = False
-
-    @cached_property
-    def _by_name(self) -> dict[str, Entry]:
-        return {entry.name: entry for entry in self.entries}
+    _table: dict[str, Entry] | None = field(default=None, init=False, repr=False, compare=False)
 
     def entry(self, name: str) -> Entry | None:
         """The entry of this key, or None."""
-        return self._by_name.get(name)
+        if len(self.entries) <= _FEW:
+            for entry in self.entries:
+                if entry.key.value == name:
+                    return entry
+            return None
+        if self._table is None:
+            object.__setattr__(self, "_table", {entry.name: entry for entry in self.entries})
+        assert self._table is not None
+        return self._table.get(name)
 
     def get(self, name: str) -> Node | None:
         """The value of this key, or None."""
-        entry = self._by_name.get(name)
+        entry = self.entry(name)
         return None if entry is None else entry.value
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Sequence:
     """A list whose items are nodes."""
 
