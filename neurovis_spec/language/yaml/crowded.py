@@ -24,7 +24,7 @@ def crowded(text: str, most: int = MOST_ENTRIES) -> int | None:
     where there is none.
 
     >>> crowded("a:\\n  b: 1\\n  c: 2\\nd:\\n  e: 3\\n", 2), crowded("a:\\n  b: 1\\n  c: 2\\n  d: 3\\n", 2)
-    (None, 22)
+    (None, 19)
     """
     if len(text) <= _SHORTEST * most:
         return None
