@@ -55,10 +55,10 @@ def test_a_misspelt_declaration_is_one_finding(spec: str) -> None:
         if found.code == "misspelt-declaration":
             at_declaration += 1
             assert found.span == key.span._replace(end_column=key.span.column + len(wrong))
-            assert f"did you mean '{name}'?" == found.hint
+            assert (found.hint or "").startswith(f"did you mean '{name}'?")
         else:  # it is used once: that may be the slip, too
             assert wrong in (found.hint or found.message)
-    assert at_declaration >= 3
+    assert at_declaration  # of short names none is accused
 
 
 @pytest.mark.parametrize(
@@ -73,3 +73,47 @@ def test_what_is_nowhere_declared_is_one_finding(spec: str, name: str) -> None:
     (found,) = caught.value.diagnostics
     assert f"'{name}" in found.message
     assert "more uses: " in found.message
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "words"),
+    [
+        # names of one series, which differ in their number or their one letter
+        ("neurons: {left1: {}, left2: {}, A: {}}\nconnections: {left1 -> A: 1, left3 -> A: 1, A -> left3: 1}\n", 4, ""),
+        ("parameters: {tau1: 1, tau2: 2}\nneurons: {A: {bias: tau1 + tau3}, B: {bias: tau3}}\n", 4, "'tau2'"),
+        ("neurons: {h1: {}, h3: {}}\nconnections:\n  h1 -> h4: 1\n  h4 -> h1: 1\n", 5, "'h3'"),
+        ("parameters: {gain_b: 1}\nneurons: {A: {bias: gain_c}, B: {bias: gain_c}}\n", 4, "'gain_b'"),
+        ("parameters: {gainB: 1}\nneurons: {A: {bias: gainC}, B: {bias: gainC}}\n", 4, "'gainB'"),
+        ("parameters: {l_gain: 1}\nneurons: {A: {bias: r_gain}, B: {bias: r_gain}}\n", 4, "'l_gain'"),
+        # one that is used is as near
+        (
+            "neurons: {hidden: {}, hide: {}, A: {}}\nconnections: {hidden -> A: 1, hidde -> A: 1, A -> hidde: 1}\n",
+            4,
+            "did you mean 'hidden' or 'hide'?",
+        ),
+        # of few letters
+        (
+            "neurons: {A: {}, B: {}, AB: {}}\nconnections: {A -> B: 1, A -> BB: 1, BB -> A: 1}\n",
+            4,
+            "did you mean 'B'? 'AB' (line 3) is declared and never used",
+        ),
+        ("neurons: {RL: {}, B: {}}\nconnections: {B -> LR: 1, LR -> B: 1}\n", 4, ""),
+    ],
+)
+def test_what_may_be_another_name_is_not_accused(text: str, line: int, words: str) -> None:
+    with pytest.raises(nv.SpecError) as caught:
+        nv.compile_text(f"neurovis: 1\nname: x\n{text}")
+    (found,) = caught.value.diagnostics
+    assert found.code in ("unknown-name", "unknown-neuron")
+    assert found.span.line == line
+    assert "one more use" in found.message
+    assert words in (found.hint or "")
+
+
+def test_a_slip_within_a_series_is_found() -> None:
+    text = "neurons: {left1: {}, letf2: {}, A: {}}\nconnections: {left1 -> A: 1, left2 -> A: 1, A -> left2: 1}\n"
+    with pytest.raises(nv.SpecError) as caught:
+        nv.compile_text(f"neurovis: 1\nname: x\n{text}")
+    (found,) = caught.value.diagnostics
+    assert found.code == "misspelt-declaration"
+    assert found.hint == "did you mean 'left2'? or is 'left2' (line 4) meant to be 'letf2'?"

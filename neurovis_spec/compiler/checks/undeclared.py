@@ -1,8 +1,8 @@
 """Names that are used and declared nowhere: one cause, one finding.
 
 In: the findings of a spec that miss a name, the files in which its declaration should stand. Out: one finding for each
-name. Where it is used several times, and another one like it is declared and never used, the declaration is misspelt,
-and the finding stands there; else it stands at the first use and says where the others are.
+name. Where it is used several times, and another one is declared and never used that can only be a slip of it, the
+declaration is misspelt, and the finding stands there; else it stands at the first use and says where the others are.
 """
 
 from __future__ import annotations
@@ -27,6 +27,12 @@ _MANY: Final = 10_000
 _WORD: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _REST_OF_LINE: Final = re.compile(r"[^\r\n]*")
 _DIGITS: Final = "0123456789"
+#: Where a name is used no more often than this, the uses may be the slip.
+_FEW_USES: Final = 3
+#: A name of so many letters is a slip away from many others.
+_SHORT: Final = 3
+#: What tells names of one series apart: numbers, and letters by themselves, as in ``h3``, ``gain_b``, ``gainB``.
+_MEMBER: Final = re.compile(r"[0-9]+|(?<![A-Za-z])[A-Za-z](?![A-Za-z])|(?<=[a-z])[A-Z](?![A-Za-z])")
 
 
 class _Use(NamedTuple):
@@ -60,7 +66,7 @@ def gather_undeclared(files: Collection[Mapping], findings: Findings) -> None:
         groups.setdefault((name, use.home, use.told.span.file), []).append(use)
     for group in groups.values():
         if len(group) > 1:
-            findings.fold([use.mark for use in group], _at_first_use(group))
+            findings.fold([use.mark for use in group], _at_first_use(group, declarations.near(group)))
 
 
 def _explained(use: _Use, declarations: _Declarations) -> Diagnostic:
@@ -106,18 +112,28 @@ def _at_declaration(name: str, declared: Scalar, uses: Sequence[_Use]) -> Diagno
         f"'{shorten(name)}' is used {len(uses)} times (first in {place}) and nowhere declared; "
         f"'{declared.value}' is declared and never used"
     )
-    return Diagnostic("misspelt-declaration", message, declared.span, hint=f"did you mean '{shorten(name)}'?")
+    hint = f"did you mean '{shorten(name)}'?"
+    if len(uses) <= _FEW_USES:
+        spans = (use.told.span for use in uses)
+        lines = [span.seen_from(here) if span.file == here.file else f"{span.file}:{span.line}" for span in spans]
+        hint += f" or is '{shorten(name)}' ({_some(list(dict.fromkeys(lines)))}) meant to be '{declared.value}'?"
+    return Diagnostic("misspelt-declaration", message, declared.span, hint=hint)
 
 
-def _at_first_use(uses: Sequence[_Use]) -> Diagnostic:
-    """The finding at the first of the uses, in their order, that says where the others are."""
+def _at_first_use(uses: Sequence[_Use], unused: Scalar | None) -> Diagnostic:
+    """The finding at the first of the uses, in their order, that says where the others are. ``unused`` is a declaration
+    that might be meant."""
     first, others = uses[0].told, uses[1:]
     names = [f"'{shorten(name)}'" for name in dict.fromkeys(use.name for use in others) if name != uses[0].name]
     spans = (use.told.span for use in others)
     lines = list(dict.fromkeys(span.seen_from(first.span) for span in spans if span != first.span))
     message = first.message + (f", nor {_some(names)}" if names else "")
     count = "one more use" if len(others) == 1 else f"{len(others)} more uses"
-    return replace(first, message=f"{message}; {count}" + (f": {_some(lines)}" if lines else ""))
+    hint = first.hint
+    if unused is not None and f"'{unused.value}'" not in (hint or ""):
+        line = unused.span.seen_from(first.span) if unused.span.file == first.span.file else f"in {unused.span.file}"
+        hint = f"{hint or ''} '{unused.value}' ({line}) is declared and never used".strip()
+    return replace(first, message=f"{message}; {count}" + (f": {_some(lines)}" if lines else ""), hint=hint)
 
 
 def _some(words: Sequence[str]) -> str:
@@ -139,10 +155,20 @@ class _Declarations:
         """The declaration that is never used and can only be meant for this name. ``counted``: it makes several."""
         homes = dict.fromkeys(use.home for use in uses)
         declared = dict.fromkeys(one for home in homes for one in self.at(home, counted))
-        unused = {str(one.value): one for one in declared if self._unused(one)}
-        near = [other for other in unused if len(name) > 1 and slips(name, other) < 2]
+        alike = {str(one.value): one for one in declared if _may_be_slip(name, str(one.value))}
+        unused = [other for other, one in alike.items() if self._unused(one)]
+        near = [other for other in unused if slips(name, other) < 2]
         right = near[0] if len(near) == 1 else meant(name, unused) if unused else None
-        return None if right is None else unused[right]
+        if right is None or any(slips(name, other) <= slips(name, right) for other in alike if other != right):
+            return None
+        return alike[right]
+
+    def near(self, uses: Sequence[_Use]) -> Scalar | None:
+        """The first declaration a slip away from a name that is never used."""
+        name, homes = uses[0].name, dict.fromkeys(use.home for use in uses)
+        declared = (one for home in homes for one in self.at(home, counted=False))
+        close = (one for one in declared if len(name) > 1 and slips(name, str(one.value)) < 2)
+        return next((one for one in close if self._unused(one)), None)
 
     def at(self, home: Home, counted: bool) -> Iterator[Scalar]:
         """What is declared at a home: all, or what makes several with numbers behind."""
@@ -168,6 +194,12 @@ class _Declarations:
             stem = word.rstrip(_DIGITS)
             words[stem] += times if stem != word else 0
         return words
+
+
+def _may_be_slip(name: str, other: str) -> bool:
+    """Whether one name may be the other one misspelt: neither is short, and they are no two of a series."""
+    letters = min(sum(letter.isalpha() for letter in one) for one in (name, other))
+    return letters > _SHORT and _MEMBER.sub("", name) != _MEMBER.sub("", other)
 
 
 def _without_comments(text: str) -> str:
