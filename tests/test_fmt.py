@@ -202,6 +202,13 @@ def test_what_is_written_and_what_becomes_of_it(name: str) -> None:
     assert values(after) == values(before)
 
 
+def test_tabs_on_lines_without_values_become_blanks() -> None:
+    text = "neurovis: 1\nname: x\n\t\nneurons:\n  A:\n    bias: 1\n  \t # c\n\t\n\t# d\n  B: {bias: 1}\n\t"
+    assert formatted(text) == (
+        "neurovis: 1\nname: x\n\nneurons:\n  A:\n    bias: 1\n    # c\n\n  # d\n  B: {bias: 1}\n"
+    )
+
+
 def test_the_deepest_and_the_longest() -> None:
     deep = "a: " + "[" * 63 + "]" * 63 + "\n"
     assert formatted(deep) == deep

@@ -34,7 +34,6 @@ _BREAK: Final = re.compile(r"\r\n|\n|\r")
 BLANKS: Final = re.compile(" *")
 _BLANK_LINE: Final = re.compile(r"[ \t]*(#[^\r\n]*)?(?:\r\n|\n|\r)")
 _NEXT_TEXT: Final = re.compile(r"[ \t]*(?:\r\n|\n|\r)(?:[ \t]*(?:\r\n|\n|\r))*")
-_TAB: Final = re.compile(r"(?<![^\r\n]) *\t")
 VISIBLE: Final = re.compile(r"[^\s]")
 #: A line end, the blanks that begin the next line, and the rest of it.
 _LINE: Final = re.compile(r"(?:\r\n|\n|\r)( *)[^\r\n]*")
@@ -164,11 +163,11 @@ class Scanner:
         return self._at < self._end and self._text[self._at] not in "\r\n"
 
     def _next_line(self) -> None:
-        """Go from behind the last value of a line to the first of the next."""
+        """Go from behind the last value of a line to the first of the next. In lines between that hold nothing, or a
+        comment alone, tabs are blanks."""
         before = self._at
-        self._gap()
-        if self._text.find("\t", before, self._at) >= 0 and (tab := _TAB.search(self._text, before, self._at)):
-            self._misplaced(faults.TAB, tab.end() - 1)
+        if self._gap() and self._start >= before and (tab := self._text.find("\t", self._start, self._at)) >= 0:
+            self._misplaced(faults.TAB, tab)
 
     def _indicator(self, sign: str) -> bool:
         """Whether a sign comes next that has a blank behind it."""
