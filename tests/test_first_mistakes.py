@@ -163,11 +163,22 @@ STATE = "models: {m: {state: {v: {initial: 0, each_step: v + drive}}, activity: 
         (G + AB + "connections: {A -> B: {weight: 2*g}}\n", "5:34", "(combine: product), or a rule"),
         (G + "neurons: {A: {bias: g}}\n", "4:21", "neurons take in with input: g"),
         ("neurons: {A: {bias: 1}, B: {bias: A}}\n", "3:35", "what 'A' does arrives by a connection"),
-        (STATE + "neurons: {A: {model: m}, B: {}}\nconnections: {A.v -> B: 1}\n", "5:15", "can be an output"),
+        (STATE + "neurons: {A: {model: m}, B: {}}\nconnections: {A.v -> B: 1}\n", "5:15", "write 'A'; what of v its"),
+        (
+            STATE + "neurons: {A: {model: m}, B: {}}\nconnections: {B.v -> A: 1}\n",
+            "5:15",
+            "'B' is no instance, nothing",
+        ),
         (
             STATE + "neurons: {A: {model: m}, B: {}}\nconnections: {A -> B: {plasticity: {delta: {target: A.v}}}}\n",
             "5:53",
-            "a state of its model can be an output",
+            "v is a state of 'A', and only activities are sent and are signals: write 'A'",
+        ),
+        (
+            STATE + "modules: {leg: {neurons: {K: {count: 2, model: m}}}}\ninstances: {left: {module: leg}}\n"
+            "neurons: {A: {bias: 1}}\nconnections: {A -> left.K: {plasticity: {delta: {target: left.K2.v}}}}\n",
+            "7:58",
+            "v is a state of 'left.K2', and only activities are sent and are signals: write 'left.K2'",
         ),
         (STATE + "neurons: {A: {model: m}, B: {input: A.v}}\n", "4:37", "an input is declared under 'inputs'"),
         (

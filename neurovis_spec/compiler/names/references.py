@@ -70,6 +70,8 @@ class Directory:
     scope: int = 0
     #: the module that it is of
     module: str | None = None
+    #: the states that the models of groups have
+    states: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @cached_property
     def known(self) -> tuple[str, ...]:
@@ -98,7 +100,10 @@ class Directory:
     def _hint_of_instance(self, head: str, rest: str) -> str:
         """What ``head`` in ``head.rest`` may be meant for."""
         if self.holds(head):
-            return f"'{head}' is no instance, nothing is in it; a state of its model can be an output, and is recorded"
+            if rest in self._states_of(head):
+                seen = f"write '{head}'; what of {rest} its activity shows is for its model to say"
+                return f"{rest} is a state of '{head}', and only activities are sent and are signals: {seen}"
+            return f"'{head}' is no instance, nothing is in it"
         if not self.instances:
             return "there are no instances here"
         stem = head.rstrip("0123456789")
@@ -107,6 +112,13 @@ class Directory:
         close = nearest(head, few(head, tuple(self.instances)))
         whole = [f"{name}.{rest}" for name in close if self.holds(f"{name}.{rest}")]
         return did_you_mean(whole) if whole else suggest(head, few(head, tuple(self.instances)), "instances") or ""
+
+    def _states_of(self, name: str) -> tuple[str, ...]:
+        """The states of a group's model, or of that of a neuron's group."""
+        if name in self.groups:
+            return self.states.get(name, ())
+        index = self.neurons.get(name, -1)
+        return next((self.states.get(own, ()) for own, group in self.groups.items() if index in group.indices), ())
 
     def find(self, name: str) -> tuple[int, ...] | Unknown | None:
         """The neurons of a group, or one neuron; ``left.K`` is K in all instances that ``left`` names. None where there
