@@ -118,6 +118,7 @@ def test_indentation_that_is_no_blank_is_named(character: str) -> None:
     [
         ("time: {steps: 10,000}\n", "3:15", "'10,000' is not one number | write 10000"),
         ("time: {steps: 1,000,000}\n", "3:15", "write 1000000"),
+        ("models: {m: {description: 10,000, activity: drive}}\n", "3:27", "write 10000"),
         ("time:\n  steps: 10,000\n", "4:10", "nothing stands between thousands | write 10000"),
         ("time:\n  steps: 1,000,000\n", "4:10", "write 1000000"),
         ("time:\n  steps: 10_000\n", "4:10", "write 10000"),

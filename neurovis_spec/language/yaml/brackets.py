@@ -264,6 +264,7 @@ class Brackets(Scanner):
             self._at = key.end if more is None else more.end()
             span = self._from(one.span.line, one.span.column)
             self._refuse.number_with_commas(self._text[before.begin : self._at], span)
+            self._lost.append(one.span)  # it is a part of what was meant
             return True
         if isinstance(one.value, str) and isinstance(other.value, str) and "->" not in other.value:
             self._refuse.stray_text(one, other)
