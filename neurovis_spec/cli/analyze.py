@@ -11,6 +11,7 @@ from neurovis_spec.cli.completion import paths
 from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.files import count, network_of, recording_of, tables, writing
 from neurovis_spec.cli.options import (
+    FirstStep,
     body_options,
     examples,
     finite,
@@ -45,7 +46,7 @@ from neurovis_spec.cli.targets import check_files, check_folder, check_target, f
 @click.option("--recording", metavar="FILE", shell_complete=paths, help="Measure this; without it the network is run.")
 @run_option
 @click.option("--of", metavar="REFS", multiple=True, help="The neurons to measure, such as K or 'C + K'; default: all.")
-@click.option("--from", "start", type=click.IntRange(0, 2**53), metavar="STEP", help="The first step to measure.")
+@click.option("--from", "start", type=FirstStep(0, 2**53), metavar="STEP", help="The first step to measure.")
 @click.option("--to", "stop", type=click.IntRange(1, 2**53), metavar="STEP", help="The step to end before.")
 @click.option(
     "--threshold",

@@ -8,7 +8,7 @@ import click
 
 from neurovis_spec.cli.drawing import Drawing, drawing_options, show_warnings
 from neurovis_spec.cli.files import writing
-from neurovis_spec.cli.options import examples, finite, output_option
+from neurovis_spec.cli.options import FirstStep, examples, finite, output_option
 from neurovis_spec.cli.progress import progress
 
 
@@ -23,7 +23,7 @@ from neurovis_spec.cli.progress import progress
 )
 @output_option("The moving picture; the suffix says what kind: .svg, .mp4, .webm, .gif or .webp.", required=True)
 @click.option("--steps", type=click.IntRange(min=1), metavar="N", help="Steps to show; default: to the end of the run.")
-@click.option("--from", "start", type=click.IntRange(min=0), default=0, metavar="N", help="The first step to show.")
+@click.option("--from", "start", type=FirstStep(min=0), default=0, metavar="N", help="The first step to show.")
 @click.option(
     "--every",
     type=click.IntRange(min=1),

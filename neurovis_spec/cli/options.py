@@ -24,6 +24,20 @@ Option: TypeAlias = Callable[[Command], Command]
 Callback = Callable[[click.Context, click.Parameter, str | None], str | None]
 
 
+class FirstStep(click.IntRange):
+    """The number of a step. ``--from`` takes a file elsewhere: who gives one is told what it is called here."""
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """The number. Raises BadParameter."""
+        try:
+            number = int(str(value))
+        except ValueError:
+            is_file = Path(str(value)).suffix.lower() in (".npz", ".csv")
+            hint = f": did you mean --recording {value}?" if is_file else ""
+            self.fail(f"'{value}' is no number of a step{hint}", param, ctx)
+        return int(super().convert(number, param, ctx))
+
+
 def several(*options: Option) -> Option:
     """Options in this order, as one decorator."""
 
