@@ -15,7 +15,6 @@ from neurovis_spec.real_paths import is_circular, real_path
 
 ROOT = Path(__file__).parent.parent
 ROUND = "lead round in a circle"
-TOO_MANY = "Too many levels of symbolic links"
 
 
 @pytest.fixture
@@ -30,22 +29,23 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 SAID = {
+    "validate a.yaml": ROUND,
     "run small.yaml -o a.npz": ROUND,
     "run small.yaml -o a/x.npz": ROUND,
     "run small.yaml --checkpoint a": ROUND,
-    "run small.yaml --from a.npz": TOO_MANY,
-    "run small.yaml --input push=a.csv": TOO_MANY,
-    "run small.yaml --body a.yaml": TOO_MANY,
-    "run a.yaml": TOO_MANY,
-    "run a/x.yaml": TOO_MANY,
-    "fmt a.yaml": TOO_MANY,
-    "validate reads.yaml": TOO_MANY,
-    "validate includes.yaml": TOO_MANY,
+    "run small.yaml --from a.npz": ROUND,
+    "run small.yaml --input push=a.csv": ROUND,
+    "run small.yaml --body a.yaml": ROUND,
+    "run a.yaml": ROUND,
+    "run a/x.yaml": ROUND,
+    "fmt a.yaml": ROUND,
+    "validate reads.yaml": ROUND,
+    "validate includes.yaml": ROUND,
     "sweep small.yaml --over seed=0..1 --metric mean(Y) -o a.csv": ROUND,
-    "sweep small.yaml --over seed=0..1 --metric mean(Y) --body a.yaml": TOO_MANY,
+    "sweep small.yaml --over seed=0..1 --metric mean(Y) --body a.yaml": ROUND,
     "analyze small.yaml -o a": ROUND,
     "render small.yaml -o a.svg": ROUND,
-    "render small.yaml --recording a.npz -o x.svg": TOO_MANY,
+    "render small.yaml --recording a.npz -o x.svg": ROUND,
     "animate small.yaml -o a.svg": ROUND,
     "layout small.yaml -o a.yaml": ROUND,
     "layout small.yaml --update a.yaml": ROUND,
@@ -53,7 +53,7 @@ SAID = {
     "export small.yaml --to c -o a/x": ROUND,
     "ros export small.yaml -o a": ROUND,
     "ros play a.mcap": ROUND,
-    "live small.yaml --recording a.npz": TOO_MANY,
+    "live small.yaml --recording a.npz": ROUND,
     "new a": ROUND,
 }
 

@@ -12,6 +12,7 @@ import click
 
 from neurovis_spec.diagnostics import SpecError
 from neurovis_spec.findings import printable, show_text
+from neurovis_spec.real_paths import reason_of
 
 
 class Failure(click.ClickException):
@@ -57,7 +58,7 @@ def said(error: OSError) -> str:
     >>> said(FileNotFoundError(2, "No such file or directory", "x.npz"))
     'x.npz: No such file or directory'
     """
-    words = error.strerror or str(error)
+    words = reason_of(error)
     return f"{error.filename}: {words}" if isinstance(error.filename, str) else words
 
 

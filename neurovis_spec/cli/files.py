@@ -18,7 +18,7 @@ import click
 from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.progress import progress
 from neurovis_spec.cli.targets import refuse_circle, refuse_dash
-from neurovis_spec.real_paths import real_path
+from neurovis_spec.real_paths import real_path, reason_of
 
 if TYPE_CHECKING:
     from neurovis_spec.arrays import FloatArray
@@ -226,7 +226,7 @@ def writing(path: Path) -> Iterator[None]:
         raise
     except OSError as error:
         full = error.filename if error.errno in FULL else None
-        raise fault(f"{full or path} cannot be written: {error.strerror or error}") from error
+        raise fault(f"{full or path} cannot be written: {reason_of(error)}") from error
 
 
 def count(number: int, word: str) -> str:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import click
 
 from neurovis_spec.cli.failure import fault
-from neurovis_spec.real_paths import is_circular
+from neurovis_spec.real_paths import CIRCLE, is_circular
 
 if TYPE_CHECKING:
     from neurovis_spec.compiled import CompiledNetwork
@@ -53,7 +53,7 @@ def refuse_dash(path: Path, kind: str, option: str = "-o") -> None:
 def refuse_circle(path: Path) -> None:
     """Refuse a path on which links lead round in a circle."""
     if is_circular(path):
-        raise fault(f"{path}: its symbolic links lead round in a circle", "remove these links, or choose another name")
+        raise fault(f"{path}: {CIRCLE}", "remove these links, or choose another name")
 
 
 def files_of(inputs: Mapping[str, str]) -> list[tuple[str, str | None]]:

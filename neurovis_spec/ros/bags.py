@@ -20,7 +20,7 @@ from urllib.parse import quote
 import yaml
 
 from neurovis_spec.language.ros_types import plain
-from neurovis_spec.real_paths import is_circular, real_path
+from neurovis_spec.real_paths import CIRCLE, is_circular, real_path
 from neurovis_spec.ros import bag1
 from neurovis_spec.ros.definitions import definition
 from neurovis_spec.ros.files import METADATA
@@ -137,7 +137,7 @@ def _named(path: Path) -> list[str]:
 def _part(path: Path) -> Part:
     if not path.is_file():
         if not path.exists():
-            what = "its symbolic links lead round in a circle" if is_circular(path) else "there is no such file"
+            what = CIRCLE if is_circular(path) else "there is no such file"
             raise RecordingError(f"{path}: {what}")
         raise RecordingError(f"{path}: not a regular file")
     with path.open("rb") as file:

@@ -25,6 +25,7 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.language.references import Sum, parse, state_of
+from neurovis_spec.real_paths import reason_of
 from neurovis_spec.runtime.files import regular_size, replacing
 from neurovis_spec.runtime.kinds import Rows
 from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows
@@ -160,7 +161,7 @@ def _read(path: Path, chosen: Callable[[Iterator[str]], Iterator[str]]) -> Recor
             header = next(reader, [])
             return _recording(header, _table(reader, len(header)))
     except OSError as error:
-        raise RecordingError(f"{path}: {error.strerror or error}") from None
+        raise RecordingError(f"{path}: {reason_of(error)}") from None
     except (csv.Error, UnicodeDecodeError, RecordingError) as error:
         raise RecordingError(f"{path}: {error}") from None
 

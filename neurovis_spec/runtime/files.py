@@ -18,7 +18,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO, Final
 
-from neurovis_spec.real_paths import is_circular, real_path
+from neurovis_spec.real_paths import CIRCLE, is_circular, real_path
 from neurovis_spec.runtime.parts import Kind, clear, open_beside
 
 #: What the system says where there is no room: on the disk, for this user, in a file.
@@ -72,7 +72,7 @@ def written_to(path: str | os.PathLike[str]) -> Path:
     lead round in a circle, and where there is no folder to write it into."""
     target = real_path(path)
     if is_circular(target):
-        raise OSError(errno.ELOOP, "its symbolic links lead round in a circle", os.fspath(path))
+        raise OSError(errno.ELOOP, CIRCLE, os.fspath(path))
     if not target.parent.is_dir():
         raise FileNotFoundError(errno.ENOENT, "there is no folder", os.path.dirname(path))  # noqa: PTH120
     if target.exists() and not target.is_file() and not target.is_char_device():

@@ -29,6 +29,7 @@ from neurovis_spec.body.skeletons import skeleton_of, text_of
 from neurovis_spec.compiler.limits import DEEPEST
 from neurovis_spec.language.data.npy import LONGEST_HEADER, read_header
 from neurovis_spec.language.data.table import CellError
+from neurovis_spec.real_paths import reason_of
 from neurovis_spec.runtime.files import regular_size, replacing
 from neurovis_spec.runtime.journal import Journal, JournalWriter, is_begun, read_journal
 from neurovis_spec.runtime.kinds import KINDS, Rows, Widths
@@ -274,7 +275,7 @@ def recording_errors(path: Path, what: str = "a recording") -> Iterator[None]:
     except RecordingError as error:
         raise RecordingError(f"{path}: {error}") from None
     except OSError as error:
-        raise RecordingError(f"{path}: {error.strerror or error}") from None
+        raise RecordingError(f"{path}: {reason_of(error)}") from None
     except Exception as error:
         # zipfile, zlib, NumPy's header parser and json have errors of their own for every way to be malformed
         raise RecordingError(f"{path}: not {what} ({type(error).__name__}: {str(error)[:200]})") from None

@@ -11,6 +11,8 @@ import stat
 from pathlib import Path
 from typing import NamedTuple
 
+from neurovis_spec.real_paths import reason_of
+
 _FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
 _CHUNK = 1 << 24
 
@@ -71,5 +73,5 @@ def _too_large(most: int) -> FileFault:
 def _unreadable(error: Exception) -> FileFault:
     if isinstance(error, FileNotFoundError | NotADirectoryError):
         return FileFault("file-missing", "does not exist")
-    reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    reason = reason_of(error) if isinstance(error, OSError) else str(error)
     return FileFault("file-unreadable", f"cannot be read: {reason}")
