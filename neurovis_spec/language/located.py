@@ -208,8 +208,11 @@ def as_number(node: Node, info: ValidationInfo) -> Located[float]:
     """A finite number as such, no expression."""
     if not isinstance(node, Scalar) or isinstance(node.value, (str, bool)) or node.value is None:
         text = node.value if isinstance(node, Scalar) else None
-        hint = decimal_hint(text) or ungrouped_hint(text) if isinstance(text, str) else None
-        refuse(info, node, "a number", hint)
+        if isinstance(text, str) and (apart := ungrouped_hint(text)):
+            message = f"'{shorten(text)}' is no number: nothing stands between thousands"
+            findings_of(info).error("malformed-number", node.span, message, apart)
+            give_up()
+        refuse(info, node, "a number", decimal_hint(text) if isinstance(text, str) else None)
     formula = as_formula(node, info)
     assert formula.value is not UNKNOWN
     return Located(float(formula.value), formula.node)

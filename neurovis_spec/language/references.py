@@ -193,6 +193,11 @@ def _parse(text: str, start: int, end: int) -> Sum | Arrow | NoReference:
     if len(arrows) > 1 or both:
         return NoReference(whole, first, "bad-connection", f"'{shorten(whole)}' is no connection", _steps(whole, both))
     (arrow,) = arrows
+    source, target = text[start:arrow].rstrip(), text[arrow + 2 : end].lstrip()
+    if source.endswith("-") or target.startswith(">"):
+        plain = source.rstrip("- ").strip(), target.lstrip("> ").strip()
+        hint = f"write {shorten(f'{plain[0]} -> {plain[1]}', 200)}"
+        return NoReference(whole, first, "bad-connection", f"'{shorten(whole)}' is no connection", hint)
     sources = _sum(text, start, arrow, [plus for plus in pluses if plus < arrow])
     return Arrow(whole, first, sources, _sum(text, arrow + 2, end, [plus for plus in pluses if plus > arrow]))
 

@@ -41,7 +41,7 @@ _MANY = 10_000
 #: A neuron's number as its name has it: without leading zeros.
 _NUMBER = re.compile(r"0|[1-9][0-9]{0,63}")
 #: Two names with something between them that is no arrow, two neurons of a group, and what no name holds.
-_JOINED = re.compile(r"([\w.]+) *(=>|<-|<=|-->|->>|>|→|–>|\bto\b) *([\w.]+)")
+_JOINED = re.compile(r"([\w.]+) *(=>|<-|<=|--+>|- +>|->>|>|→|[‐‑‒–—−] *>|\bto\b) *([\w.]+)")
 _FROM_TO = re.compile(r"([A-Za-z_][\w.]*?)([0-9]+) *(?:-|:|–|…|\.\.\.|to) *(?:\1)?([0-9]+)")
 _FORMULA = re.compile(r"[*/^()%]|\d *[-+]|[-+] *\d")
 _PATH = re.compile(r"[A-Za-z_]\w*(?:/[A-Za-z_]\w*)+")

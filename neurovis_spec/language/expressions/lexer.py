@@ -48,6 +48,8 @@ _KEYWORD = re.compile(r"=(?!=)")
 _TAIL = re.compile(r"[A-Za-z0-9_.]+")
 #: An integer with zeros in front of it: a text in YAML, an octal number in other languages.
 _ZEROS = re.compile(r"0+[0-9]+")
+#: What stands before the last three digits of a number with commas between thousands.
+_THOUSANDS = re.compile(r"(?<![\w.])[1-9][0-9]{0,2},(?:[0-9]{3},)*\Z")
 _DATE = re.compile(r"\s*([0-9]{4}-[0-9]{1,2}-[0-9]{1,2})\s*")
 _QUOTED = re.compile(r"(?P<quote>['\"`“”‘’]).*?(?:['\"`“”‘’]|$)", re.DOTALL)
 #: A number and what may be its unit.
@@ -184,11 +186,22 @@ def _number(text: str, number: re.Match[str]) -> Token:
         )
     if _ZEROS.fullmatch(number.group()):
         message = f"'{shorten(number.group())}' is no number: a zero stands in front of it"
-        raise ExpressionError("malformed-number", message, start, end, decimal_hint(number.group()))
+        raise ExpressionError("malformed-number", message, start, end, _zeros_hint(text, number))
     if math.isinf(float(number.group())):
         message = f"{shorten(number.group(), 20)} is beyond the range of numbers, which ends near 1.8e308"
         raise ExpressionError("number-overflow", message, start, end)
     return Token("number", number.group(), start, end)
+
+
+def _zeros_hint(text: str, number: re.Match[str]) -> str | None:
+    """What to write instead of such an integer, which may be the end of one with a comma between thousands."""
+    hint, before = decimal_hint(number.group()), _THOUSANDS.search(text, 0, number.start())
+    if before is not None and len(number.group()) == 3:
+        whole = f"{before.group()}{number.group()}"
+        return f"if {shorten(whole)} is one number, {ungrouped_hint(whole)}: nothing stands between thousands"
+    if number.group() == "000":
+        return f"{hint}; a comma before it that sets thousands apart is to be left out"
+    return hint
 
 
 def decimal_hint(text: str) -> str | None:
@@ -227,7 +240,11 @@ def _unit_at(text: str, at: int) -> str:
 def _no_token(text: str, at: int, after: Token | None) -> ExpressionError:
     character = text[at]
     if quoted := _QUOTED.match(text, at):
-        return ExpressionError("no-strings", "an expression holds no texts, only numbers", at, quoted.end())
+        message, inside = "an expression holds no texts, only numbers", quoted.group().strip("'\"`“”‘’").strip()
+        hint = f"leave the quotes out: write {shorten(inside)}" if _NUMBER.fullmatch(inside) else None
+        if not character.isascii():
+            message = f"'{character}' is {character_name(character)}: {message}"
+        return ExpressionError("no-strings", message, at, quoted.end(), hint)
     if character == ".":
         end = at + 1 + len(name.group() if (name := _NAME.match(text, at + 1)) else "")
         hint = "refer to a value by its name alone"
