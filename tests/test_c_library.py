@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -46,6 +48,34 @@ def test_a_broken_library_is_made_anew(cache: Path) -> None:
     cache.mkdir(parents=True)
     place(TEXT % 44).write_bytes(b"half")
     assert load(TEXT % 44).answer() == 44
+
+
+@pytest.mark.parametrize("kind", ["a pipe", "a link to a pipe", "a device", "a file without bytes", "a folder"])
+def test_what_is_no_library_is_not_opened(kind: str, cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pipe in the place of a library would have every run wait for ever."""
+    cache.mkdir(mode=0o700, parents=True)
+    kept = place(TEXT % 48)
+    if kind == "a pipe":
+        os.mkfifo(kept)
+    elif kind == "a link to a pipe":
+        os.mkfifo(cache / "pipe")
+        kept.symlink_to(cache / "pipe")
+    elif kind == "a device":
+        kept.symlink_to("/dev/zero")
+    elif kind == "a folder":
+        kept.mkdir()
+    else:
+        kept.touch()
+
+    def opened(path: str) -> ctypes.CDLL:
+        assert Path(path).is_file()
+        return library(path)
+
+    library = ctypes.CDLL
+    monkeypatch.setattr(c_library.ctypes, "CDLL", opened)
+    assert load(TEXT % 48).answer() == 48
+    assert load(TEXT % 48).answer() == 48
+    assert kept.is_file() == (kind != "a folder")  # which stays: nothing of a user's is removed
 
 
 def test_the_cache_is_bounded_and_the_oldest_goes(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:

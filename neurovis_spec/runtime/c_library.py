@@ -128,6 +128,8 @@ def load(text: str) -> ctypes.CDLL:
     try:
         if not _is_ours(path.parent):
             raise OSError("not a folder that this user alone writes to")
+        if not path.is_file():  # who opens a pipe waits for ever
+            raise OSError("no file")
         library = ctypes.CDLL(str(path))
     except OSError:  # not there, or no library
         return _made(text, path)
