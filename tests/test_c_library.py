@@ -72,7 +72,7 @@ def test_what_is_no_library_is_not_opened(kind: str, cache: Path, monkeypatch: p
         return library(path)
 
     library = ctypes.CDLL
-    monkeypatch.setattr(c_library.ctypes, "CDLL", opened)
+    monkeypatch.setattr(ctypes, "CDLL", opened)
     assert load(TEXT % 48).answer() == 48
     assert load(TEXT % 48).answer() == 48
     assert kept.is_file() == (kind != "a folder")  # which stays: nothing of a user's is removed

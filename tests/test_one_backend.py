@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 import zipfile
 from collections.abc import Iterator
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import numpy as np
@@ -15,12 +17,14 @@ from toy_bodies import SPEC as CARTED
 from toy_bodies import registered
 
 import neurovis_spec as nv
+from neurovis_spec import plugins
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.runtime import backend as backends
 from neurovis_spec.runtime import c_library
-from neurovis_spec.runtime.backend import DEFAULT, BackendError, choose_backend
+from neurovis_spec.runtime.backend import DEFAULT, Availability, BackendError, Capabilities, choose_backend
 from neurovis_spec.runtime.c_library import Compiler, CompilerError
+from neurovis_spec.runtime.numpy_backend import NumpyBackend
 from neurovis_spec.runtime.recording import Recording
 
 BODY = """
@@ -57,7 +61,7 @@ def invoke(*arguments: str) -> Result:
     ("found", "name", "words"),
     [
         (Compiler(("/usr/bin/gcc",), "gcc", ""), "c", "compiled by gcc"),
-        (Compiler(("python", "-m", "ziglang", "cc"), "ziglang", "", on_request=True), "numpy", "ziglang"),
+        (Compiler(("python", "-m", "ziglang", "cc"), "ziglang", "", on_request=True), "numpy", "c on request"),
         (None, "numpy", "there is no C compiler"),
     ],
 )
@@ -78,6 +82,48 @@ def test_it_depends_on_the_machine_and_not_on_the_steps(
         assert "5 neurons" in made[1]
 
 
+class Fast(NumpyBackend):
+    """A backend of somebody else's."""
+
+    name = "a fast one"
+    by_default, works = True, True
+    capabilities = Capabilities(noise=True)
+
+    def availability(self) -> Availability:
+        return Availability(self.works, "by a fast processor" if self.works else "no such processor", self.by_default)
+
+
+@pytest.mark.usefixtures("chosen_here")
+def test_a_backend_of_somebody_else_s_may_be_the_default(
+    network: nv.CompiledNetwork, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the mechanism by which C is: where it says so, and can run the network."""
+    ours = dict(plugins._points(plugins.BACKENDS))
+    theirs = EntryPoint("a fast one", "test_one_backend:Fast", plugins.BACKENDS)
+    monkeypatch.setattr(plugins, "_points", lambda group: {"a fast one": theirs, **ours})
+    monkeypatch.setattr(EntryPoint, "load", lambda self: Fast if self is theirs else loaded(self))
+    assert network.choose_backend()[0] == "a fast one"
+    assert "by a fast processor" in network.choose_backend()[1]
+    monkeypatch.setattr(c_library, "compiler", no_compiler)
+    monkeypatch.setattr(Fast, "capabilities", Capabilities(noise=True, largest=3))
+    assert choose_backend(network.network)[0] == "numpy"
+    assert "at most 3 neurons" in choose_backend(network.network)[1]
+    monkeypatch.setattr(Fast, "capabilities", Capabilities(noise=True))
+    monkeypatch.setattr(Fast, "works", False)
+    with pytest.warns(RuntimeWarning, match="no such processor"):
+        assert network.choose_backend()[0] == "numpy"
+    monkeypatch.setattr(Fast, "by_default", False)
+    assert choose_backend(network.network)[0] == "numpy"
+    assert Availability(True).by_default is False  # who says nothing of it waits to be named
+
+
+def no_compiler() -> Compiler:
+    raise CompilerError("there is no C compiler")
+
+
+loaded = EntryPoint.load
+
+
 def test_the_environment_names_another_default(network: nv.CompiledNetwork, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(DEFAULT, "reference")
     assert network.choose_backend() == ("reference", "named by NEUROVIS_BACKEND")
@@ -87,17 +133,26 @@ def test_the_environment_names_another_default(network: nv.CompiledNetwork, monk
         network.run(3)
 
 
+@pytest.mark.parametrize(
+    ("compiler", "reason"),
+    [
+        ("false", "'false' fails: status 1"),
+        ("/nonexistent/cc -m64", "CC names '/nonexistent/cc', which is not there"),
+        ("'", 'CC is no command: "\'"'),
+    ],
+)
 @pytest.mark.usefixtures("chosen_here")
 def test_a_compiler_that_fails_is_told_of_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, network: nv.CompiledNetwork
+    compiler: str, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, network: nv.CompiledNetwork
 ) -> None:
-    """A compiler that is there and cannot compile: array code runs, and says why, in inspect, too."""
-    monkeypatch.setenv("CC", "false")
+    """A compiler that cannot compile, or that is asked for and not there: array code runs, and says why, in inspect,
+    too."""
+    monkeypatch.setenv("CC", compiler)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     (tmp_path / "spec.yaml").write_text(PARTS)
     first = invoke("run", str(tmp_path / "spec.yaml"), "--steps", "5")
     assert first.exit_code == 0, first.output
-    said = "warning: the backend 'c' is not available here: 'false' fails: status 1: NumPy computes instead"
+    said = f"warning: the backend 'c' is not available here: {reason}: NumPy computes instead"
     assert first.stderr.splitlines().count(said) == 1
     assert first.stdout.splitlines()[0].endswith("backend numpy")
     with warnings.catch_warnings():
@@ -107,8 +162,8 @@ def test_a_compiler_that_fails_is_told_of_once(
         line for line in invoke("inspect", str(tmp_path / "spec.yaml")).output.splitlines() if "backend" in line
     )
     assert "numpy" in shown
-    assert "'false' fails" in shown
-    with pytest.raises(BackendError, match="'false' fails"):
+    assert reason in shown
+    with pytest.raises(BackendError, match=re.escape(reason)):
         network.run(5, backend="c")
 
 

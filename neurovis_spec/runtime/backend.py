@@ -21,6 +21,8 @@ from neurovis_spec.runtime.state import State
 
 #: The environment variable that names the default.
 DEFAULT: Final = "NEUROVIS_BACKEND"
+#: What runs a network where no backend is to be taken by default: it is everywhere, and runs all.
+_LAST_RESORT: Final = "numpy"
 
 
 class BackendError(ValueError):
@@ -45,12 +47,12 @@ class Capabilities:
 
 @dataclass(frozen=True, slots=True)
 class Availability:
-    """Whether a backend works here; ``note`` says which way, or why not. ``by_default``: it is also taken where nobody
-    asks for it."""
+    """Whether a backend works here; ``note`` says which way, or why not. ``by_default``: it is the one to take here
+    where nobody names one; if it is not available then, a warning says so, and NumPy computes."""
 
     available: bool
     note: str = ""
-    by_default: bool = True
+    by_default: bool = False
 
 
 class Stepper(Protocol):
@@ -130,7 +132,7 @@ def available(name: str) -> Availability:
     """Whether the backend of this name works here; one that cannot even be loaded does not."""
     try:
         return load(name).availability()
-    except plugins.PluginError as error:
+    except (BackendError, plugins.PluginError) as error:
         return Availability(False, str(error))
 
 
@@ -146,10 +148,11 @@ def listing() -> tuple[str, ...]:
 
 
 def choose_backend(network: Network) -> tuple[str, str]:
-    """The name of the backend that runs this network unless another is asked for, and why: by the network and the
-    machine alone, so that a run and its parts give the same bits. The environment may name another (``DEFAULT``).
-    Raises BackendError where it names none that there is."""
-    named = os.environ.get(DEFAULT, "").strip()
+    """The name of the backend that runs this network unless another is asked for, and why: the first by name that is
+    to be taken by default here and has what the network asks for, else NumPy's; by the network and the machine alone,
+    so that a run and its parts give the same bits. The environment may name another (``DEFAULT``). Raises BackendError
+    where it names none that there is."""
+    named = _named()
     if named:
         if named not in names():
             raise BackendError(
@@ -157,16 +160,21 @@ def choose_backend(network: Network) -> tuple[str, str]:
             )
         return named, f"named by {DEFAULT}"
     size = f"{len(network.neurons)} neurons, {len(network.connections)} connections"
-    why = "needs nothing but NumPy"
-    if "c" in names():
-        found = available("c")
-        reasons = (
-            (*lacking(network, load("c").capabilities),) if found.available and found.by_default else (found.note,)
-        )
-        if not reasons:
-            return "c", f"{found.note} ({size})"
-        why = "; ".join(reasons)
-    return "numpy", f"array code made for this network ({size}); {why}"
+    passed = list[str]()
+    for name in names():
+        if name == _LAST_RESORT:
+            continue
+        found = available(name)
+        missing = lacking(network, load(name).capabilities) if found.available else ()
+        if found.by_default and not missing:
+            return name, f"{found.note} ({size})"
+        passed += missing if found.by_default else [f"{name} on request" if found.available else found.note]
+    return _LAST_RESORT, "; ".join((f"array code made for this network ({size})", *passed))
+
+
+def _named() -> str:
+    """The backend that the environment names, if it does."""
+    return os.environ.get(DEFAULT, "").strip()
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,8 +190,8 @@ class Ready:
 
 def ready(network: Network, backend: str | Backend | Ready | None = None, before: str = "") -> Ready:
     """Make a network ready to run on a backend; by default on the one that has made the steps ``before``, if there are
-    any, else on the one that is chosen. Where that is C and cannot be compiled, array code takes its place, which a
-    RuntimeWarning says once.
+    any, else on the one that is chosen. Where that cannot be had, as a compiler fails, array code takes its place,
+    which a RuntimeWarning says once.
 
     Raises BackendError where it is unknown, not available, or lacks something that the network asks for. Warns where
     another one is asked for than has made the steps before.
@@ -218,10 +226,10 @@ def _default(network: Network) -> Ready:
     try:
         return _made(network, load(name), why)
     except BackendError as error:
-        if name != "c" or os.environ.get(DEFAULT, "").strip():
+        if name == _LAST_RESORT or _named():
             raise
         _say(f"{error}: NumPy computes instead")
-        return _made(network, load("numpy"), f"array code made for this network; {error}")
+        return _made(network, load(_LAST_RESORT), f"array code made for this network; {error}")
 
 
 @cache

@@ -403,9 +403,9 @@ class CBackend:
         """Whether there is a compiler."""
         try:
             found = c_library.compiler()
-            return Availability(True, f"C made for each network, compiled by {found.name}", not found.on_request)
         except c_library.CompilerError as error:
-            return Availability(False, str(error))
+            return Availability(False, str(error), by_default=c_library.is_asked_for())
+        return Availability(True, f"C made for each network, compiled by {found.name}", not found.on_request)
 
     def prepare(self, network: Network) -> CStepper:
         """Compile a network, or take what was compiled before."""

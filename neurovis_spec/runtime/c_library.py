@@ -62,6 +62,11 @@ def compiler() -> Compiler:
     return _compiler(os.environ.get("CC", ""), os.environ.get("PATH", ""))
 
 
+def is_asked_for() -> bool:
+    """Whether the environment says which compiler to take: without it, who asked has to be told."""
+    return bool(os.environ.get("CC", "").strip())
+
+
 @cache
 def _compiler(chosen: str, path: str) -> Compiler:
     if chosen.strip():
