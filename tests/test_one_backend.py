@@ -136,7 +136,7 @@ def test_the_environment_names_another_default(network: nv.CompiledNetwork, monk
 @pytest.mark.parametrize(
     ("compiler", "reason"),
     [
-        ("false", "'false' fails: status 1"),
+        ("false", "'false' fails with status 1"),
         ("/nonexistent/cc -m64", "CC names '/nonexistent/cc', which is not there"),
         ("'", 'CC is no command: "\'"'),
     ],
@@ -152,7 +152,7 @@ def test_a_compiler_that_fails_is_told_of_once(
     (tmp_path / "spec.yaml").write_text(PARTS)
     first = invoke("run", str(tmp_path / "spec.yaml"), "--steps", "5")
     assert first.exit_code == 0, first.output
-    said = f"warning: the backend 'c' is not available here: {reason}: NumPy computes instead"
+    said = f"warning: NumPy computes, as the backend 'c' is not available here: {reason}"
     assert first.stderr.splitlines().count(said) == 1
     assert first.stdout.splitlines()[0].endswith("backend numpy")
     with warnings.catch_warnings():

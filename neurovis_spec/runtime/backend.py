@@ -228,7 +228,7 @@ def _default(network: Network) -> Ready:
     except BackendError as error:
         if name == _LAST_RESORT or _named():
             raise
-        _say(f"{error}: NumPy computes instead")
+        _say(f"NumPy computes, as {error}")
         return _made(network, load(_LAST_RESORT), f"array code made for this network; {error}")
 
 

@@ -199,8 +199,8 @@ def _compiled(text: str, into: Path, zig: Path) -> Path:
         raise CompilerError(f"'{made_by.name}' cannot be started: {error.strerror}") from None
     if done.returncode != 0 or not library.exists():
         said = done.stdout.decode(errors="replace").strip().splitlines()
-        first = next((line for line in said if "error" in line), said[0] if said else f"status {done.returncode}")
-        raise CompilerError(f"'{made_by.name}' fails: {first.strip()[:300]}")
+        first = next((line for line in said if "error" in line), said[0] if said else "").strip()[:300]
+        raise CompilerError(f"'{made_by.name}' fails " + (f"({first})" if first else f"with status {done.returncode}"))
     return library
 
 
