@@ -492,3 +492,25 @@ def test_a_rule_of_no_connections_runs(backend: str) -> None:
         "connections: {A -> A: {pattern: {random: {probability: 0.0001}}, plasticity: hebbian}}"
     )
     assert nv.compile_text(text).run(3, backend=backend)["A"].tolist() == [[1.0, 1.0]] * 3
+
+
+@pytest.mark.parametrize("suffix", ["", ".npz", ".mcap"])
+def test_what_steps_record_is_what_a_run_records(suffix: str, tmp_path: Path) -> None:
+    """Also where events of the step to come have changed something: that is not true after the last step."""
+    compiled = nv.compile_text(
+        "neurovis: 1\nname: told\nneurons: {A: {count: 3, bias: 0.1}}\nparameters: {gain: 1}\ntime: {steps: 9}\n"
+        "connections: {A1 -> A2: gain, A2 -> A3: 0.5}\n"
+        "events: [{at: 5, set: {gain: 3}}, {at: 5, lesion: A3}]\n"
+    )
+    place = tmp_path / f"stepped{suffix}" if suffix else True
+    with compiled.simulator(record=place) as simulation:
+        for _ in range(5):
+            simulation.step()
+    made, run = simulation.recording, compiled.run(5)
+    assert dict(made.set_parameters) == dict(run.set_parameters) == {}
+    for name in ("activity", "weights_after", "weights_static", "lesioned_neurons", "lesioned_connections"):
+        assert getattr(made, name).tolist() == getattr(run, name).tolist(), name
+    if suffix == "":
+        simulation.set(gain=2)  # by hand, after the events: what the next step begins with
+        assert dict(simulation.recording.set_parameters) == {"gain": 2.0}
+        assert simulation.recording.lesioned_neurons.tolist() == [2]

@@ -1,12 +1,15 @@
 """The recorder: what a simulation does, step by step, in memory or in a file that is written meanwhile.
 
-In: the State before and after each step. Out: a Recording at any time; a file when it is closed. After an exception
-there is a part in its place, as after a run that broke off; Ctrl-C and ``sys.exit`` are ordinary ends of a loop.
+In: the State before and after each step, and what was true after the last one. Out: a Recording at any time; a file
+when it is closed. After an exception there is a part in its place, as after a run that broke off; Ctrl-C and
+``sys.exit`` are ordinary ends of a loop.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 
@@ -21,8 +24,7 @@ from neurovis_spec.runtime.formats import StreamingFormat, load, settle
 from neurovis_spec.runtime.inputs import STRETCH
 from neurovis_spec.runtime.kinds import Rows
 from neurovis_spec.runtime.parts import beside
-from neurovis_spec.runtime.record import after
-from neurovis_spec.runtime.recording import Numbers, Recording, RecordingError, for_path, recording_of
+from neurovis_spec.runtime.recording import After, Numbers, Recording, RecordingError, for_path, recording_of
 from neurovis_spec.runtime.rows import RowWriter, Steps
 from neurovis_spec.runtime.state import State
 from neurovis_spec.runtime.stream import OFTEN, frame_of
@@ -32,13 +34,21 @@ _ENDLESS = 1 << 53
 
 
 class Recorder:
-    """Records from a state on, one step in ``every``; into a file at ``path``, else in memory. Raises KeyError for a
-    name that there is not, RecordingError, OSError."""
+    """Records from a state on, one step in ``every``; into a file at ``path``, else in memory. ``told`` says what was
+    true after the last step, with the weights of all connections (m,). Raises KeyError for a name that there is not,
+    RecordingError, OSError."""
 
     def __init__(
-        self, network: Network, state: State, body: Embodied | None, path: Path | None, every: int, keep: Keep
+        self,
+        network: Network,
+        state: State,
+        body: Embodied | None,
+        path: Path | None,
+        every: int,
+        keep: Keep,
+        told: Callable[[], After],
     ) -> None:
-        self._network, self._body, self._path = network, body, path
+        self._network, self._body, self._path, self._told = network, body, path, told
         self._columns, self._steps = columns_of(network, keep, body), Steps(_ENDLESS, every, state.k)
         self._changing = subscript(self._columns.weights)
         self._last, self._row, self._closed = state, -1, False
@@ -94,7 +104,7 @@ class Recorder:
         """Give the rows to the file, or put them to those before."""
         rows = self._room.part(slice(self._filled))
         if self._writer is not None:
-            self._writer.write(rows, after(self._network, self._last))
+            self._writer.write(rows, self._after(self._told()))
             self._due = monotonic() + OFTEN
         elif self._filled:
             self._before.append(rows)
@@ -118,10 +128,12 @@ class Recorder:
         rows = Rows(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
         count = len(rows.activity)
         step = np.array([self._steps.at(row) for row in range(count)], dtype=np.int64)
-        state = self._last
-        numbers = Numbers(step, rows)
-        told = after(self._network, state)
-        return recording_of(self._network, self._columns, numbers, state.weights, told, state.backend)
+        told, backend = self._told(), self._last.backend
+        return recording_of(self._network, self._columns, Numbers(step, rows), told.weights, self._after(told), backend)
+
+    def _after(self, told: After) -> After:
+        """With the weights of those connections alone that can change."""
+        return replace(told, weights=told.weights[self._network.changing])
 
     def close(self, error: BaseException | None = None) -> None:
         """End the recording, as that of a run that broke off where there is an ``error``, an Exception. Raises what

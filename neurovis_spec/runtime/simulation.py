@@ -101,7 +101,9 @@ class Simulation:
             raise RecordingError("this simulation is recorded already")
         place = None if path is None else arguments.path("path", path)
         step = arguments.integer("every", every, 1, arguments.MOST_STEPS)
-        self._recorder = Recorder(self.network, self._state, self._body, place, step, keep)
+        self._recorder = Recorder(
+            self.network, self._state, self._body, place, step, keep, lambda: self._ended or self.after()
+        )
 
     @property
     def recording(self) -> Recording:
@@ -264,11 +266,11 @@ class Simulation:
         with np.errstate(all="ignore"):
             self._stepper.step(state, vector)
             self._watch.look(state)
+        self._ended = self.after() if self._controls.due(state) else None
         if recorder is not None:
             recorder.end(state)
         if body is not None:
             body.move(state)
-        self._ended = self.after() if self._controls.due(state) else None
         if self._apply(state):  # events of the next step apply now, so that ``weights`` are those of the next step
             self._reader.use(state)
         return self.outputs
@@ -276,7 +278,8 @@ class Simulation:
     @property
     def ended(self) -> After | None:
         """What was true after the last step, where events of the step to come have changed something since; None where
-        ``after`` is that. Its weights are those of all connections (m,)."""
+        ``after`` is that, as it is once the caller has changed something, too. Its weights are those of all connections
+        (m,)."""
         return self._ended
 
     def after(self) -> After:
@@ -306,6 +309,7 @@ class Simulation:
                 self._controls.set(state.conditions, state.weights, checked)
         except PatchError as error:
             raise ParameterError(str(error)) from None
+        self._ended = None
         self._reader.use(state)
 
     def _checked(self, values: Mapping[str, object]) -> dict[int, float]:
@@ -346,6 +350,7 @@ class Simulation:
         """Remove neurons (``K3``) or connections (``K -> O``) from step k on. Raises KeyError."""
         for part in parts:
             self._parts(part)
+        self._ended = None
         for part in parts:
             self._controls.lesion(self._state, *self._parts(part))
 
@@ -354,6 +359,7 @@ class Simulation:
         lost, but where no step was made without them. Raises KeyError."""
         for part in parts:
             self._parts(part)
+        self._ended = None
         for part in parts:
             self._controls.mend(self._state, *self._parts(part))
 
