@@ -14,7 +14,10 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as TwoWriter
 from rosbags.typesys import Stores, get_typestore
 
+import neurovis_spec as nv
 from neurovis_spec.ros.bags import read_bag
+from neurovis_spec.ros.files import Files, Rotation
+from neurovis_spec.ros.logs import Stored, Topic
 from neurovis_spec.runtime.recording import RecordingError
 from neurovis_spec.runtime.wire import ArrayForm, text_message
 
@@ -136,6 +139,56 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     for name in ("x.bag", "empty", "x.db3", "view.db3", "missing"):
         with pytest.raises(RecordingError, match=name):
             read_bag(tmp_path / name)
+
+
+def written(path: Path, texts: list[str]) -> None:
+    with path.open("wb") as file:
+        writer = McapWriter(file)
+        writer.start("ros2")
+        schema = writer.register_schema(STRING, "ros2msg", b"string data\n")
+        channel = writer.register_channel("/s", "cdr", schema)
+        for number, text in enumerate(texts):
+            writer.add_message(channel, START + number, text_message(text, "cdr"), START + number, number)
+        writer.finish()  # type: ignore[no-untyped-call]
+
+
+def texts(path: Path) -> list[bytes]:
+    return [message.data for message in read_bag(path).messages()]
+
+
+def test_a_folder_without_metadata_is_a_recording_where_its_files_follow_each_other(tmp_path: Path) -> None:
+    """As ros2 bag numbers them; where the recorder was killed, nothing says what there is."""
+    expected = [text_message(name, "cdr") for name in "abc"]
+    for number, name in ((9, "a"), (10, "b"), (11, "c")):
+        written(tmp_path / f"x_{number}.mcap", [name])
+    assert texts(tmp_path) == expected
+    written(tmp_path / "another.mcap", ["d"])
+    with pytest.raises(RecordingError, match="its 4 files are not one recording: name one of them"):
+        read_bag(tmp_path)
+    (tmp_path / "metadata.yaml").write_text("rosbag2_bagfile_information: {relative_file_paths: [x_9.mcap]}")
+    assert texts(tmp_path) == expected  # and those that go on behind what is named
+
+
+def test_files_of_ours_follow_each_other_where_they_say_so(tmp_path: Path) -> None:
+    """Whatever they are called, and runs of a network that lie side by side do not."""
+    for place, recording in (("one", "x"), ("two", "y"), ("both", "x"), ("both", "y")):
+        (tmp_path / place).mkdir(exist_ok=True)
+        made = Files(tmp_path / place / f"{recording}.mcap", 2, {"network": "x"}, rotation=Rotation(size=1))
+        topic = Topic("/s", "std_msgs/String", "cdr", "string data\n")
+        for number, text in enumerate("abc"):
+            made.write([Stored(topic, number, START + number, START + number, text_message(text, "cdr"))])
+        made.close()
+    for place in ("one", "two"):
+        assert len(list((tmp_path / place).iterdir())) == 3
+        assert texts(tmp_path / place) == [text_message(name, "cdr") for name in "abc"]
+    with pytest.raises(RecordingError, match="its 6 files are not one recording"):
+        read_bag(tmp_path / "both")
+    compiled = nv.compile_text("neurovis: 1\nname: x\nneurons: {A: {count: 2}}\ntime: {steps: 5}\n")
+    (tmp_path / "runs").mkdir()
+    for number in range(2):
+        compiled.run(5).save(tmp_path / "runs" / f"run_{number}.mcap")
+    with pytest.raises(RecordingError, match=r"its 2 files are not one recording: .*\(run_0.mcap, run_1.mcap\)"):
+        nv.load(tmp_path / "runs")
 
 
 def test_metadata_that_leads_elsewhere_is_not_followed(tmp_path: Path) -> None:

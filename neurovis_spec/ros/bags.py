@@ -36,6 +36,7 @@ _SQLITE: Final = b"SQLite format 3\0"
 _LARGEST: Final = 1 << 30
 _ENCODINGS: Final[Mapping[str, tuple[Ros, Encoding]]] = {"ros1": (1, "ros1"), "cdr": (2, "cdr")}
 _METADATA_SIZE: Final = 8 << 20
+_NUMBERED: Final = re.compile(r"(.*_)([0-9]{1,9})(\.\w+)", re.DOTALL)
 
 
 class Part(Protocol):
@@ -103,18 +104,41 @@ def _files(path: Path) -> Iterator[Part]:
 
 
 def _folder(path: Path) -> Iterator[Part]:
-    """The files that ``metadata.yaml`` names, and those that go on behind them; without one, all that there are."""
+    """The files that ``metadata.yaml`` names, and those that go on behind them; without one, all that there are. Raises
+    RecordingError where these are several recordings."""
     known = sorted(
         (one for one in path.iterdir() if one.suffix in (".mcap", ".db3")),
         key=lambda one: [int(text) if text.isdigit() else text for text in re.split(r"(\d+)", one.name)],
     )
-    named = _named(path / METADATA)
-    paths = [path / name for name in named]
-    paths += [one for one in known if one not in paths and (not paths or one.suffix == paths[-1].suffix)]
-    if not paths:
+    parts = [_part(path / name) for name in _named(path / METADATA)]
+    is_named, paths = bool(parts), [part.path for part in parts]
+    others = sorted((_part(one) for one in known if one not in paths), key=_place)
+    if not parts and not others:
         raise RecordingError(f"{path}: a folder without a recording of ros2 bag")
-    for one in paths:
-        yield _part(one)
+    for part in others:
+        if not parts or _goes_on(parts[-1], part):
+            parts.append(part)
+        elif not is_named:
+            names = ", ".join(one.path.name for one in others[:4]) + (", …" if len(others) > 4 else "")
+            raise RecordingError(f"{path}: its {len(others)} files are not one recording: name one of them ({names})")
+    yield from parts
+
+
+def _place(part: Part) -> int:
+    """The number of a file in its recording, where it says so."""
+    number = part.about.get("part", "")
+    return int(number) if re.fullmatch(r"[0-9]{1,9}", number) else 0
+
+
+def _goes_on(before: Part, part: Part) -> bool:
+    """Whether a file is of the recording of another: it says so, or has the next number, as ``ros2 bag`` has it."""
+    if before.about or part.about:
+        return "recording" in part.about and before.about.get("recording") == part.about["recording"]
+    numbered = _NUMBERED.fullmatch(before.path.name)
+    if numbered is None:
+        return False
+    stem, number, suffix = numbered.groups()
+    return part.path.name == f"{stem}{int(number) + 1}{suffix}"
 
 
 def _named(path: Path) -> list[str]:
