@@ -23,6 +23,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.runtime import c_export
 from neurovis_spec.runtime.c_export import Exported
+from neurovis_spec.runtime.c_library import FLAGS
 from neurovis_spec.runtime.c_package import files, size_of_state
 from neurovis_spec.runtime.c_settable import ExportError
 from neurovis_spec.runtime.record import record
@@ -209,6 +210,19 @@ def test_the_command_writes_a_folder_and_leaves_what_is_not_its_own(tmp_path: Pa
     assert done.exit_code == 1
     assert "would be lost" in done.output
     assert (folder / "README.md").read_text() == "mine"
+
+
+def test_the_readme_compiles_as_cmake_does(tmp_path: Path) -> None:
+    """Both promise the bits of the backend c."""
+    made = files(nv.compile_text(EVENTS).network)
+    options = next(line for line in made["CMakeLists.txt"].splitlines() if "target_compile_options" in line)
+    options = options.partition("PRIVATE ")[2].removesuffix(")")
+    assert options.split() == [flag for flag in FLAGS if flag in options.split()]
+    name = next(name for name in made if name.endswith(".c") and name != "main.c")
+    assert f"    cc -std=c99 {options} -c {name}\n" in made["README.md"]
+    (tmp_path / name).write_text(made[name])
+    (tmp_path / name.replace(".c", ".h")).write_text(made[name.replace(".c", ".h")])
+    subprocess.run(["cc", "-std=c99", *options.split(), "-c", name], cwd=tmp_path, check=True)
 
 
 def test_the_size_in_the_readme_is_that_of_the_struct(tmp_path: Path) -> None:

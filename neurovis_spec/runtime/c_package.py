@@ -19,6 +19,9 @@ from neurovis_spec.runtime.c_settable import ExportError
 from neurovis_spec.runtime.files import replacing
 from neurovis_spec.runtime.state import State
 
+#: What gcc and clang are told, so that the bits are those of the backend c: no operation is joined to another, and no
+#: function worked out by the compiler.
+_EXACT = " ".join(("-O2", "-ffp-contract=off", *(f"-fno-builtin-{function}" for function in INEXACT)))
 #: the words in a file by which we know that we wrote it
 _MARK = "by neurovis export"
 
@@ -191,11 +194,12 @@ The state takes {size_of_state(made)} bytes where a pointer has 8. A step takes
 
 ## Building
 
-    cc -std=c99 -O2 -ffp-contract=off -c {name}.c
+    cc -std=c99 {_EXACT} -c {name}.c
     cmake -B build && cmake --build build && build/{name}_example
 
-`-ffp-contract=off` keeps a compiler from joining a product and a sum, which rounds otherwise than the reference does;
-so the numbers are those of `neurovis run --backend c`, bit for bit where the C library is the same.
+`-ffp-contract=off` keeps a compiler from joining a product and a sum, which rounds otherwise than the reference does,
+and `-fno-builtin-exp` and its like from working out functions itself; so the numbers are those of
+`neurovis run --backend c`, bit for bit where the C library is the same.
 """
 
 
@@ -228,7 +232,6 @@ def _example(made: Exported) -> str:
 
 def _cmake(made: Exported) -> str:
     name = made.name
-    kept = " ".join(f"-fno-builtin-{function}" for function in INEXACT)
     return f"""# made by neurovis export
 cmake_minimum_required(VERSION 3.10)
 project({name} C)
@@ -238,7 +241,7 @@ target_include_directories({name} INTERFACE "${{CMAKE_CURRENT_SOURCE_DIR}}")
 set_target_properties({name} PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON)
 if(CMAKE_C_COMPILER_ID MATCHES "GNU|Clang")
   # the same bits as the reference: no operation is joined to another, and no function worked out by the compiler
-  target_compile_options({name} PRIVATE -O2 -ffp-contract=off {kept})
+  target_compile_options({name} PRIVATE {_EXACT})
 endif()
 if(UNIX)
   target_link_libraries({name} PUBLIC m)
