@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 import subprocess
 import tempfile
@@ -223,6 +224,17 @@ def test_the_readme_compiles_as_cmake_does(tmp_path: Path) -> None:
     (tmp_path / name).write_text(made[name])
     (tmp_path / name.replace(".c", ".h")).write_text(made[name.replace(".c", ".h")])
     subprocess.run(["cc", "-std=c99", *options.split(), "-c", name], cwd=tmp_path, check=True)
+
+
+def test_what_is_no_folder_is_told(tmp_path: Path) -> None:
+    spec = str(next(path for path in SPECS if path.stem == "mlp"))
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "file").write_text("mine")
+    result = CliRunner().invoke(neurovis, ["export", spec, "--to", "c", "-o", str(tmp_path / "pipe")])
+    assert result.exit_code == 1, result.output
+    assert f"{tmp_path / 'pipe'} is not a folder: name one" in result.stderr
+    with pytest.raises(ExportError, match="file is not a folder: name one"):
+        nv.compile(spec).export(tmp_path / "file")
 
 
 def test_the_size_in_the_readme_is_that_of_the_struct(tmp_path: Path) -> None:

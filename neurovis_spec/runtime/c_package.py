@@ -65,6 +65,8 @@ def write(
     """Write the files, by their paths in the folder; those that begin with ``#!`` can be executed. Of the files that
     are there the ``users`` stay, as a user may have changed them, and those with our ``mark`` are replaced. Gives what
     was written, and what was there and stays. Raises ExportError for a file of somebody else's in the way, OSError."""
+    if folder.exists() and not folder.is_dir():
+        raise ExportError(f"{folder} is not a folder: name one; it is made if it is not there")
     written, kept = dict[Path, str](), []
     for name, text in texts.items():
         path = folder / name
