@@ -133,6 +133,26 @@ def test_the_environment_names_another_default(network: nv.CompiledNetwork, monk
         network.run(3)
 
 
+def test_auto_means_the_choice(tmp_path: Path, network: nv.CompiledNetwork, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where nothing is named: what goes on goes on with its backend, and the environment may name a default."""
+    (tmp_path / "spec.yaml").write_text(PARTS)
+    assert network.run(3, backend="auto").backend == network.simulator("auto").backend == "numpy"
+    before = network.run(3, backend="reference")
+    assert network.run(3, backend="auto", start=before).backend == "reference"
+    done = invoke("run", str(tmp_path / "spec.yaml"), "--steps", "3", "--backend", "auto")
+    assert done.stdout.splitlines()[0].endswith("backend numpy"), done.output
+    neuron, seed = network.network.neurons.names[0], network.network.seed
+    table = nv.sweep(tmp_path / "spec.yaml", {"seed": [seed]}, {"last": f"{neuron} * 1"}, steps=3, backend="auto")
+    assert table["last"][0] == network.run(3)[neuron][-1]
+    monkeypatch.setenv(DEFAULT, "auto")
+    assert network.choose_backend() == chosen_without(network, monkeypatch)
+
+
+def chosen_without(network: nv.CompiledNetwork, monkeypatch: pytest.MonkeyPatch) -> tuple[str, str]:
+    monkeypatch.delenv(DEFAULT)
+    return network.choose_backend()
+
+
 @pytest.mark.parametrize(
     ("compiler", "reason"),
     [

@@ -147,7 +147,7 @@ def listed(
 
 
 def _backends() -> Iterable[str]:
-    return plugins.names(plugins.BACKENDS)
+    return ("auto", *plugins.names(plugins.BACKENDS))
 
 
 def _lines_of_backends() -> Iterable[str]:
@@ -248,8 +248,8 @@ backend_option = listed(
     _lines_of_backends,
     "--backend",
     metavar="B",
-    text="What computes; default: what made the steps that it goes on from, else C where a compiler is, else numpy "
-    "(NEUROVIS_BACKEND names another). 'list' shows which there are.",
+    text="What computes; default (auto): what made the steps that it goes on from, else C where a compiler is, else "
+    "numpy (NEUROVIS_BACKEND names another). 'list' shows which there are.",
 )
 engine_option = click.option(
     "--engine",

@@ -21,6 +21,8 @@ from neurovis_spec.runtime.state import State
 
 #: The environment variable that names the default.
 DEFAULT: Final = "NEUROVIS_BACKEND"
+#: What names none, so that one is chosen, as where nothing is said.
+AUTO: Final = "auto"
 #: What runs a network where no backend is to be taken by default: it is everywhere, and runs all.
 _LAST_RESORT: Final = "numpy"
 
@@ -174,7 +176,8 @@ def choose_backend(network: Network) -> tuple[str, str]:
 
 def _named() -> str:
     """The backend that the environment names, if it does."""
-    return os.environ.get(DEFAULT, "").strip()
+    name = os.environ.get(DEFAULT, "").strip()
+    return "" if name == AUTO else name
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,16 +192,16 @@ class Ready:
 
 
 def ready(network: Network, backend: str | Backend | Ready | None = None, before: str = "") -> Ready:
-    """Make a network ready to run on a backend; by default on the one that has made the steps ``before``, if there are
-    any, else on the one that is chosen. Where that cannot be had, as a compiler fails, array code takes its place,
-    which a RuntimeWarning says once.
+    """Make a network ready to run on a backend; without one, or for ``auto``, on that which has made the steps
+    ``before``, if there are any, else on the one that is chosen. Where that cannot be had, as a compiler fails, array
+    code takes its place, which a RuntimeWarning says once.
 
     Raises BackendError where it is unknown, not available, or lacks something that the network asks for. Warns where
     another one is asked for than has made the steps before.
     """
     if isinstance(backend, Ready):
         return backend
-    if backend is None:
+    if backend is None or backend == AUTO:
         return _going_on(network, before) if before else _default(network)
     made = _made(network, load(backend) if isinstance(backend, str) else backend)
     if before not in ("", made.name):

@@ -25,7 +25,7 @@ from neurovis_spec.language.yaml.reader import LARGEST
 from neurovis_spec.plain import text_of
 from neurovis_spec.progress import Progress
 from neurovis_spec.real_paths import real_path
-from neurovis_spec.runtime.backend import BackendError, available, ready
+from neurovis_spec.runtime.backend import AUTO, BackendError, available, ready
 from neurovis_spec.runtime.backend import load as load_backend
 from neurovis_spec.runtime.embodied import embodied
 from neurovis_spec.runtime.inputs import check_names
@@ -150,7 +150,7 @@ def planned(
         {name: arguments.number(name, value) for name, value in arguments.mapping("parameters", parameters).items()},
         steps,
         {},
-        backend,
+        None if backend == AUTO else backend,
         None if root is None else str(real_path(root)),
         limit,
         body if isinstance(body, bool) else real_path(body),
