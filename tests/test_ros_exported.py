@@ -265,8 +265,8 @@ def test_inputs_become_outputs_of_a_node_in_cpp_and_its_end_is_safe(one: World, 
     assert "/target: 50 received" in run.out
     told = [line for line in run.err if "there is no" in line]
     assert len(told) == 2, "each once"
-    for name, came in (("knee", "'hip', 'ankle\\x1b[2J'"), ("hip", "none")):
-        missing = f"the input 'torque': there is no '{name}' in a message on /neurovis/joints; its names are {came}"
+    for missed, listed in (("knee", "'hip', 'ankle\\x1b[2J'"), ("hip", "none")):
+        missing = f"the input 'torque': there is no '{missed}' in a message on /neurovis/joints; its names are {listed}"
         assert any("WARN" in line and missing in line for line in told), told
 
 
