@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from neurovis_spec import arguments, pipeline
 from neurovis_spec.compiler.compile import Request
+from neurovis_spec.compiler.limits import plural
 from neurovis_spec.diagnostics import Diagnostic, Findings
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.pictures import Drawable, check, svg
@@ -80,7 +81,8 @@ class CompiledNetwork(Drawable):
     def __repr__(self) -> str:
         network = self.network
         return (
-            f"<network {network.name}: {len(network.neurons)} neurons, {len(network.connections)} connections, "
+            f"<network {network.name}: {plural(len(network.neurons), 'neuron')}, "
+            f"{plural(len(network.connections), 'connection')}, "
             f"{int((network.connections.rules >= 0).sum())} plastic>"
         )
 

@@ -133,6 +133,16 @@ def test_the_environment_names_another_default(network: nv.CompiledNetwork, monk
         network.run(3)
 
 
+@pytest.mark.usefixtures("chosen_here")
+def test_one_neuron_is_one_neuron(tmp_path: Path) -> None:
+    one = nv.compile_text("neurovis: 1\nname: x\nneurons: {A: {count: 1}}\nconnections: {A -> A: 0.5}\n")
+    assert "(1 neuron, 1 connection)" in one.choose_backend()[1]
+    one.export(tmp_path)
+    said = [repr(one), repr(one.run(1)), *(file.read_text() for file in tmp_path.iterdir())]
+    for text in said:
+        assert not re.search(r"\b1 (neurons|connections|steps)\b", text)
+
+
 def test_auto_means_the_choice(tmp_path: Path, network: nv.CompiledNetwork, monkeypatch: pytest.MonkeyPatch) -> None:
     """As where nothing is named: what goes on goes on with its backend, and the environment may name a default."""
     (tmp_path / "spec.yaml").write_text(PARTS)

@@ -16,6 +16,7 @@ from neurovis_spec.cli.options import examples
 from neurovis_spec.cli.ros_options import Meeting, meeting_options, tell
 from neurovis_spec.cli.ros_shown import Desk, shown_options
 from neurovis_spec.cli.targets import check_target
+from neurovis_spec.compiler.limits import plural
 from neurovis_spec.interrupts import heeded
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def command(output: str | None, namespace: str, network: str, desk: Desk, meetin
         def shown() -> Listening:
             opened = stack.enter_context(desk.open(listener.compiled(), node))
             listener.to(opened)
-            tell(f"{len(listener.legacy.names)} neurons, {len(listener.legacy.edges)} connections")
+            tell(f"{plural(len(listener.legacy.names), 'neuron')}, {plural(len(listener.legacy.edges), 'connection')}")
             return opened
 
         listener.look()

@@ -14,6 +14,7 @@ from typing import Final, Protocol, runtime_checkable
 
 from neurovis_spec import plugins
 from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.expressions.functions import NUMPY, Library
@@ -161,7 +162,7 @@ def choose_backend(network: Network) -> tuple[str, str]:
                 f"{DEFAULT} names '{named}', which is no backend; {suggest(named, names(), 'there are')}"
             )
         return named, f"named by {DEFAULT}"
-    size = f"{len(network.neurons)} neurons, {len(network.connections)} connections"
+    size = f"{plural(len(network.neurons), 'neuron')}, {plural(len(network.connections), 'connection')}"
     passed = list[str]()
     for name in names():
         if name == _LAST_RESORT:

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.changes import Change, Clamp
+from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Input, Network, Noise
 from neurovis_spec.compiler.run_checks import without_checks
 from neurovis_spec.compiler.values.draws import Stream
@@ -154,7 +155,8 @@ class Exported:
             "/*",
             f" * {words(network.title or network.name)}",
             " *",
-            f" * A network of {n} neurons and {m} connections, made by neurovis export. C99 and C++17; needs libm.",
+            f" * A network of {plural(n, 'neuron')} and {plural(m, 'connection')}, made by neurovis export."
+            " C99 and C++17; needs libm.",
             " */",
             f"#ifndef {macro}_H",
             f"#define {macro}_H",

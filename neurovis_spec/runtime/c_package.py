@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Collection, Iterable
 from pathlib import Path
 
+from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.expressions.emit_c import INEXACT
 from neurovis_spec.language.expressions.tree import Call, Tree, walk
@@ -131,7 +132,7 @@ def _cost(made: Exported) -> str:
     functions += _calls(entry.expression for entry in network.inputs)
     drawn = sum(len(noise.members) for noise in network.noises)
     lines = [
-        f"- {len(network.connections)} connections: a multiplication and an addition each",
+        f"- {plural(len(network.connections), 'connection')}: a multiplication and an addition each",
         f"- {functions} calls of functions such as exp and tanh",
     ]
     if learning:
@@ -143,7 +144,7 @@ def _cost(made: Exported) -> str:
 
 def _readme(made: Exported) -> str:
     name, network = made.name, made.network
-    neurons, connections = len(network.neurons), len(network.connections)
+    neurons, connections = plural(len(network.neurons), "neuron"), plural(len(network.connections), "connection")
     sets = "\n".join(
         f"- `{name}_set_{own}`: {words(parameter)}"
         for parameter, own in zip(made.settable, made.settable_names, strict=True)
@@ -159,7 +160,7 @@ def _readme(made: Exported) -> str:
     )
     return f"""# {words(network.title or network.name)}
 
-Made by neurovis export: a network of {neurons} neurons and {connections} connections as C99 (or C++17). It needs libm
+Made by neurovis export: a network of {neurons} and {connections} as C99 (or C++17). It needs libm
 and nothing else: no heap, no files, no variables that change but the struct that you hand over.
 
 ```c

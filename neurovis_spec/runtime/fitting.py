@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.columns import Columns, Keep, Probe, columns_of
 from neurovis_spec.runtime.recording import After, Numbers, Recording, RecordingError, recording_of
@@ -24,7 +25,7 @@ def fitted(recording: Recording, network: Network) -> Recording:
         return recording
     table = of_table(recording, network)
     if table is None:
-        whose = f"{recording.network or 'unnamed'}, {len(recording.neurons)} neurons"
+        whose = f"{recording.network or 'unnamed'}, {plural(len(recording.neurons), 'neuron')}"
         raise RecordingError(f"the recording is of another network ({whose})")
     return table
 

@@ -19,6 +19,7 @@ import numpy.typing as npt
 from neurovis_spec import arguments, plugins
 from neurovis_spec.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.body import Skeleton
+from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import listed
 from neurovis_spec.runtime.kinds import Rows, Widths
@@ -160,8 +161,8 @@ class Recording:
         more = f", {widths.states} states" if widths.states else ""
         more += f", {widths.sensors} sensors" if widths.sensors else ""
         return (
-            f"<recording of {self.network or 'a network'}: {len(self)} steps of {widths.activity} neurons, "
-            f"{widths.weights} changing weights{more}>"
+            f"<recording of {self.network or 'a network'}: {plural(len(self), 'step')} of "
+            f"{plural(widths.activity, 'neuron')}, {widths.weights} changing weights{more}>"
         )
 
     def __len__(self) -> int:
