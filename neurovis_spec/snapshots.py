@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from neurovis_spec.callers import callers_level
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.fitting import fitted
 from neurovis_spec.runtime.inputs import InputError
@@ -72,7 +73,7 @@ def snapshots_from(network: Network, start: int, steps: int | None, recording: R
     rows = recording.step[recording.step >= start]
     if steps is not None and len(rows) < steps:
         frames = f"{len(rows):,} frame{'' if len(rows) == 1 else 's'} instead of {steps:,}"
-        warnings.warn(f"the recording holds no more than {frames} from step {start} on", stacklevel=2)
+        warnings.warn(f"the recording holds no more than {frames} from step {start} on", stacklevel=callers_level())
     return Snapshots(network, recording, tuple(rows[:count:every].tolist()))
 
 

@@ -242,6 +242,22 @@ def test_another_backend_is_taken_where_it_is_asked_for_and_said(tmp_path: Path,
         assert network.simulator("numpy", start=before).backend == "numpy"
 
 
+def test_a_warning_points_at_the_caller_s_line(network: nv.CompiledNetwork, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not at one of ours, however deep in the package it is said."""
+    before = network.run(5, backend="reference")
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        network.run(5, backend="numpy", start=before)
+        network.simulator("numpy", start=before)
+        monkeypatch.setenv("CC", "/nonexistent/cc")
+        monkeypatch.delenv(DEFAULT)
+        backends._say.cache_clear()
+        network.run(5)
+    backends._say.cache_clear()
+    assert len(told) == 3
+    assert [one.filename for one in told] == [__file__] * 3
+
+
 @pytest.mark.parametrize("option", ["--from", "--checkpoint"])
 def test_where_the_backend_of_before_is_not_there_nothing_runs(option: str, tmp_path: Path) -> None:
     """Status 1 and why, and a way out."""

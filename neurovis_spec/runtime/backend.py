@@ -14,6 +14,7 @@ from typing import Final, Protocol, runtime_checkable
 
 from neurovis_spec import plugins
 from neurovis_spec.arrays import FloatArray
+from neurovis_spec.callers import callers_level
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
@@ -207,7 +208,7 @@ def ready(network: Network, backend: str | Backend | Ready | None = None, before
     made = _made(network, load(backend) if isinstance(backend, str) else backend)
     if before not in ("", made.name):
         other = f"the backend '{before}' made the steps before, and '{made.name}' makes those to come"
-        warnings.warn(f"{other}: their last bits may differ", stacklevel=2)
+        warnings.warn(f"{other}: their last bits may differ", stacklevel=callers_level())
     return made
 
 
@@ -239,7 +240,7 @@ def _default(network: Network) -> Ready:
 @cache
 def _say(message: str) -> None:
     """Warn once in a process."""
-    warnings.warn(message, RuntimeWarning, stacklevel=4)
+    warnings.warn(message, RuntimeWarning, stacklevel=callers_level())
 
 
 def _made(network: Network, chosen: Backend, why: str = "") -> Ready:

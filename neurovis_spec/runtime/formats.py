@@ -14,6 +14,7 @@ from io import FileIO
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
+from neurovis_spec.callers import callers_level
 from neurovis_spec.real_paths import real_path
 from neurovis_spec.runtime.csv_file import csv_size, finish_csv, held_csv, read_csv, recover_csv, stream_csv, write_csv
 from neurovis_spec.runtime.mcap_file import (
@@ -185,4 +186,4 @@ def settle(path: Path, format_: StreamingFormat) -> None:
 
 
 def _warn(message: str) -> None:
-    warnings.warn(message, stacklevel=3)
+    warnings.warn(message, stacklevel=callers_level())

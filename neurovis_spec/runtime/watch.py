@@ -14,6 +14,7 @@ from math import isfinite
 import numpy as np
 
 from neurovis_spec.arrays import BoolArray, FloatArray
+from neurovis_spec.callers import callers_level
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Check
 from neurovis_spec.runtime.state import State
@@ -68,7 +69,7 @@ class Watch:
         message = next(self._found(state), None)
         if message is not None:
             self.warned = True
-            warnings.warn(f"{message}, in '{self._network.name}'", RuntimeWarning, stacklevel=2)
+            warnings.warn(f"{message}, in '{self._network.name}'", RuntimeWarning, stacklevel=callers_level())
 
     def _found(self, state: State) -> Iterator[str]:
         """What is not finite: what shows it best comes first."""
