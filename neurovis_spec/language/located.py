@@ -20,7 +20,7 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from neurovis_spec.diagnostics import Findings, Span, did_you_mean, meant, nearest, shorten, suggest
 from neurovis_spec.language import grammar
-from neurovis_spec.language.expressions.habits import ungrouped_hint
+from neurovis_spec.language.expressions.habits import ungrouped_hint, unit_hint, unit_of
 from neurovis_spec.language.expressions.lexer import decimal_hint
 from neurovis_spec.language.grammar import FORMULA, REFERENCE, TEXT, TEXTS, Either, ListOf, Plain, Shape
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
@@ -195,12 +195,23 @@ def formula_of(node: Node, findings: Findings, hint: str | None = None) -> Formu
     return UNKNOWN
 
 
+def _refuse_unit(formula: Formula, info: ValidationInfo) -> None:
+    """Refuse a number with a unit, where the key says whether a time is wanted, and in what."""
+    unit = unit_of(formula.value) if isinstance(formula.value, str) else None
+    hint = None if unit is None or info.field_name is None else unit_hint(*unit, info.field_name.rstrip("_"))
+    if hint is not None:
+        message = f"'{shorten(str(formula.value).strip())}' is no number: it has a unit"
+        findings_of(info).error("malformed-number", formula.node.span, message, hint)
+        give_up()
+
+
 def as_formula(node: Node, info: ValidationInfo) -> Formula:
     """A finite number, or the text of an expression."""
     rows = info.field_name == "weight" and isinstance(node, AnyList)
     formula = formula_of(node, findings_of(info), "rows of weights stand under 'matrix'" if rows else None)
     if formula is UNKNOWN:
         give_up()
+    _refuse_unit(formula, info)
     return formula
 
 

@@ -5,6 +5,7 @@ In: what stands where a number is wanted. Out: a help line with the number worke
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from typing import Final
@@ -15,15 +16,22 @@ _GROUPED: Final = re.compile(r"([+-]?)([1-9][0-9]{0,2}(?:([,_' .\u00a0\u202f’]
 #: Seconds.
 _TIMES: Final[Mapping[str, float]] = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), 1.0),
-    **dict.fromkeys(("ms", "msec"), 1e-3),
-    **dict.fromkeys(("us", "usec", "µs", "μs"), 1e-6),
-    "min": 60.0,
+    **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds"), 1e-3),
+    **dict.fromkeys(("us", "usec", "µs", "μs", "microsecond", "microseconds"), 1e-6),
+    **dict.fromkeys(("min", "minute", "minutes"), 60.0),
+    **dict.fromkeys(("hour", "hours"), 3600.0),
 }
 _DEGREES: Final = frozenset({"deg", "degree", "degrees", "°"})
 _PLAIN: Final = frozenset({
     "V", "mV", "uV", "µV", "nA", "pA", "uA", "µA", "mA", "nS", "pS", "uS", "µS", "mS", "Hz", "kHz", "pF", "nF", "uF",
     "µF", "MOhm", "kOhm", "Ohm", "ohm", "Ω", "mm", "um", "µm", "cm", "rad",
 })  # fmt: skip
+#: A number and what may be its unit.
+_WITH_UNIT: Final = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*([^\W\d]\w*|[°%])\s*")
+#: Keys that are times in seconds, in steps, and those that are no times.
+_IN_SECONDS: Final = frozenset({"dt"})
+_IN_STEPS: Final = frozenset({"steps", "delay", "at", "from", "to"})
+_NO_TIMES: Final = frozenset({"bias", "initial", "weight"})
 #: Units that are no likely names.
 UNITS: Final = frozenset({*_TIMES, *_DEGREES, *_PLAIN})
 
@@ -56,19 +64,39 @@ def ungrouped_hint(text: str) -> str | None:
     )
 
 
-def unit_hint(number: str, unit: str) -> str | None:
-    """The help line for a number with a unit behind it.
+def unit_of(text: str) -> tuple[str, str] | None:
+    """A number and what may be its unit, of which a text consists.
+
+    >>> unit_of("0.1 ms"), unit_of("0.1*ms")
+    (('0.1', 'ms'), None)
+    """
+    match = _WITH_UNIT.fullmatch(text)
+    return None if match is None else (match[1], match[2])
+
+
+def unit_hint(number: str, unit: str, key: str | None = None) -> str | None:
+    """The help line for a number with a unit behind it; ``key`` is the key that it is the value of.
 
     >>> unit_hint("0.1", "ms")
     'numbers have no units: write 0.0001 where seconds are wanted, 0.0001/dt where steps are'
     >>> unit_hint("-65", "mV"), unit_hint("2", "feet")
     ('numbers have no units: write -65', None)
+    >>> unit_hint("0.1", "ms", "dt"), unit_hint("5", "ms", "delay"), unit_hint("20", "ms", "bias")
+    ("'dt' is in seconds: write 0.0001", "'delay' counts steps: write 0.005/dt", 'numbers have no units: write 20')
     """
+    if unit in UNITS and math.isinf(float(number)):
+        return "numbers have no units, and end near 1.8e308"
     if unit in _TIMES:
         seconds = f"{float(number) * _TIMES[unit]:.12g}"
+        if key in _IN_SECONDS:
+            return f"'{key}' is in seconds: write {seconds}"
+        if key in _IN_STEPS:
+            return f"'{key}' counts steps: write {seconds}/dt"
+        if key in _NO_TIMES:
+            return f"numbers have no units: write {number}"
         return f"numbers have no units: write {seconds} where seconds are wanted, {seconds}/dt where steps are"
     if unit in _DEGREES:
         return f"angles are in radians: write {number}*pi/180"
-    if unit == "%":
+    if unit == "%" and math.isfinite(float(number)):
         return f"write {float(number) / 100:.12g}"
     return f"numbers have no units: write {number}" if unit in _PLAIN else None

@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 
 from neurovis_spec.diagnostics import shorten
 from neurovis_spec.language.expressions.errors import ExpressionError
-from neurovis_spec.language.expressions.habits import UNITS, ungrouped, ungrouped_hint, unit_hint
+from neurovis_spec.language.expressions.habits import UNITS, ungrouped, ungrouped_hint, unit_hint, unit_of
 from neurovis_spec.language.yaml.characters import character_name
 
 Kind = Literal["number", "name", "operator", "end"]
@@ -52,8 +52,6 @@ _ZEROS = re.compile(r"0+[0-9]+")
 _THOUSANDS = re.compile(r"(?<![\w.])[1-9][0-9]{0,2},(?:[0-9]{3},)*\Z")
 _DATE = re.compile(r"\s*([0-9]{4}-[0-9]{1,2}-[0-9]{1,2})\s*")
 _QUOTED = re.compile(r"(?P<quote>['\"`“”‘’]).*?(?:['\"`“”‘’]|$)", re.DOTALL)
-#: A number and what may be its unit.
-_WITH_UNIT = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*([^\W\d]\w*|[°%])\s*")
 #: A unit that begins with no letter of ASCII.
 _UNIT = re.compile(r"[µμ°Ω]\w*")
 _OPERATOR = re.compile(r"\*\*|<=|>=|==|!=|[-+*/%^<>(),]")
@@ -125,8 +123,7 @@ def _check_habits(text: str) -> None:
     if hint := ungrouped_hint(text):
         message = f"'{shown}' is no number: nothing stands between thousands"
         raise ExpressionError("malformed-number", message, *whole, hint)
-    unit = _WITH_UNIT.fullmatch(text)
-    if unit and (hint := unit_hint(unit[1], unit[2])):
+    if (unit := unit_of(text)) and (hint := unit_hint(*unit)):
         raise ExpressionError("malformed-number", f"'{shown}' is no number: it has a unit", *whole, hint)
 
 
