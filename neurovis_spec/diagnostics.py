@@ -150,6 +150,10 @@ class Findings:
         there = {mark: self._told[mark] for mark in self._undeclared if mark in self._told and self._counts(mark)}
         return {mark: (there[mark], self._undeclared[mark]) for mark in sorted(there, key=lambda mark: mark[0])}
 
+    def told(self) -> dict[Mark, Diagnostic]:
+        """The errors that are no follow-up of another one."""
+        return {mark: item for mark, item in self._told.items() if item.severity == "error" and self._counts(mark)}
+
     def fold(self, marks: Iterable[Mark], into: Diagnostic) -> None:
         """Tell one finding in the place of several."""
         for mark in marks:

@@ -105,6 +105,37 @@ def test_words_and_keys_that_look_right_are_told_apart() -> None:
     hold("neurons: {M\u00fcller: {}}\n", "3:11", "U+00FC (latin small letter u with diaeresis)")
 
 
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("neurons:\n  A{0} {{bias: 1}}\n", "4:3"),
+        ("neurons:\n  A{0} {{bias: 1}}\n  B: {{}}\n", "4:3"),
+        ("neurons:\n  A{0}\n    bias: 1\n", "4:3"),
+        ("neurons:\n  A:\n    bias{0} 1\n", "5:5"),
+        ("neurons:\n  A:\n    bias{0} 1\n    count: 2\n", "5:5"),
+        ("neurons: {{A: {{bias{0} 1}}}}\n", "3:15"),
+        ("neurons{0} {{A: {{}}}}\n", "3:1"),
+        ("neurons{0} {{A: {{bias: 1, count: 2, activation: tanh}}, B: {{bias: 3, count: 8}}}}\n", "3:1"),
+        ("neurons{0}\n  A: {{bias: 1}}\n", "3:1"),
+    ],
+)
+def test_what_stands_behind_a_key_is_one_finding(text: str, place: str) -> None:
+    """A colon of another kind, and behind a colon a blank of another kind."""
+    hold(text.format("\uff1a"), place, "stands U+FF1A (fullwidth colon), not ':'")
+    hold(text.replace("{0} ", "{0}").format(":\u00a0"), place, "stands U+00A0 (no-break space), which is no blank")
+
+
+def test_keys_on_lines_below_each_other_are_each_told_of() -> None:
+    found = findings("neurons:\n  A: {bias\uff1a 1}\n  B: {bias\uff1a 2}\n  C: {bias:\u00a02}\n")
+    assert [(item.span.line, item.span.column) for item in found] == [(4, 7), (5, 7), (6, 7)]
+    assert all("behind 'bias" in item.message for item in found)
+
+
+def test_what_looks_like_a_key_in_a_text_is_not_blamed() -> None:
+    hold("description: |\n  note\uff1a this\nneurons: {A: {bais: 1}}\n", "5:15", "did you mean 'bias'?")
+    hold("description: |\n  note\uff1a this\nneurons {A: {bias: 1}}\n", "5:1", "':' is missing after 'neurons'")
+
+
 @pytest.mark.parametrize("character", ["\u00a0", "\u3000", "\u2003", "\u200b"])
 def test_indentation_that_is_no_blank_is_named(character: str) -> None:
     name = f"the line begins with U+{ord(character):04X} ({unicodedata.name(character).lower()})"
