@@ -11,7 +11,7 @@ status 1 where a law was broken, with the numbers to run again:
 - *formats*: what a run writes is read back the same, whatever was recorded in whichever format; a picture of it, and a
   run that goes on from it, are made or refused in words;
 - *live*: whatever is turned, gone back to, branched and saved in the live view, each step and the saved file are those
-  of a run with the events that were turned;
+  of a run with the events that were turned (drags apart, of which the last value alone is told);
 - *sweep*: each row of a sweep over seeds and parameters is the run with that seed and these parameters;
 - *format*: the formatted text means the same network.
 """
@@ -145,8 +145,12 @@ def live(compiled: CompiledNetwork, author: Author, choose: random.Random, folde
     assert isinstance(given, list)
     again = nv.compile({**spec, "events": [*given, *events]})
     seen = source.recall(10_000)
-    if any(isinstance(entry.turn, Feed) for entry in turned):
-        return
+    at_an_event = {change.at - 1 for change in compiled.network.changes}
+    if any(
+        isinstance(one.turn, Feed) or (isinstance(one.turn, Mend | Lesion) and one.step in at_an_event)
+        for one in turned
+    ):
+        return  # no event says what was fed, and of what a step lesions and mends the events' own order is another
     run = again.run(last + 1)
     for one in seen:
         if not np.array_equal(one.snapshot.activity, run.activity[one.snapshot.step], equal_nan=True):
@@ -201,7 +205,7 @@ def _turn(author: Author, choose: random.Random) -> Turn:
     part = choose.choice([group, *author.entries])
     turns: list[Turn] = [
         Set({"a": round(choose.uniform(0.1, 0.9), 3)}),
-        Set({"b": round(choose.uniform(0.1, 0.9), 3)}, moving=choose.random() < 0.5),
+        Set({"b": round(choose.uniform(0.1, 0.9), 3)}),
         Set({"eta": round(choose.uniform(0, 0.2), 3)}),
         Hold(group, round(choose.uniform(-1, 1), 3)),
         *([] if author.clamps else [Release(group)]),  # no event ends what another event clamps
