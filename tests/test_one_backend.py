@@ -40,6 +40,7 @@ body:
 def chosen_here(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The default is that of the machine, and what it says once has not been said yet."""
     monkeypatch.delenv(DEFAULT)
+    monkeypatch.delenv("CC", raising=False)
     backends._say.cache_clear()
     yield
     backends._say.cache_clear()
