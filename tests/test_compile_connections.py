@@ -468,4 +468,4 @@ def test_too_many_neurons_and_signals() -> None:
 
 def test_the_compiled_network_says_its_size() -> None:
     text = "neurons: {A: {count: 2}}\nconnections: {A1 -> A2: {plasticity: hebbian}}"
-    assert repr(compiled(text)) == "<network x: 2 neurons, 1 connections, 1 plastic>"
+    assert repr(compiled(text)) == "<network x: 2 neurons, 1 connection, 1 plastic>"
