@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
-from toy_bodies import SKELETON, SPEC, carted, registered
+from toy_bodies import BODY, SKELETON, SPEC, carted, registered
 
 import neurovis_spec as nv
 from neurovis_spec import analysis, api
@@ -30,13 +30,6 @@ from neurovis_spec.scene.fading import Fading
 from neurovis_spec.sweeps.grid import SweepError
 from neurovis_spec.sweeps.sweep import sweep
 
-BODY = """
-body:
-  toy: plain
-  sensors: {place: x, arms: ["arm[1]", "arm[0]"]}
-  actuators: {push: gain * drive, "lift[1]": "both[1] - 2 * both[0] + pi * dt"}
-  reset: each_episode
-"""
 WITH_BODY = SPEC + BODY
 
 

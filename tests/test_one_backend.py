@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 from test_checkpoint import SPEC as PARTS
+from toy_bodies import BODY, registered
 from toy_bodies import SPEC as CARTED
-from toy_bodies import registered
 
 import neurovis_spec as nv
 from neurovis_spec import plugins
@@ -26,14 +26,6 @@ from neurovis_spec.runtime.backend import DEFAULT, Availability, BackendError, C
 from neurovis_spec.runtime.c_library import Compiler, CompilerError
 from neurovis_spec.runtime.numpy_backend import NumpyBackend
 from neurovis_spec.runtime.recording import Recording
-
-BODY = """
-body:
-  toy: plain
-  sensors: {place: x, arms: ["arm[1]", "arm[0]"]}
-  actuators: {push: gain * drive, "lift[1]": "both[1] - 2 * both[0] + pi * dt"}
-  reset: each_episode
-"""
 
 
 @pytest.fixture

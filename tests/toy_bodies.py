@@ -168,6 +168,14 @@ connections:
   W -> O: {weight: 0.6, plasticity: hebbian}
 outputs: {drive: O1, both: O}
 """
+#: a cart for it
+BODY = """
+body:
+  toy: plain
+  sensors: {place: x, arms: ["arm[1]", "arm[0]"]}
+  actuators: {push: gain * drive, "lift[1]": "both[1] - 2 * both[0] + pi * dt"}
+  reset: each_episode
+"""
 
 
 def settings_for(network: Network, given: str = "plain", **more: object) -> BodySettings:

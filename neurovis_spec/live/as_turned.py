@@ -11,16 +11,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from neurovis_spec.arrays import IntArray, frozen
-from neurovis_spec.compiler.events.changes import NO_INDICES, Change
+from neurovis_spec.arrays import frozen
+from neurovis_spec.compiler.events.changes import Change
 from neurovis_spec.compiler.events.settable import ParameterFormula
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.expressions.tree import Number
-from neurovis_spec.language.references import Sum, parse
 from neurovis_spec.live.source import Turned
 from neurovis_spec.live.turns import Lesion, Mend, Set
-from neurovis_spec.runtime.names import Names, names_of
-from neurovis_spec.runtime.references import find_connections, find_neurons
+from neurovis_spec.runtime.names import names_of
+from neurovis_spec.runtime.references import find_parts
 
 
 def as_turned(network: Network, turned: Sequence[Turned]) -> Network:
@@ -32,7 +31,7 @@ def as_turned(network: Network, turned: Sequence[Turned]) -> Network:
         if isinstance(what, Set):
             changes[at] = before._replace(parameters=(*before.parameters, *_parameters(network, what)))
         elif isinstance(what, Lesion | Mend):  # one that is mended before a step is made is none
-            neurons, connections = _parts(network, what.part, names)
+            neurons, connections = find_parts(network, what.part, names)
             joined = np.union1d if isinstance(what, Lesion) else np.setdiff1d
             changes[at] = before._replace(
                 lesioned_neurons=frozen(joined(before.lesioned_neurons, neurons)),
@@ -46,10 +45,3 @@ def as_turned(network: Network, turned: Sequence[Turned]) -> Network:
 def _parameters(network: Network, what: Set) -> tuple[tuple[int, ParameterFormula], ...]:
     slots = network.settable.index
     return tuple((slots[name], ParameterFormula(Number(value), {})) for name, value in what.values.items())
-
-
-def _parts(network: Network, part: str, names: Names) -> tuple[IntArray, IntArray]:
-    """The neurons, or else the connections, that a reference names."""
-    if isinstance(parse(part), Sum):
-        return np.array(find_neurons(part, names), dtype=np.int64), NO_INDICES
-    return NO_INDICES, find_connections(network, part, names)

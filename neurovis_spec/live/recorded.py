@@ -101,10 +101,8 @@ class RecordedSource:
         if steps[row + 1] == steps[row] + 1:
             learn = self.network.connections.rules >= 0
             weights[learn] = recording.all_weights(row + 1)[learn]
-        found, events = (
-            after(self.network, state),
-            {slot for change in self.network.changes for slot, _ in change.parameters},
-        )
+        found = after(self.network, state)
+        events = {slot for change in self.network.changes for slot, _ in change.parameters}
         slots = self.network.settable.index
         before = {name: value for name, value in recording.set_parameters.items() if slots.get(name) not in events}
         return replace(

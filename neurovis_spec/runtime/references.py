@@ -18,7 +18,7 @@ from neurovis_spec.compiler.names.state_references import (
 )
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
-from neurovis_spec.language.references import Arrow, Part, parse, parse_sum, state_of
+from neurovis_spec.language.references import Arrow, Part, Sum, parse, parse_sum, state_of
 from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.recording import UnknownNameError
@@ -43,6 +43,14 @@ def find_connections(network: Network, reference: str, names: Names) -> IntArray
         hint = suggest(reference, (*network.connections.entries, *network.connection_names), "connections")
         raise UnknownNameError(f"there is no connection '{reference}'" + (f"; {hint}" if hint else ""))
     return connections
+
+
+def find_parts(network: Network, reference: str, names: Names) -> tuple[IntArray, IntArray]:
+    """The neurons, or else the connections, that a reference names. Raises KeyError."""
+    none: IntArray = np.zeros(0, dtype=np.int64)
+    if isinstance(parse(reference), Sum):
+        return np.array(find_neurons(reference, names), dtype=np.int64), none
+    return none, find_connections(network, reference, names)
 
 
 def _between(network: Network, arrow: Arrow, names: Names) -> IntArray:

@@ -28,7 +28,6 @@ from neurovis_spec.compiler.events.settable import ParameterFormula
 from neurovis_spec.compiler.network import Network, Output
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.expressions.tree import Number
-from neurovis_spec.language.references import Sum, parse
 from neurovis_spec.runtime.backend import Backend, Ready, ready
 from neurovis_spec.runtime.columns import ALL, Keep, Probe, probe_of
 from neurovis_spec.runtime.controls import Controls
@@ -37,7 +36,7 @@ from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.record import after
 from neurovis_spec.runtime.recording import After, Recording, RecordingError, UnknownNameError, unknown
-from neurovis_spec.runtime.references import find_connections, find_neurons
+from neurovis_spec.runtime.references import find_neurons, find_parts
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.runtime.watch import Watch
@@ -376,10 +375,7 @@ class Simulation:
 
     def _parts(self, text: str) -> tuple[IntArray, IntArray]:
         """The neurons, or else the connections, that a reference names."""
-        none = np.zeros(0, dtype=np.int64)
-        if isinstance(parse(arguments.text("reference", text)), Sum):
-            return self._neurons(text), none
-        return none, find_connections(self.network, text, self._names)
+        return find_parts(self.network, arguments.text("reference", text), self._names)
 
     def reset(self) -> None:
         """Back to the beginning, with the parameters of the beginning. Raises RecordingError where it is recorded."""
