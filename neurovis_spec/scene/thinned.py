@@ -68,7 +68,7 @@ def _ranks(network: Network, order: IntArray) -> IntArray:
         (3, sources * groups + group[targets]),
         (3, targets * groups + group[sources]),
         (2, ends.entry[order]),
-        (1, group[sources] * groups + group[targets]),
+        (1, _pathways(network)[order]),
         (0, targets),
     ):
         ranks[_first(same)] = rank

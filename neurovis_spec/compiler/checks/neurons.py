@@ -37,9 +37,9 @@ _DRIVING = ("input", "bias", "noise", "combine")
 def check_neurons(compiled: Compiled, findings: Findings) -> None:
     """Warn of idle neurons, once for each group as it is written, and of what a model leaves out of account."""
     told: set[Span] = set()
-    reads: dict[int, _Reads] = {}
+    reads: dict[str, _Reads] = {}
     for kind, written in compiled.models:
-        read = reads.get(id(kind.model)) or reads.setdefault(id(kind.model), _reads(kind.model))
+        read = reads.get(kind.model.name) or reads.setdefault(kind.model.name, _reads(kind.model))
         for span, message, hint in _ignored(kind.model, read, written):
             if span not in told:
                 told.add(span)

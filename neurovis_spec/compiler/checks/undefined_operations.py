@@ -26,11 +26,11 @@ from neurovis_spec.language.values import Choice
 def check_undefined(compiled: Compiled, findings: Findings) -> None:
     """Warn at each choice of a definition with such an operation."""
     clock: dict[str, Value] = {**CONSTANTS, "dt": compiled.network.dt}
-    found: dict[tuple[int, int], tuple[list[Hazard], list[Hazard]]] = {}
+    found: dict[tuple[str, str], tuple[list[Hazard], list[Hazard]]] = {}
     for kind, group in compiled.models:
         if group.model is None and group.activation is None:
             continue
-        key = id(kind.model), id(kind.activation)  # there may be very many groups of the same kind
+        key = kind.model.name, kind.activation.name  # there may be very many groups of the same kind
         if key not in found:
             found[key] = _of_kind(kind.model, kind.activation)
         outside, inside = found[key]

@@ -138,21 +138,21 @@ def finder_of(population: Population, made: Connected, findings: Findings) -> Fi
 
 def _models(population: Population) -> tuple[Holder, ...]:
     """The states of the models of groups, by models; nothing is known of a group whose model is invalid."""
-    members: dict[int, list[range]] = {}
-    models: dict[int, Model] = {}
+    members: dict[str, list[range]] = {}
+    models: dict[str, Model] = {}
     for one in population.groups:
         written, model = one.model, one.kind.model
         if (not written.sound and "model" in written.unknown) or (
             written.model is not None and written.model.name.value != model.name
         ):
             continue
-        models[id(model)] = model
-        members.setdefault(id(model), []).append(one.group.indices)
+        models[model.name] = model
+        members.setdefault(model.name, []).append(one.group.indices)
     return tuple(
         Holder(
-            np.fromiter(chain.from_iterable(members[key]), np.int64),
-            model.name,
+            np.fromiter(chain.from_iterable(members[name]), np.int64),
+            name,
             tuple(quantity.name for quantity in model.state),
         )
-        for key, model in models.items()
+        for name, model in models.items()
     )
