@@ -24,8 +24,8 @@ import zstandard
 
 import neurovis_spec as nv
 from neurovis_spec.runtime import mcap_records as records
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.npz_file import frame_bytes
-from neurovis_spec.runtime.recording import RecordingError
 
 SPEC = """\
 neurovis: 1

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from neurovis_spec.plugins import PluginError
     from neurovis_spec.runtime.backend import BackendError
     from neurovis_spec.runtime.c_settable import ExportError
+    from neurovis_spec.runtime.errors import RecordingError
     from neurovis_spec.runtime.inputs import InputError
-    from neurovis_spec.runtime.recording import RecordingError
     from neurovis_spec.runtime.simulation import ParameterError
     from neurovis_spec.scene.renderers import RendererError
     from neurovis_spec.sweeps.grid import SweepError

@@ -13,9 +13,10 @@ import numpy as np
 
 from neurovis_spec.callers import callers_level
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.fitting import fitted
 from neurovis_spec.runtime.inputs import InputError
-from neurovis_spec.runtime.recording import Recording, RecordingError, Snapshot
+from neurovis_spec.runtime.recording import Recording, Snapshot
 from neurovis_spec.runtime.simulation import Simulation
 from neurovis_spec.scene.fading import Fading, snapshots_of
 

@@ -12,8 +12,9 @@ import pytest
 
 import neurovis_spec as nv
 from neurovis_spec import analysis
-from neurovis_spec.analysis.period import period_of
-from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.errors import RecordingError
+from neurovis_spec.runtime.period import period_of
+from neurovis_spec.runtime.recording import Recording
 
 Array = npt.NDArray[np.float64]
 PER: tuple[Literal["period", "total"], ...] = ("period", "total")

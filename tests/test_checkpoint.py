@@ -14,7 +14,8 @@ from click.testing import CliRunner
 
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
-from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.errors import RecordingError
+from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.simulation import Simulation
 
 SPEC = """\

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.runtime import memory
-from neurovis_spec.runtime.recording import RecordingError
+from neurovis_spec.runtime.errors import RecordingError
 
 TEXT = "neurovis: 1\nname: x\nneurons: {A: {count: 2, bias: 0.1}}\n"
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import neurovis_spec as nv
-from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.errors import RecordingError
+from neurovis_spec.runtime.recording import Recording
 
 HEAD = "neurovis: 1\nname: x\nseed: 5\nparameters: {g: 1, h: 2*g}\n"
 PLAIN = (

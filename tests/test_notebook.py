@@ -24,7 +24,8 @@ from neurovis_spec.notebook import session
 from neurovis_spec.notebook.recording import PlayedRecording
 from neurovis_spec.notebook.session import MOST, Session
 from neurovis_spec.notebook.widget import LiveWidget
-from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.errors import RecordingError
+from neurovis_spec.runtime.recording import Recording
 
 ROOT = Path(__file__).parents[1]
 SPEC = """neurovis: 1

@@ -19,8 +19,9 @@ from toy_bodies import carted, registered
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.fitting import fitted
-from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.recording import Recording
 
 LEG = """\
 modules:

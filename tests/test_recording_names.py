@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import neurovis_spec as nv
-from neurovis_spec.runtime.recording import Recording, UnknownNameError
+from neurovis_spec.runtime.errors import UnknownNameError
+from neurovis_spec.runtime.recording import Recording
 
 SPEC = """\
 neurovis: 1

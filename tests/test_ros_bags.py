@@ -18,7 +18,7 @@ import neurovis_spec as nv
 from neurovis_spec.ros.bags import read_bag
 from neurovis_spec.ros.files import Files, Rotation
 from neurovis_spec.ros.logs import Stored, Topic
-from neurovis_spec.runtime.recording import RecordingError
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.wire import ArrayForm, text_message
 
 ARRAY, STRING = "std_msgs/msg/Float64MultiArray", "std_msgs/msg/String"

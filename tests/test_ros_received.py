@@ -28,7 +28,8 @@ from neurovis_spec.ros.listening import Listening, Wanted
 from neurovis_spec.ros.logs import Stored
 from neurovis_spec.ros.middleware import Arrival
 from neurovis_spec.ros.received import ReceivedSource
-from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.errors import RecordingError
+from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.ros_messages import label_of
 from neurovis_spec.runtime.wire import ENCODINGS, ArrayForm, text_message
 

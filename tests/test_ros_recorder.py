@@ -29,7 +29,7 @@ from neurovis_spec.ros.logs import BagLog, McapLog, Stored, Topic, topic_of
 from neurovis_spec.ros.middleware import Arrival, Ros
 from neurovis_spec.ros.recorder import Recorder
 from neurovis_spec.runtime import mcap_records as records
-from neurovis_spec.runtime.recording import RecordingError
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.wire import ENCODINGS, ArrayForm, text_message
 
 HASH, N = "0123456789abcdef", 12

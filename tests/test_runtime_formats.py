@@ -19,8 +19,9 @@ from networks_by_hand import Link, Unit, Use, build, cpg_rbf, rule
 
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime import files, formats
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.record import record
-from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows, ended
+from neurovis_spec.runtime.recording import After, Recording, after_rows, ended
 
 ARRAYS = ("activity", "weights", "weights_static", "plastic", "sources", "targets", "delays", "step", "ranks",
           "weights_after", "lesioned_neurons", "lesioned_connections")  # fmt: skip

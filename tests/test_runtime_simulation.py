@@ -19,9 +19,9 @@ from networks_by_hand import TANH, Link, Unit, Use, build, cpg_rbf, rule, tree
 
 import neurovis_spec as nv
 from neurovis_spec.compiler.network import Input, Network, Output
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.inputs import STRETCH, InputError, InputReader
 from neurovis_spec.runtime.record import record
-from neurovis_spec.runtime.recording import RecordingError
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
 from neurovis_spec.runtime.state import initial_state
 from neurovis_spec.runtime.watch import Watch

@@ -18,8 +18,9 @@ import neurovis_spec as nv
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.interrupts import ENDING, Ended, deferred, raise_at_signals
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.memory import TooLargeError
-from neurovis_spec.runtime.recording import Recording, RecordingError, after_rows, ended
+from neurovis_spec.runtime.recording import Recording, after_rows, ended
 from neurovis_spec.runtime.state import State
 from neurovis_spec.runtime.stream import StoppedError
 from neurovis_spec.runtime.watch import Watch

@@ -18,8 +18,9 @@ import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.runtime import parts, stream
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.numpy_backend import NumpyStepper
-from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.state import State
 
 SPEC = """\

@@ -20,7 +20,8 @@ import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiler.drawing.drawing_settings import Panel
 from neurovis_spec.language.words import VIEWS
-from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.errors import RecordingError
+from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.scene import THEMES, Disc, Film, Group, Image, Polyline, Rectangle, Scene, Text, colours, still
 from neurovis_spec.scene.figure import figure
 from neurovis_spec.scene.heat import strongest

@@ -6,17 +6,21 @@ docs/measures.md lists all measures, with equations and sources.
 
 from __future__ import annotations
 
-from neurovis_spec.analysis.activities import topography, traces
-from neurovis_spec.analysis.coactivity import awake_at_once, coactivation
-from neurovis_spec.analysis.correlation import cross_correlation, printed_correlation
-from neurovis_spec.analysis.excerpt import cut
 from neurovis_spec.analysis.gait import gait, stretches
 from neurovis_spec.analysis.importance import importance
-from neurovis_spec.analysis.information import mutual_information
-from neurovis_spec.analysis.named import Axis, NamedArray
+from neurovis_spec.analysis.recorded import (
+    awake_at_once,
+    connection_matrix,
+    cut,
+    topography,
+    traces,
+    updates,
+    weight_changes,
+    weights,
+)
 from neurovis_spec.analysis.sensitivity import sensitivity
-from neurovis_spec.analysis.structure import connection_matrix
-from neurovis_spec.analysis.weights import updates, weight_changes, weights
+from neurovis_spec.runtime.named_array import Axis, NamedArray
+from neurovis_spec.runtime.pairwise import coactivation, cross_correlation, mutual_information, printed_correlation
 
 __all__ = [
     "Axis",

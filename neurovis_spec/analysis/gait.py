@@ -13,10 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec import arguments
-from neurovis_spec.analysis.coactivity import THRESHOLD
-from neurovis_spec.analysis.excerpt import Excerpt, excerpt
-from neurovis_spec.analysis.named import Axis, NamedArray
 from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.runtime.excerpt import Excerpt, excerpt
+from neurovis_spec.runtime.named_array import Axis, NamedArray
+from neurovis_spec.runtime.pairwise import THRESHOLD
 from neurovis_spec.runtime.recording import Recording
 
 QUANTITIES = ("onset", "duty", "phase", "period", "times")

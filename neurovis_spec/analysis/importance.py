@@ -11,11 +11,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.analysis.named import Axis, NamedArray
 from neurovis_spec.analysis.trials import Trials
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.progress import Progress
+from neurovis_spec.runtime.named_array import Axis, NamedArray
 
 QUANTITIES = ("lesion", "occlusion", "lesion share", "occlusion share")
 

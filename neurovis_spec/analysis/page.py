@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from neurovis_spec.analysis.catalogue import Measure
-from neurovis_spec.analysis.named import NamedArray
 from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.runtime.named_array import NamedArray
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.scene.model import Theme
 from neurovis_spec.scene.texts import number

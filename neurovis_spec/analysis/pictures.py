@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from neurovis_spec.analysis.named import NamedArray
 from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.runtime.named_array import NamedArray
 from neurovis_spec.scene import strips, texts
 from neurovis_spec.scene.frame import MARGIN
 from neurovis_spec.scene.heading import HEADER, caption_text, title_text

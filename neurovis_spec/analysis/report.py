@@ -15,28 +15,35 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec import pipeline
-from neurovis_spec.analysis import pictures, tables
-from neurovis_spec.analysis.activities import topography, traces
+from neurovis_spec.analysis import pictures
 from neurovis_spec.analysis.catalogue import catalogue
-from neurovis_spec.analysis.coactivity import THRESHOLD, awake_at_once, coactivation
-from neurovis_spec.analysis.correlation import cross_correlation
-from neurovis_spec.analysis.excerpt import cut, excerpt
 from neurovis_spec.analysis.gait import gait, stretches
 from neurovis_spec.analysis.importance import importance_by
-from neurovis_spec.analysis.information import mutual_information
-from neurovis_spec.analysis.named import Axis, NamedArray
 from neurovis_spec.analysis.page import PAGE, Shown, page_of
+from neurovis_spec.analysis.recorded import (
+    awake_at_once,
+    connection_matrix,
+    cut,
+    matrix_around,
+    topography,
+    traces,
+    updates,
+    weight_changes,
+    weights,
+)
 from neurovis_spec.analysis.sensitivity import sensitivity_by
-from neurovis_spec.analysis.structure import connection_matrix, matrix_around
 from neurovis_spec.analysis.trials import STEPS, Trials
-from neurovis_spec.analysis.weights import updates, weight_changes, weights
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.layout.model import LayoutRefusalError
 from neurovis_spec.progress import Progress
+from neurovis_spec.runtime.errors import RecordingError
+from neurovis_spec.runtime.excerpt import excerpt
 from neurovis_spec.runtime.files import replacing
 from neurovis_spec.runtime.fitting import fitted
-from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.named_array import Axis, NamedArray, csv_of, json_of
+from neurovis_spec.runtime.pairwise import THRESHOLD, coactivation, cross_correlation, mutual_information
+from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.scene.model import Scene, Theme
 from neurovis_spec.scene.themes import theme_of
 
@@ -101,7 +108,7 @@ def analyze(
     files: dict[str, bytes] = {}
     for reading in readings:
         for name, table in reading.tables.items():
-            files[f"{name}.csv"], files[f"{name}.json"] = tables.csv_of(table).encode(), tables.json_of(table).encode()
+            files[f"{name}.csv"], files[f"{name}.json"] = csv_of(table).encode(), json_of(table).encode()
         files |= {f"{name}.svg": content for name, content in reading.pictures.items()}
     files[PAGE] = page_of(_shown(readings), network, report.recording, report.theme, report.settings())
     place.mkdir(exist_ok=True)

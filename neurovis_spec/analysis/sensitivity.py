@@ -12,11 +12,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.analysis.named import Axis, NamedArray
 from neurovis_spec.analysis.trials import Trials
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.progress import Progress
+from neurovis_spec.runtime.named_array import Axis, NamedArray
 from neurovis_spec.runtime.simulation import ParameterError
 
 QUANTITIES = ("mean", "rms", "elasticity")

@@ -20,8 +20,8 @@ from neurovis_spec.compiler.network import Input, Network
 from neurovis_spec.runtime.backend import Stepper, ready
 from neurovis_spec.runtime.columns import ALL, columns_of
 from neurovis_spec.runtime.embodied import embodied
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.record import Course, InMemory, Last, go
-from neurovis_spec.runtime.recording import RecordingError
 from neurovis_spec.runtime.rows import RowSink, Steps
 from neurovis_spec.runtime.simulation import Simulation
 from neurovis_spec.runtime.state import State, initial_state

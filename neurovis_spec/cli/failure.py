@@ -68,8 +68,8 @@ def _input_errors() -> tuple[type[Exception], ...]:
     from neurovis_spec.plugins import PluginError
     from neurovis_spec.ros.middleware import MiddlewareError
     from neurovis_spec.runtime.backend import BackendError
+    from neurovis_spec.runtime.errors import RecordingError, UnknownNameError
     from neurovis_spec.runtime.inputs import InputError
-    from neurovis_spec.runtime.recording import RecordingError, UnknownNameError
     from neurovis_spec.runtime.simulation import ParameterError
     from neurovis_spec.scene.renderers import RendererError
     from neurovis_spec.sweeps.grid import SweepError

@@ -28,7 +28,7 @@ from neurovis_spec.live.run import Change, Run, Stage
 from neurovis_spec.live.server import Server
 from neurovis_spec.live.show import Show
 from neurovis_spec.live.watch import Watch
-from neurovis_spec.runtime.recording import RecordingError
+from neurovis_spec.runtime.errors import RecordingError
 
 #: Tells everybody, and those who come later.
 Tell: TypeAlias = Callable[[str], None]

@@ -17,9 +17,10 @@ from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Tu
 from neurovis_spec.live.turns import Turn
 from neurovis_spec.runtime.columns import columns_of
 from neurovis_spec.runtime.controls import Controls
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.fitting import fitted
 from neurovis_spec.runtime.record import after
-from neurovis_spec.runtime.recording import After, Recording, RecordingError
+from neurovis_spec.runtime.recording import After, Recording
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.scene.fading import snapshots_of
 

@@ -13,8 +13,8 @@ from typing import BinaryIO, Final, NamedTuple
 
 from neurovis_spec.language.ros_types import plain
 from neurovis_spec.ros.logs import ABOUT, BAG_HEADER, BAG_MAGIC, CHUNK, CONNECTION, MESSAGE_DATA, Topic
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.mcap_records import MOST_NAMED, Reader
-from neurovis_spec.runtime.recording import RecordingError
 
 #: bytes of the header of a record
 _LARGEST_HEADER: Final = 1 << 20

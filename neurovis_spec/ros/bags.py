@@ -27,7 +27,7 @@ from neurovis_spec.ros.files import METADATA
 from neurovis_spec.ros.logs import ABOUT, BAG_MAGIC, Stored, Topic
 from neurovis_spec.ros.middleware import Ros
 from neurovis_spec.runtime import mcap_records as records
-from neurovis_spec.runtime.recording import RecordingError
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.rotated import following
 from neurovis_spec.runtime.wire import Encoding
 

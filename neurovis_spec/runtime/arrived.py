@@ -15,8 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.kinds import KINDS, Rows
-from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.ros_messages import label_of, step_of
 from neurovis_spec.runtime.wire import Encoding
 

@@ -23,9 +23,9 @@ from neurovis_spec.compiler.events.settable import ParameterFormula
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.expressions.tree import Number
 from neurovis_spec.runtime.controls import Controls
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.files import regular_size, replacing
 from neurovis_spec.runtime.npz_file import Array, put_arrays, read_array, recording_errors
-from neurovis_spec.runtime.recording import RecordingError
 from neurovis_spec.runtime.state import BodyState, State, initial_state
 
 #: bytes of the text, of the headers of all arrays, and of the archive's own

@@ -1,13 +1,14 @@
 """Columns: what of each step is kept, which are activities, changing weights and states of models and rules.
 
-In: a Network, and what is wanted of it (Keep). Out: Columns: the indices to take, and a Probe that reads states.
+In: a Network, and what is wanted of it (Keep). Out: Columns: the indices to take, and a Probe that reads states; a
+Recording of the rows that were kept.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
@@ -15,13 +16,18 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.body import Skeleton
 from neurovis_spec.compiler.names.state_references import StateOf, singles
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.runtime.kinds import Widths
+from neurovis_spec.runtime.kinds import Rows, Widths
 from neurovis_spec.runtime.names import Names, names_of
+from neurovis_spec.runtime.recording import After, Recording
 from neurovis_spec.runtime.references import find_neurons, find_states
 from neurovis_spec.runtime.state import State
 
-if TYPE_CHECKING:
-    from neurovis_spec.runtime.embodied import Embodied
+
+class Sensing(Protocol):
+    """What is recorded of a body: the names of what it senses, and how its pose is drawn."""
+
+    sensor_names: tuple[str, ...]
+    skeleton: Skeleton | None
 
 
 @dataclass(frozen=True)
@@ -94,7 +100,7 @@ class Columns:
         return Widths(neurons, len(self.weights), len(self.probe.names), len(self.sensors or ()), pose)
 
 
-def columns_of(network: Network, keep: Keep = ALL, body: Embodied | None = None) -> Columns:
+def columns_of(network: Network, keep: Keep = ALL, body: Sensing | None = None) -> Columns:
     """What is kept of a network, and of the body that it has in a run. Raises KeyError with the nearest names."""
     names = names_of(network) if keep.neurons or keep.states else None
     states: dict[tuple[str, str, int], None] = {}
@@ -165,3 +171,66 @@ def _located(network: Network, learned: bool) -> tuple[IntArray, IntArray]:
         numbers[own] = number
         positions[own] = np.arange(len(own))
     return numbers, positions
+
+
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """The rows of a recording, and their steps."""
+
+    step: IntArray
+    rows: Rows
+
+
+def recording_of(
+    network: Network, columns: Columns, numbers: Numbers, all_weights: FloatArray, after: After, backend: str = ""
+) -> Recording:
+    """A recording with the structure of a network, made by a ``backend`` of this name; ``all_weights`` (m,) gives those
+    that stay."""
+    connections = network.connections
+    static = np.setdiff1d(np.arange(len(connections)), network.changing, assume_unique=True)
+    names, rows = names_of(network), numbers.rows
+    return Recording(
+        activity=rows.activity,
+        neurons=network.neurons.names,
+        weights=rows.weights,
+        weights_static=all_weights[static],
+        plastic=network.changing.copy(),
+        sources=connections.sources.copy(),
+        targets=connections.targets.copy(),
+        delays=connections.delays.copy(),
+        dt=network.dt,
+        step=numbers.step,
+        ranks=_ranks(network),
+        weights_after=after.weights,
+        reached=after.reached,
+        set_parameters=after.set_parameters,
+        lesioned_neurons=after.lesioned_neurons,
+        lesioned_connections=after.lesioned_connections,
+        views=names.views,
+        network=network.name,
+        hash=network.hash,
+        counted=names.counted,
+        states=rows.states,
+        state_names=columns.probe.names,
+        state_views=columns.outputs,
+        recorded=columns.neurons,
+        spec=columns.spec,
+        namespace=network.ros.namespace,
+        sensors=None if columns.sensors is None else rows.sensors,
+        sensor_names=columns.sensors or (),
+        pose=None if columns.skeleton is None else rows.pose,
+        skeleton=columns.skeleton,
+        backend=backend,
+    )
+
+
+def _ranks(network: Network) -> IntArray:
+    """1 for each connection, 2, 3, … for the further ones that share both ends."""
+    connections = network.connections
+    ranks = np.ones(len(connections), dtype=np.int64)
+    pairs = connections.sources * len(network.neurons) + connections.targets
+    if len(np.unique(pairs)) < len(pairs):
+        for index, name in enumerate(network.connection_names):
+            if name.endswith(")"):
+                ranks[index] = int(name[name.rindex("(") + 1 : -1])
+    return ranks

@@ -12,8 +12,9 @@ import numpy as np
 
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.runtime.columns import Columns, Keep, Probe, columns_of
-from neurovis_spec.runtime.recording import After, Numbers, Recording, RecordingError, recording_of
+from neurovis_spec.runtime.columns import Columns, Keep, Numbers, Probe, columns_of, recording_of
+from neurovis_spec.runtime.errors import RecordingError
+from neurovis_spec.runtime.recording import After, Recording
 
 
 def fitted(recording: Recording, network: Network) -> Recording:

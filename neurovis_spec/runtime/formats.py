@@ -17,6 +17,7 @@ from typing import Protocol, runtime_checkable
 from neurovis_spec.callers import callers_level
 from neurovis_spec.real_paths import real_path
 from neurovis_spec.runtime.csv_file import csv_size, finish_csv, held_csv, read_csv, recover_csv, stream_csv, write_csv
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.mcap_file import (
     finish_mcap,
     held_mcap,
@@ -36,7 +37,7 @@ from neurovis_spec.runtime.npz_file import (
     write_npz,
 )
 from neurovis_spec.runtime.parts import beside, is_written, rest, seize, shown, target_of
-from neurovis_spec.runtime.recording import Format, Readable, Recording, RecordingError, for_path, read_by
+from neurovis_spec.runtime.recording import Format, Readable, Recording, for_path, read_by
 from neurovis_spec.runtime.rows import RowWriter, Steps
 
 

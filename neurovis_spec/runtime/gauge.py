@@ -14,8 +14,9 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.controls import Controls
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.measures import Meter, measure_of
-from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.state import initial_state
 
 LABEL = "<measure>"

@@ -21,8 +21,9 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.kinds import KINDS, Rows, Widths
-from neurovis_spec.runtime.recording import After, RecordingError
+from neurovis_spec.runtime.recording import After
 from neurovis_spec.runtime.rows import Steps
 
 MAGIC: Final = b"neurovis run 2\n"

@@ -23,11 +23,12 @@ import numpy as np
 
 from neurovis_spec.runtime import mcap_records as records
 from neurovis_spec.runtime.arrived import Arrived
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.files import regular_size
 from neurovis_spec.runtime.kinds import KINDS, Rows
 from neurovis_spec.runtime.mcap_records import Channel, DamagedError, Found, Message, Schema, Topic
 from neurovis_spec.runtime.npz_file import frame_bytes, frame_of, recording_errors
-from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows, ended
+from neurovis_spec.runtime.recording import After, Recording, after_rows, ended
 from neurovis_spec.runtime.ros_messages import ARRAY, STRING, label_of
 from neurovis_spec.runtime.rotated import following
 from neurovis_spec.runtime.rows import RowWriter, Steps

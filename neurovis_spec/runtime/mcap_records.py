@@ -15,7 +15,7 @@ from io import FileIO
 from typing import BinaryIO, Final, NamedTuple
 from zlib import crc32
 
-from neurovis_spec.runtime.recording import RecordingError
+from neurovis_spec.runtime.errors import RecordingError
 
 MAGIC: Final = b"\x89MCAP0\r\n"
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = range(1, 9)

@@ -25,8 +25,8 @@ from neurovis_spec.language.expressions.parser import ExpressionError
 from neurovis_spec.language.expressions.tree import Binary, Call, Chain, Name, Tree, is_square, names, walk
 from neurovis_spec.language.references import Arrow, parse_sum, state_of
 from neurovis_spec.runtime.columns import Probe, probe_of
+from neurovis_spec.runtime.errors import UnknownNameError
 from neurovis_spec.runtime.names import Names, names_of
-from neurovis_spec.runtime.recording import UnknownNameError
 from neurovis_spec.runtime.references import find_states
 from neurovis_spec.runtime.state import constants
 from neurovis_spec.runtime.windows import running

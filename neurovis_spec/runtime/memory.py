@@ -11,7 +11,7 @@ import shutil
 from pathlib import Path
 
 from neurovis_spec.real_paths import real_path
-from neurovis_spec.runtime.recording import RecordingError
+from neurovis_spec.runtime.errors import RecordingError
 
 _MEMORY, _GROUPS, _MOUNT = Path("/proc/meminfo"), Path("/proc/self/cgroup"), Path("/sys/fs/cgroup")
 #: a recording of so many bytes is never refused: what is free is an estimate

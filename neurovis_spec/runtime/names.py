@@ -13,6 +13,7 @@ from typing import NamedTuple
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.references import Arrow, NeuronRange, Part, RuleState, parse_sum, state_of
+from neurovis_spec.runtime.errors import unknown_text
 
 
 class Found(NamedTuple):
@@ -165,9 +166,3 @@ def _joined(found: Iterable[Found | None]) -> Found | None:
             return None
         result.extend(one.neurons)
     return Found(tuple(result), False) if result else None
-
-
-def unknown_text(what: str, name: str, known: Iterable[str]) -> str:
-    """That there is none of that name, and which are nearest."""
-    hint = suggest(name, known)
-    return f"no {what} '{name}'" + (f"; {hint}" if hint else "")

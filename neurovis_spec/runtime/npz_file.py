@@ -30,10 +30,11 @@ from neurovis_spec.compiler.limits import DEEPEST
 from neurovis_spec.language.data.npy import LONGEST_HEADER, read_header
 from neurovis_spec.language.data.table import CellError
 from neurovis_spec.real_paths import reason_of
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.files import regular_size, replacing
 from neurovis_spec.runtime.journal import Journal, JournalWriter, is_begun, read_journal
 from neurovis_spec.runtime.kinds import KINDS, Rows, Widths
-from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows, ended
+from neurovis_spec.runtime.recording import After, Recording, after_rows, ended
 from neurovis_spec.runtime.rows import RowWriter, Steps
 from neurovis_spec.runtime.unfinished import Part, part_of
 

@@ -24,13 +24,14 @@ from neurovis_spec.interrupts import Asked, deferred
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.backend import Backend, Ready, Runner, Stepper, ready
 from neurovis_spec.runtime.checkpoint import load_state, save_state
-from neurovis_spec.runtime.columns import ALL, Columns, Keep, columns_of
+from neurovis_spec.runtime.columns import ALL, Columns, Keep, Numbers, columns_of, recording_of
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.embodied import Embodied
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.inputs import STRETCH, InputReader
 from neurovis_spec.runtime.kinds import Rows, Widths
 from neurovis_spec.runtime.memory import check_room
-from neurovis_spec.runtime.recording import After, Numbers, Recording, RecordingError, recording_of
+from neurovis_spec.runtime.recording import After, Recording
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.rows import RowSink, Steps
 from neurovis_spec.runtime.state import State, initial_state

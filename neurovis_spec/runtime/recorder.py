@@ -18,13 +18,14 @@ import numpy as np
 from neurovis_spec.arrays import subscript
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.real_paths import real_path
-from neurovis_spec.runtime.columns import Keep, columns_of
+from neurovis_spec.runtime.columns import Keep, Numbers, columns_of, recording_of
 from neurovis_spec.runtime.embodied import Embodied
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.formats import StreamingFormat, load, settle
 from neurovis_spec.runtime.inputs import STRETCH
 from neurovis_spec.runtime.kinds import Rows
 from neurovis_spec.runtime.parts import beside
-from neurovis_spec.runtime.recording import After, Numbers, Recording, RecordingError, for_path, recording_of
+from neurovis_spec.runtime.recording import After, Recording, for_path
 from neurovis_spec.runtime.rows import RowWriter, Steps
 from neurovis_spec.runtime.state import State
 from neurovis_spec.runtime.stream import OFTEN, frame_of

@@ -10,6 +10,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Protocol, TypeVar, runtime_checkable
 
@@ -20,28 +21,19 @@ from neurovis_spec import arguments, plugins
 from neurovis_spec.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.body import Skeleton
 from neurovis_spec.compiler.limits import plural
-from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import listed
+from neurovis_spec.runtime import pairwise
+from neurovis_spec.runtime.errors import RecordingError, UnknownNameError, unknown
 from neurovis_spec.runtime.kinds import Rows, Widths
-from neurovis_spec.runtime.names import Found, Names, names_of, unknown_text
+from neurovis_spec.runtime.named_array import NamedArray
+from neurovis_spec.runtime.names import Found, Names
+from neurovis_spec.runtime.traces import Traced, traces
 
 if TYPE_CHECKING:
+    from types import ModuleType
+
     import pandas as pd
     import xarray as xr
-
-    from neurovis_spec.analysis.named import NamedArray
-    from neurovis_spec.runtime.columns import Columns
-
-
-class RecordingError(ValueError):
-    """A recording that cannot be read, written, or used with this network."""
-
-
-class UnknownNameError(KeyError):
-    """A name that a recording or simulation does not know; the message offers the nearest."""
-
-    def __str__(self) -> str:
-        return str(self.args[0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -347,26 +339,55 @@ class Recording:
         for_path(place).save(self, place)
 
     def to_xarray(self) -> xr.Dataset:
-        """A Dataset with the coordinates ``step``, ``seconds``, ``neuron``, ``connection``, ``state_name``,
-        ``sensor_name`` (see ``frames``). Raises ImportError without the extra ``xarray``."""
-        from neurovis_spec.runtime.frames import to_xarray
-
-        return to_xarray(self)
+        """``activity`` (step, neuron), ``weight`` (step, connection), ``state`` (step, state_name), ``sensor`` (step,
+        sensor_name), with the coordinates ``step``, ``seconds``, ``neuron``, ``connection`` (and its ``source``,
+        ``target``, ``delay``), ``state_name`` and ``sensor_name``. Weights that stay are in ``weight_static`` (static).
+        Raises ImportError without the extra ``xarray``."""
+        xarray = _extra("xarray")
+        plastic, static = self._recorded_plastic, self._static
+        result: xr.Dataset = xarray.Dataset(
+            {
+                "activity": (("step", "neuron"), self.activity),
+                "weight": (("step", "connection"), self.weights),
+                "state": (("step", "state_name"), self.states),
+                "sensor": (("step", "sensor_name"), self.rows.sensors),
+                "weight_static": ("static", self.weights_static),
+            },
+            coords={
+                "step": self.step,
+                "seconds": ("step", self.step * self.dt),
+                "neuron": list(self.columns),
+                "connection": [self.connection_names[index] for index in plastic.tolist()],
+                "source": ("connection", [self.neurons[index] for index in self.sources[plastic].tolist()]),
+                "target": ("connection", [self.neurons[index] for index in self.targets[plastic].tolist()]),
+                "delay": ("connection", self.delays[plastic]),
+                "state_name": list(self.state_names),
+                "sensor_name": list(self.sensor_names),
+                "static": [self.connection_names[index] for index in static.tolist()],
+            },
+            attrs={"network": self.network, "hash": self.hash, "dt": self.dt},
+        )
+        return result
 
     def to_pandas(self) -> pd.DataFrame:
-        """A DataFrame, a row a step, indexed by ``step`` and ``seconds``, with columns by ``quantity`` (activity,
-        weight, state, sensor) and ``name``. Raises ImportError without the extra ``pandas``."""
-        from neurovis_spec.runtime.frames import to_pandas
-
-        return to_pandas(self)
+        """A row a step, indexed by ``step`` and ``seconds``; columns by ``quantity`` (activity, weight, state, sensor)
+        and ``name`` (of the neuron, the connection, the state, the sensor): ``frame["activity"]["K1"]``. Raises
+        ImportError without the extra ``pandas``."""
+        pandas = _extra("pandas")
+        columns = [(traced.quantity, name) for traced in self._traced for name in traced.names]
+        steps = [self.step, self.step * self.dt]
+        result: pd.DataFrame = pandas.DataFrame(
+            np.hstack(self.rows[:4]),
+            index=pandas.MultiIndex.from_arrays(steps, names=["step", "seconds"]),
+            columns=pandas.MultiIndex.from_tuples(columns, names=["quantity", "name"]),
+        )
+        return result
 
     def cross_correlation(
         self, of: str | Sequence[str] | None = None, start: int | None = None, stop: int | None = None
     ) -> NamedArray:
         """Eq. 12: the mean of x·y of each pair of neurons (see ``neurovis_spec.analysis``)."""
-        from neurovis_spec.analysis.correlation import cross_correlation
-
-        return cross_correlation(self, of, start, stop)
+        return pairwise.cross_correlation(self, of, start, stop)
 
     def mutual_information(
         self,
@@ -376,9 +397,7 @@ class Recording:
         bins: int = 20,
     ) -> NamedArray:
         """Eqs. 13 and 14: what each pair of neurons tells of each other, in bits."""
-        from neurovis_spec.analysis.information import mutual_information
-
-        return mutual_information(self, of, start, stop, bins)
+        return pairwise.mutual_information(self, of, start, stop, bins)
 
     def coactivation(
         self,
@@ -390,15 +409,37 @@ class Recording:
         period: float | None = None,
     ) -> NamedArray:
         """Fig. 6A: the seconds for which each pair of neurons is active together."""
-        from neurovis_spec.analysis.coactivity import coactivation
-
-        return coactivation(self, of, start, stop, threshold, per, period)
+        return pairwise.coactivation(self, of, start, stop, threshold, per, period)
 
     def _repr_svg_(self) -> str:
         """Its traces, for a notebook."""
-        from neurovis_spec.runtime.traces import traces
+        span = f"steps {self.step[0]} … {self.step[-1]}" if len(self) else "no steps"
+        return traces(f"{self.network or 'recording'} · {span}", self._traced)
 
-        return traces(self)
+    @property
+    def _traced(self) -> tuple[Traced, ...]:
+        """What has a line over the steps, kind by kind; a pose is drawn, not traced."""
+        weights = [self.connection_names[index] for index in self._recorded_plastic.tolist()]
+        return (
+            Traced("activity", self.columns, self.activity),
+            Traced("weight", weights, self.weights),
+            Traced("state", self.state_names, self.states),
+            Traced("sensor", self.sensor_names, self.rows.sensors),
+        )
+
+    @property
+    def _recorded_plastic(self) -> IntArray:
+        """The indices of the connections whose weights it holds."""
+        return self.plastic if self.weights.shape[1] else self.plastic[:0]
+
+
+def _extra(name: str) -> ModuleType:
+    """A package that an extra of the same name brings."""
+    try:
+        return import_module(name)
+    except ImportError as error:
+        message = f"{name} is not installed: pip install 'neurovis-spec[{name}]'"
+        raise ImportError(message, name=name) from error
 
 
 @runtime_checkable
@@ -445,62 +486,6 @@ def _named(path: str | os.PathLike[str], formats: Iterable[_F]) -> _F:
     raise RecordingError(f"{os.fspath(path)}: no format has the suffix '{suffix}'; known: {', '.join(sorted(known))}")
 
 
-def unknown(what: str, name: str, known: Iterable[str]) -> UnknownNameError:
-    """An error that offers the nearest known names."""
-    return UnknownNameError(unknown_text(what, name, known))
-
-
-@dataclass(frozen=True, eq=False)
-class Numbers:
-    """The rows of a recording, and their steps."""
-
-    step: IntArray
-    rows: Rows
-
-
-def recording_of(
-    network: Network, columns: Columns, numbers: Numbers, all_weights: FloatArray, after: After, backend: str = ""
-) -> Recording:
-    """A recording with the structure of a network, made by a ``backend`` of this name; ``all_weights`` (m,) gives those
-    that stay."""
-    connections = network.connections
-    static = np.setdiff1d(np.arange(len(connections)), network.changing, assume_unique=True)
-    names, rows = names_of(network), numbers.rows
-    return Recording(
-        activity=rows.activity,
-        neurons=network.neurons.names,
-        weights=rows.weights,
-        weights_static=all_weights[static],
-        plastic=network.changing.copy(),
-        sources=connections.sources.copy(),
-        targets=connections.targets.copy(),
-        delays=connections.delays.copy(),
-        dt=network.dt,
-        step=numbers.step,
-        ranks=_ranks(network),
-        weights_after=after.weights,
-        reached=after.reached,
-        set_parameters=after.set_parameters,
-        lesioned_neurons=after.lesioned_neurons,
-        lesioned_connections=after.lesioned_connections,
-        views=names.views,
-        network=network.name,
-        hash=network.hash,
-        counted=names.counted,
-        states=rows.states,
-        state_names=columns.probe.names,
-        state_views=columns.outputs,
-        recorded=columns.neurons,
-        spec=columns.spec,
-        namespace=network.ros.namespace,
-        sensors=None if columns.sensors is None else rows.sensors,
-        sensor_names=columns.sensors or (),
-        pose=None if columns.skeleton is None else rows.pose,
-        skeleton=columns.skeleton,
-        backend=backend,
-    )
-
-
 def ended(recording: Recording, after: After) -> Recording:
     """The recording with what is true after its last step."""
     return replace(
@@ -521,15 +506,3 @@ def after_rows(step: IntArray, weights: FloatArray, changing: int | None = None)
     if not len(step) or weights.shape[1] < changing:
         return After(np.full(changing, np.nan), reached)
     return After(weights[-1].copy(), reached)
-
-
-def _ranks(network: Network) -> IntArray:
-    """1 for each connection, 2, 3, … for the further ones that share both ends."""
-    connections = network.connections
-    ranks = np.ones(len(connections), dtype=np.int64)
-    pairs = connections.sources * len(network.neurons) + connections.targets
-    if len(np.unique(pairs)) < len(pairs):
-        for index, name in enumerate(network.connection_names):
-            if name.endswith(")"):
-                ranks[index] = int(name[name.rindex("(") + 1 : -1])
-    return ranks

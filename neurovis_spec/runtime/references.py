@@ -20,8 +20,8 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.references import Arrow, Part, Sum, parse, parse_sum, state_of
 from neurovis_spec.language.unknown import UNKNOWN
+from neurovis_spec.runtime.errors import UnknownNameError
 from neurovis_spec.runtime.names import Names, names_of
-from neurovis_spec.runtime.recording import UnknownNameError
 
 
 def find_neurons(reference: str, names: Names) -> tuple[int, ...]:

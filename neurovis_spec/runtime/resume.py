@@ -25,8 +25,9 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.runtime.controls import Controls, lose
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.fitting import of_table
-from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.state import State, initial_state
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Final
 
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.runtime.recording import RecordingError
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.wire import Encoding, array_of
 
 _SEPARATOR: Final = "=" * 80

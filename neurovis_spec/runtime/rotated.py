@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
-from neurovis_spec.runtime.recording import RecordingError
+from neurovis_spec.runtime.errors import RecordingError
 
 
 def place(path: Path, number: int) -> Path:

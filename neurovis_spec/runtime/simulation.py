@@ -32,10 +32,11 @@ from neurovis_spec.runtime.backend import Backend, Ready, ready
 from neurovis_spec.runtime.columns import ALL, Keep, Probe, probe_of
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.embodied import Embodied, embodied
+from neurovis_spec.runtime.errors import RecordingError, UnknownNameError, unknown
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.record import after
-from neurovis_spec.runtime.recording import After, Recording, RecordingError, UnknownNameError, unknown
+from neurovis_spec.runtime.recording import After, Recording
 from neurovis_spec.runtime.references import find_neurons, find_parts
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.state import State, initial_state

@@ -15,7 +15,7 @@ from time import monotonic
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.interrupts import Asked, Ended, deferred
 from neurovis_spec.progress import Progress
-from neurovis_spec.runtime.columns import Columns, columns_of
+from neurovis_spec.runtime.columns import Columns, columns_of, recording_of
 from neurovis_spec.runtime.formats import StreamingFormat, settle
 from neurovis_spec.runtime.inputs import STRETCH
 from neurovis_spec.runtime.kinds import Rows, Widths
@@ -30,7 +30,7 @@ from neurovis_spec.runtime.record import (
     keep_state,
     record_course,
 )
-from neurovis_spec.runtime.recording import After, Recording, for_path, recording_of
+from neurovis_spec.runtime.recording import After, Recording, for_path
 from neurovis_spec.runtime.rows import RowWriter, Steps
 from neurovis_spec.runtime.state import State
 

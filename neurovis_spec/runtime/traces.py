@@ -1,43 +1,43 @@
 """Traces: a recording as a small picture for a notebook, one line a neuron, one for each weight that changes.
 
-In: a Recording. Out: an SVG as text. It needs no network, so that a recording that was only loaded shows itself, too.
+In: a title, and numbers over the steps, kind by kind. Out: an SVG as text. It needs no network, so that a recording
+that was only loaded shows itself, too.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Sequence
 from html import escape
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-if TYPE_CHECKING:
-    from neurovis_spec.runtime.recording import Recording
+from neurovis_spec.arrays import FloatArray
 
 WIDTH, ROW, LEFT, TOP = 720, 26, 96, 28
 #: most lines of each kind, and most points of a line (the lowest and the highest value of every column)
 MOST, COLUMNS = 24, 300
+COLOURS = {"activity": "#0072b2", "weight": "#b07d00", "state": "#009e73", "sensor": "#cc79a7"}
 
 
-def traces(recording: Recording) -> str:
-    """The activities, the changing weights, the states and the sensors over the steps; every line has its own range,
-    which is written beside it."""
-    plastic = recording.plastic if recording.weights.shape[1] else recording.plastic[:0]
-    names = [recording.connection_names[index] for index in plastic[:MOST].tolist()]
-    rows = [
-        *_rows("activity", recording.columns[:MOST], recording.activity, "#0072b2"),
-        *_rows("weight", names, recording.weights, "#b07d00"),
-        *_rows("state", recording.state_names[:MOST], recording.states, "#009e73"),
-        *_rows("sensor", recording.sensor_names[:MOST], recording.rows.sensors, "#cc79a7"),
+class Traced(NamedTuple):
+    """Numbers of one kind over the steps: ``values`` (rows, names) of what ``names`` names."""
+
+    quantity: str
+    names: Sequence[str]
+    values: FloatArray
+
+
+def traces(title: str, kinds: Sequence[Traced]) -> str:
+    """The values over the steps; every line has its own range, which is written beside it."""
+    shown = [
+        (kind.quantity, name, kind.values[:, column]) for kind in kinds for column, name in enumerate(kind.names[:MOST])
     ]
-    height = TOP + ROW * len(rows) + 8
-    hidden = sum(max(0, width - MOST) for width in recording.widths[:4])  # a pose is drawn, not traced
-    span = f"steps {recording.step[0]} … {recording.step[-1]}" if len(recording) else "no steps"
-    more = f" · {hidden} more" if hidden else ""
-    title = escape(f"{recording.network or 'recording'} · {span}{more}")
-    lines = [_line(top, *row) for top, row in zip(range(TOP, height, ROW), rows, strict=False)]
+    height = TOP + ROW * len(shown) + 8
+    hidden = sum(max(0, len(kind.names) - MOST) for kind in kinds)
+    title = escape(title + (f" · {hidden} more" if hidden else ""))
+    lines = [_line(top, *line) for top, line in zip(range(TOP, height, ROW), shown, strict=False)]
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" height="{height}" '
         f'font-family="Arial,DejaVu Sans,sans-serif" font-size="11"><title>{title}</title>'
@@ -46,13 +46,7 @@ def traces(recording: Recording) -> str:
     )
 
 
-def _rows(
-    what: str, names: tuple[str, ...] | list[str], values: npt.NDArray[np.float64], colour: str
-) -> Iterator[tuple[str, str, npt.NDArray[np.float64], str]]:
-    return ((what, name, values[:, index], colour) for index, name in enumerate(names))
-
-
-def _line(top: int, what: str, name: str, values: npt.NDArray[np.float64], colour: str) -> str:
+def _line(top: int, what: str, name: str, values: FloatArray) -> str:
     shown = name if len(name) <= 13 else name[:12] + "…"
     finite = values[np.isfinite(values)]
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
@@ -60,12 +54,12 @@ def _line(top: int, what: str, name: str, values: npt.NDArray[np.float64], colou
     return (
         f"<g><title>{escape(f'{what} of {name}: {low:.4g} … {high:.4g}')}</title>"
         f'<text x="8" y="{top + 16}" fill="#1f2328">{escape(shown)}</text>'
-        f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1"/>'
+        f'<polyline points="{points}" fill="none" stroke="{COLOURS[what]}" stroke-width="1"/>'
         f'<text x="{WIDTH - 8}" y="{top + 16}" fill="#6e7781" text-anchor="end">{low:.3g} … {high:.3g}</text></g>'
     )
 
 
-def _points(values: npt.NDArray[np.float64], low: float, high: float, top: int) -> str:
+def _points(values: FloatArray, low: float, high: float, top: int) -> str:
     """The line, by the lowest and the highest value of every column of pixels."""
     if not len(values):
         return ""

@@ -15,7 +15,8 @@ from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
 from neurovis_spec.compiler.names.state_references import StateOf
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.labels import names_in_parts, parts_of
-from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.errors import RecordingError
+from neurovis_spec.runtime.recording import Recording
 
 _NONE: npt.NDArray[np.int64] = np.zeros(0, dtype=np.int64)
 

@@ -12,8 +12,9 @@ import numpy as np
 
 from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.fitting import fitted
-from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.recording import Recording
 
 
 @dataclass(frozen=True)

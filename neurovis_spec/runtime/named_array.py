@@ -1,11 +1,16 @@
 """Named arrays: tables of numbers whose rows and columns have names.
 
 In: numbers, what their rows and columns are. Out: a frozen value that answers by names, and that NumPy takes as an
-array.
+array; the same as a file: CSV for spreadsheets, JSON for programs. Numbers are written so that they read back exactly;
+what is no number is empty in CSV and null in JSON.
 """
 
 from __future__ import annotations
 
+import csv
+import io
+import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,7 +21,7 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, frozen
 from neurovis_spec.diagnostics import suggest
-from neurovis_spec.runtime.recording import UnknownNameError
+from neurovis_spec.runtime.errors import UnknownNameError
 
 
 class Axis(NamedTuple):
@@ -78,6 +83,27 @@ def _place(known: Mapping[str, int], name: str) -> int:
     return known[name]
 
 
-def pairs(name: str, values: FloatArray, names: tuple[str, ...], unit: str = "") -> NamedArray:
-    """A table with a row and a column for each of the same neurons."""
-    return NamedArray(name, values, Axis("neuron", names), Axis("neuron", names), unit)
+def csv_of(table: NamedArray) -> str:
+    """A line with the names of the columns, then one for each row, which begins with its name."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([table.rows.name, *table.columns.labels])
+    for label, row in zip(table.rows.labels, table.values.tolist(), strict=True):
+        writer.writerow([label, *("" if math.isnan(value) else _written(value) for value in row)])
+    return text.getvalue()
+
+
+def _written(value: float) -> str:
+    return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
+
+
+def json_of(table: NamedArray) -> str:
+    """An object: ``name``, ``unit``, ``rows`` and ``columns`` ({name, labels}), ``values`` row by row."""
+    content = {
+        "name": table.name,
+        "unit": table.unit,
+        "rows": {"name": table.rows.name, "labels": table.rows.labels},
+        "columns": {"name": table.columns.name, "labels": table.columns.labels},
+        "values": [[value if math.isfinite(value) else None for value in row] for row in table.values.tolist()],
+    }
+    return json.dumps(content, ensure_ascii=False, allow_nan=False) + "\n"
