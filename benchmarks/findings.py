@@ -29,10 +29,11 @@ from pathlib import Path
 from faults import Fault, faults, pick, with_faults
 
 import neurovis_spec as nv
-from neurovis_spec.diagnostics import Diagnostic, Findings, Span, slips
+from neurovis_spec.diagnostics import Diagnostic, Findings, Span
 from neurovis_spec.language.expressions.lexer import WORDS
 from neurovis_spec.language.yaml.reader import read_text
 from neurovis_spec.language.yaml.source import Mapping, Node, Scalar, Sequence
+from neurovis_spec.likeness import slips
 
 ERRORS = Path(__file__).resolve().parent.parent / "tests" / "errors"
 _EXPECTED = re.compile(r"# (error|warning): (\d+):(\d+) ([\w-]+)")

@@ -30,7 +30,7 @@ import numpy as np
 from robustness_runs import RUNS, SUFFIXES, Attempt, network
 
 import neurovis_spec as nv
-from neurovis_spec.findings import show_text
+from neurovis_spec.diagnostics import show_text
 
 HEAD = "neurovis: 1\nname: x\n"
 SMALL = HEAD + "parameters: {a: 1}\nneurons: {A: {activation: tahn, bias: 2*a}}\nconnections: {A -> A: 1}\n"

@@ -1,24 +1,34 @@
-"""Findings: where they are, what they say, and how several are collected.
+"""Findings: where they are, what they say, how several are collected, and how people are shown them.
 
-In: facts that a stage noticed (a code, a place, a sentence). Out: an ordered tuple of Diagnostics, or a
-SpecError that holds them. Nothing is raised at the first mistake: a stage goes on and collects. How findings
-are shown (text, JSON) is in ``neurovis_spec.findings``.
+In: facts that a stage noticed (a code, a place, a sentence). Out: an ordered tuple of Diagnostics, a SpecError that
+holds them, or their text. Nothing is raised at the first mistake: a stage goes on and collects. Nothing from the
+author's files reaches a terminal raw: what could move its cursor, change its colours or reorder its text is shown as an
+escape. What other programs read is in ``neurovis_spec.findings_formats``.
 """
 
 from __future__ import annotations
 
-from collections import Counter
+import re
+import unicodedata
 from collections.abc import Callable, Collection, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Final, Literal, NamedTuple, TypeAlias
 
 Severity = Literal["error", "warning"]
 #: A help line; where it takes a while to find, what finds it.
 Hint: TypeAlias = "str | Callable[[], str | None] | None"
 #: Errors after which no help line is looked for, and no misspelt name understood: nobody reads them.
 MOST_HINTS = 100
+
+_TAB: Final = 4
+_WIDEST: Final = 100  # columns of a source line that are shown
+_BEFORE: Final = 60  # of them before the place, in a longer line
+_LONGEST_MESSAGE: Final = 1000
+_LINE_END: Final = re.compile("\r\n|\n|\r")
+_ESCAPED_CATEGORIES: Final = frozenset({"Cc", "Cs", "Zl", "Zp", "Cn", "Co"})
+_INVISIBLE: Final = re.compile("[\u061c\u200b\u200e\u200f\u202a-\u202e\u2060-\u206f\ufeff\U000e0000-\U000e007f]")
 
 
 class Span(NamedTuple):
@@ -79,8 +89,6 @@ class SpecError(Exception):
 
     def _render_traceback_(self) -> list[str]:
         """What a notebook shows: the findings with their lines, as the command line does, and no traceback."""
-        from neurovis_spec.findings import show_text
-
         return [show_text(self.diagnostics, self.sources)]
 
 
@@ -228,79 +236,109 @@ def listed(names: Collection[str]) -> str:
     return ", ".join(words) + (", …" if len(words) < len(names) else "")
 
 
-def nearest(name: str, known: Iterable[str], most: int = 3) -> tuple[str, ...]:
-    """The known names that are most like ``name``, best first, up to six; none that is too far off.
+def show_text(diagnostics: Iterable[Diagnostic], sources: Mapping[str, str], most: int = 20) -> str:
+    """Findings for a terminal: each with its place, the invalid line, carets under it and a help line.
 
-    >>> nearest("kerel", ["kernel", "sigmoid", "keel"]), nearest("tahn", ["tanh", "sigmoid", "atan"])
-    (('kernel', 'keel'), ('tanh',))
+    ``sources`` maps file names to texts; a finding about a file without a text is shown without the line. At most
+    ``most`` are shown. The last line counts them all. Empty where there is nothing to show.
     """
-    from neurovis_spec.likeness import alike  # only here: most specs have no mistake
-    from neurovis_spec.lookalikes import in_ascii
+    found = tuple(diagnostics)
+    lines: dict[str, list[str]] = {}
+    blocks: list[str] = []
+    for diagnostic in found[:most]:
+        file = diagnostic.span.file
+        if file in sources and file not in lines:
+            lines[file] = _LINE_END.split(sources[file])
+        blocks.append(_block(diagnostic, lines.get(file)))
+    if len(found) > most:
+        blocks.append(f"… and {len(found) - most} more")
+    if found:
+        blocks.append(summary(found))
+    return "\n\n".join(blocks)
 
-    names, seen = tuple(dict.fromkeys(known)), in_ascii(name)
-    return (seen,) if seen != name and seen in names else alike(seen, names)[:most]
+
+def summary(diagnostics: Iterable[Diagnostic]) -> str:
+    """How many errors and warnings there are, such as ``3 errors, 1 warning``."""
+    found = tuple(diagnostics)
+    errors = sum(diagnostic.severity == "error" for diagnostic in found)
+    counts = (("error", errors), ("warning", len(found) - errors))
+    return ", ".join(f"{count} {word}{'' if count == 1 else 's'}" for word, count in counts if count)
 
 
-def meant(name: str, known: Iterable[str]) -> str | None:
-    """The known name that a misspelt one can only be meant for: it is one slip away, two in a word of five letters or
-    more, or in one of four of which three are kept, and no other is as near. None where that is not sure.
+def printable(text: str) -> str:
+    r"""A text with every character that is no harmless visible one written as an escape.
 
-    >>> meant("wieght", ["weight", "centre"]), meant("modles", ["models", "modules"]), meant("note", ["noise"])
-    ('weight', None, None)
-    >>> meant("fomr", ["from", "to"]), meant("size", ["file"])
-    ('from', None)
+    >>> printable("a" + chr(27) + "[31m")
+    'a\\x1b[31m'
     """
-    close = nearest(name, known, 6)  # few: a distance takes a while to find
-    if not name.isascii():
-        from neurovis_spec.lookalikes import in_ascii
-
-        name = in_ascii(name)
-    most = 1 if len(name) < 4 else 2
-    far = sorted((slips(name, other), other) for other in close if abs(len(name) - len(other)) <= most)
-    if not far or far[0][0] > most or (len(far) > 1 and far[1][0] == far[0][0]):
-        return None
-    right = far[0][1]
-    if len(name) == 4 and far[0][0] == 2:
-        kept = (Counter(name.casefold()) & Counter(right.casefold())).total()
-        return right if len(right) == 4 and kept >= 3 else None
-    return right
+    return "".join(_shown(character) for character in text)
 
 
-def slips(one: str, other: str) -> int:
-    """How many slips lead from one word to the other: a letter too few, too many or wrong, two changed over (the
-    optimal string alignment distance; case is not counted).
-
-    >>> slips("wieght", "weight"), slips("sensr", "sensor"), slips("kitten", "sitting")
-    (1, 1, 3)
-    """
-    one, other = one.casefold(), other.casefold()
-    before, last = list[int](), list(range(len(other) + 1))
-    for i, letter in enumerate(one, 1):
-        row = [i]
-        for j, wanted in enumerate(other, 1):
-            cost = min(last[j] + 1, row[j - 1] + 1, last[j - 1] + (letter != wanted))
-            if i > 1 and j > 1 and letter == other[j - 2] and one[i - 2] == wanted:
-                cost = min(cost, before[j - 2] + 1)
-            row.append(cost)
-        before, last = last, row
-    return last[-1]
+def _shown(character: str) -> str:
+    harmful = unicodedata.category(character) in _ESCAPED_CATEGORIES or _INVISIBLE.match(character)
+    return _escape(character) if harmful else character
 
 
-def suggest(name: str, known: Iterable[str], what: str = "known") -> str | None:
-    """A help line for an unknown name: the nearest known ones, else all of a short list.
-
-    >>> suggest("tahn", ["tanh", "sigmoid"])
-    "did you mean 'tanh'?"
-    """
-    names = tuple(dict.fromkeys(known))
-    close = nearest(name, names)
-    if close:
-        return did_you_mean(close)
-    if not names:
-        return None
-    return f"{what}: {listed(names)}"
+def _escape(character: str) -> str:
+    code = ord(character)
+    return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
 
 
-def did_you_mean(names: Iterable[str]) -> str:
-    """The help line that offers these names."""
-    return "did you mean " + " or ".join(f"'{name}'" for name in names) + "?"
+def _block(diagnostic: Diagnostic, lines: list[str] | None) -> str:
+    parts = [printable(_bounded(headline(diagnostic)))]
+    if lines is not None and 1 <= diagnostic.span.line <= len(lines):
+        parts += _excerpt(lines[diagnostic.span.line - 1], diagnostic.span)
+    if diagnostic.hint is not None:
+        parts.append("help: " + printable(_bounded(diagnostic.hint)))
+    return "\n".join(parts)
+
+
+def _bounded(text: str) -> str:
+    return text if len(text) <= _LONGEST_MESSAGE else text[: _LONGEST_MESSAGE - 1] + "…"
+
+
+def _excerpt(line: str, span: Span) -> list[str]:
+    """The line with its number, and carets under the span's part in it."""
+    start = min(span.column - 1, len(line))
+    stop = len(line) if span.end_line > span.line else min(span.end_column - 1, len(line))
+    # Only what may come into view is measured: a line can be as long as a file.
+    first = max(0, start - 2 * _WIDEST)
+    cells = [_cell(character) for character in line[first : start + 2 * _WIDEST]]
+    start, stop = start - first, min(max(stop, start + 1) - first, len(cells))
+    low, high = _window([width for _, width in cells], start)
+    left = "…" if first + low > 0 else ""
+    right = "…" if first + high < len(line) else ""
+    shown = left + "".join(text for text, _ in cells[low:high]) + right
+    before = len(left) + sum(width for _, width in cells[low:start])
+    carets = max(1, sum(width for _, width in cells[start : min(stop, high)]))
+    number = str(span.line)
+    return [f" {number} | {shown}".rstrip(), f" {' ' * len(number)} | {' ' * before}{'^' * carets}"]
+
+
+def _window(widths: list[int], start: int) -> tuple[int, int]:
+    """The part of a line that is shown: all of a short one, else some columns before and behind the start."""
+    low = 0
+    if sum(widths) > _WIDEST:
+        low, room = start, _BEFORE
+        while low > 0 and room >= widths[low - 1]:
+            low -= 1
+            room -= widths[low]
+        if sum(widths[:low]) <= 1:
+            low = 0
+    high, room = low, _WIDEST
+    while high < len(widths) and room >= widths[high]:
+        room -= widths[high]
+        high += 1
+    return low, high
+
+
+def _cell(character: str) -> tuple[str, int]:
+    """How a character of a source line is shown, and how many columns that takes."""
+    if character == "\t":
+        return " " * _TAB, _TAB
+    shown = _shown(character)
+    if shown != character:
+        return shown, len(shown)
+    if unicodedata.category(character) in ("Mn", "Me", "Cf"):
+        return shown, 0
+    return shown, 2 if unicodedata.east_asian_width(character) in ("W", "F") else 1

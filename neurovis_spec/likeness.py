@@ -1,8 +1,9 @@
-"""Likeness: which of known names are much like another.
+"""Likeness: which of known names are much like another, and what an author who got one wrong is told.
 
-In: a name, known names. Out: those like it, best first. Few names are compared in full. Of the others a bound says that
-they are not like it: no name is more alike than the letters that both have, and of many names, which are prepared once,
-those that both have in the same order (the longest common subsequence, found for all names at once: Hyyrö 2004).
+In: a name, known names. Out: those like it, best first; the one that it can only be meant for; a help line. Few names
+are compared in full. Of the others a bound says that they are not like it: no name is more alike than the letters that
+both have, and of many names, which are prepared once, those that both have in the same order (the longest common
+subsequence, found for all names at once: Hyyrö 2004).
 """
 
 from __future__ import annotations
@@ -10,9 +11,11 @@ from __future__ import annotations
 from bisect import bisect_left, insort
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from difflib import SequenceMatcher
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final
+
+from neurovis_spec.diagnostics import listed
+from neurovis_spec.lookalikes import in_ascii
 
 if TYPE_CHECKING:  # few names need no arrays
     import numpy as np
@@ -31,10 +34,84 @@ _FEW, _LONGEST = 60, 63
 _SLACK = 1e-9
 
 
+def nearest(name: str, known: Iterable[str], most: int = 3) -> tuple[str, ...]:
+    """The known names that are most like ``name``, best first, up to six; none that is too far off.
+
+    >>> nearest("kerel", ["kernel", "sigmoid", "keel"]), nearest("tahn", ["tanh", "sigmoid", "atan"])
+    (('kernel', 'keel'), ('tanh',))
+    """
+    names, seen = tuple(dict.fromkeys(known)), in_ascii(name)
+    return (seen,) if seen != name and seen in names else alike(seen, names)[:most]
+
+
+def meant(name: str, known: Iterable[str]) -> str | None:
+    """The known name that a misspelt one can only be meant for: it is one slip away, two in a word of five letters or
+    more, or in one of four of which three are kept, and no other is as near. None where that is not sure.
+
+    >>> meant("wieght", ["weight", "centre"]), meant("modles", ["models", "modules"]), meant("note", ["noise"])
+    ('weight', None, None)
+    >>> meant("fomr", ["from", "to"]), meant("size", ["file"])
+    ('from', None)
+    """
+    close = nearest(name, known, 6)  # few: a distance takes a while to find
+    name = in_ascii(name)
+    most = 1 if len(name) < 4 else 2
+    far = sorted((slips(name, other), other) for other in close if abs(len(name) - len(other)) <= most)
+    if not far or far[0][0] > most or (len(far) > 1 and far[1][0] == far[0][0]):
+        return None
+    right = far[0][1]
+    if len(name) == 4 and far[0][0] == 2:
+        kept = (Counter(name.casefold()) & Counter(right.casefold())).total()
+        return right if len(right) == 4 and kept >= 3 else None
+    return right
+
+
+def slips(one: str, other: str) -> int:
+    """How many slips lead from one word to the other: a letter too few, too many or wrong, two changed over (the
+    optimal string alignment distance; case is not counted).
+
+    >>> slips("wieght", "weight"), slips("sensr", "sensor"), slips("kitten", "sitting")
+    (1, 1, 3)
+    """
+    one, other = one.casefold(), other.casefold()
+    before, last = list[int](), list(range(len(other) + 1))
+    for i, letter in enumerate(one, 1):
+        row = [i]
+        for j, wanted in enumerate(other, 1):
+            cost = min(last[j] + 1, row[j - 1] + 1, last[j - 1] + (letter != wanted))
+            if i > 1 and j > 1 and letter == other[j - 2] and one[i - 2] == wanted:
+                cost = min(cost, before[j - 2] + 1)
+            row.append(cost)
+        before, last = last, row
+    return last[-1]
+
+
+def suggest(name: str, known: Iterable[str], what: str = "known") -> str | None:
+    """A help line for an unknown name: the nearest known ones, else all of a short list.
+
+    >>> suggest("tahn", ["tanh", "sigmoid"])
+    "did you mean 'tanh'?"
+    """
+    names = tuple(dict.fromkeys(known))
+    close = nearest(name, names)
+    if close:
+        return did_you_mean(close)
+    if not names:
+        return None
+    return f"{what}: {listed(names)}"
+
+
+def did_you_mean(names: Iterable[str]) -> str:
+    """The help line that offers these names."""
+    return "did you mean " + " or ".join(f"'{name}'" for name in names) + "?"
+
+
 @lru_cache(maxsize=16)
 def alike(name: str, known: tuple[str, ...]) -> tuple[str, ...]:
     """The known names that are much like another, best first, but no more than ``MOST``; kept, as who is answered with
     these may also be understood by them."""
+    from difflib import SequenceMatcher  # only here: most specs have no mistake
+
     folded = name.casefold()
     matcher = SequenceMatcher(None, folded, autojunk=False)
     scored: list[tuple[float, str]] = []  # the best so far, in order

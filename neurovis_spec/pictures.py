@@ -21,8 +21,8 @@ import numpy.typing as npt
 from neurovis_spec import arguments, pipeline
 from neurovis_spec.compiler.drawing.drawing_settings import Panel, RenderSettings
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.words import TIMED
+from neurovis_spec.likeness import suggest
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.files import replacing
 

@@ -25,8 +25,8 @@ import fuzz_expressions
 import neurovis_spec as nv
 from neurovis_spec.codes import catalogue
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError
-from neurovis_spec.findings import show_text, to_json
+from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError, show_text
+from neurovis_spec.findings_formats import to_json
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.emit import emit
 from neurovis_spec.language.expressions.evaluate import evaluate

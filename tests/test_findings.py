@@ -7,8 +7,8 @@ import json
 from hypothesis import given
 from hypothesis import strategies as st
 
-from neurovis_spec.diagnostics import Diagnostic, Findings, Span
-from neurovis_spec.findings import printable, show_text, to_json
+from neurovis_spec.diagnostics import Diagnostic, Findings, Span, printable, show_text
+from neurovis_spec.findings_formats import to_json
 
 
 def finding(line: int, column: int, end: int, message: str = "wrong", hint: str | None = None) -> Diagnostic:

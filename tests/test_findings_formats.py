@@ -17,9 +17,7 @@ from jsonschema import Draft202012Validator
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import COMMANDS, neurovis
 from neurovis_spec.diagnostics import Diagnostic, Severity, Span
-from neurovis_spec.findings import to_json
-from neurovis_spec.findings_github import to_github
-from neurovis_spec.findings_sarif import SCHEMA, to_sarif
+from neurovis_spec.findings_formats import SCHEMA, to_github, to_json, to_sarif
 
 BAD = "neurovis: 1\nname: x\nneurons:\n  A: {activation: tahn}\n  B: {bias: cos(fi)}\n"
 ODD = "neurovis: 1\nname: x\nparameters: {gain: 2}\nneurons: {A: {}}\n"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections import Counter
 from collections.abc import Iterable
 from difflib import SequenceMatcher
@@ -12,7 +13,8 @@ from hypothesis import strategies as st
 
 import neurovis_spec as nv
 from neurovis_spec import likeness
-from neurovis_spec.diagnostics import MOST_HINTS, nearest
+from neurovis_spec.diagnostics import MOST_HINTS
+from neurovis_spec.likeness import nearest
 
 
 def one_by_one(name: str, known: Iterable[str]) -> list[str]:
@@ -61,7 +63,7 @@ def test_of_many_names_few_are_compared_in_full(stem: str, wrong: str, monkeypat
             compared["times"] += 1
             return super().ratio()
 
-    monkeypatch.setattr(likeness, "SequenceMatcher", Counting)
+    monkeypatch.setattr(difflib, "SequenceMatcher", Counting)
     known = [f"{stem}{number}_" for number in range(4000)]
     for number in range(0, 4000, 400):
         nearest(f"{wrong}{number}_", known)
@@ -76,7 +78,7 @@ def test_of_2000_misspelt_references_to_2000_groups_few_are_compared_in_full(mon
             compared["times"] += 1
             return super().ratio()
 
-    monkeypatch.setattr(likeness, "SequenceMatcher", Counting)
+    monkeypatch.setattr(difflib, "SequenceMatcher", Counting)
     groups = ", ".join(f"group_{number}_x: {{}}" for number in range(2000))
     wrong = ", ".join(f"gruop_{number}_x -> group_0_x: 1" for number in range(2000))
     with pytest.raises(nv.SpecError) as raised:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from neurovis_spec import plugins
-from neurovis_spec.diagnostics import nearest
+from neurovis_spec.likeness import nearest
 
 SPEC = "neurovis: 1\nname: x\nneurons: {A: {}}\n"
 

@@ -14,8 +14,7 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from neurovis_spec.diagnostics import Diagnostic, Findings
-from neurovis_spec.findings import show_text
+from neurovis_spec.diagnostics import Diagnostic, Findings, show_text
 from neurovis_spec.language.yaml.characters import Lines
 from neurovis_spec.language.yaml.reader import read_any, read_file, read_text
 from neurovis_spec.language.yaml.scalars import NumberRangeError, resolve

@@ -10,7 +10,7 @@ import pytest
 
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import COMMANDS
-from neurovis_spec.findings import show_text
+from neurovis_spec.diagnostics import show_text
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

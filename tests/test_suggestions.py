@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 import neurovis_spec as nv
-from neurovis_spec.diagnostics import MOST_HINTS, nearest
+from neurovis_spec.diagnostics import MOST_HINTS
 from neurovis_spec.language.allow import allows
+from neurovis_spec.likeness import nearest
 
 HEAD = "neurovis: 1\nname: x\n"
 

@@ -82,7 +82,7 @@ class LateCommands(click.Group):
         """As click does it, but an unknown name is answered with the nearest."""
         name = args[0]
         if name not in self.TABLE and not name.startswith("-"):
-            from neurovis_spec.diagnostics import suggest
+            from neurovis_spec.likeness import suggest
 
             raise click.UsageError(f"no command '{name}'; {suggest(name, self.TABLE, 'the commands are')}", ctx)
         return super().resolve_command(ctx, args)

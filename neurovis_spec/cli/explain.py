@@ -25,7 +25,7 @@ def command(code: str) -> None:
     CODE is what stands in brackets behind the word error or warning; with 'list' all codes are printed.
     """
     from neurovis_spec.codes import catalogue
-    from neurovis_spec.diagnostics import suggest
+    from neurovis_spec.likeness import suggest
 
     codes = catalogue()
     if code == "list":

@@ -10,8 +10,7 @@ from typing import IO, Any
 
 import click
 
-from neurovis_spec.diagnostics import SpecError
-from neurovis_spec.findings import printable, show_text
+from neurovis_spec.diagnostics import SpecError, printable, show_text
 from neurovis_spec.real_paths import reason_of
 
 

@@ -90,7 +90,7 @@ def network_of(spec: str, parameters: Mapping[str, float] | None = None) -> Comp
 def tell_warnings(spec: str, found: Sequence[Diagnostic]) -> None:
     """Say on standard error how many warnings a SPEC has, and what shows them: in full they stand there alone."""
     if found:
-        from neurovis_spec.findings import printable
+        from neurovis_spec.diagnostics import printable
 
         how = how_to_compile()
         body = None if isinstance(how["body"], bool) else how["body"]
@@ -104,7 +104,7 @@ def tell_warnings(spec: str, found: Sequence[Diagnostic]) -> None:
 def show(found: Sequence[Diagnostic], sources: Mapping[str, str]) -> None:
     """Write findings to standard error, with the lines of these texts."""
     if found:
-        from neurovis_spec.findings import show_text
+        from neurovis_spec.diagnostics import show_text
 
         click.echo(show_text(found, sources), err=True)
 

@@ -12,9 +12,8 @@ from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.files import STDIN, show, standard_input, writing
 from neurovis_spec.cli.options import examples, specs_argument
 from neurovis_spec.cli.progress import progress
-from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError
+from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError, printable
 from neurovis_spec.differences import difference
-from neurovis_spec.findings import printable
 
 _BOM: Final = "\ufeff"
 

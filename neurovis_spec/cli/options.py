@@ -16,7 +16,7 @@ import click
 
 from neurovis_spec import plugins
 from neurovis_spec.cli.completion import input_files, one_of, paths, settings
-from neurovis_spec.diagnostics import suggest
+from neurovis_spec.likeness import suggest
 
 Command: TypeAlias = Callable[..., object]
 #: What gives a command an option, or several.

@@ -14,7 +14,7 @@ import numpy as np
 from neurovis_spec.cli.files import count
 from neurovis_spec.cli.tables import number, spread, table
 from neurovis_spec.describe import wired
-from neurovis_spec.findings import printable
+from neurovis_spec.diagnostics import printable
 
 if TYPE_CHECKING:
     from neurovis_spec.arrays import IntArray

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from neurovis_spec.findings import printable
+from neurovis_spec.diagnostics import printable
 
 
 def table(rows: Sequence[Sequence[str]], header: Sequence[str] = (), *, right: bool = False) -> str:

@@ -9,8 +9,7 @@ import click
 
 from neurovis_spec.cli.files import STDIN, compiled, count
 from neurovis_spec.cli.options import body_options, compile_options, examples, specs_argument
-from neurovis_spec.diagnostics import Diagnostic, SpecError
-from neurovis_spec.findings import printable, show_text, to_json
+from neurovis_spec.diagnostics import Diagnostic, SpecError, printable, show_text
 
 FORMATS = ("text", "json", "sarif", "github")
 
@@ -74,12 +73,6 @@ def _show(found: Iterable[Diagnostic], sources: dict[str, str], form: str) -> No
 
 
 def _writer(form: str) -> Callable[[Iterable[Diagnostic]], str]:
-    if form == "sarif":
-        from neurovis_spec.findings_sarif import to_sarif
+    from neurovis_spec.findings_formats import to_github, to_json, to_sarif
 
-        return to_sarif
-    if form == "github":
-        from neurovis_spec.findings_github import to_github
-
-        return to_github
-    return to_json
+    return {"json": to_json, "github": to_github, "sarif": to_sarif}[form]

@@ -23,7 +23,7 @@ from neurovis_spec.compiler.names.scope import Surroundings
 from neurovis_spec.compiler.network import Output
 from neurovis_spec.compiler.values.constants import ALWAYS, Constants, is_constant, parse_formula
 from neurovis_spec.compiler.values.constants import Scope as Together
-from neurovis_spec.diagnostics import Findings, Home, Span, shorten, suggest
+from neurovis_spec.diagnostics import Findings, Home, Span, shorten
 from neurovis_spec.language.body import BodyModel
 from neurovis_spec.language.data.files import LARGEST, read_data
 from neurovis_spec.language.expressions.tree import Name, names, walk
@@ -31,6 +31,7 @@ from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.model import names_of
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.yaml.opening import FileFault, fault_of
+from neurovis_spec.likeness import suggest
 from neurovis_spec.real_paths import real_path
 
 #: More steps of a body within one of the network are a mistake.

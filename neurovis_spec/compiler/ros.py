@@ -23,13 +23,14 @@ from neurovis_spec.compiler.ros_settings import (
     absolute,
 )
 from neurovis_spec.compiler.values.constants import Constants
-from neurovis_spec.diagnostics import Findings, Home, Undeclared, shorten, suggest
+from neurovis_spec.diagnostics import Findings, Home, Undeclared, shorten
 from neurovis_spec.language.located import Formula, said
 from neurovis_spec.language.model import names_of
 from neurovis_spec.language.ros import PublishModel, RosModel, SubscribeModel
 from neurovis_spec.language.ros_types import Field, all_types, fields_of, misspelt, numbers_of, plain
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.language.unknown import known
+from neurovis_spec.likeness import suggest
 
 #: Where a message has its numbers if nothing else is said.
 _DATA: Final = "data"

@@ -12,9 +12,10 @@ from itertools import islice
 from typing import Final, NamedTuple
 
 from neurovis_spec.codes import VALIDATE, catalogue
-from neurovis_spec.diagnostics import Diagnostic, Findings, Span, suggest
+from neurovis_spec.diagnostics import Diagnostic, Findings, Span
 from neurovis_spec.language.yaml.characters import Lines
 from neurovis_spec.language.yaml.reader import comments
+from neurovis_spec.likeness import suggest
 
 USELESS: Final = "useless-allow"
 _MOST: Final = 1000  # of these in a spec; nobody reads what more would say

@@ -12,9 +12,10 @@ from collections.abc import Mapping as AnyMapping
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from neurovis_spec.diagnostics import Findings, Home, Undeclared, did_you_mean, meant, nearest, shorten, slips, suggest
+from neurovis_spec.diagnostics import Findings, Home, Undeclared, shorten
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.yaml.source import Entry, Mapping, Scalar
+from neurovis_spec.likeness import did_you_mean, meant, nearest, slips, suggest
 
 _NAMES: Final = r"[A-Za-z_][\w.]*(?: *(?:->|\+) *[A-Za-z_][\w.]*)*"
 _APART: Final = re.compile(

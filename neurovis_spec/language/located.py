@@ -18,7 +18,7 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import PydanticCustomError, core_schema
 
-from neurovis_spec.diagnostics import Findings, Span, did_you_mean, meant, nearest, shorten, suggest
+from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language import grammar
 from neurovis_spec.language.expressions.habits import ungrouped_hint, unit_hint, unit_of
 from neurovis_spec.language.expressions.lexer import decimal_hint
@@ -26,6 +26,7 @@ from neurovis_spec.language.grammar import FORMULA, REFERENCE, TEXT, TEXTS, Eith
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.yaml.scalars import INTEGER_HIGH, INTEGER_LOW
 from neurovis_spec.language.yaml.source import AnyList, Node, Scalar, describe, one_or_more
+from neurovis_spec.likeness import did_you_mean, meant, nearest, suggest
 from neurovis_spec.lookalikes import in_ascii
 
 T = TypeVar("T")

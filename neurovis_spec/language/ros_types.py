@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Final, Literal
 
-from neurovis_spec.diagnostics import meant
+from neurovis_spec.likeness import meant
 
 _DIGITS: Final = re.compile("[0-9]+")
 _STAMPED: Final = "Header header"

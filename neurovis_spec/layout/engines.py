@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from neurovis_spec import plugins
-from neurovis_spec.diagnostics import suggest
 from neurovis_spec.layout.model import Capabilities, LayoutEngine, LayoutRefusalError
+from neurovis_spec.likeness import suggest
 
 
 def engine_of(name: str) -> LayoutEngine:

@@ -11,11 +11,12 @@ import math
 import re
 
 from neurovis_spec.compiler.drawing.pins import FARTHEST
-from neurovis_spec.diagnostics import Findings, suggest
+from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.yaml.reader import read_content, read_text
 from neurovis_spec.language.yaml.source import AnyList, Mapping, Node, Scalar, SourceDocument, describe
 from neurovis_spec.layout.model import SIDES, Layout, Point, Route, Side
 from neurovis_spec.layout.naming import edge_key, natural_key
+from neurovis_spec.likeness import suggest
 
 VERSION = 1
 _KEYS = ("neurovis_layout", "network", "engine", "positions", "routes", "labels")

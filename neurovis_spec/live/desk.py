@@ -15,8 +15,7 @@ from threading import Condition, RLock, Thread
 from typing import Final, TypeAlias
 
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.diagnostics import SpecError
-from neurovis_spec.findings import show_text
+from neurovis_spec.diagnostics import SpecError, show_text
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.live.appearance import Appearance
 from neurovis_spec.live.pins import Compile, Saving, SavingError, saving

@@ -15,8 +15,7 @@ from queue import SimpleQueue
 from typing import TypeAlias
 
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.diagnostics import Diagnostic, SpecError
-from neurovis_spec.findings import show_text
+from neurovis_spec.diagnostics import Diagnostic, SpecError, show_text
 from neurovis_spec.interrupts import ENDING, Ended
 from neurovis_spec.layout.model import LayoutRefusalError
 from neurovis_spec.live.access import Access

@@ -9,8 +9,8 @@ from __future__ import annotations
 from functools import cache
 from typing import Final, TypeAlias
 
-from neurovis_spec.diagnostics import nearest, suggest
 from neurovis_spec.language.patterns import PATTERNS, Pattern
+from neurovis_spec.likeness import nearest, suggest
 from neurovis_spec.manual.builtins import Builtin, builtins
 from neurovis_spec.manual.keys import Key, keys
 from neurovis_spec.manual.words import Word, functions, names

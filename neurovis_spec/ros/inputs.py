@@ -14,7 +14,7 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.ros_settings import Subscription as Settings
-from neurovis_spec.diagnostics import nearest
+from neurovis_spec.likeness import nearest
 from neurovis_spec.ros.counts import REASONS, Counts, Reason, Teller
 from neurovis_spec.ros.definitions import Definition
 from neurovis_spec.ros.fields import numbers_at, texts_at

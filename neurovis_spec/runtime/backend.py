@@ -17,8 +17,8 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.callers import callers_level
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.expressions.functions import NUMPY, Library
+from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.state import State
 
 #: The environment variable that names the default.

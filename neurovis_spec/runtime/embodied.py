@@ -21,8 +21,8 @@ from neurovis_spec.compiler.body_settings import BodySettings, Moved
 from neurovis_spec.compiler.names.state_references import StateOf, singles
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.values.draws import Stream
-from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.expressions.emit import defined, emit
+from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.checkpoint import numbers_of
 from neurovis_spec.runtime.columns import Probe, probe_of
 from neurovis_spec.runtime.state import BodyState, State, constants

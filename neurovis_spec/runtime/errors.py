@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from neurovis_spec.diagnostics import suggest
+from neurovis_spec.likeness import suggest
 
 
 class RecordingError(ValueError):

@@ -17,13 +17,14 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.names.state_references import StateOf
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.diagnostics import Findings, Span, shorten, suggest
+from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.measures import PLACE, Formula, parse_measure
 from neurovis_spec.language.expressions.parser import ExpressionError
 from neurovis_spec.language.expressions.tree import Binary, Call, Chain, Name, Tree, is_square, names, walk
 from neurovis_spec.language.references import Arrow, parse_sum, state_of
+from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.columns import Probe, probe_of
 from neurovis_spec.runtime.errors import UnknownNameError
 from neurovis_spec.runtime.names import Names, names_of

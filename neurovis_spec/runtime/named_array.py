@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, frozen
-from neurovis_spec.diagnostics import suggest
+from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.errors import UnknownNameError
 
 

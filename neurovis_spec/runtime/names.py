@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.references import Arrow, NeuronRange, Part, RuleState, parse_sum, state_of
+from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.errors import unknown_text
 
 

@@ -17,9 +17,9 @@ from neurovis_spec.compiler.names.state_references import (
     model_state,
 )
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.references import Arrow, Part, Sum, parse, parse_sum, state_of
 from neurovis_spec.language.unknown import UNKNOWN
+from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.errors import UnknownNameError
 from neurovis_spec.runtime.names import Names, names_of
 

@@ -22,8 +22,8 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.patch import PatchError
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.expressions.functions import NUMPY, Library
+from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.controls import Controls, lose
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.fitting import of_table

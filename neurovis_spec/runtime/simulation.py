@@ -26,8 +26,8 @@ from neurovis_spec.compiler.events.changes import Clamp
 from neurovis_spec.compiler.events.patch import PatchError
 from neurovis_spec.compiler.events.settable import ParameterFormula
 from neurovis_spec.compiler.network import Network, Output
-from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.expressions.tree import Number
+from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.backend import Backend, Ready, ready
 from neurovis_spec.runtime.columns import ALL, Keep, Probe, probe_of
 from neurovis_spec.runtime.controls import Controls

@@ -13,9 +13,9 @@ from typing import Final, TypeAlias
 from neurovis_spec import arguments
 from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.references import Part, Sum, parse, state_of
 from neurovis_spec.language.words import VIEWS, WHOLE
+from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.errors import UnknownNameError
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.references import find_connections, find_states

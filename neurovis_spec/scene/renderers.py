@@ -6,7 +6,7 @@ In: a suffix, and whether the picture moves. Out: the Renderer that declares it,
 from __future__ import annotations
 
 from neurovis_spec import plugins
-from neurovis_spec.diagnostics import suggest
+from neurovis_spec.likeness import suggest
 from neurovis_spec.scene.model import Renderer, RendererCapabilities
 
 

@@ -16,8 +16,7 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.body import BodyError
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.diagnostics import SpecError
-from neurovis_spec.findings import printable
+from neurovis_spec.diagnostics import SpecError, printable
 from neurovis_spec.plugins import PluginError
 from neurovis_spec.runtime.backend import BackendError
 from neurovis_spec.runtime.columns import Columns, Keep, columns_of

@@ -18,10 +18,11 @@ import numpy.typing as npt
 
 from neurovis_spec import api, arguments
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.diagnostics import SpecError, suggest
+from neurovis_spec.diagnostics import SpecError
 from neurovis_spec.interrupts import Ended
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
 from neurovis_spec.language.yaml.reader import LARGEST
+from neurovis_spec.likeness import suggest
 from neurovis_spec.plain import text_of
 from neurovis_spec.progress import Progress
 from neurovis_spec.real_paths import real_path

@@ -15,10 +15,11 @@ from functools import cached_property
 from itertools import islice
 from typing import Final, NamedTuple
 
-from neurovis_spec.diagnostics import Diagnostic, Findings, Home, Mark, meant, shorten, slips
+from neurovis_spec.diagnostics import Diagnostic, Findings, Home, Mark, shorten
 from neurovis_spec.language.located import IDENTIFIER
 from neurovis_spec.language.yaml.reader import comments
 from neurovis_spec.language.yaml.source import AnyList, Mapping, Node, Scalar
+from neurovis_spec.likeness import meant, slips
 
 #: The most lines, and the most names, that a message lists.
 _SHOWN: Final = 5

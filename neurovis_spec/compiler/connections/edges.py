@@ -19,11 +19,12 @@ from neurovis_spec.compiler.values.cells import Cells, cells_of, seen_by_pairs, 
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.draws import Stream
-from neurovis_spec.diagnostics import Span, shorten, suggest
+from neurovis_spec.diagnostics import Span, shorten
 from neurovis_spec.language.located import formula_of
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
 from neurovis_spec.language.values import EdgeRows, FileReference
 from neurovis_spec.language.yaml.source import NULL, TEXT
+from neurovis_spec.likeness import suggest
 
 _AN_EDGE = "an edge is [from, to], [from, to, weight] or [from, to, weight, delay]"
 

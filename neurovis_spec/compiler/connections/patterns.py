@@ -18,12 +18,13 @@ from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.values.arguments import check_settings
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.draws import Stream
-from neurovis_spec.diagnostics import Findings, did_you_mean, meant, shorten, suggest
+from neurovis_spec.diagnostics import Findings, shorten
 from neurovis_spec.language.keys import settings_of
 from neurovis_spec.language.located import Formula, formula_of
 from neurovis_spec.language.patterns import PATTERNS
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.values import Choice
+from neurovis_spec.likeness import did_you_mean, meant, suggest
 
 
 def all_to_all(ends: Ends) -> Pairs:

@@ -18,13 +18,14 @@ from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import Input
 from neurovis_spec.compiler.program import Rule
 from neurovis_spec.compiler.values.arguments import Each, check_initials, check_settings, choose, parameters, settle
-from neurovis_spec.diagnostics import shorten, suggest
+from neurovis_spec.diagnostics import shorten
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import ConnectionModel
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.values import Choice
 from neurovis_spec.language.yaml.source import AnyList, Entry, Node, Scalar, one_or_more
+from neurovis_spec.likeness import suggest
 
 
 class Learning(NamedTuple):

@@ -12,9 +12,10 @@ from typing import Literal
 from neurovis_spec.compiler.drawing.drawing_settings import Cell, Mirror, Seat
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.names.references import Directory, home_of
-from neurovis_spec.diagnostics import Findings, Undeclared, shorten, suggest
+from neurovis_spec.diagnostics import Findings, Undeclared, shorten
 from neurovis_spec.language.drawing import PlanRow
 from neurovis_spec.language.located import Located
+from neurovis_spec.likeness import suggest
 
 Place = tuple[int, int]
 

@@ -18,7 +18,7 @@ from neurovis_spec.compiler.names.references import Directory, check_keys, key_o
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.neurons.populate import Population
 from neurovis_spec.compiler.values.constants import Constants
-from neurovis_spec.diagnostics import Findings, Span, shorten, suggest
+from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, RenderModel
 from neurovis_spec.language.located import Formula, Located, said
 from neurovis_spec.language.references import Sum, parse
@@ -27,6 +27,7 @@ from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
 from neurovis_spec.language.values import Reference
 from neurovis_spec.language.words import Direction
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
+from neurovis_spec.likeness import suggest
 from neurovis_spec.themes import COLOURS
 
 #: The most pixels of a picture: 8K is a little less. Its bytes take some 250 MB of memory.

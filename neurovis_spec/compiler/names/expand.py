@@ -25,13 +25,14 @@ from neurovis_spec.compiler.neurons.inputs import make_input
 from neurovis_spec.compiler.values.constants import Constants, Outside
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.parameters import make_parameters
-from neurovis_spec.diagnostics import Findings, Undeclared, shorten, suggest
+from neurovis_spec.diagnostics import Findings, Undeclared, shorten
 from neurovis_spec.language.expressions.tree import Number, names, substitute
 from neurovis_spec.language.located import NAME_RULE, too_long
 from neurovis_spec.language.model import names_of, unread
 from neurovis_spec.language.modules import InstanceModel
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
+from neurovis_spec.likeness import suggest
 
 #: What ``set`` knows beside the parameters: the number of the instance, from 0, and how many its entry makes.
 _SETTING = formula_at(InstanceModel, "set", "PARAMETER")

@@ -24,10 +24,11 @@ from neurovis_spec.compiler.names.state_references import (
 )
 from neurovis_spec.compiler.neurons.populate import Population
 from neurovis_spec.compiler.program import Model
-from neurovis_spec.diagnostics import Findings, shorten, suggest
+from neurovis_spec.diagnostics import Findings, shorten
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.references import Arrow, Part, StateName, state_of
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
+from neurovis_spec.likeness import suggest
 
 
 @dataclass(frozen=True)

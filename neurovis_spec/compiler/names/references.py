@@ -14,18 +14,7 @@ from typing import TypeAlias
 
 from neurovis_spec.compiler.limits import PATIENCE
 from neurovis_spec.compiler.network import Group
-from neurovis_spec.diagnostics import (
-    Findings,
-    Home,
-    Span,
-    Undeclared,
-    did_you_mean,
-    listed,
-    meant,
-    nearest,
-    shorten,
-    suggest,
-)
+from neurovis_spec.diagnostics import Findings, Home, Span, Undeclared, listed, shorten
 from neurovis_spec.language.located import IDENTIFIER, Located
 from neurovis_spec.language.modules import ModuleModel
 from neurovis_spec.language.references import Arrow, NeuronRange, NoReference, Part, Sum, parse, parse_sum
@@ -33,6 +22,7 @@ from neurovis_spec.language.spec import Spec
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 from neurovis_spec.language.yaml.source import Scalar
+from neurovis_spec.likeness import did_you_mean, meant, nearest, suggest
 
 #: What declares neurons, inputs and connections: a spec, or a module.
 Section: TypeAlias = Spec | ModuleModel

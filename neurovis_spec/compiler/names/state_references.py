@@ -12,9 +12,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from neurovis_spec.arrays import IntArray
-from neurovis_spec.diagnostics import Home, Undeclared, shorten, suggest
+from neurovis_spec.diagnostics import Home, Undeclared, shorten
 from neurovis_spec.language.references import StateName
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
+from neurovis_spec.likeness import suggest
 
 _NONE: IntArray = np.zeros(0, dtype=np.int64)
 

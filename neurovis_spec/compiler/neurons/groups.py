@@ -26,7 +26,7 @@ from neurovis_spec.compiler.values.arguments import check_initials, check_settin
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.definitions import Defaults, Definitions
 from neurovis_spec.compiler.values.draws import Stream
-from neurovis_spec.diagnostics import meant, nearest, shorten
+from neurovis_spec.diagnostics import shorten
 from neurovis_spec.language.expressions.tree import Tree, draws
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, name_hint, said, too_long
 from neurovis_spec.language.places import formula_at
@@ -35,6 +35,7 @@ from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown, known
 from neurovis_spec.language.values import Choice, FormulaList, Initial
 from neurovis_spec.language.yaml.source import AnyList, Scalar
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
+from neurovis_spec.likeness import meant, nearest
 
 T = TypeVar("T", bound=Activation | Model)
 _SETTING = formula_at(GroupModel, "model", "NAME", "SETTING")

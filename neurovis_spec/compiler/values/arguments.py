@@ -19,7 +19,7 @@ from neurovis_spec.compiler.program import Quantity
 from neurovis_spec.compiler.values.constants import Constants, Randomness, Value, value_of
 from neurovis_spec.compiler.values.definitions import Default, Defaults, check_bounds
 from neurovis_spec.compiler.values.draws import Stream
-from neurovis_spec.diagnostics import Findings, Hint, Home, Undeclared, did_you_mean, meant, shorten, suggest
+from neurovis_spec.diagnostics import Findings, Hint, Home, Undeclared, shorten
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import Name, Tree, names
@@ -28,6 +28,7 @@ from neurovis_spec.language.located import IDENTIFIER, Formula, formula_of
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.values import Choice, FormulaList
 from neurovis_spec.language.yaml.source import AnyList, Entry, Scalar, one_or_more
+from neurovis_spec.likeness import did_you_mean, meant, suggest
 
 T = TypeVar("T")
 

@@ -19,7 +19,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.settable import Dependent, ParameterFormula, Part, Slot, places_of
 from neurovis_spec.compiler.values.draws import Stream
-from neurovis_spec.diagnostics import Findings, Home, Undeclared, shorten, suggest
+from neurovis_spec.diagnostics import Findings, Home, Undeclared, shorten
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS, FUNCTIONS
 from neurovis_spec.language.expressions.given import GIVEN, meaning
@@ -30,6 +30,7 @@ from neurovis_spec.language.expressions.tree import Draw, Number, Tree, draws, n
 from neurovis_spec.language.grammar import PLAIN, Role
 from neurovis_spec.language.located import Formula
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
+from neurovis_spec.likeness import suggest
 
 Value: TypeAlias = float | FloatArray
 V = TypeVar("V")

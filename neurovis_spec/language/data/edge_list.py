@@ -14,7 +14,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from neurovis_spec.diagnostics import nearest
 from neurovis_spec.language.data.cells import (
     NO_COMMENT,
     Row,
@@ -28,6 +27,7 @@ from neurovis_spec.language.data.cells import (
     separated,
 )
 from neurovis_spec.language.data.table import CellError, Faults, Room, in_cell, in_row, quoted
+from neurovis_spec.likeness import nearest
 
 _COLUMNS: Final = ("from", "to", "weight", "delay")
 _LARGEST_DELAY: Final = 2**31 - 1

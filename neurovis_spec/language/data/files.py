@@ -12,12 +12,13 @@ from itertools import islice
 from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Final
 
-from neurovis_spec.diagnostics import Findings, Span, suggest
+from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.data.table import EMPTY_CELL, MOST_FAULTS, CellError, Faults, Room, Table, full, in_cell
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.values import DATA_FILES
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
+from neurovis_spec.likeness import suggest
 from neurovis_spec.real_paths import real_path
 
 if TYPE_CHECKING:

@@ -16,7 +16,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from neurovis_spec.diagnostics import nearest
 from neurovis_spec.language.data.cells import below
 from neurovis_spec.language.data.table import (
     MOST_FAULTS,
@@ -30,6 +29,7 @@ from neurovis_spec.language.data.table import (
     repeated,
     scattered,
 )
+from neurovis_spec.likeness import nearest
 
 _BANNER: Final = "%%matrixmarket"
 _LONGEST_LINE: Final = 1024

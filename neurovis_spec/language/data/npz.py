@@ -14,7 +14,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.data.npy import LONGEST_HEADER, REAL, numbers_in, parse_array, read_header
 from neurovis_spec.language.data.table import (
     SPARSER,
@@ -29,6 +28,7 @@ from neurovis_spec.language.data.table import (
     repeated,
     scattered,
 )
+from neurovis_spec.likeness import suggest
 
 MOST_MEMBERS: Final = 4_000
 #: what each entry of an archive's directory begins with
