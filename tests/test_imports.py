@@ -10,6 +10,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from acyclic import AcyclicContract
+from grimp import ImportGraph
 
 from neurovis_spec.cli.commands import COMMANDS
 
@@ -39,6 +41,23 @@ def test_the_contracts_hold() -> None:
 
     status = lint_imports(config_filename=str(ROOT / "pyproject.toml"), no_cache=True)
     assert status == EXIT_STATUS_SUCCESS
+
+
+def test_a_circle_of_imports_is_found_and_named(capsys: pytest.CaptureFixture[str]) -> None:
+    graph = ImportGraph()
+    for importer, imported, line in (("a.x", "a.y", 3), ("a.y", "b", 5), ("b", "a.x", 7), ("b", "c", 8), ("d", "d", 1)):
+        graph.add_import(importer=importer, imported=imported, line_number=line, line_contents="")
+    contract = AcyclicContract("none", {}, {})
+    broken = contract.check(graph, verbose=False)
+    contract.render_broken_contract(broken)
+    assert not broken.kept
+    assert capsys.readouterr().out.splitlines() == [
+        "These modules import each other: a.x <-> a.y <-> b",
+        "- a.x -> a.y (line 3)",
+        "- a.y -> b (line 5)",
+        "- b -> a.x (line 7)",
+        "",
+    ]
 
 
 def test_importing_the_package_imports_next_to_nothing() -> None:
