@@ -17,7 +17,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -26,12 +26,11 @@ import numpy.typing as npt
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from networks_by_hand import cpg_rbf, rule
+from networks_by_hand import all_learning, cpg_rbf, rule
 from stepping import cpg_by_hand, random_by_hand, random_network
 
 import neurovis_spec as nv
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Learn, Plasticity
 from neurovis_spec.runtime import c_library
 from neurovis_spec.runtime.c_backend import CBackend
 from neurovis_spec.runtime.inputs import InputReader
@@ -41,6 +40,7 @@ from neurovis_spec.runtime.state import initial_state
 
 Run = Callable[[int], None]
 HERE = Path(__file__).resolve().parent
+OJA = rule("weight + 0.01 * post * (pre - post * weight)")
 _HEAD = "#include <math.h>\n#include <stdint.h>\n#include <string.h>\n"
 
 #: tanh(Σ w·a + bias), connections of delay 1, Oja's rule where they learn
@@ -363,16 +363,6 @@ def numpy_steps(network: Network) -> Run:
     return made
 
 
-def learning(network: Network) -> Network:
-    """The same, its connections learning by Oja's rule."""
-    oja = rule("weight + 0.01 * post * (pre - post * weight)")
-    members = np.arange(len(network.connections))
-    links = replace(network.connections, rules=np.zeros(len(members), dtype=np.int64))
-    plasticity = Plasticity(oja, members, {}, {})
-    program = (*network.program, Learn(0))
-    return replace(network, connections=links, plasticity=(plasticity,), program=program)
-
-
 def brian(network: Network, steps: int) -> float:
     """Microseconds a step of the same network in Brian2, NaN where the Python in ``BRIAN_PYTHON`` has none."""
     python = os.environ.get("BRIAN_PYTHON", sys.executable)
@@ -427,7 +417,7 @@ def main() -> None:
         Case("12/28, use case 1", cpg_rbf(), cpg_in_c, cpg_by_hand, 20000, False),
         Case("148/204, hexapod", hexapod, hexapod_in_c, None, 10000, False, 2000),
         Case("150/200", random_network(150, 200), tanh_in_c, random_by_hand, 10000),
-        Case("302/7,000 plastic", learning(random_network(302, 7000)), tanh_in_c, None, 1000),
+        Case("302/7,000 plastic", all_learning(random_network(302, 7000), OJA), tanh_in_c, None, 1000),
         Case("1,000/10,000", random_network(1000, 10000), tanh_in_c, random_by_hand, 1000),
         Case("10,000/100,000", random_network(10000, 100000), tanh_in_c, random_by_hand, 100),
     )

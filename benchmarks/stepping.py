@@ -17,14 +17,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
-from networks_by_hand import TANH, Link, Unit, build, cpg_rbf
+from networks_by_hand import TANH, Unit, build, cpg_rbf, rewired
 from toy_bodies import Cart, carted
 
 import neurovis_spec as nv
 from neurovis_spec import pipeline
 from neurovis_spec.compiler.compile import Request
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Block
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.runtime.backend import load
 from neurovis_spec.runtime.embodied import Embodied
@@ -41,11 +40,8 @@ def random_network(n: int, m: int) -> Network:
     random = np.random.default_rng(1)
     ends = sorted(zip(random.integers(0, n, m).tolist(), random.integers(0, n, m).tolist(), strict=True))
     weights = random.normal(0, (n / m) ** 0.5, m).tolist()
-    few = build([Unit(f"N{i}", TANH, bias=0.01 * i) for i in range(n)])
-    links = build([Unit("A"), Unit("B")], [Link(0, 1, w) for w in weights]).connections
-    sources, targets = (np.array(side, dtype=np.int64) for side in zip(*ends, strict=True))
-    block: Block = replace(few.blocks[0], incoming=np.arange(m), slots=targets)
-    return replace(few, connections=replace(links, sources=sources, targets=targets), blocks=(block,))
+    sources, targets = zip(*ends, strict=True)
+    return rewired(build([Unit(f"N{i}", TANH, bias=0.01 * i) for i in range(n)]), weights, sources, targets)
 
 
 def random_by_hand(network: Network) -> Run:

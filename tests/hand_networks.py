@@ -11,11 +11,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from networks_by_hand import Link, Unit, Use, build, rule
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings, StatedGain
-from neurovis_spec.compiler.network import Connections, Group, Network, Neurons
-from neurovis_spec.compiler.program import Plasticity, Rule
+from neurovis_spec.compiler.network import Group, Network
 from neurovis_spec.layout.model import Layout, Point, Route
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.scene.gains import Gains, choose_gains
@@ -52,7 +52,7 @@ def numbered(name: str, count: int, **more: object) -> G:
 
 def network(
     groups: Sequence[G],
-    connections: Sequence[C],
+    wires: Sequence[C],
     *,
     name: str = "made_by_hand",
     title: str = "",
@@ -61,9 +61,8 @@ def network(
     boxes: Sequence[tuple[str, tuple[int, ...]]] = (),
     dt: float | None = None,
 ) -> Network:
-    """A Network without a program: what a picture needs. ``rules``: the rule's name and its signals' neurons."""
+    """A Network as a picture needs it. ``rules``: the rule's name and its signals' neurons."""
     names = [neuron for group in groups for neuron in group.names]
-    labels = [label for group in groups for label in (group.labels or group.names)]
     index = {neuron: place for place, neuron in enumerate(names)}
     made, start = [], 0
     for group in groups:
@@ -72,39 +71,31 @@ def network(
                   box=group.box)
         )  # fmt: skip
         start += len(group.names)
-    n, m = len(names), len(connections)
-    wires = Connections(
-        sources=np.array([index[c.source] for c in connections], np.int64),
-        targets=np.array([index[c.target] for c in connections], np.int64),
-        weights=np.array([c.weight for c in connections], float),
-        centres=np.zeros(m),
-        delays=np.array([c.delay for c in connections], np.int64),
-        rules=np.array([c.rule for c in connections], np.int64),
-        entry=np.array([c.entry for c in connections], np.int64),
-        low=np.full(m, -np.inf),
-        high=np.full(m, np.inf),
+    links = [Link(index[c.source], index[c.target], c.weight, c.delay, learns=c.rule, entry=c.entry) for c in wires]
+    uses = [
+        Use(rule(name=called, signals=tuple(signals)), signals={key: index[neuron] for key, neuron in signals.items()})
+        for called, signals in rules
+    ]
+    whole = build([Unit(neuron) for neuron in names], links, uses, groups=made, dt=1.0 if dt is None else dt)
+    learned = {c.entry: f"{rules[c.rule][0]}(rate=0.01)" for c in wires if c.rule >= 0}
+    connections = replace(
+        whole.connections,
         entries=tuple(entries),
         descriptions=(None,) * len(entries),
-        learns=tuple(
-            next((f"{rules[c.rule][0]}(rate=0.01)" for c in connections if c.entry == entry and c.rule >= 0), None)
-            for entry in range(len(entries))
-        ),
+        learns=tuple(learned.get(entry) for entry in range(len(entries))),
         labels=(None,) * len(entries),
     )
-    plasticity = []
-    for number, (rule, signals) in enumerate(rules):
-        members = np.flatnonzero(wires.rules == number).astype(np.int64)
-        sources: dict[str, IntArray] = {k: np.full(len(members), index[v], np.int64) for k, v in signals.items()}
-        plain = Rule(rule, (), tuple(signals), (), (), None, None)
-        plasticity.append(Plasticity(plain, members, {}, sources))
-    return Network(
-        name=name, title=title, description="", dt=1.0 if dt is None else dt, dt_given=dt is not None, steps=1000,
-        episode=None, seed=0, parameters={}, structural=frozenset(),
-        neurons=Neurons(tuple(names), tuple(labels), tuple(made), np.zeros(n), np.full(n, np.nan),
-                        np.full(n, -1, np.int64), np.full((n, 2), np.nan)),
-        connections=wires, inputs=(), outputs=(), blocks=(), plasticity=tuple(plasticity), program=(),
-        layout=LayoutSettings(boxes=tuple(boxes)), render=RenderSettings(), hash="0" * 64,
-    )  # fmt: skip
+    labels = tuple(label for group in groups for label in (group.labels or group.names))
+    return replace(
+        whole,
+        name=name,
+        title=title,
+        dt_given=dt is not None,
+        steps=1000,
+        neurons=replace(whole.neurons, labels=labels),
+        connections=connections,
+        layout=LayoutSettings(boxes=tuple(boxes)),
+    )
 
 
 def downward(start: Point, end: Point, spread: float = 0.0) -> Route:

@@ -1,4 +1,4 @@
-"""Small networks for tests of the runtime, lowered here by hand: no compiler is needed, and none can be at fault.
+"""Small networks for tests, lowered here by hand: no compiler is needed, and none can be at fault.
 
 In: neurons and links, one by one. Out: a Network whose blocks and program follow the contract (delay-0 connections in
 topological order, then Send, then Learn).
@@ -7,7 +7,7 @@ topological order, then Send, then Learn).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -66,10 +66,11 @@ def rule(
     parameters: Sequence[str] = (),
     signals: Sequence[str] = (),
     let: Mapping[str, str] | None = None,
+    name: str = "rule",
 ) -> Rule:
     lets = tuple((name, tree(text)) for name, text in (let or {}).items())
     found = quantities(states or {})
-    return Rule("rule", tuple(parameters), tuple(signals), lets, found, optional(step), optional(end))
+    return Rule(name, tuple(parameters), tuple(signals), lets, found, optional(step), optional(end))
 
 
 IDENTITY = activation("x")
@@ -107,6 +108,7 @@ class Link:
     learns: int = -1
     low: float = float("-inf")
     high: float = float("inf")
+    entry: int = 0
 
 
 @dataclass(frozen=True)
@@ -136,7 +138,6 @@ def build(
     levels: list[Operation] = [ReadInputs()]
     for number in range(len(blocks)):
         levels += [Gather(number), Update(number)]
-    rules = tuple(learning(number, use, links) for number, use in enumerate(uses))
     return Network(
         name="by_hand",
         title="By hand",
@@ -153,7 +154,7 @@ def build(
         inputs=tuple(inputs),
         outputs=tuple(outputs),
         blocks=blocks,
-        plasticity=rules,
+        plasticity=tuple(learning(number, use, links) for number, use in enumerate(uses)),
         program=(*levels, Send(), *(Learn(number) for number in range(len(uses)))),
         layout=LayoutSettings(),
         render=RenderSettings(),
@@ -185,7 +186,7 @@ def connections(links: Sequence[Link]) -> Connections:
         centres=floats([link.centre for link in links]),
         delays=integers([link.delay for link in links]),
         rules=integers([link.learns for link in links]),
-        entry=integers([0 for _ in links]),
+        entry=integers([link.entry for link in links]),
         low=floats([link.low for link in links]),
         high=floats([link.high for link in links]),
         entries=("all",),
@@ -238,6 +239,23 @@ def learning(number: int, use: Use, links: Sequence[Link]) -> Plasticity:
         parameters={name: np.full(len(members), value) for name, value in use.parameters.items()},
         signals={name: np.full(len(members), index, dtype=np.int64) for name, index in use.signals.items()},
     )
+
+
+def rewired(network: Network, weights: Sequence[float], sources: Sequence[int], targets: Sequence[int]) -> Network:
+    """A network of one block, all of its neurons alike, with these connections of delay 1 in place of its own."""
+    links = connections([Link(0, 0, weight) for weight in weights])
+    links = replace(links, sources=np.array(sources, dtype=np.int64), targets=np.array(targets, dtype=np.int64))
+    (one,) = network.blocks
+    one = replace(one, incoming=np.arange(len(links)), slots=links.targets)
+    return replace(network, connections=links, blocks=(one,))
+
+
+def all_learning(network: Network, by: Rule) -> Network:
+    """A network whose connections are fixed, and now all learn by a rule without parameters and signals."""
+    count = len(network.connections)
+    links = replace(network.connections, rules=np.zeros(count, dtype=np.int64))
+    plasticity = (Plasticity(by, np.arange(count), {}, {}),)
+    return replace(network, connections=links, plasticity=plasticity, program=(*network.program, Learn(0)))
 
 
 def cpg_rbf(learns: bool = True) -> Network:
