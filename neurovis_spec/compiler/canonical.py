@@ -1,47 +1,69 @@
-"""The canonical form of a network's parts: what the content hash is made from.
+"""The content hash of a network: what of it is content, how that is called there, and in which order it stands.
 
-In: parts of a Network in the order in which the spec writes them. Out: the same parts in an order that depends on names
-alone, where no run depends on the order: inputs, outputs, and the parameters, states and signals of definitions. What
-counts by the place of an input counts by its place here.
+In: a Network. Out: its hash. What the spec writes in some order, and no run depends on it, is put in one that depends
+on names alone: inputs, outputs, and the parameters, states and signals of definitions. What counts by the place of an
+input counts by its place here.
+
+Names of kinds and fields are those of the first version, whatever the types are called by now.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 
 from neurovis_spec.arrays import IntArray
-from neurovis_spec.compiler.network import Input, Neurons, Output
-from neurovis_spec.compiler.program import Activation, Block, Model, Plasticity, Rule
+from neurovis_spec.compiler.digest import TREES, Content, Record, content, digest
+from neurovis_spec.compiler.names.state_references import singles
+from neurovis_spec.compiler.network import Connections, Group, Input, Network, Neurons, Noise, Output
+from neurovis_spec.compiler.program import Activation, Block, Model, Plasticity, Quantity, Rule
+
+#: What of each type is content. What follows parameters shows by the parameters; ``starts`` and states of outputs are
+#: put behind the rest, where there are some.
+SCHEMA: Mapping[type, Content] = {
+    **TREES,
+    Neurons: content("Neurons", "names groups bias initial input position", "labels starts"),
+    Group: content(
+        "Group",
+        "name start count activation model combine activation_parameters model_parameters input",
+        "box role description module spikes",
+    ),
+    Connections: content(
+        "Connections",
+        "sources targets weights centres delays rules entry low high entries",
+        "descriptions learns labels",
+    ),
+    Input: content("Input", "name start size expression table", "slots parts"),
+    Output: content("Output", "name neurons scalar", "states"),
+    Noise: content("Noise", "name members start expression parameters", "slots widths"),
+}
 
 
-def canonical(
-    neurons: Neurons,
-    inputs: Sequence[Input],
-    outputs: Sequence[Output],
-    blocks: Sequence[Block],
-    plasticity: Sequence[Plasticity],
-) -> tuple[object, ...]:
-    """The parts, in this order, ready to be hashed."""
-    arranged, places = _arranged(inputs)
+def content_hash(network: Network) -> str:
+    """The hash of a network, before events change anything in it."""
+    neurons = network.neurons
+    arranged, places = _arranged(network.inputs)
     count = len(neurons)
     moved = np.concatenate((np.arange(count), count + places))
-    return (
+    return digest(
+        "neurovis 1",
+        network.name,
+        network.dt,
+        network.episode,
+        network.seed,
+        network.parameters,
         replace(neurons, input=np.append(places, -1)[neurons.input]),  # −1, without an input, stays −1
+        network.connections,
         arranged,
-        sorted(outputs, key=lambda output: output.name),
-        [replace(block, activation=_activation(block.activation), model=_definition(block.model)) for block in blocks],
-        [
-            replace(
-                one,
-                rule=replace(_definition(one.rule), signals=tuple(sorted(one.rule.signals))),
-                signals={name: moved[indices] for name, indices in one.signals.items()},
-            )
-            for one in plasticity
-        ],
+        sorted(network.outputs, key=lambda output: output.name),
+        [_block(one) for one in network.blocks],
+        [_plasticity(one, moved) for one in network.plasticity],
+        network.noises,
+        *((output.name, *singles(output.states)) for output in network.outputs if output.states),
+        *([("starts", neurons.starts)] if neurons.starts else []),
+        schema=SCHEMA,
     )
 
 
@@ -57,13 +79,59 @@ def _arranged(inputs: Sequence[Input]) -> tuple[list[Input], IntArray]:
     return result, places
 
 
-def _activation(activation: Activation) -> Activation:
-    return replace(activation, parameters=tuple(sorted(activation.parameters)))
+def _block(block: Block) -> Record:
+    fields: dict[str, object] = {
+        "level": block.level,
+        "members": block.members,
+        "combine": block.combine,
+        "activation": _activation(block.activation),
+        "activation_parameters": block.activation_parameters,
+        "model": _model(block.model),
+        "model_parameters": block.model_parameters,
+        "incoming": block.incoming,
+    }
+    return Record("Block", fields)
 
 
-Definition = TypeVar("Definition", Model, Rule)
+def _plasticity(one: Plasticity, moved: IntArray) -> Record:
+    """``moved``: where each place of all activities and inputs is here."""
+    signals = {name: moved[indices] for name, indices in one.signals.items()}
+    fields = {"rule": _rule(one.rule), "members": one.members, "parameters": one.parameters, "signals": signals}
+    return Record("Plasticity", fields)
 
 
-def _definition(made: Definition) -> Definition:
-    states = tuple(sorted(made.state, key=lambda state: state.name))
-    return replace(made, parameters=tuple(sorted(made.parameters)), state=states)
+def _activation(one: Activation) -> Record:
+    return Record("Activation", {"name": one.name, "parameters": sorted(one.parameters), "value": one.value})
+
+
+def _model(one: Model) -> Record:
+    shared = {"name": one.name, "parameters": sorted(one.parameters), "let": one.let, "state": _states(one.state)}
+    return Record("Model", {**shared, "activity": one.activity})
+
+
+def _rule(one: Rule) -> Record:
+    fields: dict[str, object] = {
+        "name": one.name,
+        "parameters": sorted(one.parameters),
+        "signals": sorted(one.signals),
+        "let": one.let,
+        "state": _states(one.state),
+        "each_step": one.each_step,
+        "each_episode": one.each_episode,
+    }
+    return Record("Rule", fields)
+
+
+def _states(states: Iterable[Quantity]) -> list[Record]:
+    return [
+        Record(
+            "Quantity",
+            {
+                "name": one.name,
+                "initial": one.initial,
+                "each_step": one.each_step,
+                "each_episode": one.each_episode,
+            },
+        )
+        for one in sorted(states, key=lambda state: state.name)
+    ]

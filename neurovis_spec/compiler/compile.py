@@ -16,12 +16,11 @@ import numpy as np
 
 from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.body_settings import BodySettings
-from neurovis_spec.compiler.canonical import canonical
+from neurovis_spec.compiler.canonical import content_hash
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.checks.warnings import warn
 from neurovis_spec.compiler.connections.connect import Connected, connect, join
 from neurovis_spec.compiler.connections.entries import Bundle
-from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.drawing.sections import layout_settings, render_settings
 from neurovis_spec.compiler.events.bound import make_settable, own_weights
 from neurovis_spec.compiler.limits import MOST_SIGNALS, Limits, amount
@@ -32,7 +31,6 @@ from neurovis_spec.compiler.names.modules import library_of
 from neurovis_spec.compiler.names.outputs import make_outputs
 from neurovis_spec.compiler.names.references import other_parameter
 from neurovis_spec.compiler.names.scope import Scope, Surroundings
-from neurovis_spec.compiler.names.state_references import singles
 from neurovis_spec.compiler.network import Input, Instance, Network, Output
 from neurovis_spec.compiler.neurons.noise import make_noises
 from neurovis_spec.compiler.neurons.populate import Population, populate, without_neurons
@@ -111,21 +109,6 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
     connections = join(bundles, rules)
     blocks = make_blocks(population, connections.sources, connections.targets, level)
     program = make_program(blocks, plasticity)
-    ordered = canonical(population.neurons, inputs, outputs, blocks, plasticity)
-    content = digest(
-        "neurovis 1",
-        name,
-        constants.dt,
-        episode,
-        seed,
-        constants.parameters,
-        ordered[0],
-        connections,
-        *ordered[1:],
-        noises,
-        *((output.name, *singles(output.states)) for output in outputs if output.states),
-        *([("starts", population.neurons.starts)] if population.neurons.starts else []),
-    )
     slots = tuple(constants.slots)
     network = Network(
         name=name,
@@ -147,7 +130,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         program=program,
         layout=layout,
         render=render,
-        hash=content,
+        hash="",  # of all the rest
         noises=noises,
         instances=_instances(scopes, population),
         numbering=own_weights(slots, bundles, connections.weights),
@@ -155,6 +138,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         ros=ros,
         body=body,
     )
+    network = replace(network, hash=content_hash(network))
     eventful = _eventful(spec, network, finder, constants)
     if eventful is not None and not findings.failed:  # the shape may have been invalid
         files = tuple(file.model for file in request.includes.files)

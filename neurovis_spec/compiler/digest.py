@@ -1,49 +1,60 @@
 """The content hash: SHA-256 of what a network is, not of how its spec is written.
 
-In: the parts of a Network. Out: a hexadecimal digest. Formatting, titles, ``time.steps``, ``layout``, ``render`` and
-``ros`` do not show in it; data files (through their values) and the definitions in use do.
+In: values, and a schema that says what of which record is content, and how that is called. Out: a hexadecimal digest.
+The names are those that the first version had: a hash outlives the types that it is made of, so a field that is new, or
+moved, changes none until the schema says so. A record that the schema does not know is an error.
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import fields, is_dataclass
-from typing import TYPE_CHECKING, cast
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.language.expressions.tree import Chain
+from neurovis_spec.language.expressions import tree
 from neurovis_spec.language.located import Located
 
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
 
-#: Where a node of an expression stood, and what is only shown, is no content.
-_SHOWN = frozenset(
-    # ``slots``, ``parts`` and ``widths`` are how something follows parameters; ``starts``, where there are some, are
-    # put behind the rest
-    (
-        "start",
-        "end",
-        "title",
-        "description",
-        "descriptions",
-        "labels",
-        "label",
-        "box",
-        "role",
-        "module",
-        "learns",
-        "slots",
-        "parts",
-        "starts",
-        "states",
-        "spikes",
-        "widths",
-    )
-)
+@dataclass(frozen=True, slots=True)
+class Record:
+    """A record as it is hashed, made for it: what its kind is called, and its fields by name."""
 
+    kind: str
+    fields: Mapping[str, object]
+
+
+class Content(NamedTuple):
+    """What of a type is content: what it is called, and its fields, each with the attribute that it is. ``beside`` are
+    the attributes that are none: what is only shown, where it stood, how something follows parameters."""
+
+    kind: str
+    fields: Mapping[str, str]
+    beside: frozenset[str]
+
+
+def content(kind: str, fields: str, beside: str = "") -> Content:
+    """The content of a type whose fields are called as its attributes are.
+
+    >>> content("Name", "name", "start end").fields
+    {'name': 'name'}
+    """
+    return Content(kind, {name: name for name in fields.split()}, frozenset(beside.split()))
+
+
+_PLACE = "start end"
+#: The nodes of expressions; a Chain is written as the Binary nodes that it stands for.
+TREES: Mapping[type, Content] = {
+    tree.Number: content("Number", "value", _PLACE),
+    tree.Name: content("Name", "name", _PLACE),
+    tree.Unary: content("Unary", "operator operand", _PLACE),
+    tree.Binary: content("Binary", "operator left right", _PLACE),
+    tree.Conditional: content("Conditional", "condition then otherwise", _PLACE),
+    tree.Call: content("Call", "function arguments", _PLACE),
+    tree.Draw: content("Draw", "kind first second index", _PLACE),
+}
 
 #: Pieces that are fed to the hash together.
 _MANY = 4096
@@ -52,11 +63,17 @@ _MANY = 4096
 class _Writer:
     """Feeds values of any of our kinds to the hash, each with a tag, so that no two values read alike."""
 
-    def __init__(self) -> None:
+    def __init__(self, schema: Mapping[type, Content]) -> None:
         self.hash = hashlib.sha256()
         self._pieces: list[bytes] = []
-        #: for each kind of record its beginning, and its fields: how each is called, in the hash and by itself
-        self._records: dict[type, tuple[bytes, tuple[tuple[bytes, str], ...]]] = {}
+        #: for each type its beginning, and its fields: how each is called, in the hash and by itself
+        self._records: dict[type, tuple[bytes, tuple[tuple[bytes, str], ...]]] = {
+            kind: (
+                _piece("record", one.kind.encode()),
+                tuple((_piece("text", name.encode()), attribute) for name, attribute in one.fields.items()),
+            )
+            for kind, one in schema.items()
+        }
 
         #: texts and numbers that come time and again, as pieces
         self._known: dict[tuple[type, object], bytes] = {}
@@ -80,7 +97,7 @@ class _Writer:
         elif isinstance(value, str):
             self.put("text", value.encode())
         elif kind in self._records:  # there may be many thousands of a kind
-            self._record(cast("DataclassInstance", value))
+            self._content(value)
         elif kind is dict and not value:
             self._add(_EMPTY)
         elif isinstance(value, float):
@@ -97,17 +114,20 @@ class _Writer:
             for key, item in sorted(value.items()):  # no mapping of a network has an order that matters
                 self.value(str(key))
                 self.value(item)
-        elif isinstance(value, Chain):
+        elif isinstance(value, tree.Chain):
             self._chain(value)
         elif isinstance(value, Located):  # where it stands is no content
             written = value.value
             self.value(float(written) if isinstance(written, int) else written)
-        elif is_dataclass(value) and not isinstance(value, type):
-            self._record(value)
+        elif isinstance(value, Record):
+            self.put("record", value.kind.encode())
+            for name, item in value.fields.items():
+                self.value(name)
+                self.value(item)
         elif isinstance(value, Iterable):
             self._list(list(value))
-        else:  # pragma: no cover - a new kind of value must be given a way here
-            raise TypeError(f"no canonical form for {type(value).__name__}")
+        else:
+            raise TypeError(f"no schema says what of a {kind.__name__} is content")
 
     def _common(self, kind: type, value: object) -> bytes:
         """The piece of a text, an integer or nothing, of which a network has very many, most of them alike."""
@@ -125,7 +145,7 @@ class _Writer:
         for item in items:
             self.value(item)
 
-    def _chain(self, chain: Chain) -> None:
+    def _chain(self, chain: tree.Chain) -> None:
         """One operation upon the other, in the form in which two operands are written: hashes outlive a version."""
         for operator in reversed(chain.operators):
             self.put("record", b"Binary")
@@ -137,19 +157,13 @@ class _Writer:
             self.value("right")
             self.value(operand)
 
-    def _record(self, value: DataclassInstance) -> None:
-        kind = type(value)
-        if kind not in self._records:
-            hidden = _SHOWN if kind.__name__ not in _KEEP_START else _SHOWN - {"start"}
-            called = (field.name for field in fields(kind) if field.name not in hidden)
-            parts = tuple((_piece("text", name.encode()), name) for name in called)
-            self._records[kind] = _piece("record", kind.__name__.encode()), parts
-        begin, parts = self._records[kind]
+    def _content(self, value: object) -> None:
+        begin, parts = self._records[type(value)]
         pieces, common = self._pieces, self._known
         pieces.append(begin)
-        for piece, name in parts:
+        for piece, attribute in parts:
             pieces.append(piece)
-            item = getattr(value, name)
+            item = getattr(value, attribute)
             kind = type(item)
             if kind is str or kind is int or item is None:
                 pieces.append(common.get((kind, item)) or self._common(kind, item))
@@ -162,13 +176,12 @@ def _piece(tag: str, content: bytes) -> bytes:
 
 
 _EMPTY = _piece("mapping", b"0")
-#: Records whose ``start`` is content (an index), not a place in a text.
-_KEEP_START = frozenset({"Group", "Input", "Noise"})
 
 
-def digest(*parts: object) -> str:
-    """The SHA-256 of the parts, hexadecimal."""
-    writer = _Writer()
+def digest(*parts: object, schema: Mapping[type, Content] = TREES) -> str:
+    """The SHA-256 of the parts, hexadecimal. Raises TypeError for a value of a type that is neither plain nor in the
+    schema."""
+    writer = _Writer(schema)
     for part in parts:
         writer.value(part)
     writer.flush()
