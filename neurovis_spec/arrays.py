@@ -12,6 +12,8 @@ import numpy.typing as npt
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.int64]
+#: integers of any width, to take elements by: nothing is computed with them
+Indices: TypeAlias = npt.NDArray[np.integer]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 Array = TypeVar("Array", bound="npt.NDArray[Any]")
 

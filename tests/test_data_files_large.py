@@ -21,6 +21,7 @@ import neurovis_spec as nv
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.data import cells as data_files_cells
 from neurovis_spec.language.data import csv_table as data_files_csv
+from neurovis_spec.language.data import edge_list
 from neurovis_spec.language.data.csv_table import parse_numbers
 from neurovis_spec.language.data.edge_list import parse_edges
 from neurovis_spec.language.data.files import CellError, locate, read_edges, read_table
@@ -225,3 +226,20 @@ def test_a_path_has_a_largest_length(tmp_path: Path) -> None:
         assert finding.code == "file-missing"
         assert f"a path of {len(text):,} characters" in finding.message
     assert math.isfinite(table(tmp_path, "a.csv", "1").values[0, 0])
+
+
+@given(
+    st.lists(
+        st.text("Aaé \u00a0.1", max_size=40).map(str.strip).filter(bool), min_size=1, max_size=8, unique=True
+    ).flatmap(lambda names: st.lists(st.tuples(*(st.sampled_from(names),) * 2), min_size=1, max_size=30)),
+    st.sampled_from(["", " ", "\t"]),
+    st.sampled_from([2, 16]),
+)
+def test_names_of_any_length_are_told_apart(edges: list[tuple[str, str]], blank: str, places: int) -> None:
+    text = "\n".join(["from,to", *(f"{source}{blank},{blank}{target}" for source, target in edges)])
+    with (
+        patch.object(edge_list, "_PLACES", places),
+        patch.object(data_files_cells, "_STRETCH", 50),
+    ):  # few places, so that names fall upon each other
+        got = parse_edges(text.encode())
+    assert list(zip(got.sources, got.targets, strict=True)) == edges

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
+from unittest.mock import patch
 
+import networkx
 import pytest
 from click.testing import CliRunner
 from hypothesis import given
@@ -13,6 +15,7 @@ from toy_bodies import registered
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.codes import catalogue
+from neurovis_spec.compiler.checks import neurons as checks
 from neurovis_spec.diagnostics import Diagnostic
 from neurovis_spec.language.allow import allows
 
@@ -144,6 +147,29 @@ def test_a_neuron_that_stays_at_zero() -> None:
     assert warnings("neurons: {A: {}}\noutputs: {a: A}\n") == [("idle-neuron", "A")]
     rule = "connections: {A -> B: {plasticity: {delta: {target: T}}}}\n"
     assert warnings("neurons: {A: {bias: 1}, B: {}, T: {}}\n" + rule) == [("idle-neuron", "T")]
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from("ABCDEFGH"), st.sampled_from("ABCDEFGH")), min_size=1, max_size=14, unique=True),
+    st.sets(st.sampled_from("ABCDEFGH"), max_size=2),
+    st.sampled_from([0, 32]),
+    st.sampled_from([0, 8]),
+)
+def test_idle_are_those_that_nothing_else_leads_to(
+    edges: list[tuple[str, str]], active: set[str], few: int, at_once: int
+) -> None:
+    graph = networkx.DiGraph(edges)
+    graph.add_nodes_from("ABCDEFGH")
+    idle = graph.subgraph(set(graph) - active.union(*(networkx.descendants(graph, neuron) for neuron in active)))
+    whole = networkx.condensation(idle)
+    first = {name for part in whole if not whole.in_degree(part) for name in whole.nodes[part]["members"]}
+    groups = "".join(f"  {name}: {{bias: {int(name in active)}}}\n" for name in "ABCDEFGH").replace("{bias: 0}", "{}")
+    entries = "".join(
+        f"  {source} -> {target}: {'{self: true}' if source == target else 1}\n" for source, target in edges
+    )
+    with patch.object(checks, "_FEW", few), patch.object(checks, "_AT_ONCE", at_once):
+        found = warnings(f"neurons:\n{groups}connections:\n{entries}")
+    assert sorted(found) == [("idle-neuron", name) for name in sorted(first)]
 
 
 @pytest.mark.parametrize("model", ["leaky_integrator", "adaptive", "hysteresis", "integrate_and_fire"])

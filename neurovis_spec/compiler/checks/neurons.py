@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.arrays import IntArray
+from neurovis_spec.arrays import Indices, IntArray
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.names.references import key_span
 from neurovis_spec.compiler.network import Network
@@ -30,6 +30,8 @@ from neurovis_spec.language.sections import GroupModel
 Mask = npt.NDArray[np.bool_]
 #: How far what is active is followed at once; only long ways are gone step by step.
 _AT_ONCE = 8
+#: From so many neurons connections are followed one by one, from more together.
+_FEW = 32
 #: the keys of a group that make its drive
 _DRIVING = ("input", "bias", "noise", "combine")
 
@@ -135,7 +137,40 @@ def _needed(network: Network) -> Mask:
     return needed
 
 
-def _unreached(quiet: Mask, sources: IntArray, targets: IntArray) -> Mask:
+class _Ways:
+    """The ways along connections: from each neuron where its own lead."""
+
+    def __init__(self, n: int, begins: Indices, ends: Indices) -> None:
+        self._ends = ends[np.argsort(begins, kind="stable")]
+        self._starts = np.concatenate(([0], np.cumsum(np.bincount(begins, minlength=n))))
+
+    def follow(self, reached: Mask, begin: list[int]) -> None:
+        """Mark neurons as reached, and all to which a way leads from them through neurons that are not yet."""
+        reached[begin] = True
+        seen, starts, ends = reached.data, self._starts.data, self._ends.data
+        waiting = begin
+        while waiting:
+            if len(waiting) > _FEW:
+                waiting = self._together(reached, np.array(waiting))
+                continue
+            found = []
+            for neuron in waiting:
+                for end in ends[starts[neuron] : starts[neuron + 1]]:
+                    if not seen[end]:
+                        seen[end] = True
+                        found.append(end)
+            waiting = found
+
+    def _together(self, reached: Mask, begin: IntArray) -> list[int]:
+        """Mark where connections lead from many neurons, and say what is new."""
+        first, counts = self._starts[begin], self._starts[begin + 1] - self._starts[begin]
+        ends = self._ends[np.repeat(first - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())]
+        new: Indices = np.unique(ends[~reached[ends]])
+        reached[new] = True
+        return [*map(int, new)]
+
+
+def _unreached(quiet: Mask, sources: Indices, targets: Indices) -> Mask:
     """The quiet neurons that no way leads to from one that is not."""
     reached = ~quiet
     for _ in range(_AT_ONCE):
@@ -143,33 +178,37 @@ def _unreached(quiet: Mask, sources: IntArray, targets: IntArray) -> Mask:
         reached[targets[reached[sources]]] = True
         if int(reached.sum()) == before:
             return ~reached
-    rest = np.flatnonzero(~reached[targets])  # connections that may still lead somewhere
-    order = rest[np.argsort(sources[rest], kind="stable")]
-    starts = np.searchsorted(sources[order], np.arange(len(quiet) + 1))
-    waiting = np.flatnonzero(reached).tolist()
-    while waiting:
-        neuron = waiting.pop()
-        for target in targets[order[starts[neuron] : starts[neuron + 1]]].tolist():
-            if not reached[target]:
-                reached[target] = True
-                waiting.append(target)
+    rest = ~reached[targets]  # connections that may still lead somewhere
+    _Ways(len(quiet), sources[rest], targets[rest]).follow(reached, np.flatnonzero(reached).tolist())
     return ~reached
 
 
-def _first(idle: Mask, sources: IntArray, targets: IntArray) -> Mask:
-    """Of the idle neurons those that are not behind other ones: without sources, or on a cycle that has none."""
-    inside = np.flatnonzero(idle[sources] & idle[targets] & (sources != targets))
+def _first(idle: Mask, sources: Indices, targets: Indices) -> Mask:
+    """Of the idle neurons those that are not behind other ones: without sources, or on a cycle that has none.
+
+    What is behind neurons without sources is reached from these. Of the rest each neuron has sources, in the rest: we
+    follow the ways from one neuron after the other that was not reached yet, and then once more, beginning with the
+    last of these: now those that are not reached yet are on cycles without sources, one on each, and the whole cycle is
+    what leads to it."""
+    inside = idle[sources] & idle[targets] & (sources != targets)
+    begins, ends = sources[inside], targets[inside]
     behind = np.zeros(len(idle), dtype=np.bool_)
-    behind[targets[inside]] = True
+    behind[ends] = True
     if not behind.any():
         return idle
-    import networkx
-
-    graph = networkx.DiGraph(zip(sources[inside].tolist(), targets[inside].tolist(), strict=True))
     result = idle & ~behind
-    for cycle in networkx.strongly_connected_components(graph):
-        if len(cycle) > 1 and all(before in cycle for neuron in cycle for before in graph.predecessors(neuron)):
-            result[list(cycle)] = True
+    ways, reached = _Ways(len(idle), begins, ends), ~idle
+    ways.follow(reached, np.flatnonzero(result).tolist())
+    again, tried = reached.copy(), []
+    for neuron in np.flatnonzero(~reached).tolist():
+        if not reached[neuron]:
+            tried.append(neuron)
+            ways.follow(reached, [neuron])
+    back = _Ways(len(idle), ends, begins) if tried else ways
+    for neuron in reversed(tried):
+        if not again[neuron]:
+            ways.follow(again, [neuron])
+            back.follow(result, [neuron])
     return result
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, Indices, IntArray
 from neurovis_spec.compiler.limits import LONGEST_DELAY, PATIENCE
 from neurovis_spec.compiler.names.references import Directory, few
 from neurovis_spec.compiler.values.cells import Cells, cells_of, seen_by_pairs, values_of
@@ -35,7 +35,7 @@ class EdgeList(NamedTuple):
     i: IntArray
     j: IntArray
     weights: FloatArray
-    delays: IntArray
+    delays: Indices
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ class EdgeReader:
         return UNKNOWN if len(no_names) else positions
 
     def _positions(
-        self, names: tuple[str, ...], which: IntArray, end: End, what: str, where: Callable[[int], tuple[Span, str]]
+        self, names: tuple[str, ...], which: Indices, end: End, what: str, where: Callable[[int], tuple[Span, str]]
     ) -> IntArray | Unknown:
         """The positions in an end of the neurons that edges name, by the numbers of these names. ``where`` says of an
         edge where it stands, and what is to be added in words."""
@@ -173,19 +173,14 @@ class EdgeReader:
         if table is UNKNOWN:
             return UNKNOWN
         span = reference.path.span
-        if not table.sources and table.fault is None:
+        if not len(table) and table.fault is None:
             self.constants.findings.error("wrong-size", span, "there is no edge in this file")
             return UNKNOWN
-        numbers = {name: number for number, name in enumerate(dict.fromkeys((*table.sources, *table.targets)))}
         i, j = (
             self._positions(
-                tuple(numbers),
-                np.array([numbers[name] for name in named], dtype=np.int64),
-                end,
-                what,
-                lambda edge: (span, f" (row {table.rows[edge]} of the file)"),
+                table.names, which, end, what, lambda edge: (span, f" (row {table.rows[edge]} of the file)")
             )
-            for named, end, what in ((table.sources, self.sources, "source"), (table.targets, self.targets, "target"))
+            for which, end, what in ((table.begins, self.sources, "source"), (table.ends, self.targets, "target"))
         )
         long = np.flatnonzero(table.delays > LONGEST_DELAY).tolist()
         for place in long[:PATIENCE]:

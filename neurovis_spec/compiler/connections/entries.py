@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, Indices, IntArray
 from neurovis_spec.compiler.connections.edges import EdgeReader, End
 from neurovis_spec.compiler.connections.ends import Ends
 from neurovis_spec.compiler.connections.patterns import all_to_all, empty_reason, pairs_of
@@ -70,7 +70,7 @@ class _Shape(NamedTuple):
     i: IntArray
     j: IntArray
     weights: FloatArray | None = None
-    delays: IntArray | None = None
+    delays: Indices | None = None
     #: what of its weights follows parameters
     parts: tuple[Part, ...] = ()
 

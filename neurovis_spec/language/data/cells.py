@@ -10,7 +10,6 @@ import csv
 import io
 import math
 import re
-import warnings
 from collections.abc import Iterator
 from typing import Final, NamedTuple
 
@@ -28,7 +27,6 @@ _STRETCH: Final = 1 << 18
 _NUMBER: Final = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _NOT_FINITE: Final = re.compile(r"[-+]?\.?(?:nan|inf|infinity)", re.IGNORECASE)
 _SEPARATOR: Final = re.compile(rb"[,\n]")
-_BLANK: Final = re.compile(rb",[ \t]+(?=,)")
 #: what numbers and blanks consist of
 PLAIN: Final = b"0123456789+-.eE \t"
 
@@ -95,14 +93,18 @@ def rows_of(text: bytes, number: int = 1) -> Iterator[Row]:
 def below(text: bytes, number: int) -> Iterator[tuple[int, bytes]]:
     """The lines below that of this number, many together, each time with the number of the first; all at once where
     quotes may hold ends of lines."""
-    for rest in text.split(b"\n", number)[number:]:
-        start, number = 0, number + 1
-        size = len(rest) if b'"' in rest else _STRETCH
-        while start <= len(rest):
-            end = rest.find(b"\n", start + size) % (len(rest) + 1)
-            yield number, rest[start:end]
-            number += 1 + rest.count(b"\n", start, end)
-            start = end + 1
+    start = 0
+    for _ in range(number):
+        start = text.find(b"\n", start) + 1
+        if not start:
+            return
+    size = len(text) if text.find(b'"', start) >= 0 else _STRETCH
+    number += 1
+    while start <= len(text):
+        end = text.find(b"\n", start + size) % (len(text) + 1)
+        yield number, text[start:end]
+        number += 1 + text.count(b"\n", start, end)
+        start = end + 1
 
 
 def is_number(cell: str) -> bool:
@@ -119,18 +121,15 @@ def numbers_of(cells: bytes) -> NDArray[np.float64] | None:
     """
     if cells.translate(None, PLAIN + b","):
         return None
-    text = b",%b," % cells
-    if b" " in text or b"\t" in text:
-        text = _BLANK.sub(b",", text)  # NumPy would take it for a number
-    if b",," in text:
-        text = text.replace(b",,", b",nan,").replace(b",,", b",nan,")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # of what is no number: older ones end there
+    texts = cells.decode("ascii").split(",")
+    try:
         try:
-            values = np.fromstring(text[1:] + b"0", dtype=np.float64, sep=",")[:-1]
-        except ValueError:
-            return None
-    return None if len(values) != cells.count(b",") + 1 or np.isinf(values).any() else values
+            values = np.array(list(map(float, texts)))
+        except ValueError:  # as of an empty one
+            values = np.array([float(text.strip() or "nan") for text in texts])
+    except ValueError:
+        return None
+    return None if np.isinf(values).any() else values
 
 
 def number_of(cell: str, row: int, column: int) -> float:
