@@ -12,12 +12,10 @@ from typing import TYPE_CHECKING
 import layout_conformance as suite
 import pytest
 from neurovis_layouts.layered import flips
-from neurovis_layouts.layered.frame_routing import linked
 from neurovis_layouts.layered.levels import Levels, Node, Segment
-from neurovis_layouts.routing import walls
+from neurovis_layouts.routing import obstacles, route_all
 from neurovis_layouts.routing.detours import Detours
-from neurovis_layouts.routing.obstacles import Obstacles
-from neurovis_layouts.routing.walls import Walls
+from neurovis_layouts.routing.obstacles import Obstacles, Walls
 
 import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray, IntArray
@@ -79,8 +77,8 @@ def test_a_way_round_many_frames_meets_few_of_them(monkeypatch: pytest.MonkeyPat
         compared.append(len(a) * len(rects))
         return meetings(a, b, rects)
 
-    meetings = walls.meetings
-    monkeypatch.setattr(walls, "meetings", counted)
+    meetings = obstacles.meetings
+    monkeypatch.setattr(obstacles, "meetings", counted)
     centres = [(4.0 * i, 4.0 * j) for i in range(20) for j in range(20)]
     frames = [(frozenset({k}), (x - 1.5, y - 1.5, x + 1.5, y + 1.5)) for k, (x, y) in enumerate(centres)]
     detours = Detours(Walls(frames, len(centres)), centres, None)
@@ -101,13 +99,13 @@ def test_among_many_frames_no_route_enters_a_foreign_one(engine: str) -> None:
 def test_what_stands_in_the_way_of_many_long_routes_is_found_in_little_memory() -> None:
     """1,500 routes of 60 units across a grid, of half a million points: looked at all at once they took 80 MB."""
     centres = [(1.5 * i, 1.5 * j) for i in range(40) for j in range(40)]
-    obstacles = Obstacles(centres)
+    discs = Obstacles(centres)
     walls = Walls([(frozenset({1}), (10.0, 10.0, 12.0, 12.0))], len(centres))
     own = [(0, k) for k in range(100, len(centres))]
     routes = [straight((0.0, 0.0), (60.0, 0.04 * k)) for _, k in own]
     tracemalloc.start()
     try:
-        obstacles.clearances(routes, own)
+        discs.clearances(routes, own)
         walls.entered(routes, own)
         assert tracemalloc.get_traced_memory()[1] < 15e6
     finally:
@@ -157,8 +155,8 @@ def test_what_is_boxed_is_routed_once() -> None:
 
     def note(frame: FrameType, event: str, _given: object) -> None:
         nonlocal routed
-        if event == "call" and frame.f_code is linked.__code__:
-            routed += len(frame.f_locals["links"])
+        if event == "call" and frame.f_code is route_all.__code__:
+            routed += len(frame.f_locals["edges"])
 
     draw = random.Random(2)
     pairs = sorted({(draw.randrange(24), draw.randrange(24)) for _ in range(60)})

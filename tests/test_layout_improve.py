@@ -11,14 +11,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from neurovis_layouts.routing import route_all, route_cost
+from neurovis_layouts.routing import RoutePlan, Surroundings, route_all, route_cost
 from neurovis_layouts.routing.corners import corners, smooth, smoothed
 from neurovis_layouts.routing.images import Images
 from neurovis_layouts.routing.improve import improved
-from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
+from neurovis_layouts.routing.obstacles import TOUCH, Frame, Obstacles, Walls
 from neurovis_layouts.routing.polylines import Polylines, close_segments, polylines
 from neurovis_layouts.routing.route_cost import Drawn, RouteCost
-from neurovis_layouts.routing.walls import Frame, Walls
 
 import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray
@@ -381,7 +380,7 @@ def test_mirrored_routes_keep_off_what_has_no_image() -> None:
     edges, images = [edge(0, 1), edge(0, 2)], Images({0: 1})
     walls: list[Frame] = [(frozenset({3}), (2.0, 2.0, 6.0, 5.0))]
     for frames in (walls, []):
-        found = route_all(edges, centres, frames=frames, images=images)
+        found = route_all(edges, centres, RoutePlan(images=images), Surroundings(frames))
         assert found[1] == tuple((0.0 - x, y) for x, y in found[0])
         assert not Walls(frames, 4).entered([found[1]], [(0, 2)])[0]
         assert Obstacles(centres).clearance(found[1], (0, 2)) >= TOUCH

@@ -11,10 +11,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from neurovis_layouts.layered.crossings import Ints, Segments, inversions
-from neurovis_layouts.layered.exchange import Exchange
 from neurovis_layouts.layered.halves import Halves
 from neurovis_layouts.layered.levels import Levels, Node, Segment
-from neurovis_layouts.layered.order import Order, crossings, ordered, places
+from neurovis_layouts.layered.order import Exchange, Order, crossings, ordered, places
 
 
 def levels_by_hand(nodes: list[list[Node]], segments: list[list[tuple[int, float, int, float]]]) -> Levels:

@@ -8,8 +8,8 @@ from unittest.mock import patch
 import pytest
 from click.testing import CliRunner
 from lsp_marks import marked
-from neurovis_layouts.layered import LayeredEngine, hierarchy
-from neurovis_layouts.layered.frame_routing import linked
+from neurovis_layouts.layered import LayeredEngine, frame_routing
+from neurovis_layouts.routing import route_all
 
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
@@ -151,7 +151,7 @@ def test_validate_accepts_the_pins_that_layout_keeps_and_no_others(said: str, co
 def test_pins_are_checked_where_there_are_any_and_nothing_is_routed_between_frames_for_it() -> None:
     with (
         patch.object(LayeredEngine, "check", autospec=True, side_effect=LayeredEngine.check) as check,
-        patch.object(hierarchy, "linked", side_effect=linked) as routed,
+        patch.object(frame_routing, "route_all", side_effect=route_all) as routed,
     ):
         assert nv.compile_text(f"{LEGS}  direction: down\n").refusal() is None
         assert nv.compile_text(f"{GROUPS}  positions: {{B: [0, 5]}}\n").refusal() is None
@@ -163,7 +163,7 @@ def test_pins_are_checked_where_there_are_any_and_nothing_is_routed_between_fram
         assert nv.compile_text(f"{LEGS}  positions: {{left1: [0, 0]}}\n").refusal() is None
         assert check.call_count == 1
         # within the instances, which are drawn alike
-        assert [len(called.args[0].neurons) for called in routed.call_args_list] == [2]
+        assert [len(centres) for (_, centres, *_), _ in routed.call_args_list] == [2]
 
 
 @pytest.mark.parametrize(

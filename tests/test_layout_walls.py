@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from neurovis_layouts.routing import detours, route_all
+from neurovis_layouts.routing import Surroundings, detours, route_all
 from neurovis_layouts.routing.corners import rounded
 from neurovis_layouts.routing.detours import Detours, detoured
-from neurovis_layouts.routing.obstacles import Obstacles
-from neurovis_layouts.routing.walls import Walls, meet
+from neurovis_layouts.routing.obstacles import Barriers, Obstacles, Walls, meet
 
 import neurovis_spec as nv
 from neurovis_spec.layout import Direction, Layout, LayoutEdge, LayoutProblem, LayoutRefusalError, Point
@@ -136,7 +135,7 @@ def test_edges_between_the_same_neurons_take_detours_of_their_own() -> None:
     centres = [(0.0, 0.0), (10.0, 0.0), (5.0, 0.0)]
     edges = [LayoutEdge("a", 0, 1, 1), LayoutEdge("b", 0, 1, 1), LayoutEdge("c", 1, 0, 1)]
     wall = (frozenset({2}), (3.0, -1.0, 7.0, 1.5))
-    lines = [sampled(route, 0.05) for route in route_all(edges, centres, frames=[wall])]
+    lines = [sampled(route, 0.05) for route in route_all(edges, centres, around=Surroundings([wall]))]
     for i, one in enumerate(lines):
         assert all(not (3 < x < 7 and -1 < y < 1.5) for x, y in one)
         for other in lines[:i]:
@@ -151,7 +150,7 @@ def test_where_there_is_no_way_round_there_is_no_detour() -> None:
 def test_a_loop_keeps_out_of_the_frame_beside_it() -> None:
     centres = [(0.0, 0.0), (1.5, 0.0), (1.5, 1.0)]
     wall = (frozenset({1, 2}), (0.5, -1.0, 2.2, 1.65))
-    (route,) = route_all([LayoutEdge("a", 0, 0, 1)], centres, frames=[wall])
+    (route,) = route_all([LayoutEdge("a", 0, 0, 1)], centres, around=Surroundings([wall]))
     assert max(x for x, _ in sampled(route, 0.05)) < 0.5
 
 
@@ -243,7 +242,7 @@ def test_a_detour_keeps_to_the_way_that_was_found() -> None:
     walls = Walls([(frozenset({2}), (-2.0, 4.0, 8.0, 6.0))], 3)
     routes, ways = {0: straight(*centres[:2])}, {0: [(8.5, 3.5), (8.5, 6.5)]}
     with_way, without = (
-        detoured(edges, centres, routes, Obstacles(centres), walls, line, (), 300)[0] for line in (ways, {})
+        detoured(edges, centres, routes, Barriers(Obstacles(centres), walls), line, (), 300)[0] for line in (ways, {})
     )
     assert max(x for x, _ in sampled(with_way)) > 8
     assert min(x for x, _ in sampled(without)) < -2
@@ -255,7 +254,7 @@ def test_a_detour_goes_the_longer_way_round_where_that_crosses_less() -> None:
     routes = {0: straight(*centres[:2])}
     for count, longer in ((0, False), (1, False), (4, True)):
         drawn = [straight((-20.0, 4.3 + i * 0.45), (-2.05, 4.3 + i * 0.45)) for i in range(count)]
-        found = detoured(edges, centres, routes, Obstacles(centres), walls, {}, drawn, 300)[0]
+        found = detoured(edges, centres, routes, Barriers(Obstacles(centres), walls), {}, drawn, 300)[0]
         assert (max(x for x, _ in sampled(found)) > 8) is longer
 
 
@@ -296,7 +295,7 @@ def test_in_a_crowd_routes_go_round_frames_alone() -> None:
     walls = Walls([(frozenset({5}), (8.0, 4.0, 10.0, 6.0))], 6)
     routes = {0: straight(*centres[:2]), 1: straight(*centres[3:5])}
     for most, gone_round in ((1, [0, 1]), (0, [1])):
-        found = detoured(edges, centres, routes, Obstacles(centres), walls, {}, (), most)
+        found = detoured(edges, centres, routes, Barriers(Obstacles(centres), walls), {}, (), most)
         assert sorted(found) == gone_round
 
 

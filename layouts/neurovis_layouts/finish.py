@@ -18,7 +18,7 @@ from neurovis_layouts.incremental import kept
 from neurovis_layouts.label_room import rect_of
 from neurovis_layouts.label_sides import best_sides, sided
 from neurovis_layouts.pins import with_origins
-from neurovis_layouts.routing import route_all
+from neurovis_layouts.routing import RoutePlan, Surroundings, route_all
 from neurovis_layouts.routing.images import Images
 from neurovis_layouts.symmetry import Symmetry, exact, routed_alike
 from neurovis_spec.layout import FloatArray, IntArray
@@ -36,17 +36,16 @@ def drawn(
     problem: LayoutProblem,
     engine: str,
     places: FloatArray,
-    frames: bool = True,
     clear: Iterable[int] = (),
     within: Rect | None = None,
     symmetry: Symmetry | None = None,
     sides: Mapping[str, Side] = MappingProxyType({}),
 ) -> Layout:
     """The layout with the neurons at ``places`` (n, 2; there may be more rows than neurons), where no pin says
-    otherwise. Instances without a pin are kept off the ``frames`` of those that have one. The edges ``clear``, by
-    index, run straight, as the caller knows that nothing is in their way. The others go round what is in theirs
-    ``within`` this rectangle. With a ``symmetry`` images, and routes between them, are exact reflections. On these
-    ``sides`` labels have room."""
+    otherwise. Instances without a pin are kept off the frames of those that have one. The edges ``clear``, by index,
+    run straight, as the caller knows that nothing is in their way. Places that are data lie ``within`` a rectangle:
+    then nothing is kept off a frame, and what is in the way of the other edges is gone round in there. With a
+    ``symmetry`` images, and routes between them, are exact reflections. On these ``sides`` labels have room."""
     flat: list[Point] = [(snap(x), snap(y)) for x, y in places[: len(problem.neurons)].tolist()]
     for i, point in problem.pins.items():
         flat[i] = from_picture(point, problem.direction)
@@ -56,7 +55,8 @@ def drawn(
         centres = exact(problem, symmetry, centres)
         images, ghosts = routed_alike(problem, symmetry, centres)
     there = {i: straight(centres[problem.edges[i].source], centres[problem.edges[i].target]) for i in clear}
-    routes = route_all(problem.edges, [*centres, *ghosts], careful=_CAREFUL, there=there, within=within, images=images)
+    plan, around = RoutePlan(there=there, images=images), Surroundings(within=within)
+    routes = route_all(problem.edges, [*centres, *ghosts], plan, around, _CAREFUL)
     turned = problem.direction
     fresh = Layout(
         problem.network,
@@ -68,7 +68,7 @@ def drawn(
         },
         sides,
     )
-    return sided(problem, kept(problem, fresh, pins, frames))
+    return sided(problem, kept(problem, fresh, pins, around=within is None))
 
 
 def drawn_apart(problem: LayoutProblem, engine: str, places: FloatArray, spacing: float, symmetry: Symmetry) -> Layout:

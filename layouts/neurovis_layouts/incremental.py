@@ -17,11 +17,10 @@ from neurovis_layouts.conflicts import carried, routed_from
 from neurovis_layouts.frame import from_picture, to_picture, turned
 from neurovis_layouts.occupancy import overlapping
 from neurovis_layouts.pins import with_origins
-from neurovis_layouts.routing import route_all
+from neurovis_layouts.routing import RoutePlan, Surroundings, route_all
 from neurovis_layouts.routing.ends import keys_of
 from neurovis_layouts.routing.images import Images, images_of
-from neurovis_layouts.routing.obstacles import Obstacles
-from neurovis_layouts.routing.walls import Frame, Walls
+from neurovis_layouts.routing.obstacles import Frame, Obstacles, Walls
 from neurovis_layouts.settling import Whole, settled
 from neurovis_spec.layout import FloatArray
 from neurovis_spec.layout.frames import Frames
@@ -193,7 +192,8 @@ def _found(problem: LayoutProblem, ways: _Ways, rest: Sequence[int], routes: Map
 
     def found(even: AbstractSet[int]) -> dict[int, Route]:
         images = Images({place[a]: place[b] for a, b in ways.images.of.items() if {a, b} <= even}, ways.images.twice)
-        made = route_all(edges, ways.flat, {}, frames=walls, drawn=others, there=there, images=images)
+        plan = RoutePlan(waypoints={}, there=there, images=images)
+        made = route_all(edges, ways.flat, plan, Surroundings(walls, others))
         new = (k for k in range(len(shown)) if k not in there)
         return {shown[k]: tuple(to_picture(point, problem.direction) for point in made[k]) for k in new}
 

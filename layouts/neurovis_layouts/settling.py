@@ -3,8 +3,9 @@
 In: a problem with its pins and perhaps an earlier layout (``memory``), and a fresh drawing of it as if there were
 neither. Out: a place for every neuron, pins exact. What is pinned, its mirror images and what the earlier layout knew
 have their places first; what an instance or a box that is a frame has besides stands as it is drawn, as it is or
-reflected, where there is room for that, else neuron by neuron; what is new stands near where the fresh drawing has it
-in relation to what it is connected with, in a free place (``occupancy``). What is to be drawn alike is placed together:
+reflected, where there is room for that, else neuron by neuron; what is new continues the row or the column in which
+others of its group stand, or stands near where the fresh drawing has it in relation to what it is connected with, in a
+free place (``occupancy``). What is to be drawn alike is placed together:
 the same new neuron in all instances of one make, both of a mirrored pair.
 """
 
@@ -18,13 +19,14 @@ from neurovis_layouts.axes import axes, shift_of
 from neurovis_layouts.conflicts import Earlier, Memory, carried
 from neurovis_layouts.frame import across_of, from_picture, to_picture
 from neurovis_layouts.occupancy import AxisSide, Body, Occupancy, Wish, lone
-from neurovis_layouts.rows import GroupRows
 from neurovis_spec.layout.frames import Frames
 from neurovis_spec.layout.geometry import Rect, bounds, shifted, snap
-from neurovis_spec.layout.model import LayoutProblem, LayoutRefusalError, Point, Route
+from neurovis_spec.layout.model import RADIUS, LayoutProblem, LayoutRefusalError, Point, Route
 
 #: What bodies are anchored at that stand where they are.
 _HERE = (0.0, 0.0)
+#: Steps of a row are as long as each other but for rounding.
+_SLACK = 1 / 512
 
 
 @dataclass(frozen=True, slots=True)
@@ -415,3 +417,44 @@ def _median(values: list[float]) -> float:
 
 def _sign(value: float) -> int:
     return (value > 0) - (value < 0)
+
+
+class GroupRows:
+    """The rows of groups."""
+
+    def __init__(self, problem: LayoutProblem, fresh: Sequence[Point]) -> None:
+        self._fresh = fresh
+        self._group = {
+            member: (group.members, place) for group in problem.groups for place, member in enumerate(group.members)
+        }
+
+    def next(self, neuron: int, placed: Mapping[int, Point]) -> Point | None:
+        """Where this neuron continues the row of its group."""
+        if neuron not in self._group:
+            return None
+        members, place = self._group[neuron]
+        before, after = members[max(place - 3, 0) : place][::-1], members[place + 1 : place + 4]
+        if before and after and before[0] in placed and after[0] in placed:
+            (x0, y0), (x1, y1) = placed[before[0]], placed[after[0]]
+            room = abs(x1 - x0) + abs(y1 - y0) >= 4 * RADIUS and self._on_line(neuron, before[0], (x1 - x0, y1 - y0))
+            return ((x0 + x1) / 2, (y0 + y1) / 2) if room else None
+        for row in (before, after):
+            at = [placed[mate] for mate in row if mate in placed]
+            if len(row) < 2 or len(at) < len(row):
+                continue
+            steps = [(x1 - x0, y1 - y0) for (x0, y0), (x1, y1) in zip(at[1:], at, strict=False)]
+            (dx, dy), even = steps[0], all(_equal(step, steps[0]) for step in steps)
+            if even and self._on_line(neuron, row[0], (dx, dy)):
+                return at[0][0] + dx, at[0][1] + dy
+        return None
+
+    def _on_line(self, neuron: int, mate: int, step: Point) -> bool:
+        """Whether a step runs along an axis, and the fresh layout has these two on such a line as well."""
+        for axis in (0, 1):
+            if step[axis] == 0 and step[1 - axis] != 0:
+                return self._fresh[neuron][axis] == self._fresh[mate][axis]
+        return False
+
+
+def _equal(one: Point, other: Point) -> bool:
+    return abs(one[0] - other[0]) <= _SLACK and abs(one[1] - other[1]) <= _SLACK

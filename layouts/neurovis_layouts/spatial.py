@@ -76,7 +76,7 @@ class SpatialEngine:
         within = (*(low - beyond).tolist(), *(high + beyond).tolist())
         centres: list[Point] = [(x, y) for x, y in places.tolist()]
         clear = alone(problem, unhindered(problem.edges, centres, REACH - _ROUNDED))
-        return drawn(problem, self.name, places, frames=False, clear=clear, within=within)
+        return drawn(problem, self.name, places, clear, within)
 
 
 def _data(problem: LayoutProblem) -> FloatArray:

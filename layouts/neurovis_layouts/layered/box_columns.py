@@ -18,10 +18,9 @@ import networkx as nx
 import numpy as np
 
 from neurovis_layouts.layered.crossings import Segments
-from neurovis_layouts.layered.exchange import Exchange
 from neurovis_layouts.layered.halves import Halves
 from neurovis_layouts.layered.levels import Levels, Node, Segment
-from neurovis_layouts.layered.order import places
+from neurovis_layouts.layered.order import Exchange, places
 from neurovis_spec.layout.model import LayoutProblem
 
 #: From the line of a strip to centres and to lines, within and outside; between two strips.

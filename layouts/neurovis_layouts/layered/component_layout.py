@@ -29,9 +29,8 @@ from neurovis_layouts.layered.levels import Levels, levels_of
 from neurovis_layouts.layered.mirror import mirrored
 from neurovis_layouts.layered.order import Order, crossings, ordered
 from neurovis_layouts.layered.parts import symmetric
-from neurovis_layouts.layered.place import placed, reaches
+from neurovis_layouts.layered.place import placed, reaches, staggered
 from neurovis_layouts.layered.ranks import INSTANT, levelled, ranks_of
-from neurovis_layouts.layered.staggered import staggered
 from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.packing import gap_in, packed
 from neurovis_layouts.routing import Waypoint

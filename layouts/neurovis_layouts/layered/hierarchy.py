@@ -9,34 +9,28 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 
-import numpy as np
-
 from neurovis_layouts.alike import Move, mirror_images, shifted_by
-from neurovis_layouts.frame import across_of, from_picture, to_picture
-from neurovis_layouts.label_room import covered, flipped, roomy, sides_of
+from neurovis_layouts.frame import from_picture, to_picture
+from neurovis_layouts.label_room import roomy, sides_of
 from neurovis_layouts.layered.bands import FEW, Wanted
 from neurovis_layouts.layered.compact import NONE, RANKS, WHOLE, Fold, Shape, ShapeKey, compact, may_be_folded
 from neurovis_layouts.layered.component_layout import ComponentLayout, planned
-from neurovis_layouts.layered.drawing import Drawing, Piece, brought, entitled, piece_of
-from neurovis_layouts.layered.frame_routing import linked
-from neurovis_layouts.layered.mirror_units import arranged_on_axis, symmetric_units
+from neurovis_layouts.layered.drawing import Drawing, Piece, brought, piece_of
+from neurovis_layouts.layered.frame_routing import Standing
 from neurovis_layouts.layered.page_plan import facing, in_direction, parts_by_cell
 from neurovis_layouts.layered.parts import Part, columns_of, holds_instance, images_in, may_be_frame, parts_of
-from neurovis_layouts.layered.pinning import Settled, pinned
+from neurovis_layouts.layered.pinning import pinned
 from neurovis_layouts.layered.same_rank import bonded, driven
 from neurovis_layouts.layered.templates import Book, restricted
-from neurovis_layouts.layered.units import Unit
+from neurovis_layouts.layered.units import Unit, arranged_on_axis, symmetric_units
 from neurovis_layouts.pins import with_origins
-from neurovis_layouts.routing.ends import Key, keys_of
-from neurovis_layouts.routing.obstacles import Obstacles
-from neurovis_spec.layout.frames import BOX_DOWN, PAD_LABEL, SLACK, entered
-from neurovis_spec.layout.geometry import Rect, bounds, meet, padded, snap, united
+from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.labels import BOX_WEIGHT, title_room
-from neurovis_spec.layout.model import RADIUS, Direction, LayoutMirror, LayoutProblem, Point, Route, Side
+from neurovis_spec.layout.model import Direction, LayoutMirror, LayoutProblem, Point
 
 
 class Composer:
@@ -101,9 +95,9 @@ class Composer:
         pair = mirror_images(problem)
         if problem.plan:
             return self._on_page(problem, pair, routed, kind)
-        return self._standing(problem, pair, kind).joined(problem, pair, routed)
+        return self._standing(problem, pair, kind).joined(pair, routed)
 
-    def _standing(self, problem: LayoutProblem, pair: Mapping[int, int], kind: int) -> _Standing:
+    def _standing(self, problem: LayoutProblem, pair: Mapping[int, int], kind: int) -> Standing:
         """Where everything stands, with those boxes as frames or columns that foreign neurons would stand in."""
         loose = {i for i in range(len(problem.boxes)) if may_be_frame(problem, i, pair)}
         frames = {i for i in loose if holds_instance(problem, i)}
@@ -129,7 +123,7 @@ class Composer:
         known: dict[tuple[Part, Direction], Piece],
         kind: int,
         columns: AbstractSet[int] = frozenset(),
-    ) -> _Standing:
+    ) -> Standing:
         """Where everything stands with these parts; ``known`` are boxes that are drawn already."""
         pieces = [self._piece(problem, parts, known, True, part, problem.direction) for part in parts]
         kin: dict[str, int] = {}
@@ -170,7 +164,7 @@ class Composer:
 
         resting = [_resting(plan, piece) for piece in pieces]
         rests = pinned(problem, plan, resting, pair, partial(self._redrawn, problem))
-        return _Standing.of(problem, plan, rests, units, columns)
+        return Standing.of(problem, plan, rests, units, columns)
 
     def _upright(self, kind: int) -> bool:
         """Whether no frame around a kind of instance is reflected so that it stands on its head."""
@@ -188,7 +182,7 @@ class Composer:
         for piece, move in pieces:
             plan.places.update(zip(piece.part.members, map(move.point, piece.drawing.places), strict=True))
         rests = pinned(problem, plan, pieces, pair, partial(self._redrawn, problem))
-        return _Standing.of(problem, plan, rests, (), frozenset()).joined(problem, pair, routed)
+        return Standing.of(problem, plan, rests, (), frozenset()).joined(pair, routed)
 
     def _redrawn(self, problem: LayoutProblem, piece: Piece, pins: Mapping[int, Point]) -> Piece:
         """A piece drawn anew, around pins of its neurons."""
@@ -258,128 +252,6 @@ def in_rows(family: Sequence[int], rows: int) -> list[list[int]]:
     """
     ends = [-(-len(family) * (row + 1) // rows) for row in range(rows)]
     return [list(family[a:b]) for a, b in pairwise([0, *ends]) if b > a]
-
-
-@dataclass(frozen=True, slots=True)
-class _Standing:
-    """Where neurons, frames and boxes stand, before a connection is drawn between frames: routes cost most, and what
-    stands in a box can be told without them."""
-
-    plan: ComponentLayout
-    rests: Settled
-    units: Sequence[Unit]
-    #: the frames of parts, of what is in them, and of columns
-    frames: tuple[tuple[tuple[int, ...], Rect], ...]
-    #: boxes that are no frames
-    boxes: tuple[tuple[tuple[int, ...], Rect], ...]
-    #: the line round the neurons of each of the problem's boxes; where labels stand
-    lined: Sequence[Rect]
-    #: where labels stand, and what they cover with the air that a frame leaves them
-    sides: Sequence[Side | None]
-    labels: Mapping[int, Rect]
-
-    @classmethod
-    def of(
-        cls,
-        problem: LayoutProblem,
-        plan: ComponentLayout,
-        rests: Settled,
-        units: Sequence[Unit],
-        columns: AbstractSet[int],
-    ) -> _Standing:
-        """What has settled, with its frames."""
-        places = rests.places
-        sides = [plan.sides.get(i, side) for i, side in enumerate(sides_of(problem))]
-        for piece, move in rests.pieces:
-            for member, side in zip(piece.part.members, piece.drawing.sides, strict=True):
-                sides[member] = flipped(side, across_of(problem.direction)) if side and move.mirrored else side
-        lined = [_box(problem, places, sides, name, own) for name, own in problem.boxes]
-        frames: list[tuple[tuple[int, ...], Rect]] = []
-        boxes: list[tuple[tuple[int, ...], Rect]] = []
-        for piece, move in rests.pieces:
-            part = piece.part
-            for found, inner in ((frames, piece.drawing.frames), (boxes, piece.drawing.boxes)):
-                found += [(tuple(part.members[m] for m in own), move.rect(rect)) for own, rect in inner]
-            if piece.framed:
-                frames.append((part.members, move.rect(piece.rect)))
-        frames += [(problem.boxes[i][1], lined[i]) for i in sorted(columns)]
-        done = {frozenset(own) for own, _ in (*frames, *boxes)}
-        centres = np.array(places, dtype=np.float64).reshape(-1, 2)
-        boxes += [
-            (own, lined[i])
-            for i, (_, own) in enumerate(problem.boxes)
-            if frozenset(own) not in done and not entered(centres, lined[i], own)  # none is drawn round a stranger
-        ]
-        return cls(
-            plan,
-            rests,
-            units,
-            tuple(frames),
-            tuple(boxes),
-            lined,
-            sides,
-            covered(problem, places, sides, range(len(places))),
-        )
-
-    def entered(self, box: int, members: Sequence[int]) -> bool:
-        """Whether a disc or a label stands, or a frame reaches, where the line round the neurons of a box is drawn."""
-        own, places, line = set(members), self.rests.places, self.lined[box]
-        x0, y0, x1, y1 = padded(line, RADIUS - SLACK)
-        if any(x0 < x < x1 and y0 < y < y1 for i, (x, y) in enumerate(places) if i not in own):
-            return True
-        if any(meet(line, rect) for i, rect in self.labels.items() if i not in own):
-            return True
-        return any(not own & set(inside) and meet(line, rect) for inside, rect in self.frames)
-
-    def joined(self, problem: LayoutProblem, pair: Mapping[int, int], routed: bool) -> Drawing:
-        """Neurons, what is within frames, and, where they are to be ``routed``, the connections between them."""
-        places = self.rests.places
-        routes: dict[Key, Route] = {}
-        keys = keys_of(problem.edges)
-        known = set(keys)
-        for piece, move in self.rests.pieces:
-            members = piece.part.members
-            for (a, b, number), route in piece.drawing.routes.items():
-                key = members[a], members[b], number
-                if key in known:
-                    ends = places[key[0]], places[key[1]]
-                    routes[key] = (ends[0], *move.route(route)[1:-1], ends[1])
-        if problem.pins:  # which may have put somebody on them
-            over = Obstacles(places).run_over(list(routes.values()), [key[:2] for key in routes])
-            routes = {key: route for (key, route), on in zip(routes.items(), over, strict=True) if not on}
-        links = [i for i, key in enumerate(keys) if key not in routes]
-        drawn = list(routes.values())
-        if routed:
-            names = [((i,), padded(rect, -PAD_LABEL)) for i, rect in self.labels.items()]
-            routes.update(
-                linked(
-                    problem, links, keys, self.plan, self.rests, self.units, self.frames, self.boxes, names, pair, drawn
-                )
-            )
-        axis = self.rests.axis if pair else None
-        upright = bool(problem.plan and pair) or any(piece.drawing.upright for piece, _ in self.rests.pieces)
-        return Drawing(
-            tuple(places),
-            routes,
-            self.frames,
-            self.boxes,
-            axis,
-            bool(problem.pins),
-            upright,
-            problem.direction,
-            tuple(self.sides),
-            tuple(self.labels.values()),
-            problem.title,
-        )
-
-
-def _box(
-    problem: LayoutProblem, places: Sequence[Point], sides: Sequence[Side | None], name: str, members: Sequence[int]
-) -> Rect:
-    rect = padded(bounds([places[m] for m in members]), BOX_DOWN)
-    rect = united([rect, *covered(problem, places, sides, members).values()])
-    x0, y0, x1, y1 = entitled(rect, title_room(name, BOX_WEIGHT), problem.direction)
-    return snap(x0), snap(y0), snap(x1), snap(y1)
 
 
 def _spread(problem: LayoutProblem, units: Sequence[Unit]) -> list[Unit]:

@@ -3,7 +3,8 @@
 In: Levels and the order. Out: x and y of every node. Across, each rank is moved to the weighted mean of what its
 nodes are connected to, in sweeps; within a rank that is an isotonic regression, so that what is symmetric stays
 symmetric. Along, ranks are as far apart as asked, farther where blocks are high or the ranks so wide that lines would
-run flat over discs.
+run flat over discs. Ranks that make a drawing much wider than a page are staggered: every other neuron stands a step
+behind its neighbours, and connections run in the gaps between those before (``fold_ports``).
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
+from dataclasses import replace
 from itertools import pairwise
 from typing import TypeAlias
 
@@ -21,7 +23,7 @@ from neurovis_layouts.isotonic import spread
 from neurovis_layouts.layered.box_columns import Strips
 from neurovis_layouts.layered.levels import Levels, Node, Segment
 from neurovis_spec.layout.geometry import snap
-from neurovis_spec.layout.model import Point
+from neurovis_spec.layout.model import LayoutProblem, Point
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -36,6 +38,8 @@ _MOST_STRETCH = 2.0
 _NARROW = 0.4
 _FLAT, _FANNED = 14.0, 5.0
 _HARDLY = 1e-7
+#: What is wider than a page by this is staggered: its ranks of so many neurons and more, that make it so wide.
+_WIDE, _FEWEST, _PART = 2.0, 20, 0.5
 
 
 def placed(
@@ -203,3 +207,29 @@ def _along(
         wide = max(1.0, min(2.5, longest / (_FANNED if (r in fanned) != (r - 1 in fanned) else _FLAT)))
         result.append(snap(result[-1] + behind[r - 1] + before[r] + max(spacing, 0.75) * wide))
     return result
+
+
+def staggered(
+    problem: LayoutProblem, levels: Levels, order: Sequence[Sequence[int]], places: Sequence[Point]
+) -> Levels | None:
+    """The levels with the widest ranks staggered; None where they are not much wider than a page."""
+    xs, ys = zip(*places, strict=True)
+    wide, high = max(xs) - min(xs) + 1, max(ys) - min(ys) + 1
+    page = problem.page if problem.direction in ("down", "up") else 1 / problem.page
+    if wide < _WIDE * page * high:
+        return None
+    lined = {m for line in problem.align for m in line}
+    nodes, rise = list(levels.nodes), snap(problem.neuron_spacing / 2)
+    for rank in order:
+        own = [n for n in rank if nodes[n].members]
+        across = [places[n][0] for n in own]
+        alone = all(_alone(nodes[n], lined) for n in own)
+        if alone and len(own) >= _FEWEST and max(across) - min(across) > _PART * wide:
+            for place, n in enumerate(own):
+                nodes[n] = replace(nodes[n], lift=rise if place % 2 else -rise)
+    return None if nodes == levels.nodes else replace(levels, nodes=nodes)
+
+
+def _alone(node: Node, lined: AbstractSet[int]) -> bool:
+    """Whether a node is a single neuron, as high as its disc, that nobody wants on a line."""
+    return len(node.members) == 1 and node.reach == (0.0, 0.0) and not node.lift and node.members[0][0] not in lined

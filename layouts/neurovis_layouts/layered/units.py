@@ -4,13 +4,14 @@ In: a LayoutProblem. Out: units in canonical order, each neuron in exactly one. 
 connections within it run forward (a chain), or only some of its neurons are on a line with others: then each of its
 neurons finds its own, as if it were in no group. Neurons that drive each other in
 a loop (a half-centre oscillator, a ring, a reservoir) are one block: a row or a column where they are a line, else a
-ring, with the one neuron in its middle that all of it is connected with.
+ring, with the one neuron in its middle that all of it is connected with. Of a problem that is to be symmetric each
+unit is its own mirror image, on the axis, or has one (``symmetric_units``).
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from functools import partial
@@ -20,8 +21,9 @@ import networkx as nx
 from neurovis_layouts.alike import mirror_images
 from neurovis_layouts.formations import offsets
 from neurovis_layouts.frame import from_picture
+from neurovis_layouts.layered.parts import symmetric
 from neurovis_spec.layout.geometry import distance, snap, turn
-from neurovis_spec.layout.model import Arrangement, LayoutProblem, Point
+from neurovis_spec.layout.model import Arrangement, LayoutProblem, LayoutRefusalError, Point
 
 #: Loops of more neurons than this are unrolled along the direction instead of drawn as a ring.
 _MOST_IN_A_RING = 32
@@ -307,3 +309,74 @@ def _without_needless_loops(problem: LayoutProblem, found: list[Unit], lines: Ma
         whole = unit.places is not None or row[i] not in looping
         result += [unit] if whole else [Unit((member,)) for member in unit.members]
     return result
+
+
+def symmetric_units(problem: LayoutProblem, frames: Sequence[Unit], pair: Mapping[int, int]) -> list[Unit]:
+    """All units, in the order of their first neurons; ``frames`` are those of both sides.
+
+    Raises LayoutRefusalError where an arrangement cannot be symmetric.
+    """
+    framed = {m for unit in frames for m in unit.members}
+    second = {b for mirror in problem.mirrors for _, b in mirror.pairs} - framed
+    blocks = arranged_on_axis(problem, pair, framed)
+    solid = framed | {m for unit in blocks for m in unit.members}
+    result: list[Unit] = []
+    for unit in units_of(problem, [*frames, *blocks], second - solid):
+        for piece in [unit] if unit.members[0] in solid else _pure(unit, pair):
+            result.append(piece)
+            if piece.members[0] in pair and piece.members[0] not in solid:
+                result.append(_reflected(piece, pair))
+    return sorted(result, key=lambda unit: min(unit.members))
+
+
+def arranged_on_axis(problem: LayoutProblem, pair: Mapping[int, int], framed: AbstractSet[int]) -> list[Unit]:
+    """The arrangements of neurons that are not ``framed`` in which mirror images stand opposite each other.
+
+    Raises LayoutRefusalError where one cannot be symmetric.
+    """
+    return [block for members, how in problem.arrange if (block := _on_axis(problem, members, how, pair, framed))]
+
+
+def _pure(unit: Unit, pair: Mapping[int, int]) -> Iterator[Unit]:
+    """A unit as it is if all of its neurons have an image or none has, else in pieces."""
+    with_image = tuple(m for m in unit.members if m in pair)
+    if len(with_image) in (0, len(unit.members)):
+        yield unit
+    elif unit.places is None:
+        yield Unit(with_image)
+        yield Unit(tuple(m for m in unit.members if m not in pair))
+    else:  # a block that is not symmetric in itself would pull its neurons off the axis
+        yield from (Unit((m,)) for m in unit.members)
+
+
+def _reflected(unit: Unit, pair: Mapping[int, int]) -> Unit:
+    places = None if unit.places is None else tuple((-x + 0.0, y) for x, y in unit.places)
+    return replace(unit, members=tuple(pair[m] for m in unit.members), places=places)
+
+
+def _on_axis(
+    problem: LayoutProblem, members: Sequence[int], how: Arrangement, pair: Mapping[int, int], framed: AbstractSet[int]
+) -> Unit | None:
+    """An arrangement that holds mirror images of each other: a block on the axis, in which these stand opposite."""
+    own = set(members)
+    if own & framed or not symmetric(members, pair):
+        return None
+    points = formation(problem, members, how)
+    left = sorted((p for p in points if p[0] < 0), key=points.index)
+    middle = [p for p in points if p[0] == 0]
+    first = {a for mirror in problem.mirrors for a, _ in mirror.pairs}
+    leads = [m for m in members if m in first and pair[m] in own]
+    lone = [m for m in members if m not in pair]
+    twins = [(-x, y) in set(points) for x, y in left]
+    if len(leads) != len(left) or len(lone) != len(middle) or not all(twins):
+        names = problem.neurons
+        raise LayoutRefusalError(
+            "mirror-arrange",
+            f"'{names[members[0]]}' and those arranged with it as {how} cannot be mirror images of each other in it",
+            "arrange each side by itself",
+            tuple(names[m] for m in members),
+        )
+    places: dict[int, Point] = dict(zip(lone, middle, strict=True))
+    for one, (x, y) in zip(leads, left, strict=True):
+        places[one], places[pair[one]] = (x, y), (-x, y)
+    return Unit(tuple(members), tuple(places[m] for m in members))

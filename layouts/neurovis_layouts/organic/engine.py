@@ -15,11 +15,9 @@ import numpy as np
 
 from neurovis_layouts.apart import apart
 from neurovis_layouts.finish import alone, drawn, drawn_apart, nearest
-from neurovis_layouts.organic.field import GridField
+from neurovis_layouts.organic.field import Cooling, GridField, Held, settle
 from neurovis_layouts.organic.flow import in_flow
-from neurovis_layouts.organic.levels import COARSEST
-from neurovis_layouts.organic.settle import Cooling, settle
-from neurovis_layouts.organic.spread import SPARSE, spread, spread_small
+from neurovis_layouts.organic.levels import COARSEST, SPARSE, spread, spread_small
 from neurovis_layouts.organic.trees import trees_of
 from neurovis_layouts.packing import packed
 from neurovis_layouts.symmetry import Symmetry, about_pins, first_of_pairs, symmetry_of
@@ -70,7 +68,7 @@ class OrganicEngine:
             real = places[: len(problem.neurons)]
             return drawn_apart(problem, self.name, real, _APART * problem.neuron_spacing, symmetry)
         clear = [i for i, edge in enumerate(problem.edges) if planar[edge.source] and edge.source != edge.target]
-        return drawn(problem, self.name, places, clear=alone(problem, clear))
+        return drawn(problem, self.name, places, alone(problem, clear))
 
     def check(self, problem: LayoutProblem) -> None:
         """Raises LayoutRefusalError for mirror images that it cannot draw."""
@@ -225,7 +223,7 @@ def _around_pins(
     places[fixed] = there
     scale = 2.0 * problem.neuron_spacing
     cooling, field = Cooling(_PINNED_STEPS, 0.5, 0.02), GridField(wiring.mass)
-    pulled = settle(wiring, places / scale, field, cooling, fixed, axis=symmetry.axis / scale) * scale
+    pulled = settle(wiring, places / scale, field, cooling, Held(fixed, symmetry.axis / scale)) * scale
     pulled[fixed] = there
     real, arcs = slice(0, wiring.neurons), (wiring.above, wiring.below)
     pulled[real] = apart(pulled[real], _APART * problem.neuron_spacing, fixed, arcs, None, symmetry.kept)

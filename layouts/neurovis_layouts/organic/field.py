@@ -1,6 +1,10 @@
-"""The field: how all points push each other off, by the inverse of their distance.
+"""Forces on points, and where these come to rest.
 
-In: places and masses. Out: the push on each. Points of many small parts are taken pair by pair; those of a large one
+In: a wiring, where its points are. Out: where they come to rest (``settle``), step by step, each shorter than the one
+before. Links pull with a force that grows slower than their length, so that clusters stand apart (Noack 2007: forces
+between linear and logarithmic); arcs press their target below their source; mirror images are such at each step. All
+points push each other off, by the inverse of their distance: that is the field. Points of many small parts are taken
+pair by pair; those of a large one
 give their mass to a grid, whose field is one convolution, by Fourier transform (Hockney and Eastwood 1988:
 particle-mesh). Closer than a cell that push fades, which is as well, as discs are kept apart afterwards; but of a
 network that reaches far out on one side cells are so large that whole clusters would fall into one: there what the grid
@@ -10,13 +14,16 @@ cannot tell apart is added pair by pair.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 
 from neurovis_layouts.apart import pushed
+from neurovis_layouts.symmetry import Symmetry
+from neurovis_layouts.wiring import Wiring
 from neurovis_spec.layout import FloatArray, IntArray
-from neurovis_spec.layout.geometry import near_pairs
+from neurovis_spec.layout.geometry import lengths, near_pairs
 
 #: Cells wider than this, in the distance that points of such a mass have from each other, are too wide; how far, in the
 #: same, pairs are added then.
@@ -27,6 +34,10 @@ _SOFT = 0.01
 
 #: Whatever gives the push (n, 2) on places (n, 2).
 Field: TypeAlias = Callable[[FloatArray], FloatArray]
+#: How strongly points push each other off.
+_PUSH = 0.2
+#: How strongly an arc presses as long as its target is too little below its source.
+_PRESS = 4.0
 
 
 def pair_field(mass: FloatArray, one: IntArray, other: IntArray) -> Field:
@@ -110,3 +121,58 @@ def _smooth(least: int) -> int:
         if rest == 1:
             return least
         least += 1
+
+
+@dataclass(frozen=True, slots=True)
+class Cooling:
+    """How many steps, and the longest move in the first and in the last."""
+
+    steps: int
+    first: float
+    last: float
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """What does not move: ``points`` (k,), by index, and the ``axis`` of mirror images, which stands at this x."""
+
+    points: IntArray
+    axis: float
+
+
+def settle(
+    wiring: Wiring,
+    places: FloatArray,
+    field: Field,
+    cooling: Cooling,
+    held: Held | None = None,
+    drop: FloatArray | float = 1.0,
+    tick: Callable[[int], None] | None = None,
+) -> FloatArray:
+    """Places (count, 2) at rest, but for what is ``held``. An arc presses as long as its target is less than ``drop``
+    below its source, one for all or (m,). ``tick`` is called after every step with the number of points."""
+    count, symmetry = wiring.count, Symmetry(wiring.image, held.axis if held else 0.0)
+    for step in range(cooling.steps):
+        force = _PUSH * field(places)
+        way = places[wiring.b] - places[wiring.a]
+        length = lengths(way) + 1e-9
+        # links pull with the power 11/16 of their length, by roots alone, which every processor rounds alike
+        fourth = np.sqrt(np.sqrt(length))
+        stiffness = wiring.weight / (fourth * np.sqrt(np.sqrt(fourth)))
+        force += pushed(count, wiring.b, wiring.a, way * stiffness[:, None])
+        stiff = np.bincount(wiring.a, stiffness, count) + np.bincount(wiring.b, stiffness, count)
+        missing = drop - (places[wiring.below, 1] - places[wiring.above, 1])
+        press = _PRESS * wiring.pull * np.maximum(missing, 0)
+        force[:, 1] += np.bincount(wiring.below, press, count) - np.bincount(wiring.above, press, count)
+        active = _PRESS * wiring.pull * (missing > 0)
+        stiff += np.bincount(wiring.below, active, count) + np.bincount(wiring.above, active, count)
+        move = force / (stiff + 1e-9)[:, None]
+        far = lengths(move) + 1e-12
+        longest = cooling.first * (cooling.last / cooling.first) ** (step / max(1, cooling.steps - 1))
+        move *= (np.minimum(far, longest) / far)[:, None]
+        if held is not None:
+            move[held.points] = 0.0
+        places = symmetry.kept(places + move)
+        if tick is not None:
+            tick(count)
+    return places

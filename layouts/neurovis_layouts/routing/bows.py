@@ -9,8 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
-from neurovis_layouts.routing.obstacles import REACH, Obstacles
-from neurovis_layouts.routing.walls import Frame, Walls
+from neurovis_layouts.routing.obstacles import REACH, Frame, Obstacles, Walls
 from neurovis_spec.layout.geometry import Rect, bounds, distance, straight, united
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 

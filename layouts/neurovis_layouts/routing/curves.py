@@ -1,19 +1,26 @@
 """Curves along the direction: down from the source, through gaps in the ranks between, spread into the target.
 
-In: both centres, the waypoints between, how the ends lean. Out: a route.
+In: edges, centres, the waypoints between. Out: a route for each. Where it leaves and arrives is told by ports: for one
+side of one disc, each connection there leans sideways by a share u in (−1, 1) of a unit vector whose other part points
+away from the disc, in the order of the other ends, spread so that arrowheads do not pile up.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from neurovis_spec.layout.model import Point, Route
+from neurovis_layouts.isotonic import spread
+from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
 #: How far across a route runs in a gap, at most, for a unit along.
 _SLOPE = 1.0
+#: How much the shares of neighbours at a port differ, those of two that share both ends, and how far out the last lean.
+_GAP, _PARTNER_GAP, _WIDEST = 0.28, 0.5, 0.85
+#: Lines leave more steeply than they arrive: first out of the rank, then across.
+_LEAN_SOURCE, _LEAN_TARGET = 0.5, 0.75
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +30,41 @@ class Waypoint:
     x: float
     y: float
     half: float = 0.0
+
+
+def curves(
+    edges: Sequence[LayoutEdge],
+    centres: Sequence[Point],
+    chosen: Sequence[int],
+    waypoints: Mapping[int, Sequence[Waypoint]],
+) -> dict[int, Route]:
+    """Curves along the direction for the ``chosen`` edges, by index, from port to port: these lean by disc and side."""
+    sides: dict[tuple[int, bool], list[Port]] = {}
+    for i in chosen:
+        edge = edges[i]
+        ways = [(way.x, way.y) for way in waypoints.get(i, ())]
+        start, end = centres[edge.source], centres[edge.target]
+        line = [start, *ways, end]
+        backward = end[1] < start[1]
+        for own, other, partner, at_source in (
+            (start, line[1], edge.target, True),
+            (end, line[-2], edge.source, False),
+        ):
+            below = other[1] > own[1]
+            port = Port(other[0] - own[0], partner, backward, i, at_source, other[1] - own[1])
+            sides.setdefault((edge.source if at_source else edge.target, below), []).append(port)
+    lean: dict[tuple[int, bool], float] = {}
+    for ports in sides.values():
+        lean.update(leanings(ports))
+    return {
+        i: curve(
+            centres[edges[i].source],
+            centres[edges[i].target],
+            waypoints.get(i, ()),
+            (lean[i, True], lean[i, False]),
+        )
+        for i in chosen
+    }
 
 
 def handle(across: float, along: float) -> float:
@@ -69,3 +111,40 @@ def _slopes(start: Point, end: Point, ways: Sequence[Waypoint]) -> list[float]:
         slope = 2 * before * after / (before + after) if before * after > 0 else 0.0
         result.append(max(-_SLOPE, min(_SLOPE, slope)))
     return result
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Port:
+    """One end of an edge on one side of a disc: where it goes (relative), the partner, the edge, which end."""
+
+    across: float
+    partner: int
+    backward: bool
+    edge: int
+    at_source: bool
+    along: float
+
+
+def leanings(ports: Sequence[Port]) -> dict[tuple[int, bool], float]:
+    """u for each (edge, whether at its source), in the order of the other ends.
+
+    A lone connection leans towards its other end; several keep a least difference, smaller where they are many.
+    """
+    ordered = sorted(ports)
+    wishes = [
+        (_LEAN_SOURCE if port.at_source else _LEAN_TARGET)
+        * (port.across / math.sqrt(port.across * port.across + port.along * port.along))
+        for port in ordered
+    ]
+    room = 2 * _WIDEST / max(1, len(ordered) - 1)
+    gaps = [min(room, _PARTNER_GAP if first.partner == second.partner else _GAP) for first, second in pairwise(ordered)]
+    places = spread(wishes, [1.0] * len(ordered), gaps)
+    # a whole fan that leans out to one side is moved back, one that is too wide is narrowed as well
+    over, under = places[-1] - _WIDEST, -_WIDEST - places[0]
+    if over > 0 and under <= 0:
+        places = [place - min(over, -under) for place in places]
+    elif under > 0 and over <= 0:
+        places = [place + min(under, -over) for place in places]
+    widest = max(abs(place) for place in places)
+    scale = _WIDEST / widest if widest > _WIDEST else 1.0
+    return {(port.edge, port.at_source): place * scale for port, place in zip(ordered, places, strict=True)}

@@ -18,10 +18,9 @@ import numpy as np
 
 from neurovis_layouts.routing.corners import rounded
 from neurovis_layouts.routing.ends import by_ends
-from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
+from neurovis_layouts.routing.obstacles import TOUCH, Barriers, Walls, blocked, meet
 from neurovis_layouts.routing.polylines import crossings, polylines
 from neurovis_layouts.routing.route_cost import ALONG, BENDING, ENTERING
-from neurovis_layouts.routing.walls import Walls, blocked, meet
 from neurovis_spec.layout import BoolArray, FloatArray, IntArray
 from neurovis_spec.layout.geometry import distance, lengths
 from neurovis_spec.layout.model import RADIUS, LayoutEdge, Point, Route
@@ -63,8 +62,7 @@ def detoured(
     edges: Sequence[LayoutEdge],
     centres: Sequence[Point],
     routes: Mapping[int, Route],
-    obstacles: Obstacles,
-    walls: Walls,
+    barriers: Barriers,
     ways: Mapping[int, Sequence[Point]],
     drawn: Sequence[Route],
     most: int,
@@ -76,8 +74,8 @@ def detoured(
     Where more than ``most`` run over discs, detours would only move the crowd: these stay."""
     chosen = sorted(routes)
     own = [(edges[i].source, edges[i].target) for i in chosen]
-    entered = walls.entered([routes[i] for i in chosen], own)
-    clear = obstacles.clearances([routes[i] for i in chosen], own)
+    entered = barriers.frames.entered([routes[i] for i in chosen], own)
+    clear = barriers.discs.clearances([routes[i] for i in chosen], own)
     crowd = sum(near < TOUCH + _BARELY and not enters for near, enters in zip(clear, entered, strict=True)) > most
     wrong = [
         (-distance(*(centres[end] for end in ends)), i, enters, clearance)
@@ -89,11 +87,11 @@ def detoured(
     between, found = by_ends(enumerate(edges)), dict[int, Route]()
     right = [routes[i] for i in sorted(routes.keys() - {i for _, i, _, _ in wrong})]
     few = (len(routes) + len(drawn)) * len(wrong) <= _MOST_CROSSED
-    detours = Detours(walls, centres, [*right, *drawn] if few else None)
+    detours = Detours(barriers.frames, centres, [*right, *drawn] if few else None)
     for _, i, enters, clearance in sorted(wrong):
         ends = edges[i].source, edges[i].target
         route = detours.route(*ends, len(between[frozenset(ends)]) == 1, ways.get(i, ()))
-        if route is not None and (enters or obstacles.clearance(route, ends) > clearance):
+        if route is not None and (enters or barriers.discs.clearance(route, ends) > clearance):
             found[i] = route
     return found
 

@@ -1,22 +1,21 @@
 """Self-loops: out of the disc and back, to the side where there is most room.
 
-In: a centre, what is around it, the loops that it has. Out: a route that leaves the centre and comes back to it, clear
-of those loops: around them, or to another side.
+In: edges, centres, the routes of other edges. Out: for each edge from a neuron to itself a route that leaves the centre
+and comes back to it, clear of the other loops of the neuron: around them, or to another side.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
+from neurovis_layouts.routing.obstacles import REACH, TOUCH, Barriers
 from neurovis_layouts.routing.route_cost import ENTERING
-from neurovis_layouts.routing.walls import Walls
 from neurovis_spec.layout import FloatArray
-from neurovis_spec.layout.geometry import distance, pieces_of, points_on
-from neurovis_spec.layout.model import Point, Route
+from neurovis_spec.layout.geometry import Cells, distance, pieces_of, points_on
+from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
 _DIAGONAL = math.sqrt(0.5)
 #: Cosine and sine of an eighth of a half turn.
@@ -36,7 +35,8 @@ _WAYS: tuple[tuple[Point, float], ...] = (
     ((_DIAGONAL, _DIAGONAL), 0.2),
     ((-_DIAGONAL, _DIAGONAL), 0.2),
 )
-_CROWDED = 0.35
+#: How far around a neuron others count for where its loops have room, and how much.
+_NEAR, _CROWDED = 3.0, 0.35
 #: An edge within some 50° of a loop's way runs along one of its legs, which stand 30° to either side.
 _LEGS = 0.64
 #: Shapes, the first of equals wins: how long the handles are (three quarters of it is how far the loop reaches) and how
@@ -60,12 +60,50 @@ def loop(centre: Point, way: Point, handle: float, wide: float) -> Route:
 
 
 def loops(
+    edges: Sequence[LayoutEdge],
+    centres: Sequence[Point],
+    routes: Mapping[int, Route],
+    barriers: Barriers,
+    there: Mapping[int, Route],
+) -> dict[int, Route]:
+    """The loops of all edges that lead to where they come from, by index; those ``there`` stay. ``routes`` are those of
+    the other edges, by index."""
+    looping: dict[int, list[int]] = {}
+    for i, edge in enumerate(edges):
+        if edge.source == edge.target:
+            looping.setdefault(edge.source, []).append(i)
+    tangents: dict[int, list[Point]] = {own: [] for own in looping}
+    for i, route in sorted(routes.items()):
+        if edges[i].source in tangents:
+            tangents[edges[i].source].append(_unit(route[0], route[1]))
+        if edges[i].target in tangents:
+            tangents[edges[i].target].append(_unit(route[-1], route[-2]))
+    near: dict[int, list[Point]] = {own: [] for own in tangents}
+    places, owns = np.array(centres, dtype=np.float64).reshape(-1, 2), np.array(list(tangents), dtype=np.int64)
+    number, other, _ = Cells(places, _NEAR).near(places[owns])
+    for own, neighbour in zip(owns[number].tolist(), other.tolist(), strict=True):
+        if neighbour != own:
+            near[own].append(centres[neighbour])
+    result: dict[int, Route] = {}
+    for own, mine in looping.items():
+        result.update({i: there[i] for i in mine if i in there})
+        new, old = [i for i in mine if i not in result], [result[i] for i in mine if i in result]
+        made = _beside(own, centres[own], near[own], tangents[own], barriers, old, len(new))
+        result.update(zip(new, made, strict=True))
+    return result
+
+
+def _unit(origin: Point, towards: Point) -> Point:
+    length = distance(origin, towards) or 1.0
+    return (towards[0] - origin[0]) / length, (towards[1] - origin[1]) / length
+
+
+def _beside(
+    neuron: int,
     centre: Point,
-    index: int,
     near: Sequence[Point],
     tangents: Sequence[Point],
-    obstacles: Obstacles,
-    walls: Walls,
+    barriers: Barriers,
     there: Sequence[Route],
     count: int,
 ) -> list[Route]:
@@ -77,8 +115,11 @@ def loops(
     def tried(shapes: Sequence[tuple[float, float]]) -> tuple[list[Route], FloatArray]:
         """The loops of these shapes, way by way, and what they cost, but for being close to other loops."""
         routes = [loop(centre, way, *shape) for way, _ in _WAYS for shape in shapes]
-        own = [(index, index)] * len(routes)
-        clear, entering = np.array(obstacles.clearances(routes, own)), np.array(walls.entered(routes, own))
+        own = [(neuron, neuron)] * len(routes)
+        clear, entering = (
+            np.array(barriers.discs.clearances(routes, own)),
+            np.array(barriers.frames.entered(routes, own)),
+        )
         costs = np.repeat(crowds, len(shapes)) + np.tile(0.12 * np.arange(len(shapes)), len(crowds))
         costs += 8 * np.maximum(0.0, REACH - clear) + ENTERING * entering + ENTERING * (clear <= TOUCH)
         return routes, costs

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from neurovis_layouts.routing.walls import blocked
+from neurovis_layouts.routing.obstacles import blocked
 from neurovis_spec.layout import BoolArray, FloatArray, IntArray
 from neurovis_spec.layout.geometry import crossing, cubic, lengths, pieces_of, ranges, squared_distances
 from neurovis_spec.layout.model import Route

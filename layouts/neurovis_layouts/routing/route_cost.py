@@ -14,9 +14,8 @@ import numpy as np
 
 from neurovis_layouts.routing.ends import by_ends
 from neurovis_layouts.routing.images import Images
-from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
+from neurovis_layouts.routing.obstacles import REACH, TOUCH, Frame, Obstacles, Walls, meet
 from neurovis_layouts.routing.polylines import END, STEP, Polylines, polylines
-from neurovis_layouts.routing.walls import Frame, Walls, meet
 from neurovis_spec.layout import BoolArray, FloatArray, IntArray
 from neurovis_spec.layout.geometry import distance, distinct, padded, straight
 from neurovis_spec.layout.model import LayoutEdge, Point, Route

@@ -1,6 +1,8 @@
 """The router: a route for every edge of a problem whose neurons have their places.
 
-In: the problem, centres in the engine's frame (x across, y along), waypoints. Out: routes in that frame, by edge index.
+In: edges, centres in the engine's frame (x across, y along), what is planned and what is around. Out: routes in that
+frame, by edge index. The stages: curves along the direction and bows; detours round what these run into; reflections of
+mirror images; what is hard to follow drawn anew; loops.
 """
 
 from __future__ import annotations
@@ -8,26 +10,21 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
-
-import numpy as np
+from dataclasses import dataclass, field
 
 from neurovis_layouts.routing.bows import FEW_TRIES, MANY_TRIES, BowSought, clear_bows
-from neurovis_layouts.routing.curves import Waypoint, curve
+from neurovis_layouts.routing.curves import Waypoint, curves
 from neurovis_layouts.routing.detours import detoured
 from neurovis_layouts.routing.images import Images
 from neurovis_layouts.routing.improve import MOST_IMPROVED, improved
 from neurovis_layouts.routing.loops import loops
-from neurovis_layouts.routing.obstacles import Obstacles
-from neurovis_layouts.routing.ports import Port, leanings
+from neurovis_layouts.routing.obstacles import Barriers, Frame, Obstacles, Walls
 from neurovis_layouts.routing.route_cost import Drawn
-from neurovis_layouts.routing.walls import Frame, Walls
-from neurovis_spec.layout.geometry import Cells, Rect, bounds, distance, united
+from neurovis_spec.layout.geometry import Rect, bounds, distance, united
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
-__all__ = ["Waypoint", "route_all"]
+__all__ = ["RoutePlan", "Surroundings", "Waypoint", "route_all"]
 
-#: How far around a neuron others count for where its self-loop has room.
-_NEAR = 3.0
 #: With more edges than this nobody can follow one: discs in the way are not gone round.
 _MOST_CAREFULLY = 4000
 #: With more than this they do not go far out of their way, which would only move the crowd.
@@ -41,55 +38,72 @@ _MOST_AROUND, _MOST_AROUND_PLANNED = 60, 300
 _STEEP_ENOUGH = 0.75
 
 
+@dataclass(frozen=True, slots=True)
+class RoutePlan:
+    """What is known of routes before any is found, by edge index.
+
+    Without ``waypoints`` every edge runs from anywhere to anywhere; with them, edges not in ``bowed`` run along the
+    direction (through their waypoints, if they have any). ``begun`` are routes to begin with, not curves; those that
+    are ``there`` stay as they are. Of ``images`` one route is the other's reflection. Those that are ``firm``, which
+    cross nothing, are not drawn anew, but for arcs between images.
+    """
+
+    waypoints: Mapping[int, Sequence[Waypoint]] | None = None
+    bowed: AbstractSet[int] = frozenset()
+    begun: Mapping[int, Route] = field(default_factory=dict)
+    there: Mapping[int, Route] = field(default_factory=dict)
+    images: Images = field(default_factory=Images)
+    firm: AbstractSet[int] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What else is drawn: ``frames``, none of which a route enters that has neither of its ends in it, if there is a
+    way round; other routes (``drawn``). Nothing is gone round outside of ``within``."""
+
+    frames: Sequence[Frame] = ()
+    drawn: Sequence[Route] = ()
+    within: Rect | None = None
+
+
 def route_all(
     edges: Sequence[LayoutEdge],
     centres: Sequence[Point],
-    waypoints: Mapping[int, Sequence[Waypoint]] | None = None,
-    bowed: AbstractSet[int] = frozenset(),
+    plan: RoutePlan = RoutePlan(),
+    around: Surroundings = Surroundings(),
     careful: int = _MOST_CAREFULLY,
-    frames: Sequence[Frame] = (),
-    drawn: Sequence[Route] = (),
-    there: Mapping[int, Route] | None = None,
-    images: Images | None = None,
-    within: Rect | None = None,
-    begun: Mapping[int, Route] | None = None,
-    planned: AbstractSet[int] = frozenset(),
 ) -> list[Route]:
-    """Routes by edge index.
-
-    Without ``waypoints`` every edge runs from anywhere to anywhere; with them, edges not in ``bowed`` run along the
-    direction (through their waypoints, if they have any). With more than ``careful`` edges, discs in the way are not
-    gone round. No route enters one of the ``frames`` that holds neither of its ends, if there is a way round. ``drawn``
-    are other routes, which are there, as are those of these edges that are ``there``. Nothing that is in the way is
-    gone round outside of ``within``. ``begun`` are routes to begin with, not curves; of those with ``images`` one is
-    the other's reflection. Those that are ``planned``, which cross nothing, are not drawn anew, but for arcs between
-    images.
-    """
-    near = Obstacles(centres)
-    obstacles = near if len(edges) <= careful else Obstacles(())
-    routes: dict[int, Route] = dict(begun or {})
-    if waypoints is not None:
-        chosen = bowed | routes.keys()
+    """Routes by edge index, between ``centres`` by neuron index. With more than ``careful`` edges, discs in the way are
+    not gone round."""
+    walls = Walls(around.frames, len(centres))
+    near = Barriers(Obstacles(centres), walls)
+    barriers = near if len(edges) <= careful else Barriers(Obstacles(()), walls)
+    routes: dict[int, Route] = dict(plan.begun)
+    if plan.waypoints is not None:
+        chosen = plan.bowed | routes.keys()
         along = [i for i, edge in enumerate(edges) if i not in chosen and _runs_along(edge, centres)]
-        routes.update(_curves(edges, centres, along, waypoints))
+        routes.update(curves(edges, centres, along, plan.waypoints))
     rest = [i for i, edge in enumerate(edges) if i not in routes and edge.source != edge.target]
-    routes.update(_bows(edges, centres, rest, obstacles, within))
-    walls = Walls(frames, len(centres))
-    ways = {i: [(way.x, way.y) for way in line] for i, line in (waypoints or {}).items()}
-    most = _MOST_AROUND if waypoints is None else _MOST_AROUND_PLANNED
-    detours = detoured(edges, centres, routes, obstacles, walls, ways, drawn, most)
-    routes.update((i, way) for i, way in detours.items() if within is None or united([bounds(way), within]) == within)
-    images = _led(images or Images(), routes, edges, centres, obstacles, walls)
+    routes.update(_bows(edges, centres, rest, barriers.discs, around.within))
+    ways = {i: [(way.x, way.y) for way in line] for i, line in (plan.waypoints or {}).items()}
+    most = _MOST_AROUND if plan.waypoints is None else _MOST_AROUND_PLANNED
+    detours = detoured(edges, centres, routes, barriers, ways, around.drawn, most)
+    routes.update((i, way) for i, way in detours.items() if _inside(way, around.within))
+    images = _led(plan.images, routes, edges, centres, barriers)
     routes.update(images.kept(routes, edges, centres))
-    routes.update((i, route) for i, route in (there or {}).items() if i in routes)
-    free = set(routes) - (there or {}).keys() - {image for i, image in images.of.items() if image != i}
-    free -= {i for i in planned if images.of.get(i) != i}
+    routes.update((i, route) for i, route in plan.there.items() if i in routes)
+    free = set(routes) - plan.there.keys() - {image for i, image in images.of.items() if image != i}
+    free -= {i for i in plan.firm if images.of.get(i) != i}
     if free and len(edges) <= MOST_IMPROVED:
-        routes.update(improved(Drawn(edges, centres, routes, frames, drawn, images), free))
-    looped = _loops(edges, centres, routes, near, walls, there or {})
+        routes.update(improved(Drawn(edges, centres, routes, around.frames, around.drawn, images), free))
+    looped = loops(edges, centres, routes, near, plan.there)
     routes.update(looped)
     routes.update(images.kept(looped, edges, centres))
     return [routes[i] for i in range(len(edges))]
+
+
+def _inside(route: Route, within: Rect | None) -> bool:
+    return within is None or united([bounds(route), within]) == within
 
 
 def _led(
@@ -97,8 +111,7 @@ def _led(
     routes: Mapping[int, Route],
     edges: Sequence[LayoutEdge],
     centres: Sequence[Point],
-    obstacles: Obstacles,
-    walls: Walls,
+    barriers: Barriers,
 ) -> Images:
     """The same images, of which the second is drawn and the first is its reflection where that is the only way in which
     both are clear: not everything that is in the way has an image itself."""
@@ -106,8 +119,7 @@ def _led(
     def in_the_way(images: Images) -> set[int]:
         found = images.kept(routes, edges, centres)
         ways, own = list(found.values()), [(edges[i].source, edges[i].target) for i in found]
-        over, entered = obstacles.run_over(ways, own), walls.entered(ways, own)
-        return {i for i, *unclear in zip(found, over, entered, strict=True) if any(unclear)}
+        return {i for i, hit in zip(found, barriers.hit(ways, own), strict=True) if hit}
 
     first = in_the_way(images)
     if not first:
@@ -123,41 +135,6 @@ def _led(
 def _runs_along(edge: LayoutEdge, centres: Sequence[Point]) -> bool:
     (ax, ay), (bx, by) = centres[edge.source], centres[edge.target]
     return abs(by - ay) >= max(_STEEP_ENOUGH, abs(bx - ax) / 40)
-
-
-def _curves(
-    edges: Sequence[LayoutEdge],
-    centres: Sequence[Point],
-    chosen: Sequence[int],
-    waypoints: Mapping[int, Sequence[Waypoint]],
-) -> dict[int, Route]:
-    """Curves along the direction, from port to port: these lean by disc and side."""
-    sides: dict[tuple[int, bool], list[Port]] = {}
-    for i in chosen:
-        edge = edges[i]
-        ways = [(way.x, way.y) for way in waypoints.get(i, ())]
-        start, end = centres[edge.source], centres[edge.target]
-        line = [start, *ways, end]
-        backward = end[1] < start[1]
-        for own, other, partner, at_source in (
-            (start, line[1], edge.target, True),
-            (end, line[-2], edge.source, False),
-        ):
-            below = other[1] > own[1]
-            port = Port(other[0] - own[0], partner, backward, i, at_source, other[1] - own[1])
-            sides.setdefault((edge.source if at_source else edge.target, below), []).append(port)
-    lean: dict[tuple[int, bool], float] = {}
-    for ports in sides.values():
-        lean.update(leanings(ports))
-    return {
-        i: curve(
-            centres[edges[i].source],
-            centres[edges[i].target],
-            waypoints.get(i, ()),
-            (lean[i, True], lean[i, False]),
-        )
-        for i in chosen
-    }
 
 
 def _bows(
@@ -214,41 +191,3 @@ def _least(
     odd = count % 2
     least = 0.0 if odd and place == 0 else left + 0.3 if (place + odd) % 2 == 0 else right - 0.3
     return least / 2 if not odd and place < 2 else least, count > 1
-
-
-def _loops(
-    edges: Sequence[LayoutEdge],
-    centres: Sequence[Point],
-    routes: Mapping[int, Route],
-    obstacles: Obstacles,
-    walls: Walls,
-    there: Mapping[int, Route],
-) -> dict[int, Route]:
-    looping: dict[int, list[int]] = {}
-    for i, edge in enumerate(edges):
-        if edge.source == edge.target:
-            looping.setdefault(edge.source, []).append(i)
-    tangents: dict[int, list[Point]] = {own: [] for own in looping}
-    for i, route in sorted(routes.items()):
-        if edges[i].source in tangents:
-            tangents[edges[i].source].append(_unit(route[0], route[1]))
-        if edges[i].target in tangents:
-            tangents[edges[i].target].append(_unit(route[-1], route[-2]))
-    near: dict[int, list[Point]] = {own: [] for own in tangents}
-    places, owns = np.array(centres, dtype=np.float64).reshape(-1, 2), np.array(list(tangents), dtype=np.int64)
-    number, other, _ = Cells(places, _NEAR).near(places[owns])
-    for own, neighbour in zip(owns[number].tolist(), other.tolist(), strict=True):
-        if neighbour != own:
-            near[own].append(centres[neighbour])
-    result: dict[int, Route] = {}
-    for own, mine in looping.items():
-        result.update({i: there[i] for i in mine if i in there})
-        new, old = [i for i in mine if i not in result], [result[i] for i in mine if i in result]
-        made = loops(centres[own], own, near[own], tangents[own], obstacles, walls, old, len(new))
-        result.update(zip(new, made, strict=True))
-    return result
-
-
-def _unit(origin: Point, towards: Point) -> Point:
-    length = distance(origin, towards) or 1.0
-    return (towards[0] - origin[0]) / length, (towards[1] - origin[1]) / length
