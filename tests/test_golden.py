@@ -18,9 +18,9 @@ from typing import TypeAlias
 
 import numpy as np
 import pytest
+from scenes import file_of, scene_of
 
 import neurovis_spec as nv
-from neurovis_spec import pipeline
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.scene import Scene
 
@@ -65,11 +65,9 @@ def network_of(compiled: CompiledNetwork) -> Plain:
     }
 
 
-def scene_of(compiled: CompiledNetwork) -> Scene:
+def drawn(compiled: CompiledNetwork) -> Scene:
     step = STEPS.get(compiled.name, 100)
-    snapshot = compiled.run(step + 1).snapshot(step)
-    layout = compiled.layout().value
-    return pipeline.picture(compiled.network, layout, snapshot, compiled.gains, compiled.network.render)
+    return scene_of(compiled, compiled.run(step + 1).snapshot(step))
 
 
 def same(one: Plain, other: Plain, path: str = "$") -> None:
@@ -120,10 +118,10 @@ def test_layout(compiled: CompiledNetwork, update_golden: bool) -> None:
 
 @pytest.mark.parametrize("compiled", SMALL, indirect=True, ids=lambda path: path.stem)
 def test_scene(compiled: CompiledNetwork, update_golden: bool) -> None:
-    scene = scene_of(compiled)
+    scene = drawn(compiled)
     folder = HERE / "golden" / compiled.name
     compare(folder / "scene.json", plain(scene), update_golden)
-    svg = pipeline.draw(scene, ".svg").decode()
+    svg = file_of(scene, ".svg").decode()
     if update_golden:
         (folder / "scene.svg").write_text(svg, encoding="utf-8")
     items = re.compile(r"<(\w+)|data-[\w-]+=\"[^\"]*\"")

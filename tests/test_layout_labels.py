@@ -7,9 +7,9 @@ import random
 from itertools import combinations, pairwise
 
 import pytest
+from scenes import scene_of
 
 import neurovis_spec as nv
-from neurovis_spec import pipeline
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.layout import Layout
@@ -71,8 +71,7 @@ def test_no_label_lies_on_anything_in_a_layered_layout(seed: int) -> None:
 
 def shown(network: CompiledNetwork) -> tuple[dict[str, Text], dict[str, Disc], dict[str, Text], dict[str, Rectangle]]:
     """The labels and the discs by neuron, the titles and the frames by path, of a picture."""
-    layout, snapshot = network.layout().value, network.run(2).snapshot(1)
-    scene = pipeline.picture(network.network, layout, snapshot, network.gains, network.network.render)
+    scene = scene_of(network, network.run(2).snapshot(1))
     labels: dict[str, Text] = {}
     discs: dict[str, Disc] = {}
     titles: dict[str, Text] = {}

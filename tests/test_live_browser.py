@@ -13,9 +13,9 @@ import pytest
 from chromium import Page, chromium
 from PIL import Image
 from renderer_conformance import similarity
+from scenes import file_of, scene_of
 
 import neurovis_spec as nv
-from neurovis_spec import pipeline
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.live.access import Access
 from neurovis_spec.live.hub import Hub
@@ -95,9 +95,8 @@ def test_the_page_shows_the_picture_that_render_draws(spec: str, theme: str, tmp
             taken = Image.open(io.BytesIO(await opened.shot())).convert("RGB")
             settings = RenderSettings(theme=theme) if spec == "cpg_rbf.yaml" else compiled.network.render
             snapshot = compiled.run(step + 1).snapshot(step)
-            layout = compiled.drawn().value
-            scene = pipeline.picture(compiled.network, layout, snapshot, compiled.gains, settings)
-            drawn = Image.open(io.BytesIO(pipeline.draw(scene, ".png"))).convert("RGB")
+            scene = scene_of(compiled, snapshot, settings=settings)
+            drawn = Image.open(io.BytesIO(file_of(scene, ".png"))).convert("RGB")
             seen = taken.crop((0, 0, *drawn.size))
             seen.save(tmp_path / "seen.png")
             drawn.save(tmp_path / "drawn.png")
@@ -120,8 +119,7 @@ def test_two_thousand_lines_are_those_of_render_on_a_display_of_two_pixels_a_pix
         (tmp_path / "dense.yaml").write_text(DENSE)
         async with shown(str(tmp_path / "dense.yaml"), tmp_path) as (opened, compiled, _):
             step = await pause(opened)
-            snapshot, layout = compiled.run(step + 1).snapshot(step), compiled.drawn().value
-            scene = pipeline.picture(compiled.network, layout, snapshot, compiled.gains, compiled.network.render)
+            scene = scene_of(compiled, compiled.run(step + 1).snapshot(step))
             width, height = round(scene.width * scene.density), round(scene.height * scene.density)
             await fit(opened, width, height, density=2.0)
             await opened.shot()  # headless, a page that stands still notices another display when it is looked at
@@ -129,7 +127,7 @@ def test_two_thousand_lines_are_those_of_render_on_a_display_of_two_pixels_a_pix
             await opened.ask("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
             taken = Image.open(io.BytesIO(await opened.shot())).convert("RGB")
             sharp = replace(scene, density=2 * scene.density)
-            drawn = Image.open(io.BytesIO(pipeline.draw(sharp, ".png"))).convert("RGB")
+            drawn = Image.open(io.BytesIO(file_of(sharp, ".png"))).convert("RGB")
             seen = taken.crop((0, 0, *drawn.size))
             seen.save(tmp_path / "seen.png")
             drawn.save(tmp_path / "drawn.png")

@@ -14,12 +14,12 @@ import pytest
 from chromium import Page, chromium
 from PIL import Image
 from renderer_conformance import similarity
+from scenes import file_of, scene_of
 from test_live_browser import SPECS, STEP, fit, pause
 from test_live_everyone import tap
 from test_live_looking import places
 
 import neurovis_spec as nv
-from neurovis_spec import pipeline
 from neurovis_spec.live.access import Access
 from neurovis_spec.live.desk import Desk, Written
 from neurovis_spec.live.hub import Hub
@@ -360,11 +360,8 @@ def test_the_whole_picture_is_saved_as_png(tmp_path: Path) -> None:
                     break
                 await asyncio.sleep(0.02)
             picture, compiled = Image.open(saved).convert("RGB"), desk.placed.compiled
-            snapshot = compiled.run(8).snapshot(7)
-            scene = pipeline.picture(
-                compiled.network, desk.placed.layout, snapshot, compiled.gains, compiled.network.render
-            )
-            drawn = Image.open(io.BytesIO(pipeline.draw(scene, ".png"))).convert("RGB")
+            scene = scene_of(compiled, compiled.run(8).snapshot(7), desk.placed.layout)
+            drawn = Image.open(io.BytesIO(file_of(scene, ".png"))).convert("RGB")
             assert picture.size == drawn.size
             assert similarity(picture, drawn) >= 0.95, "the step is about the same"
 

@@ -14,9 +14,9 @@ import pytest
 import toy_bodies
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
+from scenes import file_of, scene_of
 
 import neurovis_spec as nv
-from neurovis_spec import pipeline
 from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.saving import film, picture, recording, steps_for, told_by
 from neurovis_spec.live.simulated import SimulatedSource
@@ -60,9 +60,8 @@ def test_a_recording_has_every_bit(tmp_path: Path) -> None:
 def test_the_picture_is_that_of_render() -> None:
     view = view_of(COMPILED, COMPILED.gains)
     source = SimulatedSource(COMPILED.simulator())
-    snapshot, layout = COMPILED.run(1).snapshot(0), COMPILED.drawn().value
-    scene = pipeline.picture(COMPILED.network, layout, snapshot, COMPILED.gains, COMPILED.network.render)
-    assert picture(view, told_by(source, 1)) == pipeline.draw(scene, ".svg")
+    scene = scene_of(COMPILED, COMPILED.run(1).snapshot(0))
+    assert picture(view, told_by(source, 1)) == file_of(scene, ".svg")
 
 
 def test_what_was_lesioned_by_hand_is_faint_in_picture_and_film() -> None:

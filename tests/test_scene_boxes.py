@@ -7,9 +7,9 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from scenes import scene_of
 
 import neurovis_spec as nv
-from neurovis_spec import pipeline
 from neurovis_spec.layout.geometry import meet, sampled
 from neurovis_spec.layout.model import RADIUS
 from neurovis_spec.scene import Spline, Text
@@ -115,8 +115,7 @@ def test_neurons_that_do_not_follow_each_other_on_a_ring_have_no_sector() -> Non
 
 def test_sectors_are_drawn_as_lines_around_their_neurons() -> None:
     network = nv.compile_text(RING.replace("ENGINE", "circular"))
-    whole, snapshot = network.network, network.run(1).snapshot(0)
-    scene = pipeline.picture(whole, network.drawn().value, snapshot, network.gains, whole.render)
+    scene = scene_of(network, network.run(1).snapshot(0))
     groups = {group.id: group for group in scene.groups}
     for name in ("one", "two", "three"):
         (shape,) = groups[f"box:{name}"].shapes

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes import file_of, film_of, scene_of
 
 import neurovis_spec as nv
-from neurovis_spec import pipeline
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.scene import THEMES, Film, Scene, colours, still
+from neurovis_spec.scene import THEMES, Scene, colours, still
 
 SPEC = """
 neurovis: 1
@@ -47,14 +47,12 @@ layout: {mirror: [[left, right]]}
 """
 
 
-def scene_of(network: CompiledNetwork, step: int) -> Scene:
-    whole = network.network
-    snapshot = network.run(step + 1).snapshot(step)
-    return pipeline.picture(whole, network.drawn().value, snapshot, network.gains, whole.render)
+def scene_at(network: CompiledNetwork, step: int) -> Scene:
+    return scene_of(network, network.run(step + 1).snapshot(step))
 
 
 def groups(network: CompiledNetwork, step: int, kind: str) -> dict[str, ET.Element]:
-    root = ET.fromstring(pipeline.draw(scene_of(network, step), ".svg"))
+    root = ET.fromstring(file_of(scene_at(network, step), ".svg"))
     return {name: group for group in root.iter() if (name := group.get(f"data-{kind}")) is not None}
 
 
@@ -100,11 +98,9 @@ def test_a_glyph_has_the_mean_and_a_bundle_the_sums(step: int) -> None:
 def test_a_film_of_glyphs_is_the_same_as_its_stills() -> None:
     network = nv.compile_text(SPEC)
     recording = network.run(5)
-    whole = network.network
-    shots = [recording.snapshot(step) for step in range(5)]
-    moving: Film = pipeline.moving(whole, network.drawn().value, shots, network.gains, whole.render, 5)
+    moving = film_of(network, [recording.snapshot(step) for step in range(5)])
     for frame in range(5):
-        one, other = still(moving, frame), scene_of(network, frame)
+        one, other = still(moving, frame), scene_at(network, frame)
         for a, b in zip(one.groups, other.groups, strict=True):
             assert a.data == b.data
             if a.id != "caption":
@@ -162,7 +158,7 @@ def test_boxes_rules_lesions_and_gains_follow_what_is_drawn() -> None:
         .replace("gain: {activity: 1, signal: 2, thickness: 8, change: 5}, ", "")
     )
     network = nv.compile_text(spec + "events: [{at: 2, lesion: [A1]}, {at: 3, lesion: [A2, A3]}]\n")
-    scene = scene_of(network, 4)
+    scene = scene_at(network, 4)
     assert {group.id for group in scene.groups if group.id.startswith("box:")} == {"box:b"}
     faint = {group.data["neuron"] for group in scene.groups if group.opacity < 1 and "neuron" in group.data}
     assert faint == {"A"}

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes import film_of, scene_of
 from small_specs import compiled, network_of
 
-from neurovis_spec import pipeline
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.runtime.simulation import Simulation
 from neurovis_spec.scene import Disc, Scene, Text, still
@@ -113,11 +113,9 @@ def test_it_goes_by_steps_where_a_recording_has_not_all_of_them() -> None:
 def pictures(network: CompiledNetwork) -> tuple[Scene, Scene]:
     """Step 250 as a still, and as a frame of a film."""
     recording = network.run()
-    layout, gains = network.layout().value, network.gains
     alone = snapshot_at(network.network, 250, recording, network.run)
     steps = list(snapshots_from(network.network, 230, 40, recording))
-    moving = pipeline.moving(network.network, layout, steps, gains, network.network.render, 60)
-    return pipeline.picture(network.network, layout, alone, gains, network.network.render), still(moving, 20)
+    return scene_of(network, alone), still(film_of(network, steps), 20)
 
 
 def test_a_still_and_the_frame_of_a_film_show_the_same_trace() -> None:

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from scenes import scene_of
 
 import neurovis_spec as nv
-from neurovis_spec import pipeline
 from neurovis_spec.scene import Disc, Text
 from neurovis_spec.scene.beside import placed
 from neurovis_spec.scene.labels import _among_own
@@ -29,9 +29,7 @@ connections: {{A -> B: {{pattern: all_to_all}}}}
 
 def test_every_neuron_of_a_row_has_a_label_shortened_where_there_is_no_room_for_all_of_it() -> None:
     network = nv.compile_text(SPEC)
-    snapshot = network.run(3).snapshot(2)
-    layout = network.layout().value
-    scene = pipeline.picture(network.network, layout, snapshot, network.gains, network.network.render)
+    scene = scene_of(network, network.run(3).snapshot(2))
     texts = {group.data.get("neuron"): [s.text for s in group.shapes if isinstance(s, Text)] for group in scene.groups}
     said = [text for name in ("A1", "A2", "A3") for text in texts[name]]
     assert len(said) == 3
@@ -59,8 +57,7 @@ def test_a_shortened_text_uses_all_of_its_room(text: str, size: float, sizes: fl
 
 def labels(spec: str) -> dict[str, Text]:
     network = nv.compile_text("neurovis: 1\nname: labels\n" + spec)
-    snapshot, layout = network.run(3).snapshot(2), network.layout().value
-    scene = pipeline.picture(network.network, layout, snapshot, network.gains, network.network.render)
+    scene = scene_of(network, network.run(3).snapshot(2))
     return {g.data["neuron"]: s for g in scene.groups if "neuron" in g.data for s in g.shapes if isinstance(s, Text)}
 
 
@@ -95,9 +92,7 @@ def test_a_label_on_a_disc_leaves_its_ring_free() -> None:
         "neurovis: 1\nname: x\nneurons: {saliva: {}, right: {}, food: {}}\n"
         "connections: {food -> saliva: 1, right -> saliva: 1}\n"
     )
-    scene = pipeline.picture(
-        network.network, network.layout().value, network.run(3).snapshot(2), network.gains, network.network.render
-    )
+    scene = scene_of(network, network.run(3).snapshot(2))
     for group in (group for group in scene.groups if "neuron" in group.data):
         (disc,) = (shape for shape in group.shapes if isinstance(shape, Disc))
         (text,) = (shape for shape in group.shapes if isinstance(shape, Text))
@@ -269,8 +264,7 @@ connections:
 def named(spec: str) -> tuple[dict[str, Text], list[str]]:
     """The labels of connections by entry, and all tooltips."""
     network = nv.compile_text(spec)
-    snapshot, layout = network.run(3).snapshot(2), network.layout().value
-    scene = pipeline.picture(network.network, layout, snapshot, network.gains, network.network.render)
+    scene = scene_of(network, network.run(3).snapshot(2))
     found = {g.id: s for g in scene.groups for s in g.shapes if isinstance(s, Text) and g.id.startswith("label:")}
     return found, [group.title for group in scene.groups]
 
@@ -321,8 +315,7 @@ def test_a_name_that_is_too_long_for_its_disc_stands_beside_it_at_every_size() -
 def texts_outside(spec: str) -> tuple[list[str], list[str]]:
     """The texts of a picture, and those of them that leave it to the left or to the right."""
     network = nv.compile_text("neurovis: 1\nname: labels\n" + spec)
-    snapshot, layout = network.run(3).snapshot(2), network.layout().value
-    scene = pipeline.picture(network.network, layout, snapshot, network.gains, network.network.render)
+    scene = scene_of(network, network.run(3).snapshot(2))
     texts = [shape for shape in scene.shapes() if isinstance(shape, Text)]
     found = []
     for text in texts:

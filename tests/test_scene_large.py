@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from large_networks import connectome
+from scenes import scene_of
 
 import neurovis_spec as nv
-from neurovis_spec import pipeline
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
@@ -29,10 +29,8 @@ LARGE = "layout: {engine: large}"
 WORM = connectome(90, 2600, 4, more=f"{GAINS}\n{LARGE}")
 
 
-def scene_of(network: CompiledNetwork, settings: RenderSettings | None = None, step: int = 2) -> Scene:
-    whole = network.network
-    snapshot = network.run(step + 1).snapshot(step)
-    return pipeline.picture(whole, network.drawn().value, snapshot, network.gains, settings or whole.render)
+def scene_at(network: CompiledNetwork, settings: RenderSettings | None = None, step: int = 2) -> Scene:
+    return scene_of(network, network.run(step + 1).snapshot(step), settings=settings)
 
 
 def of_kind(scene: Scene, kind: str) -> dict[str, Group]:
@@ -52,7 +50,7 @@ def widths(scene: Scene) -> list[float]:
 
 
 def test_of_too_many_connections_some_are_drawn_the_thick_ones_last_and_the_rest_is_said() -> None:
-    scene, whole = scene_of(WORM), WORM.network
+    scene, whole = scene_at(WORM), WORM.network
     drawn = widths(scene)
     assert len(drawn) == 1000
     assert drawn == sorted(drawn)
@@ -63,13 +61,13 @@ def test_of_too_many_connections_some_are_drawn_the_thick_ones_last_and_the_rest
     assert sum(int(count) for count in re.findall(r"(\d+) of", lost)) == 1600
     shown = [shape.text for group in scene.groups for shape in group.shapes if isinstance(shape, Text)]
     assert set(scene.notes) <= set(shown)
-    assert len(widths(scene_of(WORM, replace(whole.render, full=True)))) == 2600
-    assert not scene_of(WORM, replace(whole.render, full=True)).notes
+    assert len(widths(scene_at(WORM, replace(whole.render, full=True)))) == 2600
+    assert not scene_at(WORM, replace(whole.render, full=True)).notes
     assert len(of_kind(scene, "neuron")) == 90
 
 
 def test_what_has_no_more_connections_than_can_be_read_is_drawn_whole() -> None:
-    assert len(widths(scene_of(connectome(60, 2500, 3, more=LARGE)))) == 2500
+    assert len(widths(scene_at(connectome(60, 2500, 3, more=LARGE)))) == 2500
 
 
 def test_of_connections_that_are_equally_thick_the_longest_are_left_out() -> None:
@@ -77,7 +75,7 @@ def test_of_connections_that_are_equally_thick_the_longest_are_left_out() -> Non
         "neurovis: 1\nname: x\nneurons: {N: {count: 60}}\nlayout: {engine: circular}\n"
         "connections: {N -> N: {pattern: all_to_all, weight: 0.1}}\n"
     )
-    scene = scene_of(network)
+    scene = scene_at(network)
     far = Counter(
         min(apart, 60 - apart)
         for name in of_kind(scene, "connection")
@@ -91,7 +89,7 @@ def test_of_connections_that_are_equally_thick_the_longest_are_left_out() -> Non
 
 @pytest.mark.parametrize("least", [0.0, 0.2, 1.0])
 def test_min_weight_leaves_out_what_is_weaker_and_nothing_else(least: float) -> None:
-    scene = scene_of(WORM, replace(WORM.network.render, min_weight=least))
+    scene = scene_at(WORM, replace(WORM.network.render, min_weight=least))
     weights = np.abs(WORM.network.connections.weights)
     assert len(widths(scene)) == np.count_nonzero(weights >= least)
     weak = np.count_nonzero(weights < least)
@@ -111,7 +109,7 @@ connections:
 render: {min_weight: 0.2, gain: {activity: 1, signal: 1, thickness: 1, change: 1}}
 """
     network = nv.compile_text(spec)
-    first, last = (of_kind(scene_of(network, step=step), "connection") for step in (0, 5))
+    first, last = (of_kind(scene_at(network, step=step), "connection") for step in (0, 5))
     assert "A -> B3" in first
     assert len(first) == 1
     recording = network.run(6)
@@ -123,7 +121,7 @@ render: {min_weight: 0.2, gain: {activity: 1, signal: 1, thickness: 1, change: 1
 def test_focus_shows_neurons_with_all_that_they_are_connected_to() -> None:
     whole = WORM.network
     chosen = whole.neuron_index["class1_neuron_1"]
-    scene = scene_of(WORM, replace(whole.render, focus=("class1_neuron_1", (chosen,))))
+    scene = scene_at(WORM, replace(whole.render, focus=("class1_neuron_1", (chosen,))))
     ends = [(a, b) for a, b in zip(whole.connections.sources, whole.connections.targets, strict=True)]
     names = whole.neurons.names
     assert set(of_kind(scene, "connection")) == {f"{names[a]} -> {names[b]}" for a, b in ends if chosen in (a, b)}
@@ -221,7 +219,7 @@ def test_lines_are_never_thicker_than_their_neurons_and_as_thick_as_eq_4_says(
     network = connectome(
         count, edges, classes, more=f"{LARGE}\n{GAINS}".replace("render: {", "render: {size: [320, 240], ")
     )
-    scene, whole = scene_of(network), network.network
+    scene, whole = scene_at(network), network.network
     discs = [s.radius for g in of_kind(scene, "neuron").values() for s in g.shapes if isinstance(s, Disc)]
     assert max(widths(scene)) <= 2 * min(discs)
     weights = np.abs(whole.connections.weights)
@@ -257,7 +255,7 @@ def test_a_larger_picture_shows_every_name_that_a_smaller_one_shows(network: Com
     before: set[str] = set()
     labelled: set[str] = set()
     for size in LADDER:
-        scene = scene_of(network, replace(network.network.render, size=size), step=0)
+        scene = scene_at(network, replace(network.network.render, size=size), step=0)
         shown = {name for name, group in of_kind(scene, "neuron").items() if label(group).rpartition("…")[2] in names}
         now = {name for name, group in of_kind(scene, "neuron").items() if label(group)}
         titles = [group for group in scene.groups if (group.id or "").startswith("title:")]
@@ -272,7 +270,7 @@ def test_every_neuron_of_a_chain_of_twenty_has_its_label() -> None:
     chain = nv.compile_text(
         "neurovis: 1\nname: c\nneurons: {N: {count: 20}}\nconnections: {N -> N: {pattern: chain}}\n"
     )
-    assert all(label(group) for group in of_kind(scene_of(chain), "neuron").values())
+    assert all(label(group) for group in of_kind(scene_at(chain), "neuron").values())
 
 
 @pytest.mark.parametrize("hub", [4, 5])
@@ -286,7 +284,7 @@ def test_where_there_is_room_for_few_names_hubs_keep_theirs(hub: int) -> None:
         "render: {title: false, legend: false}\n"
     )
     for size in [(300, 100), (400, 150), (500, 150)]:
-        scene = scene_of(network, replace(network.network.render, size=size), step=0)
+        scene = scene_at(network, replace(network.network.render, size=size), step=0)
         said = {name: label(group) for name, group in of_kind(scene, "neuron").items() if label(group)}
         assert said[names[hub]] == names[hub]
         assert sum(said.get(name) == name for name in names) < 9
@@ -312,7 +310,7 @@ connections:
 layout: {{mirror: [[left, right]], direction: {direction}}}
 """
     network = nv.compile_text(spec)
-    groups = of_kind(scene_of(network, replace(network.network.render, size=size)), "neuron")
+    groups = of_kind(scene_at(network, replace(network.network.render, size=size)), "neuron")
     for part in ("shoulder", "elbow", "wrist"):
         one, other = ([s for s in groups[f"{part}_{side}"].shapes if isinstance(s, Text)] for side in ("l", "r"))
         assert len(one) == len(other)
@@ -330,7 +328,7 @@ def test_names_that_begin_alike_are_cut_in_front() -> None:
 @pytest.mark.parametrize("engine", ["auto", "organic", "large", "layered"])
 def test_a_box_has_its_frame_its_title_and_its_tint_in_every_engine(engine: str) -> None:
     network = connectome(40, 120, 5, seed=4, more=f"layout: {{engine: {engine}}}")
-    scene = scene_of(network)
+    scene = scene_at(network)
     frames = [group for group in scene.groups if group.id.startswith("box:")]
     titles = {group.id for group in scene.groups if group.id.startswith("title:")}
     assert titles == {f"title:class{k}" for k in range(5)}

@@ -11,9 +11,9 @@ from neurovis_renderers.animated_svg import AnimatedSvgRenderer
 from neurovis_renderers.raster import PillowRenderer
 from neurovis_renderers.svg import SvgRenderer
 from PIL import Image
+from scenes import file_of, film_of, scene_of
 
 import neurovis_spec as nv
-from neurovis_spec import pipeline
 from neurovis_spec.scene import Disc, Film, Scene, Text, channels, still
 from neurovis_spec.scene.lesions import FAINT, lesions_of
 
@@ -34,16 +34,12 @@ GONE_AT_4 = {"A1 -> B2", "A2 -> B1", "A2 -> B2", "A2"}
 
 
 def scene_at(step: int) -> Scene:
-    snapshot = NETWORK.run(step + 1).snapshot(step)
-    layout = NETWORK.layout().value
-    return pipeline.picture(NETWORK.network, layout, snapshot, NETWORK.gains, NETWORK.network.render)
+    return scene_of(NETWORK, NETWORK.run(step + 1).snapshot(step))
 
 
-def film_of(start: int, frames: int) -> Film:
+def film_from(start: int, frames: int) -> Film:
     recording = NETWORK.run(start + frames)
-    snapshots = [recording.snapshot(step) for step in range(start, start + frames)]
-    layout = NETWORK.layout().value
-    return pipeline.moving(NETWORK.network, layout, snapshots, NETWORK.gains, NETWORK.network.render, 10.0)
+    return film_of(NETWORK, [recording.snapshot(step) for step in range(start, start + frames)])
 
 
 def faint(scene: Scene) -> set[str]:
@@ -72,12 +68,7 @@ def test_what_is_lesioned_is_faint_from_its_step_on(step: int, gone: set[str]) -
 def test_a_network_without_lesions_has_nothing_faint() -> None:
     plain = nv.compile_text(SPEC.split("events:")[0])
     assert not lesions_of(plain.network)
-    drawn = pipeline.draw(
-        pipeline.picture(
-            plain.network, plain.layout().value, plain.run(9).snapshot(8), plain.gains, plain.network.render
-        ),
-        ".svg",
-    )
+    drawn = file_of(scene_of(plain, plain.run(9).snapshot(8)), ".svg")
     assert b"opacity" not in drawn
     assert b"Faint" not in drawn
 
@@ -95,13 +86,13 @@ def test_a_lesioned_connection_keeps_its_width_and_says_its_colour() -> None:
 
 
 def test_a_film_shows_the_same_as_its_stills() -> None:
-    film = film_of(2, 8)
+    film = film_from(2, 8)
     for frame in range(8):
         assert faint(still(film, frame)) == faint(scene_at(2 + frame))
 
 
 def test_an_animation_gives_the_class_from_the_frame_of_the_lesion_on() -> None:
-    root = ET.fromstring(AnimatedSvgRenderer().animate(film_of(2, 8), ".svg"))
+    root = ET.fromstring(AnimatedSvgRenderer().animate(film_from(2, 8), ".svg"))
     (group,) = [g for g in root.iter() if g.get("data-connection") == "B1 -> B2"]
     moving = next(e for e in group if e.tag.endswith("animate"))
     times = [float(t) for t in moving.get("keyTimes", "").split(";") if t]

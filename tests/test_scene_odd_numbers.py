@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes import scene_of
 
 import neurovis_spec as nv
-from neurovis_spec import pipeline
-from neurovis_spec.runtime.record import Course
+from neurovis_spec.runtime.numpy_backend import NumpyBackend
 from neurovis_spec.runtime.recording import Recording, Snapshot
 from neurovis_spec.scene import Disc, RendererCapabilities, Spline, encoding
 from neurovis_spec.scene.film import film, still
@@ -66,8 +66,7 @@ def test_widths_follow_equation_4_until_they_cover_the_picture() -> None:
     widths = encoding.line_width(weights, 2.0, widest)
     assert widths.tolist() == [6.0, encoding.THINNEST, 1800.0, widest, widest, encoding.THINNEST, encoding.THINNEST]
     network = nv.compile_text(TEXT.format(weight=1e6, bias=0, gain="thickness: 1"))
-    snapshot = network.run(1).snapshot(0)
-    scene = pipeline.picture(network.network, network.layout().value, snapshot, network.gains, network.network.render)
+    scene = scene_of(network, network.run(1).snapshot(0))
     lines = [shape.width for group in scene.groups if "connection" in group.data for shape in group.shapes
              if isinstance(shape, Spline)]  # fmt: skip
     assert set(lines) == {2 * np.hypot(scene.width, scene.height)}
@@ -105,7 +104,7 @@ def test_a_film_that_is_too_long_is_refused_before_anything_is_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     network = nv.compile_text("neurovis: 1\nname: x\nneurons: {A: {}, B: {}}\nconnections: {A -> B: 1}")
-    monkeypatch.setattr(pipeline, "simulate", lambda *_: pytest.fail("it was run"))
+    monkeypatch.setattr(NumpyBackend, "prepare", lambda *_: pytest.fail("it was run"))
     with pytest.raises(RendererError, match=r"20,000 frames of 1280 × 960 pixels is too long: 13,981") as caught:
         network.animate(tmp_path / "x.webp", steps=20_000, every=1)
     for way in ("--steps 13981", "--frames 13981", "'.gif'", "'.mp4'"):
@@ -121,7 +120,7 @@ def test_a_film_that_is_too_long_is_refused_before_anything_is_run(
 
 
 def test_a_film_takes_snapshots_one_after_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
-    network = nv.compile_text("neurovis: 1\nname: x\nneurons: {A: {}, B: {}}\nconnections: {A -> B: 1}").network
+    network = nv.compile_text("neurovis: 1\nname: x\nneurons: {A: {}, B: {}}\nconnections: {A -> B: 1}")
     made: list[int] = []
     take = Recording.snapshot
 
@@ -130,7 +129,7 @@ def test_a_film_takes_snapshots_one_after_the_other(monkeypatch: pytest.MonkeyPa
         return take(recording, step)
 
     monkeypatch.setattr(Recording, "snapshot", counted)
-    found = snapshots_from(network, 2, 5, pipeline.simulate(network, Course(7)))
+    found = snapshots_from(network.network, 2, 5, network.run(7))
     assert (len(found), made) == (5, [])
     assert [snapshot.step for snapshot, _ in zip(found, range(3), strict=False)] == [2, 3, 4]
     assert len(made) <= 4
@@ -164,10 +163,9 @@ def test_a_neuron_without_a_finite_activity_has_a_colour_that_no_number_has(tmp_
     sent, weights = np.array([np.nan, np.inf, 2.0]), np.array([1.0, 0.0, 1.0])
     assert encoding.connection_colour(sent, weights, 1.0).tolist() == [0, 0, 1]
     run, ink = network.run(4), network.settings_for(None)
-    drawn = network.drawn().value
-    made = film(network.network, drawn, [run.snapshot(step) for step in range(4)], network.gains, ink, 25.0)
+    made = film(network.network, network.drawn().value, list(map(run.snapshot, range(4))), network.gains, ink, 25.0)
     for step, undefined in enumerate(("", "A", "AB", "AB")):
-        picture = pipeline.picture(network.network, drawn, run.snapshot(step), network.gains, ink)
+        picture = scene_of(network, run.snapshot(step), settings=ink)
         for scene in (picture, still(made, step)):
             fills = {group.data["neuron"]: disc.fill for group in scene.groups for disc in group.shapes
                      if isinstance(disc, Disc) and "neuron" in group.data}  # fmt: skip

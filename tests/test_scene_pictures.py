@@ -14,9 +14,9 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from random_specs import Spec, specs
+from scenes import scene_of
 
 import neurovis_spec as nv
-from neurovis_spec import pipeline
 from neurovis_spec.layout.geometry import Rect, meet
 from neurovis_spec.scene import Arrowhead, Disc, Rectangle, Scene, Spline, Text, texts
 from neurovis_spec.scene.boxes import Box
@@ -81,11 +81,7 @@ class Drawn:
 def drawn(network: nv.CompiledNetwork, step: int = 20) -> Drawn:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
-        snapshot = network.run(step + 1).snapshot(step)
-        layout = network.layout().value
-        return Drawn(
-            network, pipeline.picture(network.network, layout, snapshot, network.gains, network.network.render)
-        )
+        return Drawn(network, scene_of(network, network.run(step + 1).snapshot(step)))
 
 
 @pytest.fixture(scope="module", params=EXAMPLES, ids=lambda path: path.stem)

@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from hand_networks import C, Case, G, loop, network, numbered, plain_gains, straight, straight_layout, use_case_1
+from scenes import scene_of
 
 import neurovis_spec as nv
-from neurovis_spec import pipeline
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.geometry import Rect, meet
@@ -483,9 +483,7 @@ def test_curves_are_cut_together_as_they_are_one_by_one() -> None:
 
 def test_beads_of_lines_that_cross_are_apart() -> None:
     network = nv.compile(Path(__file__).parent.parent / "specs" / "sound.yaml")
-    scene = pipeline.picture(
-        network.network, network.layout().value, network.run(3).snapshot(2), network.gains, network.network.render
-    )
+    scene = scene_of(network, network.run(3).snapshot(2))
     beads = [
         shape
         for group in scene.groups

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenes import scene_of
 
 import neurovis_spec as nv
-from neurovis_spec import pipeline
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.scene import plan
 from neurovis_spec.scene.shown import Shown, shown
@@ -71,9 +71,7 @@ def told(notes: tuple[str, ...]) -> dict[tuple[str, str], tuple[int, int]]:
 @pytest.mark.parametrize("text", [RING, CELLS.replace("count: 30", "count: 25")], ids=["rings", "cells"])
 def test_no_pathway_is_gone_and_the_picture_says_of_which_some_are(text: str) -> None:
     network = nv.compile_text(text)
-    scene = pipeline.picture(
-        network.network, network.drawn().value, network.run(1).snapshot(0), network.gains, network.network.render
-    )
+    scene = scene_of(network, network.run(1).snapshot(0))
     names = [group.data["connection"] for group in scene.groups if "connection" in group.data]
     drawn = Counter(tuple(re.sub(r"\d", "", end) for end in name.split(" -> ")) for name in names)
     there = pathways(network, np.ones(len(network.network.connections), bool))
@@ -194,8 +192,6 @@ def test_of_many_dotted_lines_each_rule_keeps_some_and_the_rest_is_counted(monke
     names = network.network.neurons.names
     assert Counter(names[one.source][0] for one in kept) == {"T": 11, "G": 9}
     assert [one for one in teachers if one in set(kept)] == kept
-    scene = pipeline.picture(
-        network.network, network.drawn().value, network.run(1).snapshot(0), network.gains, network.network.render
-    )
+    scene = scene_of(network, network.run(1).snapshot(0))
     assert scene.notes == ("4 of 24 dotted lines of rules are left out",)
     assert sum("signal" in group.data for group in scene.groups) == most
