@@ -12,7 +12,6 @@ import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.recording import Recording
-from neurovis_spec.runtime.state import State
 
 SPEC = """\
 neurovis: 1
@@ -41,38 +40,26 @@ def network() -> nv.CompiledNetwork:
     return nv.compile_text(SPEC)
 
 
-def by_hand(network: nv.CompiledNetwork, read: object, steps: int = 30) -> np.ndarray:
-    """Something of the State after each step."""
-    assert callable(read)
-    simulation = network.simulator()
-    rows = []
-    for _ in range(steps):
-        simulation.step()
-        rows.append(read(simulation.state()))
-    return np.array(rows)
-
-
-def cells(network: nv.CompiledNetwork, neuron: str, state: str) -> object:
-    index = network.network.neuron_index[neuron]
-
-    def read(now: State) -> float:
-        for block, values in zip(network.network.blocks, now.cells, strict=True):
-            if index in block.members:
-                names = [quantity.name for quantity in block.model.state]
-                return float(values[names.index(state)][block.members.tolist().index(index)])
-        raise AssertionError
-
-    return read
-
-
 def test_a_state_is_that_after_the_step(network: nv.CompiledNetwork) -> None:
+    """Against plain loops over the equations of the library."""
     recording = network.run(states=WANTED)
+    k = np.arange(1, 31.0)
     assert recording["A.v"].shape == (30, 3)
-    assert recording["A2.v"].shape == (30,)
-    for neuron, state in (("A2", "v"), ("left1.K2", "v"), ("left2.K1", "b")):
-        assert np.array_equal(recording[f"{neuron}.{state}"], by_hand(network, cells(network, neuron, state)))
-    traces = by_hand(network, lambda now: now.traces[0][0][:3])
-    assert np.array_equal(recording["(A -> O).eligibility"][:, :3], traces)
+    np.testing.assert_allclose(recording["A2.v"], 2 * (1 - 0.9**k), rtol=1e-12)
+    np.testing.assert_allclose(recording["A"], np.tanh(recording["A.v"]), rtol=1e-12)
+    v, b = [0.0], [0.0]
+    for _ in range(30):
+        v, b = [*v, 0.9 * v[-1] + 0.1 * (2 - b[-1])], [*b, 0.99 * b[-1] + 0.01 * max(v[-1], 0)]
+    np.testing.assert_allclose(recording["left1.K2.v"], v[1:], rtol=1e-12)
+    np.testing.assert_allclose(recording["left2.K2.b"], b[1:], rtol=1e-12)
+    reward, post, arrived = np.sin(np.arange(30.0)), recording["O"], np.vstack([np.zeros(3), recording["A"][:-1]])
+    eligibility = np.zeros((30, 3))
+    for step in range(30):
+        if (step + 1) % 10:
+            added = reward[step] * arrived[step] * (reward[step] - post[step])
+            eligibility[step] = (eligibility[step - 1] if step else 0) + added
+    traces = recording["(A -> O).eligibility"][:, :3]
+    np.testing.assert_allclose(traces, eligibility, rtol=1e-12, atol=1e-15)
     assert traces.any()
     assert np.array_equal(recording["membrane"], recording["A.v"])
     assert recording["one"].shape == (30,)

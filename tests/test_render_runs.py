@@ -10,23 +10,31 @@ import pytest
 from click.testing import CliRunner
 
 import neurovis_spec as nv
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.progress import Progress
-from neurovis_spec.runtime.record import Course, go
-from neurovis_spec.runtime.rows import RowSink
+from neurovis_spec.runtime.backend import Stepper
+from neurovis_spec.runtime.numpy_backend import NumpyBackend
 from neurovis_spec.runtime.state import State
 
 
 def test_a_picture_takes_one_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """The step and the gains are of the same run, and gains that are stated need none."""
     runs: list[int] = []
+    prepare = NumpyBackend.prepare
 
-    def counted(of: Network, state: State, course: Course, rows: RowSink, progress: Progress | None = None) -> None:
-        runs.append(course.steps)
-        go(of, state, course, rows, progress)
+    def counting(backend: NumpyBackend, network: Network) -> Stepper:
+        made = prepare(backend, network)
+        runs.append(0)
 
-    monkeypatch.setattr("neurovis_spec.runtime.record.go", counted)
+        class Counting:
+            def step(self, state: State, inputs: FloatArray, /) -> None:
+                runs[-1] += 1
+                made.step(state, inputs)
+
+        return Counting()
+
+    monkeypatch.setattr(NumpyBackend, "prepare", counting)
     text = "neurovis: 1\nname: x\ntime: {steps: 300}\nneurons: {A: {count: 2, initial: [1, 0]}}\n"
     text += "connections: {A -> A: {pattern: ring, weight: 0.9}}\n"
     stated = text + "render: {gain: {activity: 1, signal: 1, thickness: 1, change: 1}}\n"
