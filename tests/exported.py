@@ -12,34 +12,36 @@ import numpy as np
 import pytest
 
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.compiler.network import Network
-from neurovis_spec.runtime.c_export import Exported
-from neurovis_spec.runtime.state import State
+from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.runtime.recording import Recording
 
 STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Werror", "-ffp-contract=off")
 LANGUAGES: Mapping[str, Sequence[str]] = {"C99": ("gcc", "-std=c99"), "C++17": ("g++", "-std=c++17", "-xc++")}
 
 
-def compiled(
-    network: Network, folder: Path, language: str = "C99", start: State | None = None, real: str = "double"
+def exported(
+    network: CompiledNetwork,
+    folder: Path,
+    language: str = "C99",
+    start: Recording | None = None,
+    real: str = "double",
 ) -> Controller:
     """A network exported, compiled strictly, and loaded."""
-    made = Exported(network, start, real)
-    folder.mkdir(exist_ok=True)
-    (folder / f"{made.name}.h").write_text(made.header(), encoding="ascii")
-    (folder / f"{made.name}.c").write_text(made.source(), encoding="ascii")
-    return built(made, folder, language)
+    network.export(folder, start=start, real=real)
+    return built(network, folder, language, real)
 
 
-def built(made: Exported, folder: Path, language: str = "C99") -> Controller:
+def built(network: CompiledNetwork, folder: Path, language: str = "C99", real: str = "double") -> Controller:
     """The code that lies in a folder, compiled strictly, and loaded."""
-    source = (folder / f"{made.name}.c").read_text(encoding="ascii")
+    (header,) = folder.glob("*.h")
+    name = header.stem
+    source = (folder / f"{name}.c").read_text(encoding="ascii")
     size = f"""
 #ifdef __cplusplus
 extern "C"
 #endif
 size_t size_of_state(void);
-size_t size_of_state(void) {{ return sizeof({made.name}_state); }}
+size_t size_of_state(void) {{ return sizeof({name}_state); }}
 """
     (folder / "with_size.c").write_text(source + size, encoding="ascii")
     command, *rest = LANGUAGES[language]
@@ -51,21 +53,22 @@ size_t size_of_state(void) {{ return sizeof({made.name}_state); }}
         cwd=folder,
         check=True,
     )
-    return Controller(made, ctypes.CDLL(str(library)))
+    n, m = len(network.network.neurons), len(network.network.connections)
+    return Controller(name, n, m, real, ctypes.CDLL(str(library)))
 
 
 class Controller:
     """An exported controller and its state."""
 
-    def __init__(self, made: Exported, library: ctypes.CDLL) -> None:
-        self.made, self.library = made, library
+    def __init__(self, name: str, neurons: int, connections: int, real: str, library: ctypes.CDLL) -> None:
+        self.name, self.neurons, self.connections, self.library = name, neurons, connections, library
         library.size_of_state.restype = ctypes.c_size_t
         self.memory = (ctypes.c_char * library.size_of_state()).from_buffer_copy(b"\xa5" * library.size_of_state())
-        self.kind = np.dtype(np.float32 if made.real == "float" else np.float64)
+        self.kind = np.dtype(np.float32 if real == "float" else np.float64)
         self._call("init")(ctypes.addressof(self.memory))
 
     def _call(self, name: str) -> Callable[..., int]:
-        called = getattr(self.library, f"{self.made.name}_{name}")
+        called = getattr(self.library, f"{self.name}_{name}")
         called.restype = ctypes.c_int
         return lambda *arguments: int(called(*(ctypes.c_void_p(a) if isinstance(a, int) else a for a in arguments)))
 
@@ -76,17 +79,17 @@ class Controller:
 
     def set(self, name: str, value: float) -> bool:
         """Set a parameter."""
-        kind = ctypes.c_float if self.made.real == "float" else ctypes.c_double
+        kind = ctypes.c_float if self.kind.itemsize == 4 else ctypes.c_double
         return bool(self._call(f"set_{name}")(ctypes.addressof(self.memory), kind(value)))
 
     @property
     def activity(self) -> FloatArray:
         """The activities of now."""
-        n = len(self.made.network.neurons)
-        return np.frombuffer(self.memory, self.kind, n).astype(np.float64)
+        return np.frombuffer(self.memory, self.kind, self.neurons).astype(np.float64)
 
     @property
     def weights(self) -> FloatArray:
         """The weights of now."""
-        n, m = len(self.made.network.neurons), len(self.made.network.connections)
-        return np.frombuffer(self.memory, self.kind, m, n * self.kind.itemsize).astype(np.float64)
+        return np.frombuffer(self.memory, self.kind, self.connections, self.neurons * self.kind.itemsize).astype(
+            np.float64
+        )

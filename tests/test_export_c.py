@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import re
 import subprocess
 import tempfile
 import warnings
@@ -12,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from exported import LANGUAGES, STRICT, built, compiled
+from exported import LANGUAGES, STRICT, built, exported
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from random_specs import specs
@@ -20,26 +21,20 @@ from test_runtime_conformance import EVENTS, SPECS
 
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
-from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.runtime import c_export
-from neurovis_spec.runtime.c_export import Exported
 from neurovis_spec.runtime.c_library import FLAGS
-from neurovis_spec.runtime.c_package import files, size_of_state
 from neurovis_spec.runtime.c_settable import ExportError
-from neurovis_spec.runtime.record import record
-from neurovis_spec.runtime.resume import resumed_state
-from neurovis_spec.runtime.simulation import Simulation
 
 pytestmark = pytest.mark.compiler
 
 
-def runs_alike(network: Network, folder: Path, language: str = "C99", steps: int = 60) -> None:
+def runs_alike(network: nv.CompiledNetwork, folder: Path, language: str = "C99", steps: int = 60) -> None:
     """The recording of the reference, bit for bit."""
-    expected = record(network, steps + 1, backend="reference")
-    controller = compiled(network, folder, language)
+    expected = network.run(steps + 1, backend="reference")
+    controller = exported(network, folder, language)
     for k in range(steps):
-        np.testing.assert_array_equal(controller.weights[network.changing], expected.weights[k], f"w[{k}]")
+        np.testing.assert_array_equal(controller.weights[network.network.changing], expected.weights[k], f"w[{k}]")
         controller.step()
         np.testing.assert_array_equal(controller.activity, expected.activity[k], f"a[{k}]")
 
@@ -47,7 +42,7 @@ def runs_alike(network: Network, folder: Path, language: str = "C99", steps: int
 @pytest.mark.parametrize("language", LANGUAGES)
 @pytest.mark.parametrize("path", SPECS, ids=lambda path: path.stem)
 def test_an_exported_example_gives_the_recording_of_the_reference(path: Path, language: str, tmp_path: Path) -> None:
-    runs_alike(nv.compile(path).network, tmp_path, language)
+    runs_alike(nv.compile(path), tmp_path, language)
 
 
 @pytest.mark.parametrize("small", [0, 600], ids=["loops", "written out"])
@@ -56,7 +51,7 @@ def test_events_noise_and_rules_are_part_of_it(
     language: str, small: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(c_export, "SMALL", small)
-    runs_alike(nv.compile_text(EVENTS).network, tmp_path, language, 40)
+    runs_alike(nv.compile_text(EVENTS), tmp_path, language, 40)
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
@@ -71,12 +66,12 @@ seed: 2
 neurons: {S: {count: 20, bias: "0.1*i", activation: tanh}, O: {combine: product, bias: 0.2}}
 connections: {S -> O: {weight: "uniform(0.5, 1.5)"}, O -> S: {weight: "normal(0, 1)"}}
 """
-    runs_alike(nv.compile_text(text).network, tmp_path, language, 20)
+    runs_alike(nv.compile_text(text), tmp_path, language, 20)
 
 
 def test_what_is_set_follows_as_in_a_simulation(tmp_path: Path) -> None:
-    network = nv.compile_text(EVENTS).network
-    controller, simulation = compiled(network, tmp_path), Simulation(network, "reference")
+    network = nv.compile_text(EVENTS)
+    controller, simulation = exported(network, tmp_path), network.simulator("reference")
     for k in range(30):
         if k == 5:
             assert controller.set("gain", -0.3)
@@ -91,12 +86,12 @@ def test_what_is_set_follows_as_in_a_simulation(tmp_path: Path) -> None:
 
 
 def test_a_controller_begins_with_what_was_learned(tmp_path: Path) -> None:
-    network = nv.compile(next(path for path in SPECS if path.stem == "cpg_rbf")).network
-    before = record(network, 500, backend="reference")
-    expected = record(network, 20, backend="reference", start=before)
-    controller = compiled(network, tmp_path, start=resumed_state(network, before))
+    network = nv.compile(next(path for path in SPECS if path.stem == "cpg_rbf"))
+    before = network.run(500, backend="reference")
+    expected = network.run(20, backend="reference", start=before)
+    controller = exported(network, tmp_path, start=before)
     for k in range(19):
-        np.testing.assert_array_equal(controller.weights[network.changing], expected.weights[k])
+        np.testing.assert_array_equal(controller.weights[network.network.changing], expected.weights[k])
         controller.step()
         np.testing.assert_array_equal(controller.activity, expected.activity[k])
     assert expected.weights[0].any()
@@ -111,7 +106,7 @@ def test_the_command_goes_on_from_a_recording(suffix: str, tmp_path: Path) -> No
     invoke("export", str(spec), "--to", "c", "--from", str(recording), "-o", str(tmp_path / "controller"))
     network = nv.compile(spec)
     expected = network.run(25, backend="reference", start=nv.load(recording))
-    controller = built(Exported(network.network), tmp_path / "controller")
+    controller = built(network, tmp_path / "controller")
     for k in range(24):
         np.testing.assert_array_equal(controller.weights[network.network.changing], expected.weights[k], f"w[{k}]")
         controller.step()
@@ -148,8 +143,8 @@ outputs: {{class: while, errno: k, HUGE_VAL: for}}
 @pytest.mark.parametrize("language", LANGUAGES)
 @pytest.mark.parametrize("name", ["double", "math", "main", "NULL", "__x", "INT8_MAX", "nv", "sem", "time"])
 def test_no_name_of_an_author_breaks_the_code(name: str, language: str, tmp_path: Path) -> None:
-    network = nv.compile_text(HOSTILE.format(name=name)).network
-    controller, simulation = compiled(network, tmp_path, language), Simulation(network, "reference")
+    network = nv.compile_text(HOSTILE.format(name=name))
+    controller, simulation = exported(network, tmp_path, language), network.simulator("reference")
     for _ in range(5):
         controller.step(np.array([0.1, 0.2, 0.3, 0.4]))
         simulation.step({"int": [0.1, 0.2], "main": 0.3, "template": 0.4})
@@ -157,8 +152,8 @@ def test_no_name_of_an_author_breaks_the_code(name: str, language: str, tmp_path
 
 
 def test_numbers_of_32_bits(tmp_path: Path) -> None:
-    network = nv.compile_text(EVENTS).network
-    expected, controller = record(network, 10, backend="reference"), compiled(network, tmp_path, real="float")
+    network = nv.compile_text(EVENTS)
+    expected, controller = network.run(10, backend="reference"), exported(network, tmp_path, real="float")
     for k in range(10):
         controller.step()
         np.testing.assert_allclose(controller.activity, expected.activity[k], rtol=0, atol=1e-5)
@@ -179,14 +174,14 @@ def test_nothing_is_touched_that_is_not_its_own(path: Path, tmp_path: Path) -> N
 
 
 def test_events_under_the_sanitizers(tmp_path: Path) -> None:
-    texts = files(nv.compile_text(EVENTS).network)
-    for name, text in texts.items():
-        (tmp_path / name).write_text(text.replace("k < 10", "k < 40"), encoding="ascii")
+    network = nv.compile_text(EVENTS)
+    network.export(tmp_path)
+    main = tmp_path / "main.c"
+    main.write_text(main.read_text().replace("k < 10", "k < 40"))
     flags = ("-std=c99", *STRICT, "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
     subprocess.run(["gcc", *flags, "main.c", "events.c", "-o", "example", "-lm"], cwd=tmp_path, check=True)
     done = subprocess.run([tmp_path / "example"], capture_output=True, text=True, check=True)
-    network = nv.compile_text(EVENTS).network
-    expected = record(network, 40, backend="reference")["O"]
+    expected = network.run(40, backend="reference")["O"]
     assert [float(line.split()[1]) for line in done.stdout.splitlines()] == pytest.approx(expected, rel=1e-5)
 
 
@@ -215,14 +210,13 @@ def test_the_command_writes_a_folder_and_leaves_what_is_not_its_own(tmp_path: Pa
 
 def test_the_readme_compiles_as_cmake_does(tmp_path: Path) -> None:
     """Both promise the bits of the backend c."""
-    made = files(nv.compile_text(EVENTS).network)
+    nv.compile_text(EVENTS).export(tmp_path)
+    made = {path.name: path.read_text() for path in tmp_path.iterdir()}
     options = next(line for line in made["CMakeLists.txt"].splitlines() if "target_compile_options" in line)
     options = options.partition("PRIVATE ")[2].removesuffix(")")
     assert options.split() == [flag for flag in FLAGS if flag in options.split()]
     name = next(name for name in made if name.endswith(".c") and name != "main.c")
     assert f"    cc -std=c99 {options} -c {name}\n" in made["README.md"]
-    (tmp_path / name).write_text(made[name])
-    (tmp_path / name.replace(".c", ".h")).write_text(made[name.replace(".c", ".h")])
     subprocess.run(["cc", "-std=c99", *options.split(), "-c", name], cwd=tmp_path, check=True)
 
 
@@ -239,8 +233,9 @@ def test_what_is_no_folder_is_told(tmp_path: Path) -> None:
 
 def test_the_size_in_the_readme_is_that_of_the_struct(tmp_path: Path) -> None:
     for text in (EVENTS, "neurovis: 1\nname: x\nneurons: {A: {}, B: {}, C: {}}\n"):
-        controller = compiled(nv.compile_text(text).network, tmp_path / str(len(text)))
-        assert size_of_state(controller.made) == len(controller.memory)
+        controller = exported(nv.compile_text(text), tmp_path / str(len(text)))
+        readme = (tmp_path / str(len(text)) / "README.md").read_text()
+        assert f"The state takes {len(controller.memory)} bytes" in readme
 
 
 SETTING = """
@@ -272,8 +267,8 @@ events:
 
 def test_everything_that_follows_a_parameter_follows_it_in_c(tmp_path: Path) -> None:
     """Draws, instances, tables, bounds, parameters of parameters, clamps, and what events set in between."""
-    network = nv.compile_text(SETTING).network
-    controller, simulation = compiled(network, tmp_path), Simulation(network, "reference")
+    network = nv.compile_text(SETTING)
+    controller, simulation = exported(network, tmp_path), network.simulator("reference")
     for k in range(30):
         for at, name, value in ((3, "g", 0.9), (5, "h", 0.7), (9, "x", 0.1), (15, "d", 0.15), (17, "g", 0.2)):
             if k == at:
@@ -295,13 +290,13 @@ def test_what_never_learns_may_be_lesioned_and_mended(language: str, tmp_path: P
     connected = "connections: {A -> B: {weight: 0.5, delay: 2}}\n"
     both = "events: [{at: 2, lesion: [A2, A -> B]}, {at: 4, mend: [A2]}, {at: 6, mend: [A -> B]}]\n"
     alone = "events: [{at: 2, lesion: [A2]}, {at: 4, mend: [A2]}]\n"
-    runs_alike(nv.compile_text(head + connected + both).network, tmp_path / "both", language)
-    runs_alike(nv.compile_text(head + alone).network, tmp_path / "alone", language)
+    runs_alike(nv.compile_text(head + connected + both), tmp_path / "both", language)
+    runs_alike(nv.compile_text(head + alone), tmp_path / "alone", language)
 
 
 @pytest.mark.parametrize("path", SPECS, ids=lambda path: path.stem)
 def test_an_exported_example_is_sound_with_numbers_of_32_bits(path: Path, tmp_path: Path) -> None:
-    compiled(nv.compile(path).network, tmp_path, "C++17", real="float").step()
+    exported(nv.compile(path), tmp_path, "C++17", real="float").step()
 
 
 RESERVOIR = """
@@ -326,9 +321,9 @@ def test_what_c_cannot_work_out_is_structural_there(tmp_path: Path) -> None:
     assert "keeps its value, 0.7: a scale of weights follows it; export with --set for another" in said[0]
     readme = (tmp_path / "made" / "README.md").read_text()
     assert "'rho' is structural in C and keeps its value, 0.7" in readme
-    network = nv.compile(tmp_path / "spec.yaml", rho=0.7).network
-    controller, simulation = built(Exported(network), tmp_path / "made"), Simulation(network, "c")
-    assert controller.made.settable == ["gain"]
+    network = nv.compile(tmp_path / "spec.yaml", rho=0.7)
+    controller, simulation = built(network, tmp_path / "made"), network.simulator("c")
+    assert re.findall(r"reservoir_set_(\w+)\(", (tmp_path / "made" / "reservoir.h").read_text()) == ["gain"]
     for k in range(8):
         if k == 4:
             assert controller.set("gain", 0.3)
@@ -347,7 +342,7 @@ def test_an_event_that_sets_what_is_structural_in_c_is_refused(tmp_path: Path) -
         network.export(tmp_path)
 
 
-def test_too_many_numbers_by_positions_are_structural_in_c() -> None:
+def test_too_many_numbers_by_positions_are_structural_in_c(tmp_path: Path) -> None:
     """Each would be written out: there is a bound, and what is beyond it keeps its value."""
     places = ", ".join(f"[{i}*s, 0]" for i in range(80))
     group = f"{{count: 80, position: [{places}]}}"
@@ -355,9 +350,10 @@ def test_too_many_numbers_by_positions_are_structural_in_c() -> None:
     text += (
         f"neurons: {{A: {group}, B: {group}}}\nconnections: {{A -> B: {{weight: g*distance, pattern: all_to_all}}}}\n"
     )
-    made = Exported(nv.compile_text(text).network)
-    assert set(made.fixed) == {"s", "g"}
-    assert "6,400 positions or data" in made.fixed["s"]
+    with pytest.warns(UserWarning, match="6,400 positions or data"):
+        nv.compile_text(text).export(tmp_path)
+    readme = (tmp_path / "README.md").read_text()
+    assert re.findall(r"'(\w)' is structural in C .*6,400 positions or data", readme) == ["s", "g"]
 
 
 @settings(max_examples=8, deadline=None, phases=(Phase.explicit, Phase.generate))
@@ -365,7 +361,7 @@ def test_too_many_numbers_by_positions_are_structural_in_c() -> None:
 def test_random_networks_run_alike_when_exported(spec: dict[str, object]) -> None:
     with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
         warnings.simplefilter("ignore")
-        runs_alike(nv.compile(spec).network, Path(folder), steps=12)
+        runs_alike(nv.compile(spec), Path(folder), steps=12)
 
 
 _CALLS = [
@@ -408,7 +404,7 @@ def test_what_was_set_before_follows_by_the_functions_of_c(tmp_path: Path) -> No
         simulation.step()
     before = simulation.recording
     network.export(tmp_path, start=before)
-    controller = built(Exported(network.network), tmp_path)
+    controller = built(network, tmp_path)
     controller.step()
     np.testing.assert_array_equal(controller.activity, network.run(1, start=before).activity[0])
 
@@ -435,10 +431,10 @@ def test_what_is_computed_beside_the_step_has_the_same_bits(seed: int) -> None:
     }
     with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
         warnings.simplefilter("ignore")
-        network = nv.compile(spec).network
-        one, other = (record(network, 12, backend=backend) for backend in ("c", "reference"))
+        network = nv.compile(spec)
+        one, other = (network.run(12, backend=backend) for backend in ("c", "reference"))
         assert one.activity.tobytes() == other.activity.tobytes()
-        controller, simulation = compiled(network, Path(folder)), Simulation(network, "c")
+        controller, simulation = exported(network, Path(folder)), network.simulator("c")
         for k in range(12):
             if k in (5, 7, 8):  # what is set for the second time is set by code made for it
                 assert controller.set("q", 0.1 * k)
