@@ -179,7 +179,7 @@ def test_a_checkpoint_of_before_is_read(tmp_path: Path) -> None:
 def test_exported_c_reads_the_same(small: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(c_export, "SMALL", small)
     events = "events: [{at: 6, lesion: [A1, A2 -> B2]}, {at: 8, mend: [A1, A2 -> B2]}, {at: 12, lesion: B1}]\n"
-    runs_alike(network_of(events).network, tmp_path, steps=24)
+    runs_alike(network_of(events), tmp_path, steps=24)
 
 
 def test_a_run_that_goes_on_reads_nothing_of_before_a_lesion() -> None:
