@@ -27,9 +27,8 @@ from neurovis_spec.codes import catalogue
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError, show_text
 from neurovis_spec.findings_formats import to_json
-from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.emit import emit
-from neurovis_spec.language.expressions.evaluate import evaluate
+from neurovis_spec.language.expressions.evaluate import evaluate, evaluate_array
 from neurovis_spec.language.expressions.parser import ExpressionError, parse
 from neurovis_spec.language.expressions.tree import Binary, Call, Conditional, Draw, Tree, names, walk
 from neurovis_spec.language.format.canonical import format_read, format_text

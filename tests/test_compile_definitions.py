@@ -9,7 +9,7 @@ import pytest
 from small_specs import HEAD, answer, codes, compiled, network_of
 
 import neurovis_spec as nv
-from neurovis_spec.language.expressions.given import meaning
+from neurovis_spec.language.expressions.functions import meaning
 
 USE = "\nneurons: {A: {activation: %s, bias: 2}}"
 

@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.emit import emit, simplify
-from neurovis_spec.language.expressions.evaluate import evaluate
+from neurovis_spec.language.expressions.evaluate import evaluate, evaluate_array
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.expressions.parser import parse
 from neurovis_spec.language.expressions.tree import (

@@ -12,9 +12,8 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from test_emit import DIVIDED, EXACT_TREES, LONG, NAMES, OPERATIONS, SMOOTH_TREES, VALUES
 
-from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.emit_c import Emitter, known_in
-from neurovis_spec.language.expressions.evaluate import evaluate
+from neurovis_spec.language.expressions.evaluate import evaluate, evaluate_array
 from neurovis_spec.language.expressions.functions import FUNCTIONS, PLAIN
 from neurovis_spec.language.expressions.parser import parse
 from neurovis_spec.language.expressions.tree import Call, Name, Number, Tree

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from neurovis_spec.language.expressions import arrays, emit, evaluate, functions, lexer, parser, tree
-from neurovis_spec.language.expressions.arrays import evaluate_array
+from neurovis_spec.language.expressions import derivative, emit, evaluate, functions, lexer, parser, tree
 from neurovis_spec.language.expressions.evaluate import evaluate as value_of
+from neurovis_spec.language.expressions.evaluate import evaluate_array
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.expressions.parser import ExpressionError, parse, unknown_names
 from neurovis_spec.language.expressions.tree import (
@@ -32,7 +32,9 @@ from neurovis_spec.language.expressions.tree import (
 NAN, INF = math.nan, math.inf
 
 
-@pytest.mark.parametrize("module", [arrays, emit, evaluate, functions, lexer, parser, tree], ids=lambda m: m.__name__)
+@pytest.mark.parametrize(
+    "module", [derivative, emit, evaluate, functions, lexer, parser, tree], ids=lambda m: m.__name__
+)
 def test_doctests(module: ModuleType) -> None:
     result = doctest.testmod(module)
     assert result.attempted > 0

@@ -15,7 +15,7 @@ import yaml
 import neurovis_spec as nv
 from neurovis_spec.language.data.files import LARGEST
 from neurovis_spec.language.data.table import MOST_CELLS
-from neurovis_spec.language.expressions.given import RESERVED
+from neurovis_spec.language.expressions.functions import RESERVED
 from neurovis_spec.language.values import DATA_FILES
 from neurovis_spec.manual.keys import keys
 

@@ -12,7 +12,6 @@ import pytest
 from fuzz_expressions import NAMES, make
 
 import neurovis_spec as nv
-from neurovis_spec.language.expressions.errors import ExpressionError
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.parser import parse
@@ -21,11 +20,10 @@ from neurovis_spec.language.expressions.tree import (
     Call,
     Chain,
     Conditional,
+    ExpressionError,
     Name,
     Tree,
-    children,
     names,
-    rebuild,
 )
 from neurovis_spec.language.expressions.undefined import either, hazards
 
@@ -209,8 +207,8 @@ def lazily(tree: Tree, known: dict[str, float]) -> tuple[float, bool, bool]:
                 undefined, overflown = undefined or right[1] or wrong, overflown or right[2] or beyond
             return value, undefined, overflown
         case _:
-            parts = [lazily(part, known) for part in children(tree)]
-            own = rebuild(tree, tuple(Name(str(place)) for place in range(len(parts))))
+            parts = [lazily(part, known) for part in tree.parts]
+            own = tree.having(tuple(Name(str(place)) for place in range(len(parts))))
             made = one(own, tuple(part[0] for part in parts), known)
             parts.append(made)
             value = made[0]

@@ -21,12 +21,12 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import UNDEFINED_F, Block, Check, CheckedActivation, Model, Plasticity, Rule
-from neurovis_spec.language.expressions.arrays import Value, evaluate_array
-from neurovis_spec.language.expressions.errors import ExpressionError
-from neurovis_spec.language.expressions.functions import CONSTANTS
+from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
+from neurovis_spec.language.expressions.functions import CONSTANTS, Hidden
 from neurovis_spec.language.expressions.tree import (
     Call,
     Conditional,
+    ExpressionError,
     Name,
     Number,
     Tree,
@@ -34,7 +34,7 @@ from neurovis_spec.language.expressions.tree import (
     names,
     substitute,
 )
-from neurovis_spec.language.expressions.undefined import Hazard, Hazards, Hidden, Read, either, hazards, together
+from neurovis_spec.language.expressions.undefined import Hazard, Hazards, Read, either, hazards, together
 
 M = TypeVar("M", Model, Rule)
 

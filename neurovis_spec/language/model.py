@@ -31,7 +31,7 @@ from pydantic_core import core_schema
 
 from neurovis_spec.diagnostics import Findings, Span, listed, shorten
 from neurovis_spec.language.exclusions import Rules, check_rules, contradictory, schema_of
-from neurovis_spec.language.expressions.given import RESERVED
+from neurovis_spec.language.expressions.functions import RESERVED
 from neurovis_spec.language.grammar import Needs, NotWith, OneOf
 from neurovis_spec.language.keys import Keys, Words, apart, joined, mend_torn, read_keys
 from neurovis_spec.language.located import (

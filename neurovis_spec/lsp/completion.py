@@ -14,7 +14,7 @@ from typing import Literal
 from neurovis_spec import plugins
 from neurovis_spec.compiler.values.constants import ALWAYS
 from neurovis_spec.diagnostics import Span
-from neurovis_spec.language.expressions.given import GIVEN
+from neurovis_spec.language.expressions.functions import GIVEN
 from neurovis_spec.language.grammar import Role
 from neurovis_spec.language.patterns import PATTERNS
 from neurovis_spec.language.places import keys_at, role_of, words_at

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Literal
 
 from neurovis_spec.diagnostics import Span
-from neurovis_spec.language.expressions.given import GIVEN
+from neurovis_spec.language.expressions.functions import GIVEN
 from neurovis_spec.language.grammar import Role
 from neurovis_spec.language.patterns import PATTERNS
 from neurovis_spec.language.places import key_at, role_of

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from neurovis_spec.diagnostics import Diagnostic, Span
-from neurovis_spec.language.expressions.given import GIVEN, RESERVED
+from neurovis_spec.language.expressions.functions import GIVEN, RESERVED
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, bad_name
 from neurovis_spec.language.places import role_of
 from neurovis_spec.language.yaml.scalars import resolve

@@ -18,7 +18,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.language.expressions.emit_c import Emitter
 from neurovis_spec.language.expressions.functions import FUNCTIONS, Library
-from neurovis_spec.language.expressions.tree import Binary, Call, Chain, Name, Tree
+from neurovis_spec.language.expressions.tree import Call, Chain, Name, Tree
 from neurovis_spec.runtime import c_library
 from neurovis_spec.runtime.c_code import words_of
 
@@ -32,7 +32,7 @@ _HEAD: Final = """#include <math.h>
 #endif
 """
 _ARGUMENTS: Final = ("a", "b", "c")
-_OPERATORS: Final = {"remainder": "%", "power": "^"}
+_REMAINDER: Final = "remainder"
 
 
 def library() -> Library:
@@ -46,7 +46,7 @@ def _loaded(place: object, source: str) -> Library:
     compiled = c_library.load(source)
     made = {name: _Function.of(compiled, name, len(names)) for name, names in _parameters().items()}
     calls = {name: made[name].over_all if FUNCTIONS[name].most is None else made[name] for name in FUNCTIONS}
-    return Library(calls, made["remainder"], made["power"])
+    return Library(calls, made[_REMAINDER])
 
 
 @cache
@@ -69,17 +69,12 @@ def text() -> str:
 def _parameters() -> dict[str, tuple[str, ...]]:
     """The names of the arguments of each; of one that takes any number, those of two."""
     functions = {name: _ARGUMENTS[: entry.most or entry.least] for name, entry in FUNCTIONS.items()}
-    return functions | dict.fromkeys(_OPERATORS, _ARGUMENTS[:2])
+    return functions | {_REMAINDER: _ARGUMENTS[:2]}
 
 
 def _tree(name: str, names: tuple[str, ...]) -> Tree:
     arguments = tuple(Name(own) for own in names)
-    match name:
-        case "remainder":
-            return Chain(("%",), arguments)
-        case "power":
-            return Binary("^", arguments[0], arguments[1])
-    return Call(name, arguments)
+    return Chain(("%",), arguments) if name == _REMAINDER else Call(name, arguments)
 
 
 @dataclass(frozen=True, slots=True)

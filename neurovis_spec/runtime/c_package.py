@@ -13,6 +13,7 @@ from pathlib import Path
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.expressions.emit_c import INEXACT
+from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.expressions.tree import Call, Tree, walk
 from neurovis_spec.runtime.c_export import Exported
 from neurovis_spec.runtime.c_names import words
@@ -108,9 +109,9 @@ def size_of_state(made: Exported) -> int:
 
 def _calls(trees: Iterable[Tree | None]) -> int:
     """The functions of the library that some expressions call."""
-    called = {*INEXACT, "sigmoid"}
     found = (node for tree in trees if tree is not None for node in walk(tree))
-    return sum(isinstance(node, Call) and node.function in called for node in found)
+    called = (FUNCTIONS.get(node.function) for node in found if isinstance(node, Call))
+    return sum(row is not None and row.agree == "rounding" for row in called)
 
 
 def _cost(made: Exported) -> str:

@@ -21,8 +21,8 @@ from neurovis_spec.compiler.events.settable import (
     Settable,
     Subset,
 )
-from neurovis_spec.language.expressions.arrays import Value as ArrayValue
 from neurovis_spec.language.expressions.emit_c import Value
+from neurovis_spec.language.expressions.evaluate import Value as ArrayValue
 from neurovis_spec.language.expressions.tree import Draw
 from neurovis_spec.runtime.c_code import Code, Place
 

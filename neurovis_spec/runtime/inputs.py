@@ -17,7 +17,7 @@ import numpy.typing as npt
 from neurovis_spec.arrays import BoolArray, FloatArray
 from neurovis_spec.compiler.network import Input, Network, Noise
 from neurovis_spec.compiler.values.draws import Stream
-from neurovis_spec.language.expressions.arrays import evaluate_array
+from neurovis_spec.language.expressions.evaluate import evaluate_array
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.language.expressions.tree import Draw, Tree
 from neurovis_spec.language.expressions.undefined import either, hazards

@@ -18,11 +18,11 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.names.state_references import StateOf
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Findings, Span, shorten
-from neurovis_spec.language.expressions.arrays import evaluate_array
-from neurovis_spec.language.expressions.evaluate import evaluate
+from neurovis_spec.language.expressions.evaluate import evaluate, evaluate_array
+from neurovis_spec.language.expressions.functions import rows_of
 from neurovis_spec.language.expressions.measures import PLACE, Formula, parse_measure
 from neurovis_spec.language.expressions.parser import ExpressionError
-from neurovis_spec.language.expressions.tree import Binary, Call, Chain, Name, Tree, is_square, names, walk
+from neurovis_spec.language.expressions.tree import Name, Tree, is_square, names, walk
 from neurovis_spec.language.references import Arrow, parse_sum, state_of
 from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.columns import Probe, probe_of
@@ -81,11 +81,9 @@ class Measure:
 def _by_numpy(node: Tree) -> bool:
     """Whether NumPy works out a part of a formula in its own way: of 0 and −0, which are equal, its ``min`` takes
     either. A square is a product to both."""
-    if isinstance(node, Chain):
-        return "%" in node.operators
-    if isinstance(node, Binary):
-        return node.operator == "^" and is_square(node) is None
-    return isinstance(node, Call) and node.function not in ("abs", "sign", "step", "sqrt")
+    if is_square(node) is not None:
+        return False
+    return any(row.agree != "bits" for row in rows_of(node))
 
 
 def findings_of(text: str, label: str) -> Findings:

@@ -19,7 +19,7 @@ from neurovis_spec.compiler.events.changes import Held
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.initial_states import starts_of
 from neurovis_spec.compiler.program import Quantity
-from neurovis_spec.language.expressions.arrays import evaluate_array
+from neurovis_spec.language.expressions.evaluate import evaluate_array
 from neurovis_spec.language.expressions.functions import PLAIN
 from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import signal_layout

@@ -20,7 +20,7 @@ from neurovis_spec.compiler.values.builtin import installed
 from neurovis_spec.compiler.values.constants import value_of
 from neurovis_spec.compiler.values.definitions import Defaults
 from neurovis_spec.diagnostics import Findings, Span
-from neurovis_spec.language.expressions.arrays import Value, evaluate_array
+from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.parser import parse
 from neurovis_spec.language.expressions.tree import Tree, names

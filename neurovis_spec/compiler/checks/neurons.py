@@ -22,7 +22,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.initial_states import starts_of
 from neurovis_spec.compiler.program import Block, Model
 from neurovis_spec.diagnostics import Findings, Span
-from neurovis_spec.language.expressions.arrays import Value, evaluate_array
+from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.sections import GroupModel

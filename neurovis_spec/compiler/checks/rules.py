@@ -18,7 +18,7 @@ from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Rule
 from neurovis_spec.diagnostics import Findings, Span, shorten
-from neurovis_spec.language.expressions.arrays import Value, evaluate_array
+from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.grammar import ACTIVITIES
 from neurovis_spec.language.yaml.source import Scalar

@@ -16,10 +16,10 @@ from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.program import Activation, Model
 from neurovis_spec.compiler.run_checks import through_let
 from neurovis_spec.diagnostics import Findings
-from neurovis_spec.language.expressions.arrays import Value, evaluate_array
-from neurovis_spec.language.expressions.functions import CONSTANTS
+from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
+from neurovis_spec.language.expressions.functions import CONSTANTS, Hidden
 from neurovis_spec.language.expressions.tree import Binary, Name, Tree, names
-from neurovis_spec.language.expressions.undefined import Hazard, Hidden, hazards
+from neurovis_spec.language.expressions.undefined import Hazard, hazards
 from neurovis_spec.language.values import Choice
 
 

@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.events.settable import Binding, ParameterFormula, Settable
-from neurovis_spec.language.expressions.arrays import Value
 from neurovis_spec.language.expressions.emit import defined, emit
+from neurovis_spec.language.expressions.evaluate import Value
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 
 #: What the arrays of a network are called in messages.
@@ -211,7 +211,7 @@ def _calls(by: Library) -> Mapping[str, Callable[..., str]]:
     """What makes the code of a call of a library's function; for NumPy's there is other code, which is quicker."""
     if by is NUMPY:
         return {}
-    names = {name: name for name in by.calls} | {"%": "remainder", "^": "power"}
+    names = {name: name for name in by.calls} | {"%": "remainder"}
     return {name: partial(_call, f"by_{own}") for name, own in names.items()}
 
 

@@ -16,7 +16,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
-from neurovis_spec.language.expressions.arrays import Drawing, Value, evaluate_array
+from neurovis_spec.language.expressions.evaluate import Drawing, Value, evaluate_array
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.language.expressions.tree import Number, Tree, names
 

@@ -11,7 +11,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Neurons
 from neurovis_spec.compiler.program import Block
-from neurovis_spec.language.expressions.arrays import Value, evaluate_array
+from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS, PLAIN
 
 

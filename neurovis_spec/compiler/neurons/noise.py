@@ -14,9 +14,9 @@ from neurovis_spec.compiler.events.settable import ParameterFormula, places_of
 from neurovis_spec.compiler.network import Noise
 from neurovis_spec.compiler.neurons.populate import Population
 from neurovis_spec.compiler.values.constants import Constants, Value, width_of
-from neurovis_spec.language.expressions.arrays import evaluate_array
+from neurovis_spec.language.expressions.evaluate import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
-from neurovis_spec.language.expressions.tree import Chain, Conditional, Draw, Tree, children, draws, names
+from neurovis_spec.language.expressions.tree import Chain, Conditional, Draw, Tree, draws, names
 from neurovis_spec.language.located import Formula
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
@@ -68,4 +68,4 @@ def _always_drawn(tree: Tree) -> Iterator[Draw]:
         node = waiting.pop()
         if isinstance(node, Draw):
             yield node
-        waiting.extend((node.condition,) if isinstance(node, Conditional) else children(node))
+        waiting.extend((node.condition,) if isinstance(node, Conditional) else node.parts)

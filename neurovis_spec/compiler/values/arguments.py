@@ -20,7 +20,7 @@ from neurovis_spec.compiler.values.constants import Constants, Randomness, Value
 from neurovis_spec.compiler.values.definitions import Default, Defaults, check_bounds
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Findings, Hint, Home, Undeclared, shorten
-from neurovis_spec.language.expressions.arrays import evaluate_array
+from neurovis_spec.language.expressions.evaluate import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import Name, Tree, names
 from neurovis_spec.language.keys import settings_of

@@ -20,12 +20,11 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.settable import Dependent, ParameterFormula, Part, Slot, places_of
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Findings, Home, Undeclared, shorten
-from neurovis_spec.language.expressions.arrays import evaluate_array
-from neurovis_spec.language.expressions.functions import CONSTANTS, FUNCTIONS
-from neurovis_spec.language.expressions.given import GIVEN, meaning
+from neurovis_spec.language.expressions.evaluate import evaluate_array
+from neurovis_spec.language.expressions.functions import CONSTANTS, DRAWS, FUNCTIONS, GIVEN, meaning
 from neurovis_spec.language.expressions.habits import UNITS, unit_hint
 from neurovis_spec.language.expressions.mistakes import INSTEAD
-from neurovis_spec.language.expressions.parser import DRAWS, ExpressionError, parse, unknown_names
+from neurovis_spec.language.expressions.parser import ExpressionError, parse, unknown_names
 from neurovis_spec.language.expressions.tree import Draw, Number, Tree, draws, names
 from neurovis_spec.language.grammar import PLAIN, Role
 from neurovis_spec.language.located import Formula
@@ -130,9 +129,8 @@ def parse_formula(
 
 def _unknown(name: str, known: Collection[str], functions: Mapping[str, int], what: str) -> tuple[str, str | None]:
     """The message and the hint for a name that means nothing here."""
-    usage = FUNCTIONS[name].usage if name in FUNCTIONS else DRAWS.get(name)
-    if name in functions:
-        usage = f"{name}(x)"
+    row = FUNCTIONS.get(name) or DRAWS.get(name)
+    usage = f"{name}(x)" if name in functions else None if row is None else row.usage
     if usage is not None:
         return f"'{name}' is a function, not a value", f"write {usage}"
     message = f"unknown name '{shorten(name)}'"

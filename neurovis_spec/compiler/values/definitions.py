@@ -25,11 +25,9 @@ from neurovis_spec.compiler.values.constants import (
     value_of,
 )
 from neurovis_spec.diagnostics import Findings, Home, Span
-from neurovis_spec.language.expressions.arrays import evaluate_array
-from neurovis_spec.language.expressions.errors import ExpressionError
-from neurovis_spec.language.expressions.functions import CONSTANTS
-from neurovis_spec.language.expressions.given import meaning
-from neurovis_spec.language.expressions.tree import Name, Number, Tree, substitute
+from neurovis_spec.language.expressions.evaluate import evaluate_array
+from neurovis_spec.language.expressions.functions import CONSTANTS, meaning
+from neurovis_spec.language.expressions.tree import ExpressionError, Name, Number, Tree, substitute
 from neurovis_spec.language.library import ActivationModel, Library, ModelModel, RuleModel, StateModel
 from neurovis_spec.language.located import IDENTIFIER, Formula, bad_name, name_hint
 from neurovis_spec.language.model import Model as LanguageModel

@@ -11,7 +11,7 @@ from collections.abc import Collection, Mapping
 from neurovis_spec.compiler.names.references import Section, key_span
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Span
-from neurovis_spec.language.expressions.given import RESERVED, meaning
+from neurovis_spec.language.expressions.functions import RESERVED, meaning
 from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.located import Formula
 from neurovis_spec.language.unknown import UNKNOWN

@@ -1,21 +1,22 @@
-"""From a tree to NumPy code, for backends that compile what they run.
+"""From a tree to code: to NumPy code, for backends that compile what they run, and what all code has in common.
 
 In: a tree, and an identifier (or code of our own making) for each of its names. Out: one Python expression over ``np``.
 Nothing of the author's text gets into it: names are replaced, numbers written by ``repr``, operators and functions
 taken from tables. The code is meant to run under ``np.errstate(all="ignore")`` on float64 values (arrays, NumPy scalars
-or Python floats), with no name but ``np`` and those given.
+or Python floats), with no name but ``np`` and those given. A Writer of another language (``emit_c``) has other levels.
 """
 
 from __future__ import annotations
 
 import math
 import re
+from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
-from typing import TypeAlias
+from typing import ClassVar, NamedTuple, TypeAlias
 
 from neurovis_spec.language.expressions.evaluate import evaluate
-from neurovis_spec.language.expressions.functions import FUNCTIONS
+from neurovis_spec.language.expressions.functions import FUNCTIONS, OPERATORS, Function, Operation
 from neurovis_spec.language.expressions.tree import (
     Binary,
     Call,
@@ -26,19 +27,14 @@ from neurovis_spec.language.expressions.tree import (
     Number,
     Tree,
     Unary,
-    children,
+    Visitor,
     is_square,
-    rebuild,
 )
 
 #: Makes the code of a draw from the codes of its two arguments.
 DrawCode: TypeAlias = Callable[[Draw, str, str], str]
-#: Code, and how tight its outermost operator binds in Python.
-_Code: TypeAlias = tuple[str, int]
 
 _ANY, _COMPARE, _OR, _AND, _ADD, _MULTIPLY, _SIGN, _ATOM = range(8)
-_ARITHMETIC: Mapping[str, int] = {"+": _ADD, "-": _ADD, "*": _MULTIPLY}
-_COMPARISONS = frozenset({"<", "<=", ">", ">=", "==", "!="})
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_.]*(?:\[[A-Za-z0-9_:, ]*\])?")
 _NONE: Mapping[str, Callable[..., str]] = MappingProxyType({})
 
@@ -51,8 +47,8 @@ def emit(
 ) -> str:
     """NumPy code for ``tree``.
 
-    ``names`` gives the code of each name, ``functions`` makes that of a call from the codes of the arguments (``%`` and
-    ``^`` among them, where they are not NumPy's), ``draw`` that of a draw. Raises KeyError for a name or a function
+    ``names`` gives the code of each name, ``functions`` makes that of a call from the codes of the arguments (``%``
+    among them, where it is not NumPy's), ``draw`` that of a draw. Raises KeyError for a name or a function
     that is not given, ValueError for a draw without ``draw``.
 
     >>> from neurovis_spec.language.expressions.parser import parse
@@ -61,7 +57,7 @@ def emit(
     >>> emit(parse("x^2 if x < 0 or c else tanh(x)"), {"x": "a3", "c": "p0"})
     'np.where((a3 < 0.0) | (p0 != 0.0), a3*a3, np.tanh(a3))'
     """
-    return _Emitter(names, functions, draw).value(simplify(tree))[0]
+    return _NumPy(names, functions, draw).loose(simplify(tree))
 
 
 def simplify(tree: Tree) -> Tree:
@@ -73,7 +69,7 @@ def simplify(tree: Tree) -> Tree:
     >>> simplify(parse("2 * 3 + 1/0")).operands[0]
     Number(value=6.0, start=0, end=5)
     """
-    parts = tuple(simplify(part) for part in children(tree))
+    parts = tuple(simplify(part) for part in tree.parts)
     tree = with_values(tree, parts)
     if isinstance(tree, Chain):
         return _folded_chain(tree)
@@ -87,9 +83,9 @@ def simplify(tree: Tree) -> Tree:
 def with_values(tree: Tree, parts: tuple[Tree, ...]) -> Tree:
     """The node with operands that have the same values; an exponent that only comes to 2 is a power, not a square: it
     stays as it is written."""
-    made = rebuild(tree, parts)
+    made = tree.having(parts)
     if is_square(made) is not None and is_square(tree) is None:
-        made = rebuild(tree, (parts[0], children(tree)[1]))
+        made = tree.having((parts[0], tree.parts[1]))
     return made
 
 
@@ -106,98 +102,155 @@ def _folded_chain(tree: Chain) -> Tree:
     return Chain(tuple(operators), (first, *rest), tree.start, tree.end) if rest else first
 
 
-class _Emitter:
-    """Makes code: as a value (float64), or as a truth (a NumPy or Python bool)."""
+class Code(NamedTuple):
+    """Code, and how tight its outermost operator binds. It is a number, or a ``truth`` (0 and 1 are none)."""
+
+    text: str
+    level: int
+    truth: bool = False
+
+    def within(self, level: int) -> str:
+        """In parentheses where its operator binds less tight than is wanted."""
+        return self.text if self.level >= level else f"({self.text})"
+
+
+class Writer(Visitor[Code]):
+    """Makes code of a language. ``levels`` says how tight an operator binds there, one before its operand as ``sign``;
+    ``compared`` how tight the operands of a comparison have to, ``joined`` those of ``and`` and ``or``, ``signed`` that
+    of a sign."""
+
+    levels: ClassVar[Mapping[str, int]]
+    compared: ClassVar[int]
+    joined: ClassVar[Mapping[str, int]]
+    signed: ClassVar[int]
+
+    def value(self, tree: Tree) -> Code:
+        """A tree as a number."""
+        made = self.of(tree)
+        return self.counted(made) if made.truth else made
+
+    def truth(self, tree: Tree) -> Code:
+        """A tree as a truth."""
+        made = self.of(tree)
+        if made.truth:
+            return made
+        zero = self.number(Number(0.0)).text
+        return Code(f"{made.within(self.compared)} != {zero}", self.levels["!="], True)
+
+    def loose(self, tree: Tree) -> str:
+        """A number where everything may stand."""
+        return self.value(tree).text
+
+    def tight(self, tree: Tree, level: int) -> str:
+        """A number as an operand of an operator that binds so tight."""
+        return self.value(tree).within(level)
+
+    @abstractmethod
+    def counted(self, truth: Code) -> Code:
+        """A truth as a number."""
+
+    @abstractmethod
+    def sign(self, row: Operation) -> str:
+        """What an operator is written as."""
+
+    def negative(self, operand: Tree) -> Code:
+        """``-x``."""
+        return Code(f"-{self.tight(operand, self.signed)}", self.levels["sign"])
+
+    def comparison(self, node: Binary) -> Code:
+        """``a < b``, a truth."""
+        left, right = (self.tight(part, self.compared) for part in node.parts)
+        return Code(f"{left} {node.operator} {right}", self.levels[node.operator], True)
+
+    def logic(self, node: Chain) -> Code:
+        """``a and b``, a truth."""
+        operator = node.operators[0]
+        operands = [self.truth(operand).within(self.joined[operator]) for operand in node.operands]
+        return Code(f" {self.sign(OPERATORS[operator])} ".join(operands), self.levels[operator], True)
+
+    def infix(self, code: Code, operator: str, operand: Tree, level: int) -> Code:
+        """An operand more, behind what is there."""
+        own = self.levels[operator]
+        sign = f" {operator} " if own == self.levels["+"] else operator
+        return Code(f"{code.within(own)}{sign}{self.tight(operand, level)}", own)
+
+
+class _NumPy(Writer):
+    """NumPy code; a truth is a bool of NumPy or Python."""
+
+    levels: ClassVar[Mapping[str, int]] = {
+        **dict.fromkeys(("<", "<=", ">", ">=", "==", "!="), _COMPARE),
+        **{"or": _OR, "and": _AND, "+": _ADD, "-": _ADD, "*": _MULTIPLY, "/": _MULTIPLY, "%": _MULTIPLY, "sign": _SIGN},
+    }
+    compared: ClassVar[int] = _OR
+    joined: ClassVar[Mapping[str, int]] = {"or": _OR + 1, "and": _AND + 1}
+    signed: ClassVar[int] = _SIGN
 
     def __init__(
-        self, names: Mapping[str, str], functions: Mapping[str, Callable[..., str]], draw: DrawCode | None
+        self, names: Mapping[str, str], functions: Mapping[str, Callable[..., str]], drawn: DrawCode | None
     ) -> None:
         self.names = names
         self.functions = functions
-        self.draw = draw
+        self.drawn = drawn
 
-    def value(self, tree: Tree) -> _Code:
-        if (square := is_square(tree)) is not None:
-            return self.square(square)
-        match tree:
-            case Number(value=value):
-                return _number(value)
-            case Name(name=name):
-                code = self.names[name]
-                return code, _ATOM if _IDENTIFIER.fullmatch(code) else _ANY
-            case Unary(operator="-", operand=operand):
-                return f"-{self.tight(operand, _SIGN)}", _SIGN
-            case Unary(operator="+", operand=operand):
-                return self.value(operand)
-            case Binary(operator="^", left=left, right=right):
-                # the operator of Python raises where both operands are Python floats; the function of NumPy never does
-                made = self.functions.get("^", "np.float_power({}, {})".format)
-                return made(self.loose(left), self.loose(right)), _ATOM
-            case Chain() if tree.operators[0] not in ("and", "or"):
-                return self.arithmetic(tree)
-            case Conditional(condition=condition, then=then, otherwise=otherwise):
-                choice = f"{self.truth(condition)[0]}, {self.loose(then)}, {self.loose(otherwise)}"
-                return f"np.where({choice})", _ATOM
-            case Call(function=function, arguments=arguments):
-                return self.call(function, arguments)
-            case Draw(first=first, second=second):
-                if self.draw is None:
-                    raise ValueError("this expression draws, and no code to draw was given")
-                return self.draw(tree, self.loose(first), self.loose(second)), _ANY
-            case _:
-                return f"{wrapped(self.truth(tree), _ATOM)}*1.0", _MULTIPLY
+    def number(self, node: Number) -> Code:
+        value = node.value
+        if math.isnan(value):
+            return Code("np.nan", _ATOM)
+        if math.isinf(value):
+            return Code("np.inf", _ATOM) if value > 0 else Code("-np.inf", _SIGN)
+        return Code(repr(float(value)), _ATOM if math.copysign(1.0, value) > 0 else _SIGN)
 
-    def truth(self, tree: Tree) -> _Code:
-        match tree:
-            case Binary(operator=operator, left=left, right=right) if operator in _COMPARISONS:
-                return f"{self.tight(left, _OR)} {operator} {self.tight(right, _OR)}", _COMPARE
-            case Chain(operators=("and", *_), operands=operands):
-                return " & ".join(wrapped(self.truth(operand), _AND + 1) for operand in operands), _AND
-            case Chain(operators=("or", *_), operands=operands):
-                return " | ".join(wrapped(self.truth(operand), _OR + 1) for operand in operands), _OR
-            case Unary(operator="not", operand=operand):
-                return f"np.logical_not({self.truth(operand)[0]})", _ATOM
-            case _:
-                return f"{self.tight(tree, _OR)} != 0.0", _COMPARE
+    def name(self, node: Name) -> Code:
+        code = self.names[node.name]
+        return Code(code, _ATOM if _IDENTIFIER.fullmatch(code) else _ANY)
 
-    def arithmetic(self, chain: Chain) -> _Code:
-        """Sums and products: one operator after the other."""
-        code, by_numpy = self.value(chain.operands[0]), False
-        for operator, operand in chain.steps:
-            if operator in _ARITHMETIC:
-                level = _ARITHMETIC[operator]
-                joined = f" {operator} " if level == _ADD else operator
-                code = f"{wrapped(code, level)}{joined}{self.tight(operand, level + 1)}", level
+    def counted(self, truth: Code) -> Code:
+        return Code(f"{truth.within(_ATOM)}*1.0", _MULTIPLY)
+
+    def sign(self, row: Operation) -> str:
+        return row.code
+
+    def negation(self, operand: Tree) -> Code:
+        return Code(f"np.logical_not({self.truth(operand).text})", _ATOM, True)
+
+    def square(self, base: Tree) -> Code:
+        code = self.value(base)
+        if isinstance(base, Name) and code.level == _ATOM:
+            return Code(f"{code.text}*{code.text}", _MULTIPLY)
+        return Code(f"np.square({code.text})", _ATOM)
+
+    def arithmetic(self, node: Chain) -> Code:
+        """One operator after the other."""
+        code, by_numpy = self.value(node.operands[0]), False
+        for operator, operand in node.steps:
+            if operator in ("+", "-", "*"):
+                code = self.infix(code, operator, operand, self.levels[operator] + 1)
             elif (by_numpy and operator not in self.functions) or (operator == "/" and _divides(operand)):
-                code = f"{wrapped(code, _MULTIPLY)}{operator}{self.tight(operand, _SIGN)}", _MULTIPLY
+                code = self.infix(code, operator, operand, _SIGN)
             else:
                 # the operators of Python raise where both operands are Python floats; the functions of NumPy never do,
                 # and what comes of them is no such float
-                name = {"/": "divide", "%": "remainder"}[operator]
-                made = self.functions.get(operator, f"np.{name}({{}}, {{}})".format)
-                code, by_numpy = (made(code[0], self.loose(operand)), _ATOM), True
+                made = self.functions.get(operator, OPERATORS[operator].code.format)
+                code, by_numpy = Code(made(code.text, self.loose(operand)), _ATOM), True
         return code
 
-    def square(self, base: Tree) -> _Code:
-        code, level = self.value(base)
-        if isinstance(base, Name) and level == _ATOM:
-            return f"{code}*{code}", _MULTIPLY
-        return f"np.square({code})", _ATOM
+    def conditional(self, node: Conditional) -> Code:
+        choice = f"{self.truth(node.condition).text}, {self.loose(node.then)}, {self.loose(node.otherwise)}"
+        return Code(f"np.where({choice})", _ATOM)
 
-    def call(self, function: str, arguments: tuple[Tree, ...]) -> _Code:
-        if function in self.functions:
-            return self.functions[function](*map(self.loose, arguments)), _ANY
-        entry = FUNCTIONS[function]
-        codes = [self.tight(argument, _SIGN if entry.signed else _ANY) for argument in arguments]
-        if entry.most is None:
-            return folded(entry.code.format, codes), _ATOM
-        return entry.code.format(*codes), _ATOM
+    def call(self, node: Call) -> Code:
+        made = self.functions.get(node.function)
+        if made is not None:
+            return Code(made(*map(self.loose, node.arguments)), _ANY)
+        row = FUNCTIONS[node.function]
+        tight = _SIGN if "-{" in row.code else _ANY
+        return Code(called(row, row.code, [self.tight(argument, tight) for argument in node.arguments]), _ATOM)
 
-    def loose(self, tree: Tree) -> str:
-        return self.value(tree)[0]
-
-    def tight(self, tree: Tree, level: int) -> str:
-        return wrapped(self.value(tree), level)
+    def draw(self, node: Draw) -> Code:
+        if self.drawn is None:
+            raise ValueError("this expression draws, and no code to draw was given")
+        return Code(self.drawn(node, self.loose(node.first), self.loose(node.second)), _ANY)
 
 
 def _divides(tree: Tree) -> bool:
@@ -205,25 +258,16 @@ def _divides(tree: Tree) -> bool:
     return isinstance(tree, Number) and tree.value != 0 and math.isfinite(tree.value)
 
 
-def wrapped(code: _Code, level: int) -> str:
-    """Code, in parentheses where its operator binds less tight than is wanted."""
-    return code[0] if code[1] >= level else f"({code[0]})"
-
-
-def _number(value: float) -> _Code:
-    if math.isnan(value):
-        return "np.nan", _ATOM
-    if math.isinf(value):
-        return ("np.inf", _ATOM) if value > 0 else ("-np.inf", _SIGN)
-    return repr(float(value)), _ATOM if math.copysign(1.0, value) > 0 else _SIGN
-
-
-def folded(join: Callable[[str, str], str], arguments: list[str]) -> str:
-    """min and max of many, halved again and again: few parentheses inside each other, however many there are."""
+def called(row: Function, template: str, arguments: list[str], suffix: str = "") -> str:
+    """The code of a call. min and max of many are halved again and again: few parentheses inside each other, however
+    many there are."""
+    if row.most is not None or len(arguments) == row.least:
+        return template.format(*arguments, s=suffix)
     if len(arguments) == 1:
         return arguments[0]
     middle = (len(arguments) + 1) // 2
-    return join(folded(join, arguments[:middle]), folded(join, arguments[middle:]))
+    halves = (called(row, template, half, suffix) for half in (arguments[:middle], arguments[middle:]))
+    return template.format(*halves, s=suffix)
 
 
 def defined(name: str, lines: Iterable[str], about: str, namespace: dict[str, object]) -> object:

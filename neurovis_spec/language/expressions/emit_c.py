@@ -11,57 +11,34 @@ import math
 import re
 from collections.abc import Callable, Container, Mapping
 from types import MappingProxyType
-from typing import TypeAlias
+from typing import ClassVar, Final, TypeAlias
 
-from neurovis_spec.language.expressions.emit import folded, simplify, with_values, wrapped
-from neurovis_spec.language.expressions.tree import (
-    Binary,
-    Call,
-    Chain,
-    Conditional,
-    Draw,
-    Name,
-    Number,
-    Tree,
-    Unary,
-    children,
-    is_square,
-    rebuild,
-)
+from neurovis_spec.language.expressions.emit import Code, Writer, called, simplify, with_values
+from neurovis_spec.language.expressions.functions import FUNCTIONS, OPERATORS, Operation
+from neurovis_spec.language.expressions.tree import Call, Chain, Conditional, Draw, Name, Number, Tree
 
 #: What a name may be: a number, or code.
 Value: TypeAlias = float | str
 #: Makes the value of a call from the values of its arguments, that of a draw from its two.
 Made: TypeAlias = Callable[..., Value]
 Drawn: TypeAlias = Callable[[Draw, Value, Value], Value]
-#: Code, and how tight its outermost operator binds in C.
-_Code: TypeAlias = tuple[str, int]
 
 _CHOICE, _OR, _AND, _EQUAL, _COMPARE, _ADD, _MULTIPLY, _SIGN, _ATOM = range(9)
-_ARITHMETIC: Mapping[str, int] = {"+": _ADD, "-": _ADD, "*": _MULTIPLY, "/": _MULTIPLY}
-_COMPARISONS: Mapping[str, int] = {
-    "<": _COMPARE,
-    "<=": _COMPARE,
-    ">": _COMPARE,
-    ">=": _COMPARE,
-    "==": _EQUAL,
-    "!=": _EQUAL,
-}
 _NONE: Mapping[str, Made] = MappingProxyType({})
 
-#: Functions of C's library whose results a compiler must not work out itself: it rounds better than the library.
-INEXACT: tuple[str, ...] = (
-    *("exp", "log", "log1p", "expm1", "pow", "sin", "cos", "tan", "sinh", "cosh", "tanh"),
-    *("asin", "acos", "atan", "atan2"),
+#: Functions of C's library whose results a compiler must not work out itself: it rounds better than the library. The
+#: arcs stand behind the others in the files that are exported.
+INEXACT: tuple[str, ...] = tuple(
+    sorted(
+        dict.fromkeys(
+            name for row in FUNCTIONS.values() if row.agree == "rounding" for name in re.findall(r"(\w+)\{s\}\(", row.c)
+        ),
+        key=lambda name: name.startswith("a"),
+    )
 )
-#: Functions of C's library that are what the language means.
-_LIBRARY: Mapping[str, str] = MappingProxyType(
-    {name: name for name in (*INEXACT, "floor", "ceil", "sqrt")} | {"abs": "fabs", "round": "rint"}
-)
-#: What the language means and C lacks: ``{real}`` is the type of numbers, ``{s}`` the suffix of functions and literals.
-HELPERS: Mapping[str, str] = MappingProxyType(
-    {
-        "nv_mod": """static {real} nv_mod({real} a, {real} b)
+#: What operators and the code around them need and C lacks, as the helpers of functions (``Function.helper``).
+_OF_OPERATORS: Final = {
+    "nv_mod": """static {real} nv_mod({real} a, {real} b)
 {{
     {real} m;
     if (b == 0.0{s})
@@ -71,43 +48,30 @@ HELPERS: Mapping[str, str] = MappingProxyType(
         return copysign{s}(0.0{s}, b);
     return (b < 0.0{s}) != (m < 0.0{s}) ? m + b : m;
 }}""",
-        "nv_sign": """static {real} nv_sign({real} x)
-{{
-    return x > 0.0{s} ? 1.0{s} : x < 0.0{s} ? -1.0{s} : x == 0.0{s} ? 0.0{s} : x;
-}}""",
-        "nv_step": """static {real} nv_step({real} x)
-{{
-    return x >= 0.0{s} ? 1.0{s} : x < 0.0{s} ? 0.0{s} : x;
-}}""",
-        "nv_min": """static {real} nv_min({real} a, {real} b)
-{{
-    return a <= b || a != a ? a : b;
-}}""",
-        "nv_max": """static {real} nv_max({real} a, {real} b)
-{{
-    return a >= b || a != a ? a : b;
-}}""",
-        # gcc makes -0 of the difference of 0 and a choice that comes to 0
-        "nv_from_zero": """static {real} nv_from_zero({real} x)
+    # gcc makes -0 of the difference of 0 and a choice that comes to 0
+    "nv_from_zero": """static {real} nv_from_zero({real} x)
 {{
     return 0.0{s} - x;
 }}""",
-        "nv_square": """static {real} nv_square({real} x)
+    "nv_square": """static {real} nv_square({real} x)
 {{
     return x * x;
 }}""",
-        "nv_sigmoid": """static {real} nv_sigmoid({real} x)
-{{
-    return 1.0{s} / (1.0{s} + exp{s}(-x));
-}}""",
-        # of a power whose exponent it knows a compiler makes a product, which is not what the library gives
-        "nv_power": """static {real} nv_power({real} x, {real} exponent)
-{{
-    volatile {real} e = exponent;
-    return pow{s}(x, e);
-}}""",
-    }
-)
+}
+#: The order in which they stand in the files that are exported; what is not named here comes last.
+_ORDER = ("mod", "sign", "step", "min", "max", "from_zero", "square", "sigmoid")
+
+
+def _helpers() -> dict[str, str]:
+    """What the language means and C lacks, by name: ``{real}`` is the type of numbers, ``{s}`` the suffix of functions
+    and literals."""
+    texts = [row.helper for row in FUNCTIONS.values() if row.helper]
+    named = {text.partition("(")[0].split()[-1]: text for text in texts} | _OF_OPERATORS
+    first = [f"nv_{name}" for name in _ORDER if f"nv_{name}" in named]
+    return {name: named[name] for name in (*first, *named)}
+
+
+HELPERS: Mapping[str, str] = MappingProxyType(_helpers())
 
 
 def known_in(tree: Tree, names: Mapping[str, Value]) -> Tree:
@@ -124,7 +88,7 @@ def _put(tree: Tree, names: Mapping[str, Value]) -> Tree:
     if isinstance(tree, Name):
         value = names.get(tree.name)
         return Number(value, tree.start, tree.end) if isinstance(value, float) else tree
-    return with_values(tree, tuple(_put(part, names) for part in children(tree)))
+    return with_values(tree, tuple(_put(part, names) for part in tree.parts))
 
 
 class Emitter:
@@ -155,7 +119,7 @@ class Emitter:
         if calls or drawn is not None:
             tree, names = self._called(tree, dict(names), calls, drawn)
         tree = known_in(tree, names)
-        return tree.value if isinstance(tree, Number) else _Writer(self, names).value(tree)[0]
+        return tree.value if isinstance(tree, Number) else _C(self, names).loose(tree)
 
     def _called(
         self, tree: Tree, names: dict[str, Value], calls: Mapping[str, Made], drawn: Drawn | None
@@ -170,121 +134,91 @@ class Emitter:
                 return Name(name, node.start, node.end)
             if isinstance(node, Draw) and drawn is not None:
                 name = f" {len(names)}"
-                names[name] = drawn(node, *(self.value(replaced(part), names) for part in children(node)))
+                names[name] = drawn(node, *(self.value(replaced(part), names) for part in node.parts))
                 return Name(name, node.start, node.end)
-            return rebuild(node, tuple(map(replaced, children(node))))
+            return node.having(tuple(map(replaced, node.parts)))
 
         return replaced(tree), names
 
     def text(self, value: Value) -> str:
         """A value as code; a number as the shortest literal that gives it back."""
-        return value if isinstance(value, str) else self.literal(value)[0]
+        return value if isinstance(value, str) else self.literal(value).text
 
-    def literal(self, value: float) -> _Code:
+    def literal(self, value: float) -> Code:
         """A number as code."""
         if math.isnan(value):
-            return "NAN", _ATOM
+            return Code("NAN", _ATOM)
         if math.isinf(value):
             huge = "HUGE_VALF" if self.suffix else "HUGE_VAL"
-            return (huge, _ATOM) if value > 0 else (f"-{huge}", _SIGN)
-        return repr(float(value)) + self.suffix, _ATOM if math.copysign(1.0, value) > 0 else _SIGN
+            return Code(huge, _ATOM) if value > 0 else Code(f"-{huge}", _SIGN)
+        return Code(repr(float(value)) + self.suffix, _ATOM if math.copysign(1.0, value) > 0 else _SIGN)
 
     def helpers(self, used: Container[str]) -> str:
         """The text of these helpers."""
         return "\n\n".join(text.format(real=self.real, s=self.suffix) for name, text in HELPERS.items() if name in used)
 
 
-class _Writer:
-    """Makes code: as a number, or as a truth."""
+class _C(Writer):
+    """C; a truth is an int."""
+
+    levels: ClassVar[Mapping[str, int]] = {
+        **{"or": _OR, "and": _AND, "==": _EQUAL, "!=": _EQUAL},
+        **dict.fromkeys(("<", "<=", ">", ">="), _COMPARE),
+        **{"+": _ADD, "-": _ADD, "*": _MULTIPLY, "/": _MULTIPLY, "sign": _SIGN},
+    }
+    compared: ClassVar[int] = _ADD
+    joined: ClassVar[Mapping[str, int]] = {"or": _EQUAL, "and": _EQUAL}  # compilers warn of && within ||
+    signed: ClassVar[int] = _ATOM
 
     def __init__(self, emitter: Emitter, names: Mapping[str, Value]) -> None:
         self.emitter, self.names = emitter, names
 
-    def value(self, tree: Tree) -> _Code:
-        if (square := is_square(tree)) is not None:
-            return f"nv_square({self.loose(square)})", _ATOM
-        match tree:
-            case Number(value=value):
-                return self.emitter.literal(value)
-            case Name(name=name):
-                known = self.names[name]
-                if isinstance(known, float):
-                    return self.emitter.literal(known)
-                return known, _ATOM if re.fullmatch(r"[\w.>\[\]-]*", known.replace("->", ".")) else _CHOICE
-            case Unary(operator="-", operand=operand):
-                return f"-{self.tight(operand, _ATOM)}", _SIGN
-            case Unary(operator="+", operand=operand):
-                return self.value(operand)
-            case Chain() if tree.operators[0] not in ("and", "or"):
-                return self.arithmetic(tree)
-            case Binary(operator="^", left=left, right=right):
-                return self.power(left, right)
-            case Conditional(condition=condition, then=then, otherwise=otherwise):
-                test = wrapped(self.truth(condition), _OR)
-                return f"{test} ? {self.tight(then, _OR)} : {self.tight(otherwise, _CHOICE)}", _CHOICE
-            case Call(function=function, arguments=arguments):
-                return self.call(function, arguments)
-            case _:
-                return f"{wrapped(self.truth(tree), _OR)} ? {self.number(1.0)} : {self.number(0.0)}", _CHOICE
+    def number(self, node: Number) -> Code:
+        return self.emitter.literal(node.value)
 
-    def truth(self, tree: Tree) -> _Code:
-        match tree:
-            case Binary(operator=operator, left=left, right=right) if operator in _COMPARISONS:
-                level = _COMPARISONS[operator]
-                return f"{self.tight(left, _ADD)} {operator} {self.tight(right, _ADD)}", level
-            case Chain(operators=("and", *_), operands=operands):
-                return " && ".join(wrapped(self.truth(operand), _EQUAL) for operand in operands), _AND
-            case Chain(operators=("or", *_), operands=operands):
-                # compilers warn of && within ||
-                return " || ".join(wrapped(self.truth(operand), _EQUAL) for operand in operands), _OR
-            case Unary(operator="not", operand=operand):
-                return f"!{wrapped(self.truth(operand), _ATOM)}", _SIGN
-            case _:
-                return f"{self.tight(tree, _ADD)} != {self.number(0.0)}", _EQUAL
+    def name(self, node: Name) -> Code:
+        known = self.names[node.name]
+        if isinstance(known, float):
+            return self.emitter.literal(known)
+        return Code(known, _ATOM if re.fullmatch(r"[\w.>\[\]-]*", known.replace("->", ".")) else _CHOICE)
 
-    def arithmetic(self, chain: Chain) -> _Code:
-        """Sums and products: one operator after the other."""
-        code = self.value(chain.operands[0])
-        for number, (operator, operand) in enumerate(chain.steps):
-            if number == 0 and operator == "-" and _is_zero(chain.operands[0]):
-                code = f"nv_from_zero({self.loose(operand)})", _ATOM
-            elif operator == "%":
-                code = f"nv_mod({code[0]}, {self.loose(operand)})", _ATOM
+    def counted(self, truth: Code) -> Code:
+        one, zero = (self.emitter.literal(value).text for value in (1.0, 0.0))
+        return Code(f"{truth.within(_OR)} ? {one} : {zero}", _CHOICE)
+
+    def sign(self, row: Operation) -> str:
+        return row.c
+
+    def negation(self, operand: Tree) -> Code:
+        return Code(f"!{self.truth(operand).within(_ATOM)}", _SIGN, True)
+
+    def square(self, base: Tree) -> Code:
+        return Code(f"nv_square({self.loose(base)})", _ATOM)
+
+    def arithmetic(self, node: Chain) -> Code:
+        """One operator after the other."""
+        code = self.value(node.operands[0])
+        for number, (operator, operand) in enumerate(node.steps):
+            if number == 0 and operator == "-" and _is_zero(node.operands[0]):
+                code = Code(f"nv_from_zero({self.loose(operand)})", _ATOM)
+            elif operator in self.levels:
+                code = self.infix(code, operator, operand, self.levels[operator] + 1)
             else:
-                level = _ARITHMETIC[operator]
-                joined = f" {operator} " if level == _ADD else operator
-                code = f"{wrapped(code, level)}{joined}{self.tight(operand, level + 1)}", level
+                code = Code(OPERATORS[operator].c.format(code.text, self.loose(operand)), _ATOM)
         return code
 
-    def power(self, base: Tree, exponent: Tree) -> _Code:
-        known = known_in(exponent, self.names)
-        if isinstance(known, Number):
-            return f"nv_power({self.loose(base)}, {self.number(known.value)})", _ATOM
-        return f"pow{self.emitter.suffix}({self.loose(base)}, {self.loose(exponent)})", _ATOM
+    def conditional(self, node: Conditional) -> Code:
+        test = self.truth(node.condition).within(_OR)
+        return Code(f"{test} ? {self.tight(node.then, _OR)} : {self.tight(node.otherwise, _CHOICE)}", _CHOICE)
 
-    def call(self, function: str, arguments: tuple[Tree, ...]) -> _Code:
-        codes = [self.loose(argument) for argument in arguments]
-        match function:
-            case "pow":
-                return self.power(*arguments)
-            case "min" | "max":
-                return folded(f"nv_{function}({{}}, {{}})".format, codes), _ATOM
-            case "clip":
-                greater = f"nv_max({codes[0]}, {codes[1]})"
-                return f"nv_min({greater}, {codes[2]})", _ATOM
-            case "sign" | "step" | "sigmoid":
-                return f"nv_{function}({codes[0]})", _ATOM
-            case _:
-                return f"{_LIBRARY[function]}{self.emitter.suffix}({', '.join(codes)})", _ATOM
+    def call(self, node: Call) -> Code:
+        row = FUNCTIONS[node.function]
+        if row.name == "pow" and isinstance(known := known_in(node.arguments[1], self.names), Number):
+            return Code(f"nv_power({self.loose(node.arguments[0])}, {self.emitter.literal(known.value).text})", _ATOM)
+        return Code(called(row, row.c, list(map(self.loose, node.arguments)), self.emitter.suffix), _ATOM)
 
-    def number(self, value: float) -> str:
-        return self.emitter.literal(value)[0]
-
-    def loose(self, tree: Tree) -> str:
-        return self.value(tree)[0]
-
-    def tight(self, tree: Tree, level: int) -> str:
-        return wrapped(self.value(tree), level)
+    def draw(self, node: Draw) -> Code:
+        raise ValueError("this expression draws, and no code to draw was given")
 
 
 def _is_zero(tree: Tree) -> bool:

@@ -1,28 +1,69 @@
-"""The elementary functions: the one table that parser, evaluation and code emission share.
+"""What formulas may say: functions, operators, given names. One table for all who parse, compute, check, explain.
 
 In: floats. Out: floats, by IEEE 754: poles are infinities, undefined values NaN, overflow an infinity; nothing raises.
-Each function stands here three times, side by side: on floats (the reference), on NumPy arrays, and as NumPy code.
-Adding one is adding a row. A Library is what all of them are computed by on arrays: NumPy's own functions, which differ
-from those of the C library in the last bit, or others.
+A row says all that is known of a function: on floats (the reference), on NumPy arrays, as NumPy code, in C; its
+derivatives, what it hides, where it is undefined, and what the manual says of it. Adding one is adding a row. A Library
+is what all of them are computed by on arrays: NumPy's own functions, which differ from those of the C library in the
+last bit, or others.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+import operator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
 from functools import reduce
 from types import MappingProxyType
-from typing import NamedTuple, TypeAlias
+from typing import Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
+from neurovis_spec.language.expressions.tree import Binary, Call, Chain, Number, Tree
 
 Scalar: TypeAlias = Callable[..., float]
 Vector: TypeAlias = Callable[..., FloatArray]
 
 #: Names that mean the same everywhere; ``dt`` is known to whoever evaluates.
 CONSTANTS: Mapping[str, float] = MappingProxyType({"pi": math.pi, "e": math.e})
+
+
+#: What each name means, and where.
+GIVEN: Final[Mapping[str, str]] = {
+    "pi": "The constant π, 3.14159…",
+    "e": "The constant e, 2.71828…",
+    "dt": "The seconds a step takes (time.dt, by default 1).",
+    "k": "The step of the run, from 0; in inputs, noise and definitions, which are worked out at each step.",
+    "t": "The seconds of the run, k·dt; in inputs, noise and definitions, which are worked out at each step.",
+    "i": "The index from 0: of a neuron in its group; in a connection, of the source in its reference.",
+    "j": "In a connection, the index from 0 of the target in its reference.",
+    "n": "The number of neurons of the group; a connection has n_from and n_to.",
+    "number": "In a label within a module, the number of the instance: 1 of left1, and where there is only one.",
+    "n_from": "In a connection, the number of sources.",
+    "n_to": "In a connection, the number of targets.",
+    "distance": "In a connection, how far apart the positions of both neurons are.",
+    "x": "In an activation, the combined input.",
+    "drive": "In a model, the combined input with bias, input and noise: u[t].",
+    "f": "In the activity of a model, the neuron's activation: f(v).",
+    "pre": "In a rule, the signal that reaches the synapse: the source's activity d steps ago, d being the delay.",
+    "sent": "In a rule, the source's activity of this step.",
+    "post": "In a rule, the target's activity of this step.",
+    "weight": "In a rule, the weight before the step.",
+}
+#: Names that no parameter may have.
+RESERVED: Final = ("t", "k", "dt", "i", "j", "n", "pi", "e")
+
+
+def meaning(name: str) -> str:
+    """What a name means, within a sentence.
+
+    >>> meaning("n_to")
+    'in a connection, the number of targets'
+    """
+    about = GIVEN[name].removesuffix(".")
+    return about[0].lower() + about[1:]
 
 
 def divide(a: float, b: float) -> float:
@@ -125,20 +166,92 @@ def _unbounded(function: Callable[[float], float], odd: bool = False) -> Scalar:
 _exp = _unbounded(math.exp)
 
 
-class Function(NamedTuple):
-    """A function: ``least`` to ``most`` arguments (None: as many as wanted), and what it is to each consumer.
+class Hidden(IntEnum):
+    """What does not show in the value of the whole: more and more."""
 
-    ``code`` is a template with ``{0}``, ``{1}``, … for the code of its arguments, and gives a call; of a function
-    of any number of arguments it takes two, and the emitter folds. ``signed``: it puts a sign before its arguments.
+    NOTHING = 0
+    INFINITY = 1
+    ALL = 2
+
+
+class Undefined(NamedTuple):
+    """An operation is undefined ``where`` a formula over its arguments is true, and, unless the argument of that is a
+    number, a ``further`` one. ``what`` says it of a definition: ``divides by 0``."""
+
+    what: str
+    where: str
+    further: str = ""
+
+
+#: How far all who compute a function agree: to the bit; but for the sign of a 0; up to rounding.
+Agreement: TypeAlias = Literal["bits", "zeros", "rounding"]
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """An operator between a and b, and what it is to each consumer.
+
+    ``usage`` is how it is written. ``code`` and ``c`` are templates with ``{0}``, ``{1}``, … for the code of its
+    arguments, in C with ``{s}`` for the suffix of functions and literals, or the sign of an infix operator.
+    ``derivative`` gives, by each argument, a formula over them; None: it jumps, and is constant in between.
+    ``hides`` is what its value hides of its arguments, or gives that for each of them: mostly NaN gives NaN, and an
+    infinity either. ``infinite`` says where it gives an infinity, ``undefined`` where an infinity or NaN; that a number
+    overflows is neither.
     """
 
     usage: str
-    scalar: Scalar
+    scalar: Callable[..., float]
     array: Vector
     code: str
-    least: int = 1
-    most: int | None = 1
-    signed: bool = False
+    c: str
+    derivative: tuple[str, ...] | None
+    hides: Hidden | Callable[..., tuple[Hidden, ...]] = Hidden.NOTHING
+    infinite: tuple[Undefined, ...] = ()
+    undefined: tuple[Undefined, ...] = ()
+    agree: Agreement = "bits"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What its formulas call its arguments."""
+        return ("a", "b")
+
+    def hidden(self, arguments: tuple[Tree, ...]) -> tuple[Hidden, ...]:
+        """What its value hides of each of these arguments."""
+        hides = self.hides
+        return (hides,) * len(arguments) if isinstance(hides, Hidden) else hides(*arguments)
+
+
+@dataclass(frozen=True, slots=True)
+class Function(Operation):
+    """A function. Of one of any number of arguments the usage ends in an ellipsis; its code takes two, and is folded.
+
+    ``about`` is the word of the manual; ``helper`` the C function that ``c`` calls and C lacks, with ``{real}`` for the
+    type of numbers.
+    """
+
+    agree: Agreement = "rounding"
+    about: str = ""
+    helper: str = ""
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        return self.usage.partition("(")[0]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What its formulas call its arguments, as its usage does."""
+        return tuple(name for name in self.usage.partition("(")[2].rstrip(")").split(", ") if name != "…")
+
+    @property
+    def least(self) -> int:
+        """The least number of arguments."""
+        return len(self.names)
+
+    @property
+    def most(self) -> int | None:
+        """The greatest; None: as many as wanted."""
+        return None if "…" in self.usage else len(self.names)
 
 
 def _clip(x: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
@@ -157,50 +270,233 @@ def _folded(function: np.ufunc) -> Vector:
     return lambda *values: reduce(function, values)
 
 
-def _one(name: str, scalar: Scalar, array: np.ufunc) -> Function:
-    return Function(f"{name}(x)", scalar, array, f"np.{array.__name__}({{0}})")
+def _of_power(base: Tree, exponent: Tree) -> tuple[Hidden, Hidden]:
+    """∞^−1 is 0, and NaN^0 is 1."""
+    grows = isinstance(exponent, Number) and exponent.value > 0
+    return Hidden.NOTHING if grows else Hidden.ALL, Hidden.ALL
 
 
+def _behind(a: Tree, b: Tree) -> tuple[Hidden, Hidden]:
+    """x/∞ is 0."""
+    return Hidden.NOTHING, Hidden.INFINITY
+
+
+_BY_ZERO = (Undefined("divides by 0", "b == 0"),)
+_POLE_OF_POWER = Undefined("divides by 0", "x == 0", "exponent < 0")
+_BROKEN_POWER = Undefined("takes a broken power of a number below 0", "x < 0", "exponent != floor(exponent)")
+
+#: The operators that join two operands; ``x^y`` is ``pow``.
+OPERATORS: Mapping[str, Operation] = MappingProxyType({
+    "+": Operation("a + b", operator.add, np.add, "+", "+", ("1", "1")),
+    "-": Operation("a - b", operator.sub, np.subtract, "-", "-", ("1", "-1")),
+    "*": Operation("a * b", operator.mul, np.multiply, "*", "*", ("b", "a")),
+    "/": Operation(
+        "a / b", divide, np.divide, "np.divide({0}, {1})", "/", ("1/b", "-a/b^2"),
+        hides=_behind, infinite=_BY_ZERO, undefined=_BY_ZERO,
+    ),
+    "%": Operation(
+        "a % b", modulo, np.remainder, "np.remainder({0}, {1})", "nv_mod({0}, {1})", ("1", "-floor(a/b)"),
+        hides=_behind, undefined=_BY_ZERO, agree="zeros",
+    ),
+    "<": Operation("a < b", operator.lt, np.less, "<", "<", None, Hidden.ALL),
+    "<=": Operation("a <= b", operator.le, np.less_equal, "<=", "<=", None, Hidden.ALL),
+    ">": Operation("a > b", operator.gt, np.greater, ">", ">", None, Hidden.ALL),
+    ">=": Operation("a >= b", operator.ge, np.greater_equal, ">=", ">=", None, Hidden.ALL),
+    "==": Operation("a == b", operator.eq, np.equal, "==", "==", None, Hidden.ALL),
+    "!=": Operation("a != b", operator.ne, np.not_equal, "!=", "!=", None, Hidden.ALL),
+    "and": Operation("a and b", lambda a, b: a != 0 and b != 0, np.logical_and, "&", "&&", None, Hidden.ALL),
+    "or": Operation("a or b", lambda a, b: a != 0 or b != 0, np.logical_or, "|", "||", None, Hidden.ALL),
+})  # fmt: skip
+
+_ROWS = (
+    Function(
+        "abs(x)", math.fabs, np.absolute, "np.absolute({0})", "fabs{s}({0})", ("sign(x)",),
+        about="The absolute value.", agree="bits",
+    ),
+    Function(
+        "sign(x)", sign, np.sign, "np.sign({0})", "nv_sign({0})", None,
+        about="−1, 0 or 1.", agree="bits", hides=Hidden.INFINITY,
+        helper="""static {real} nv_sign({real} x)
+{{
+    return x > 0.0{s} ? 1.0{s} : x < 0.0{s} ? -1.0{s} : x == 0.0{s} ? 0.0{s} : x;
+}}""",
+    ),
+    Function(
+        "min(a, b, …)", minimum, _folded(np.minimum), "np.minimum({0}, {1})", "nv_min({0}, {1})",
+        ("1 if a <= b else 0", "0 if a <= b else 1"),
+        about="The least of two or more.", agree="zeros", hides=Hidden.INFINITY,
+        helper="""static {real} nv_min({real} a, {real} b)
+{{
+    return a <= b || a != a ? a : b;
+}}""",
+    ),
+    Function(
+        "max(a, b, …)", maximum, _folded(np.maximum), "np.maximum({0}, {1})", "nv_max({0}, {1})",
+        ("1 if a >= b else 0", "0 if a >= b else 1"),
+        about="The greatest of two or more.", agree="zeros", hides=Hidden.INFINITY,
+        helper="""static {real} nv_max({real} a, {real} b)
+{{
+    return a >= b || a != a ? a : b;
+}}""",
+    ),
+    Function(
+        "clip(x, low, high)", clip, _clip,
+        "np.minimum(np.maximum({0}, {1}), {2})", "nv_min(nv_max({0}, {1}), {2})",
+        (
+            "1 if low <= x and x <= high else 0",
+            "1 if x < low and low <= high else 0",
+            "1 if max(x, low) > high else 0",
+        ),
+        about="x, held between two bounds.", agree="zeros", hides=Hidden.INFINITY,
+    ),
+    Function(
+        "floor(x)", _integral(math.floor), np.floor, "np.floor({0})", "floor{s}({0})", None,
+        about="The integer below.", agree="bits",
+    ),
+    Function(
+        "ceil(x)", _integral(math.ceil), np.ceil, "np.ceil({0})", "ceil{s}({0})", None,
+        about="The integer above.", agree="bits",
+    ),
+    Function(
+        "round(x)", _integral(round), np.rint, "np.rint({0})", "rint{s}({0})", None,
+        about="The nearest integer; halves go to the even one.", agree="bits",
+    ),
+    Function(
+        "sqrt(x)", _defined(math.sqrt), np.sqrt, "np.sqrt({0})", "sqrt{s}({0})", ("0.5/sqrt(x)",),
+        about="The square root.", agree="bits",
+        undefined=(Undefined("takes the square root of a number below 0", "x < 0"),),
+    ),
+    Function(
+        "exp(x)", _exp, np.exp, "np.exp({0})", "exp{s}({0})", ("exp(x)",),
+        about="e to the power of x.", hides=Hidden.INFINITY,
+    ),
+    Function(
+        "log(x)", _with_pole(math.log, 0.0), np.log, "np.log({0})", "log{s}({0})", ("1/x",),
+        about="The natural logarithm.",
+        infinite=(Undefined("takes the logarithm of 0", "x == 0"),),
+        undefined=(Undefined("takes the logarithm of a number that is not above 0", "x <= 0"),),
+    ),
+    Function(
+        "log1p(x)", _with_pole(math.log1p, -1.0), np.log1p, "np.log1p({0})", "log1p{s}({0})", ("1/(1 + x)",),
+        about="log(1 + x), exact for small x.",
+        infinite=(Undefined("takes the logarithm of 0", "x == -1"),),
+        undefined=(Undefined("takes the logarithm of a number that is not above 0", "x <= -1"),),
+    ),
+    Function(
+        "expm1(x)", _unbounded(math.expm1), np.expm1, "np.expm1({0})", "expm1{s}({0})", ("exp(x)",),
+        about="exp(x) − 1, exact for small x.", hides=Hidden.INFINITY,
+    ),
+    Function(
+        "pow(x, exponent)", power, np.float_power, "np.float_power({0}, {1})", "pow{s}({0}, {1})",
+        ("exponent*x^(exponent - 1)", "x^exponent*log(x)"),
+        about="x to the power of the exponent, as x^exponent.",
+        hides=_of_power, infinite=(_POLE_OF_POWER,), undefined=(_POLE_OF_POWER, _BROKEN_POWER),
+        # np.power takes a root of −∞ where the exponent is a scalar 0.5; of a power whose exponent it knows a compiler
+        # makes a product, which is not what the library gives
+        helper="""static {real} nv_power({real} x, {real} exponent)
+{{
+    volatile {real} e = exponent;
+    return pow{s}(x, e);
+}}""",
+    ),
+    Function(
+        "sin(x)", _defined(math.sin), np.sin, "np.sin({0})", "sin{s}({0})", ("cos(x)",),
+        about="The sine; angles are in radians.",
+    ),
+    Function(
+        "cos(x)", _defined(math.cos), np.cos, "np.cos({0})", "cos{s}({0})", ("-sin(x)",),
+        about="The cosine.",
+    ),
+    Function(
+        "tan(x)", _defined(math.tan), np.tan, "np.tan({0})", "tan{s}({0})", ("1 + tan(x)^2",),
+        about="The tangent.",
+    ),
+    Function(
+        "asin(x)", _defined(math.asin), np.arcsin, "np.arcsin({0})", "asin{s}({0})", ("1/sqrt(1 - x^2)",),
+        about="The angle with this sine, from −π/2 to π/2.",
+        undefined=(Undefined("takes asin of a number beyond -1 to 1", "abs(x) > 1"),),
+    ),
+    Function(
+        "acos(x)", _defined(math.acos), np.arccos, "np.arccos({0})", "acos{s}({0})", ("-1/sqrt(1 - x^2)",),
+        about="The angle with this cosine, from 0 to π.",
+        undefined=(Undefined("takes acos of a number beyond -1 to 1", "abs(x) > 1"),),
+    ),
+    Function(
+        "atan(x)", math.atan, np.arctan, "np.arctan({0})", "atan{s}({0})", ("1/(1 + x^2)",),
+        about="The angle with this tangent, from −π/2 to π/2.", hides=Hidden.INFINITY,
+    ),
+    Function(
+        "atan2(y, x)", math.atan2, np.arctan2, "np.arctan2({0}, {1})", "atan2{s}({0}, {1})",
+        ("x/(x^2 + y^2)", "-y/(x^2 + y^2)"),
+        about="The angle of the point (x, y), from −π to π.", hides=Hidden.INFINITY,
+    ),
+    Function(
+        "sinh(x)", _unbounded(math.sinh, odd=True), np.sinh, "np.sinh({0})", "sinh{s}({0})", ("cosh(x)",),
+        about="The hyperbolic sine.",
+    ),
+    Function(
+        "cosh(x)", _unbounded(math.cosh), np.cosh, "np.cosh({0})", "cosh{s}({0})", ("sinh(x)",),
+        about="The hyperbolic cosine.",
+    ),
+    Function(
+        "tanh(x)", math.tanh, np.tanh, "np.tanh({0})", "tanh{s}({0})", ("1 - tanh(x)^2",),
+        about="The hyperbolic tangent, from −1 to 1.", hides=Hidden.INFINITY,
+    ),
+    Function(
+        "sigmoid(x)", sigmoid, _sigmoid, "np.reciprocal(1.0 + np.exp(-{0}))", "nv_sigmoid({0})",
+        ("sigmoid(x)*(1 - sigmoid(x))",),
+        about="1 / (1 + exp(−x)), from 0 to 1.", hides=Hidden.INFINITY,
+        helper="""static {real} nv_sigmoid({real} x)
+{{
+    return 1.0{s} / (1.0{s} + exp{s}(-x));
+}}""",
+    ),
+    Function(
+        "step(x)", step, _step, "np.heaviside({0}, 1.0)", "nv_step({0})", None,
+        about="1 from 0 on, else 0.", agree="bits", hides=Hidden.INFINITY,
+        helper="""static {real} nv_step({real} x)
+{{
+    return x >= 0.0{s} ? 1.0{s} : x < 0.0{s} ? 0.0{s} : x;
+}}""",
+    ),
+)  # fmt: skip
 #: All functions of §6, in its order.
-FUNCTIONS: Mapping[str, Function] = MappingProxyType(
-    {
-        "abs": _one("abs", math.fabs, np.absolute),
-        "sign": _one("sign", sign, np.sign),
-        "min": Function("min(a, b, …)", minimum, _folded(np.minimum), "np.minimum({0}, {1})", 2, None),
-        "max": Function("max(a, b, …)", maximum, _folded(np.maximum), "np.maximum({0}, {1})", 2, None),
-        "clip": Function("clip(x, low, high)", clip, _clip, "np.minimum(np.maximum({0}, {1}), {2})", 3, 3),
-        "floor": _one("floor", _integral(math.floor), np.floor),
-        "ceil": _one("ceil", _integral(math.ceil), np.ceil),
-        "round": _one("round", _integral(round), np.rint),
-        "sqrt": _one("sqrt", _defined(math.sqrt), np.sqrt),
-        "exp": _one("exp", _exp, np.exp),
-        "log": _one("log", _with_pole(math.log, 0.0), np.log),
-        "log1p": _one("log1p", _with_pole(math.log1p, -1.0), np.log1p),
-        "expm1": _one("expm1", _unbounded(math.expm1), np.expm1),
-        "pow": Function("pow(x, exponent)", power, np.float_power, "np.float_power({0}, {1})", 2, 2),
-        "sin": _one("sin", _defined(math.sin), np.sin),
-        "cos": _one("cos", _defined(math.cos), np.cos),
-        "tan": _one("tan", _defined(math.tan), np.tan),
-        "asin": _one("asin", _defined(math.asin), np.arcsin),
-        "acos": _one("acos", _defined(math.acos), np.arccos),
-        "atan": _one("atan", math.atan, np.arctan),
-        "atan2": Function("atan2(y, x)", math.atan2, np.arctan2, "np.arctan2({0}, {1})", 2, 2),
-        "sinh": _one("sinh", _unbounded(math.sinh, odd=True), np.sinh),
-        "cosh": _one("cosh", _unbounded(math.cosh), np.cosh),
-        "tanh": _one("tanh", math.tanh, np.tanh),
-        "sigmoid": Function("sigmoid(x)", sigmoid, _sigmoid, "np.reciprocal(1.0 + np.exp(-{0}))", signed=True),
-        "step": Function("step(x)", step, _step, "np.heaviside({0}, 1.0)"),
-    }
-)
+FUNCTIONS: Mapping[str, Function] = MappingProxyType({row.name: row for row in _ROWS})
+
+
+def rows_of(node: Tree) -> Iterator[Operation]:
+    """What a node computes itself; its parts are others' business, and so are signs."""
+    match node:
+        case Chain(operators=operators):
+            yield from map(OPERATORS.__getitem__, operators)
+        case Binary(operator=sign):
+            yield FUNCTIONS["pow"] if sign == "^" else OPERATORS[sign]
+        case Call(function=name):
+            yield FUNCTIONS[name]
+
+
+class Draws(NamedTuple):
+    """What draws a random number from two arguments: how it is written, in a finding and in the manual, and the words
+    of this."""
+
+    usage: str
+    brief: str
+    about: str
+
+
+#: The functions that draw.
+DRAWS: Mapping[str, Draws] = MappingProxyType({
+    "normal": Draws("normal(mean, deviation)", "normal(mean, sd)", "A normally distributed random number."),
+    "uniform": Draws("uniform(low, high)", "uniform(low, high)", "An evenly distributed random number."),
+})  # fmt: skip
 
 
 class Library(NamedTuple):
-    """What computes the functions of formulas on arrays: ``calls`` by their names, and two operators, ``%`` and ``^``.
-    What is left, sums, products and comparisons, is exact to rounding whoever computes it."""
+    """What computes the functions of formulas on arrays: ``calls`` by their names, and the operator ``%``; ``^`` is
+    ``pow``. What is left, sums, products and comparisons, is exact to rounding whoever computes it."""
 
     calls: Mapping[str, Vector]
     remainder: Vector
-    power: Vector
 
 
 def _each(scalar: Scalar, count: int) -> Vector:
@@ -211,19 +507,11 @@ def _each(scalar: Scalar, count: int) -> Vector:
 
 def _of_numbers(function: Function) -> Vector:
     """The function on floats, for arrays."""
-    if function.most is None:
-        two = _each(function.scalar, function.least)
-        return lambda *values: reduce(two, values)
-    return _each(function.scalar, function.most)
+    each = _each(function.scalar, function.least)
+    return each if function.most is not None else lambda *values: reduce(each, values)
 
 
 #: NumPy's functions: quick, and their last bits depend on what the processor can do.
-NUMPY = Library(
-    {name: function.array for name, function in FUNCTIONS.items()},
-    np.remainder,
-    np.float_power,  # not np.power, which takes a root of −∞ where the exponent is a scalar 0.5
-)
+NUMPY = Library({name: function.array for name, function in FUNCTIONS.items()}, np.remainder)
 #: Python's functions, number by number: they are those of the C library, bit for bit.
-PLAIN = Library(
-    {name: _of_numbers(function) for name, function in FUNCTIONS.items()}, _each(modulo, 2), _each(power, 2)
-)
+PLAIN = Library({name: _of_numbers(function) for name, function in FUNCTIONS.items()}, _each(modulo, 2))

@@ -14,8 +14,8 @@ from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple
 
 from neurovis_spec.diagnostics import shorten
-from neurovis_spec.language.expressions.errors import ExpressionError
 from neurovis_spec.language.expressions.habits import UNITS, ungrouped, ungrouped_hint, unit_hint, unit_of
+from neurovis_spec.language.expressions.tree import ExpressionError
 from neurovis_spec.language.yaml.characters import character_name
 
 Kind = Literal["number", "name", "operator", "end"]

@@ -13,11 +13,10 @@ from functools import cached_property
 from typing import Final, Literal, TypeAlias, cast, get_args
 
 from neurovis_spec.language.expressions import mistakes
-from neurovis_spec.language.expressions.errors import ExpressionError
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.expressions.lexer import Token
 from neurovis_spec.language.expressions.parser import Parser
-from neurovis_spec.language.expressions.tree import Name, Number, Tree
+from neurovis_spec.language.expressions.tree import ExpressionError, Name, Number, Tree
 from neurovis_spec.likeness import suggest
 
 #: What a window is summed up by.

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from neurovis_spec.diagnostics import shorten
-from neurovis_spec.language.expressions.errors import ExpressionError
 from neurovis_spec.language.expressions.habits import unit_hint
 from neurovis_spec.language.expressions.lexer import Token, is_operand
+from neurovis_spec.language.expressions.tree import ExpressionError
 from neurovis_spec.likeness import nearest
 
 INSTEAD: Mapping[str, str] = {

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import cache
 from typing import Literal, TypeAlias, cast
 
 from neurovis_spec.language.expressions import mistakes
-from neurovis_spec.language.expressions.errors import ExpressionError
-from neurovis_spec.language.expressions.functions import FUNCTIONS
+from neurovis_spec.language.expressions.functions import DRAWS, FUNCTIONS
 from neurovis_spec.language.expressions.lexer import Token, tokens
 from neurovis_spec.language.expressions.tree import (
-    LEVELS,
     Binary,
     BinaryOperator,
     Call,
@@ -25,6 +25,7 @@ from neurovis_spec.language.expressions.tree import (
     ChainOperator,
     Conditional,
     Draw,
+    ExpressionError,
     Name,
     Number,
     Tree,
@@ -38,14 +39,18 @@ __all__ = ["ExpressionError", "parse", "unknown_names"]
 
 #: How many operators, parentheses and calls may stand inside each other; keeps every walk off the recursion limit.
 MAX_NESTING = 64
-#: The functions that draw a number from two arguments.
-DRAWS: Mapping[str, str] = {"normal": "normal(mean, deviation)", "uniform": "uniform(low, high)"}
-
 #: The least and the most arguments of a function; None where there is no most.
 Arity: TypeAlias = tuple[int, int | None]
 
-_COMPARISON, _SIGN, _POWER = LEVELS["<"], LEVELS["%"] + 1, LEVELS["^"]
-_NOT = LEVELS["<"] - 1
+#: How tight the operators bind; ``not`` is between ``and`` and the comparisons, signs between ``%`` and ``^``.
+_OR, _AND, _NOT, _COMPARISON, _SUM, _PRODUCT, _SIGN, _POWER = range(1, 9)
+_LEVELS: Mapping[str, int] = {
+    **{"or": _OR, "and": _AND},
+    **dict.fromkeys(("<", "<=", ">", ">=", "==", "!="), _COMPARISON),
+    **dict.fromkeys(("+", "-"), _SUM),
+    **dict.fromkeys(("*", "/", "%"), _PRODUCT),
+    **dict.fromkeys(("^", "**"), _POWER),
+}
 
 
 def parse(
@@ -62,6 +67,18 @@ def parse(
 right=Number(value=2.0, start=3, end=4), start=1, end=4), start=0, end=4)
     """
     return Parser(text, random, dict(extra_functions or {}), subscripts=subscripts).whole()
+
+
+@cache
+def formula(text: str) -> Tree:
+    """The tree of a formula of the table of functions, without places; a sign before a number belongs to it."""
+    return _unplaced(parse(text))
+
+
+def _unplaced(tree: Tree) -> Tree:
+    if isinstance(tree, Unary) and isinstance(tree.operand, Number):
+        return Number(-tree.operand.value)
+    return replace(tree.having(tuple(map(_unplaced, tree.parts))), start=0, end=0)
 
 
 def unknown_names(tree: Tree, known: Iterable[str]) -> list[Name]:
@@ -191,7 +208,7 @@ class Parser:
 
     def level(self) -> int:
         """How tight the operator binds that stands here; -1 where there is none."""
-        return LEVELS.get(self.token.text, -1) if self.token.kind == "operator" else -1
+        return _LEVELS.get(self.token.text, -1) if self.token.kind == "operator" else -1
 
     def chain(self, first: Tree, own: int, start: int) -> Tree:
         """What is joined to ``first`` by operators that bind as tight as ``own``."""
@@ -277,7 +294,8 @@ class Parser:
             hint = "draw in 'weight', 'centre', 'bias', 'initial' (once) or in 'noise' (at every step)"
             self.faults.append(ExpressionError("draw-not-allowed", message, name.start, name.end, hint))
         elif given is not None and not _takes(arity, given):
-            usage = DRAWS.get(name.text) if drawn else FUNCTIONS[name.text].usage if name.text in FUNCTIONS else None
+            row = DRAWS[name.text] if drawn else FUNCTIONS.get(name.text)
+            usage = None if row is None else row.usage
             self.faults.append(mistakes.wrong_arguments(name, end, given, arity, usage))
         else:
             return True

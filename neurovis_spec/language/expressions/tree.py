@@ -1,36 +1,48 @@
-"""The typed tree of an expression.
+"""The typed tree of an expression, and the one place that tells its kinds of nodes apart.
 
-In: nothing; this is the data that the parser makes and that ``evaluate`` (numbers), ``arrays`` (NumPy values) and
-``emit`` (NumPy code) consume. Every node knows the characters it came from, ``start`` to ``end`` (0-based,
-exclusive), in the text of its expression.
+In: nothing; this is the data that the parser makes. Who reads it is a Visitor: values (``evaluate``), NumPy code and C
+(``emit``, ``emit_c``), what is undefined (``undefined``), derivatives (``derivative``). Every node knows the characters
+it came from, ``start`` to ``end`` (0-based, exclusive), in the text of its expression, and its ``parts``: its operands,
+in the order written.
+
+What is wrong with a text is an ExpressionError, which the caller turns into a finding at its place in the file. Behind
+a mistake of the grammar all is guesswork; functions that are unknown, out of place or called wrongly are mistakes of
+their own, of which there may be several.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, TypeAlias
+from typing import ClassVar, Generic, Literal, TypeAlias, TypeVar
 
-from neurovis_spec.language.expressions.errors import ExpressionError
+T = TypeVar("T")
 
 UnaryOperator = Literal["-", "+", "not"]
 BinaryOperator = Literal["^", "<", "<=", ">", ">=", "==", "!="]
 ChainOperator = Literal["+", "-", "*", "/", "%", "and", "or"]
 
-#: How tight the operators bind; ``not`` is between ``and`` and the comparisons, signs between ``%`` and ``^``.
-LEVELS: Mapping[str, int] = {
-    **dict.fromkeys(("or",), 1),
-    **dict.fromkeys(("and",), 2),
-    **dict.fromkeys(("<", "<=", ">", ">=", "==", "!="), 4),
-    **dict.fromkeys(("+", "-"), 5),
-    **dict.fromkeys(("*", "/", "%"), 6),
-    **dict.fromkeys(("^", "**"), 8),
-}
 #: The cost of an expression: its operations and values.
 MAX_COST = 600
 #: How far down a tree goes, which every walk may do by recursion. A long sum is one node.
 MAX_DEPTH = 200
+
+
+class ExpressionError(Exception):
+    """An expression is invalid from character ``start`` to ``end`` (0-based, exclusive) of its text. ``others`` are
+    further mistakes in it; ``used`` its names, each with where it begins and ends, as far as these are known."""
+
+    def __init__(self, code: str, message: str, start: int, end: int, hint: str | None = None) -> None:
+        self.code = code
+        self.message = message
+        self.start = start
+        self.end = end
+        self.hint = hint
+        self.others: tuple[ExpressionError, ...] = ()
+        self.used: tuple[tuple[str, int, int], ...] = ()
+        super().__init__(message)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +53,12 @@ class Number:
     start: int = 0
     end: int = 0
 
+    parts: ClassVar[tuple[Tree, ...]] = ()
+
+    def having(self, parts: tuple[Tree, ...]) -> Number:
+        """The node with other operands."""
+        return self
+
 
 @dataclass(frozen=True, slots=True)
 class Name:
@@ -49,6 +67,12 @@ class Name:
     name: str
     start: int = 0
     end: int = 0
+
+    parts: ClassVar[tuple[Tree, ...]] = ()
+
+    def having(self, parts: tuple[Tree, ...]) -> Name:
+        """The node with other operands."""
+        return self
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +83,16 @@ class Unary:
     operand: Tree
     start: int = 0
     end: int = 0
+
+    @property
+    def parts(self) -> tuple[Tree, ...]:
+        """The operand."""
+        return (self.operand,)
+
+    def having(self, parts: tuple[Tree, ...]) -> Unary:
+        """The node with other operands."""
+        (operand,) = parts
+        return Unary(self.operator, operand, self.start, self.end)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +105,16 @@ class Binary:
     start: int = 0
     end: int = 0
 
+    @property
+    def parts(self) -> tuple[Tree, ...]:
+        """Both operands."""
+        return (self.left, self.right)
+
+    def having(self, parts: tuple[Tree, ...]) -> Binary:
+        """The node with other operands."""
+        left, right = parts
+        return Binary(self.operator, left, right, self.start, self.end)
+
 
 @dataclass(frozen=True, slots=True)
 class Chain:
@@ -81,6 +125,15 @@ class Chain:
     operands: tuple[Tree, ...]
     start: int = 0
     end: int = 0
+
+    @property
+    def parts(self) -> tuple[Tree, ...]:
+        """All operands."""
+        return self.operands
+
+    def having(self, parts: tuple[Tree, ...]) -> Chain:
+        """The node with other operands."""
+        return Chain(self.operators, parts, self.start, self.end)
 
     @property
     def steps(self) -> Iterator[tuple[ChainOperator, Tree]]:
@@ -98,6 +151,16 @@ class Conditional:
     start: int = 0
     end: int = 0
 
+    @property
+    def parts(self) -> tuple[Tree, ...]:
+        """Both values, and between them the condition."""
+        return (self.then, self.condition, self.otherwise)
+
+    def having(self, parts: tuple[Tree, ...]) -> Conditional:
+        """The node with other operands."""
+        then, condition, otherwise = parts
+        return Conditional(condition, then, otherwise, self.start, self.end)
+
 
 @dataclass(frozen=True, slots=True)
 class Call:
@@ -107,6 +170,15 @@ class Call:
     arguments: tuple[Tree, ...]
     start: int = 0
     end: int = 0
+
+    @property
+    def parts(self) -> tuple[Tree, ...]:
+        """The arguments."""
+        return self.arguments
+
+    def having(self, parts: tuple[Tree, ...]) -> Call:
+        """The node with other operands."""
+        return Call(self.function, parts, self.start, self.end)
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,27 +192,95 @@ class Draw:
     start: int = 0
     end: int = 0
 
+    @property
+    def parts(self) -> tuple[Tree, ...]:
+        """Both arguments."""
+        return (self.first, self.second)
+
+    def having(self, parts: tuple[Tree, ...]) -> Draw:
+        """The node with other operands."""
+        first, second = parts
+        return Draw(self.kind, first, second, self.index, self.start, self.end)
+
 
 Tree: TypeAlias = Number | Name | Unary | Binary | Chain | Conditional | Call | Draw
 
 
-def children(tree: Tree) -> tuple[Tree, ...]:
-    """The operands of a node, in the order written."""
-    match tree:
-        case Unary(operand=operand):
-            return (operand,)
-        case Binary(left=left, right=right):
-            return (left, right)
-        case Chain(operands=operands):
-            return operands
-        case Conditional(condition=condition, then=then, otherwise=otherwise):
-            return (then, condition, otherwise)
-        case Call(arguments=arguments):
-            return arguments
-        case Draw(first=first, second=second):
-            return (first, second)
-        case _:
-            return ()
+class Visitor(ABC, Generic[T]):
+    """What is made of a tree: ``of`` tells what kind of node it is, and the method of that kind says what becomes of
+    it, with ``of`` for those of its parts that count. ``+x`` is x to everybody, and ``x^y`` the call of ``pow``."""
+
+    def of(self, tree: Tree) -> T:
+        """What becomes of this tree."""
+        match tree:
+            case Name():
+                return self.name(tree)
+            case Number():
+                return self.number(tree)
+            case Chain():
+                return self.logic(tree) if tree.operators[0] in ("and", "or") else self.arithmetic(tree)
+            case Binary() | Call() if (base := is_square(tree)) is not None:
+                return self.square(base)
+            case Call():
+                return self.call(tree)
+            case Binary(operator="^"):
+                return self.call(Call("pow", tree.parts, tree.start, tree.end))
+            case Binary():
+                return self.comparison(tree)
+            case Unary(operator="-"):
+                return self.negative(tree.operand)
+            case Unary(operator="not"):
+                return self.negation(tree.operand)
+            case Unary():
+                return self.of(tree.operand)
+            case Conditional():
+                return self.conditional(tree)
+            case Draw():
+                return self.draw(tree)
+
+    @abstractmethod
+    def number(self, node: Number) -> T:
+        """A literal."""
+
+    @abstractmethod
+    def name(self, node: Name) -> T:
+        """A value that has a name."""
+
+    @abstractmethod
+    def negative(self, operand: Tree) -> T:
+        """``-x``."""
+
+    @abstractmethod
+    def negation(self, operand: Tree) -> T:
+        """``not x``."""
+
+    @abstractmethod
+    def square(self, base: Tree) -> T:
+        """``x^2``, or ``pow(x, 2)``, the exponent being written so."""
+
+    @abstractmethod
+    def comparison(self, node: Binary) -> T:
+        """``a < b``."""
+
+    @abstractmethod
+    def arithmetic(self, node: Chain) -> T:
+        """A sum or a product."""
+
+    @abstractmethod
+    def logic(self, node: Chain) -> T:
+        """``a and b``, ``a or b``."""
+
+    @abstractmethod
+    def conditional(self, node: Conditional) -> T:
+        """``a if c else b``."""
+
+    @abstractmethod
+    def call(self, node: Call) -> T:
+        """A function, of the language or of the place (``f`` of a model)."""
+
+    @abstractmethod
+    def draw(self, node: Draw) -> T:
+        """A random number."""
 
 
 def walk(tree: Tree) -> Iterator[Tree]:
@@ -149,7 +289,7 @@ def walk(tree: Tree) -> Iterator[Tree]:
     while waiting:
         node = waiting.pop()
         yield node
-        waiting.extend(reversed(children(node)))
+        waiting.extend(reversed(node.parts))
 
 
 def names(tree: Tree) -> frozenset[str]:
@@ -184,25 +324,6 @@ def is_square(tree: Tree) -> Tree | None:
             return None
 
 
-def rebuild(tree: Tree, parts: tuple[Tree, ...]) -> Tree:
-    """The node with other operands, in the order of ``children``."""
-    match tree:
-        case Unary():
-            return replace(tree, operand=parts[0])
-        case Binary():
-            return replace(tree, left=parts[0], right=parts[1])
-        case Chain():
-            return replace(tree, operands=parts)
-        case Conditional():
-            return replace(tree, then=parts[0], condition=parts[1], otherwise=parts[2])
-        case Call():
-            return replace(tree, arguments=parts)
-        case Draw():
-            return replace(tree, first=parts[0], second=parts[1])
-        case _:
-            return tree
-
-
 def substitute(tree: Tree, mapping: Mapping[str, Tree]) -> Tree:
     """The tree with the names in ``mapping`` replaced (at once, not again in what was put in).
 
@@ -215,15 +336,16 @@ def substitute(tree: Tree, mapping: Mapping[str, Tree]) -> Tree:
     costs = {name: sum(map(_cost, walk(put))) for name, put in mapping.items()}
     cost = sum(costs.get(node.name, 1) if isinstance(node, Name) else _cost(node) for node in walk(tree))
     _check_cost(cost, tree)
-    result = _substituted(tree, mapping)
+    result = put(tree, mapping)
     check_extent(result, tree)
     return result
 
 
-def _substituted(tree: Tree, mapping: Mapping[str, Tree]) -> Tree:
+def put(tree: Tree, mapping: Mapping[str, Tree]) -> Tree:
+    """The same, however much it costs."""
     if isinstance(tree, Name):
         return mapping.get(tree.name, tree)
-    return rebuild(tree, tuple(_substituted(part, mapping) for part in children(tree)))
+    return tree.having(tuple(put(part, mapping) for part in tree.parts))
 
 
 def check_extent(tree: Tree, place: Tree | None = None) -> None:
@@ -235,7 +357,7 @@ def check_extent(tree: Tree, place: Tree | None = None) -> None:
         node, depth = waiting.pop()
         cost += _cost(node)
         deepest = max(deepest, depth)
-        waiting.extend((child, depth + 1) for child in children(node))
+        waiting.extend((child, depth + 1) for child in node.parts)
     _check_cost(cost, place)
     if deepest > MAX_DEPTH:
         message = f"this expression has more than {MAX_DEPTH} operations inside each other"

@@ -12,33 +12,28 @@ something is hidden are given. That a number overflows is no hazard: what hides 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from enum import IntEnum
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from neurovis_spec.language.expressions.evaluate import evaluate
+from neurovis_spec.language.expressions.functions import FUNCTIONS, OPERATORS, Hidden, Operation
+from neurovis_spec.language.expressions.parser import formula
 from neurovis_spec.language.expressions.tree import (
     Binary,
     Call,
     Chain,
     Conditional,
+    Draw,
     Name,
     Number,
     Tree,
     Unary,
-    children,
+    Visitor,
     names,
+    put,
 )
 
 _NONE: Mapping[str, Tree] = MappingProxyType({})
-
-
-class Hidden(IntEnum):
-    """What does not show in the value of the whole: more and more."""
-
-    NOTHING = 0
-    INFINITY = 1
-    ALL = 2
 
 
 class Read(NamedTuple):
@@ -79,13 +74,6 @@ class Hazards(NamedTuple):
     calls: list[Called]
 
 
-#: Functions, and what their values hide of their arguments; of the others NaN gives NaN, an infinity either.
-_HIDING = {
-    **dict.fromkeys(("min", "max", "clip", "exp", "expm1", "sign", "step"), Hidden.INFINITY),
-    **dict.fromkeys(("atan", "atan2", "tanh", "sigmoid"), Hidden.INFINITY),
-}
-
-
 def hazards(
     tree: Tree, hidden: Hidden = Hidden.NOTHING, where: Tree | None = None, functions: Mapping[str, Tree] = _NONE
 ) -> Hazards:
@@ -98,31 +86,101 @@ def hazards(
     >>> hazards(parse("1/x if x > 0 else 0")).found, hazards(parse("tanh(x/2)")).found
     ([], [])
     """
-    made = Hazards([], [], [])
+    reading = _Reading(functions)
     waiting = [(tree, hidden, where)]
     while waiting:
-        node, hidden, where = waiting.pop()
-        made.found.extend(
-            Hazard(what, condition, where) for what, condition in _own(node, hidden) if _may_be(condition)
-        )
-        match node:
-            case Name():
-                made.names.append(Read(node.name, hidden, where))
-            case Call(function=function, arguments=(argument,)) if function in functions:
-                made.calls.append(Called(node, hidden, where))
-                inside = together(read for read in hazards(functions[function], hidden).names if read.name == "x")
-                waiting.append((argument, Hidden.ALL if inside is None else inside.hidden, where))
-            case Conditional(condition=condition, then=then, otherwise=otherwise):
-                waiting.append((condition, Hidden.ALL, where))
-                waiting.append((then, hidden, both(where, condition)))
-                waiting.append((otherwise, hidden, both(where, Unary("not", condition))))
-            case Chain(operators=("and" | "or" as sign, *_), operands=operands):
-                for operand in operands:  # each is guarded by those before it, as in x != 0 and 1/x > 2
-                    waiting.append((operand, Hidden.ALL, where))
-                    where = both(where, operand if sign == "and" else Unary("not", operand))
-            case _:
-                waiting.extend((child, max(hidden, own), where) for child, own in _operands(node))
-    return made
+        node, reading.hidden, reading.where = waiting.pop()
+        waiting += reading.of(node)
+    return reading.made
+
+
+#: What is still to be read: a part, what of it is hidden, and where it is computed.
+_Rest: TypeAlias = list[tuple[Tree, Hidden, Tree | None]]
+
+
+class _Reading(Visitor[_Rest]):
+    """Goes through a formula. Of a node of whose value something is ``hidden`` and that is computed ``where`` it notes
+    what there is, and gives its parts."""
+
+    def __init__(self, functions: Mapping[str, Tree]) -> None:
+        self.functions = functions
+        self.made = Hazards([], [], [])
+        self.hidden = Hidden.NOTHING
+        self.where: Tree | None = None
+
+    def number(self, node: Number) -> _Rest:
+        return []
+
+    def name(self, node: Name) -> _Rest:
+        self.made.names.append(Read(node.name, self.hidden, self.where))
+        return []
+
+    def negative(self, operand: Tree) -> _Rest:
+        return [(operand, self.hidden, self.where)]
+
+    def square(self, base: Tree) -> _Rest:
+        return [(base, self.hidden, self.where)]
+
+    def negation(self, operand: Tree) -> _Rest:
+        return [(operand, Hidden.ALL, self.where)]
+
+    def comparison(self, node: Binary) -> _Rest:
+        return self.operation(OPERATORS[node.operator], node.parts)
+
+    def arithmetic(self, node: Chain) -> _Rest:
+        first = node.operands[0]
+        rest: _Rest = [(first, self.hidden, self.where)]
+        for operator, operand in node.steps:
+            rest += self.operation(OPERATORS[operator], (first, operand))[1:]
+        return rest
+
+    def logic(self, node: Chain) -> _Rest:
+        rest: _Rest = []
+        where = self.where
+        for operand in node.operands:  # each is guarded by those before it, as in x != 0 and 1/x > 2
+            rest.append((operand, Hidden.ALL, where))
+            where = both(where, operand if node.operators[0] == "and" else Unary("not", operand))
+        return rest
+
+    def conditional(self, node: Conditional) -> _Rest:
+        return [
+            (node.condition, Hidden.ALL, self.where),
+            (node.then, self.hidden, both(self.where, node.condition)),
+            (node.otherwise, self.hidden, both(self.where, Unary("not", node.condition))),
+        ]
+
+    def call(self, node: Call) -> _Rest:
+        if node.function not in self.functions:
+            return self.operation(FUNCTIONS[node.function], node.arguments)
+        self.made.calls.append(Called(node, self.hidden, self.where))
+        read = hazards(self.functions[node.function], self.hidden).names
+        inside = together(one for one in read if one.name == "x")
+        return [(node.arguments[0], Hidden.ALL if inside is None else inside.hidden, self.where)]
+
+    def draw(self, node: Draw) -> _Rest:
+        return [(part, self.hidden, self.where) for part in node.parts]
+
+    def operation(self, row: Operation, arguments: tuple[Tree, ...]) -> _Rest:
+        """Where an operation is undefined, as far as that is hidden; its arguments, of which it may hide more."""
+        undefined = ((), row.infinite, row.undefined)[self.hidden]
+        given = dict(zip(row.names, arguments, strict=False))
+        for what, where, further in undefined:
+            condition = _put(where, given)
+            if further:
+                more = _put(further, given)
+                if not any(isinstance(given[name], Number) for name in names(formula(further))):
+                    condition = both(condition, more)
+                elif evaluate(more, {}) == 0:
+                    continue
+            if names(condition) or evaluate(condition, {}) != 0:  # it depends on something, or is so: not in x/2
+                self.made.found.append(Hazard(what, condition, self.where))
+        own = row.hidden(arguments)
+        return [(part, max(self.hidden, more), self.where) for part, more in zip(arguments, own, strict=True)]
+
+
+def _put(condition: str, arguments: Mapping[str, Tree]) -> Tree:
+    """A formula over arguments, of these."""
+    return put(formula(condition), arguments)
 
 
 def both(where: Tree | None, condition: Tree) -> Tree:
@@ -152,82 +210,3 @@ def together(reads: Iterable[Read]) -> Read | None:
         return Read(always[0].name, min(read.hidden for read in always), None)
     where = either(read.where for read in several if read.where is not None)
     return Read(several[0].name, max(read.hidden for read in several), where)
-
-
-def _operands(node: Tree) -> list[tuple[Tree, Hidden]]:
-    """The operands of a node, and what of each does not show in its value."""
-    match node:
-        case Unary(operator="not"):
-            return [(node.operand, Hidden.ALL)]
-        case Binary(operator="^", left=base, right=exponent):
-            return _of_power(base, exponent)
-        case Call(function="pow", arguments=(base, exponent)):
-            return _of_power(base, exponent)
-        case Binary():
-            return [(child, Hidden.ALL) for child in children(node)]
-        case Chain(operands=operands):
-            return [(operands[0], Hidden.NOTHING), *((operand, _BEHIND[sign]) for sign, operand in node.steps)]
-        case Call(function=function):
-            return [(child, _HIDING.get(function, Hidden.NOTHING)) for child in children(node)]
-        case _:
-            return [(child, Hidden.NOTHING) for child in children(node)]
-
-
-#: What an operator hides of the operand behind it: x/∞ is 0.
-_BEHIND = {**dict.fromkeys("/%", Hidden.INFINITY), **dict.fromkeys("+-*", Hidden.NOTHING)}
-
-
-def _of_power(base: Tree, exponent: Tree) -> list[tuple[Tree, Hidden]]:
-    """∞^−1 is 0, and NaN^0 is 1."""
-    grows = isinstance(exponent, Number) and exponent.value > 0
-    return [(base, Hidden.NOTHING if grows else Hidden.ALL), (exponent, Hidden.ALL)]
-
-
-def _own(node: Tree, hidden: Hidden) -> list[tuple[str, Tree]]:
-    """What is undefined in an operation itself, as far as that is hidden: words for it, and where it is so."""
-    if hidden is Hidden.NOTHING:
-        return []
-    match node:
-        case Chain():
-            undefined = ("/", "%") if hidden is Hidden.ALL else ("/",)  # x % 0 is NaN, which shows
-            divisors = [operand for operator, operand in node.steps if operator in undefined]
-            return [("divides by 0", _is(divisor, 0.0)) for divisor in divisors]
-        case Binary(operator="^", left=base, right=exponent):
-            return _power(base, exponent, hidden)
-        case Call(function="pow", arguments=(base, exponent)):
-            return _power(base, exponent, hidden)
-        case Call(function="log" | "log1p" as function, arguments=(x,)):
-            pole = 0.0 if function == "log" else -1.0
-            if hidden is Hidden.INFINITY:  # NaN, below the pole, shows
-                return [("takes the logarithm of 0", _is(x, pole))]
-            return [("takes the logarithm of a number that is not above 0", Binary("<=", x, Number(pole)))]
-        case Call(function="sqrt", arguments=(x,)) if hidden is Hidden.ALL:
-            return [("takes the square root of a number below 0", Binary("<", x, Number(0.0)))]
-        case Call(function="asin" | "acos" as function, arguments=(x,)) if hidden is Hidden.ALL:
-            outside = Binary(">", Call("abs", (x,)), Number(1.0))
-            return [(f"takes {function} of a number beyond -1 to 1", outside)]
-        case _:
-            return []
-
-
-def _power(base: Tree, exponent: Tree, hidden: Hidden) -> list[tuple[str, Tree]]:
-    found = []
-    fixed = exponent.value if isinstance(exponent, Number) else None
-    if fixed is None or fixed < 0:
-        pole = _is(base, 0.0)
-        found.append(("divides by 0", pole if fixed is not None else both(pole, Binary("<", exponent, Number(0.0)))))
-    if hidden is Hidden.ALL and (fixed is None or not fixed.is_integer()):
-        below = Binary("<", base, Number(0.0))
-        broken = Binary("!=", exponent, Call("floor", (exponent,)))
-        what = "takes a broken power of a number below 0"
-        found.append((what, below if fixed is not None else both(below, broken)))
-    return found
-
-
-def _is(tree: Tree, value: float) -> Tree:
-    return Binary("==", tree, Number(value))
-
-
-def _may_be(condition: Tree) -> bool:
-    """Whether it depends on something, or is true: in ``x/2`` it is neither."""
-    return bool(names(condition)) or evaluate(condition, {}) != 0

@@ -1,0 +1,127 @@
+"""Derivatives of formulas, symbolic and exact: the chain rule over the table of functions.
+
+In: a tree, and one of its names. Out: a tree. What is constant between its jumps (``floor``, comparisons, conditions)
+has the derivative 0; of a conditional it is that of the branch that is taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import reduce
+
+from neurovis_spec.language.expressions.emit import simplify
+from neurovis_spec.language.expressions.functions import FUNCTIONS, OPERATORS, Operation
+from neurovis_spec.language.expressions.parser import formula
+from neurovis_spec.language.expressions.tree import (
+    Binary,
+    Call,
+    Chain,
+    Conditional,
+    Draw,
+    Name,
+    Number,
+    Tree,
+    Unary,
+    Visitor,
+    check_extent,
+    names,
+    put,
+)
+
+_ZERO: Tree = Number(0.0)
+_ONE: Tree = Number(1.0)
+
+
+def derivative(tree: Tree, name: str) -> Tree:
+    """The derivative of a formula by a name. Raises KeyError for a function of the place, ValueError for a draw of what
+    depends on the name, ExpressionError where it costs more or goes deeper than an expression may.
+
+    >>> from neurovis_spec.language.expressions.emit import emit
+    >>> from neurovis_spec.language.expressions.parser import parse
+    >>> emit(derivative(parse("a*tanh(x) + x^2"), "x"), {"a": "a", "x": "x"})
+    'a*(1.0 - np.square(np.tanh(x))) + 2.0*x'
+    """
+    made = simplify(_By(name).of(tree))
+    check_extent(made, tree)
+    return made
+
+
+class _By(Visitor[Tree]):
+    """The derivatives by one name."""
+
+    def __init__(self, by: str) -> None:
+        self.by = by
+
+    def of(self, tree: Tree) -> Tree:
+        return super().of(tree) if self.by in names(tree) else _ZERO
+
+    def number(self, node: Number) -> Tree:
+        return _ZERO
+
+    def name(self, node: Name) -> Tree:
+        return _ONE
+
+    def negative(self, operand: Tree) -> Tree:
+        return Unary("-", self.of(operand))
+
+    def negation(self, operand: Tree) -> Tree:
+        return _ZERO
+
+    def square(self, base: Tree) -> Tree:
+        return _product(_product(Number(2.0), base), self.of(base))
+
+    def comparison(self, node: Binary) -> Tree:
+        return _ZERO
+
+    def logic(self, node: Chain) -> Tree:
+        return _ZERO
+
+    def arithmetic(self, node: Chain) -> Tree:
+        made, slope = node.operands[0], self.of(node.operands[0])
+        for place, (operator, operand) in enumerate(node.steps, start=1):
+            slope = _chained(OPERATORS[operator], (made, operand), (slope, self.of(operand)))
+            made = Chain(node.operators[:place], node.operands[: place + 1])
+        return slope
+
+    def conditional(self, node: Conditional) -> Tree:
+        return Conditional(node.condition, self.of(node.then), self.of(node.otherwise))
+
+    def call(self, node: Call) -> Tree:
+        row = FUNCTIONS[node.function]
+        first, *others = node.arguments
+        if row.most is not None:
+            return _chained(row, node.arguments, [self.of(argument) for argument in node.arguments])
+        made, slope = first, self.of(first)
+        for argument in others:
+            slope = _chained(row, (made, argument), (slope, self.of(argument)))
+            made = Call(node.function, (made, argument))
+        return slope
+
+    def draw(self, node: Draw) -> Tree:
+        raise ValueError(f"a random number that depends on '{self.by}' has no derivative")
+
+
+def _chained(row: Operation, arguments: Sequence[Tree], slopes: Sequence[Tree]) -> Tree:
+    """The chain rule: the derivatives by each argument, times those of the arguments."""
+    if row.derivative is None:
+        return _ZERO
+    given = dict(zip(row.names, arguments, strict=True))
+    terms = [
+        _product(put(formula(text), given), slope)
+        for text, slope in zip(row.derivative, slopes, strict=True)
+        if slope != _ZERO
+    ]
+    return reduce(_sum, terms, _ZERO)
+
+
+def _product(a: Tree, b: Tree) -> Tree:
+    return b if a == _ONE else a if b == _ONE else Chain(("*",), (a, b))
+
+
+def _sum(a: Tree, b: Tree) -> Tree:
+    """A long sum stays one node."""
+    if a == _ZERO:
+        return b
+    if isinstance(a, Chain) and set(a.operators) <= {"+", "-"}:
+        return Chain((*a.operators, "+"), (*a.operands, b))
+    return Chain(("+",), (a, b))
