@@ -22,7 +22,16 @@ from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.runtime import backend as backends
 from neurovis_spec.runtime import c_library
-from neurovis_spec.runtime.backend import DEFAULT, Availability, BackendError, Capabilities, choose_backend
+from neurovis_spec.runtime.backend import (
+    DEFAULT,
+    Availability,
+    BackendError,
+    Capabilities,
+    choose_backend,
+    load,
+    names,
+    ready,
+)
 from neurovis_spec.runtime.c_library import Compiler, CompilerError
 from neurovis_spec.runtime.numpy_backend import NumpyBackend
 from neurovis_spec.runtime.recording import Recording
@@ -233,6 +242,23 @@ def test_another_backend_is_taken_where_it_is_asked_for_and_said(tmp_path: Path,
     before = network.run(5, backend="reference")
     with pytest.warns(UserWarning, match="their last bits may differ"):
         assert network.simulator("numpy", start=before).backend == "numpy"
+
+
+@pytest.mark.filterwarnings("error")
+def test_nothing_is_said_where_both_give_the_bits_of_the_reference(
+    network: nv.CompiledNetwork, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert {name: load(name).capabilities.exactness for name in names()} == {
+        "c": "bits",
+        "numpy": "rounding",
+        "reference": "bits",
+    }
+    monkeypatch.setattr(Fast, "capabilities", Capabilities(noise=True, exactness="bits", exact_sums=True))
+    assert ready(network.network, Fast(), "reference").name == "a fast one"
+    monkeypatch.setattr(Fast, "capabilities", Capabilities(noise=True, exact_sums=True))
+    for before in ("reference", "one that is not here"):
+        with pytest.warns(UserWarning, match="their last bits may differ"):
+            ready(network.network, Fast(), before)
 
 
 def test_a_warning_points_at_the_caller_s_line(network: nv.CompiledNetwork, monkeypatch: pytest.MonkeyPatch) -> None:

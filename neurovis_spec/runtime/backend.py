@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import os
 import warnings
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
 from functools import cache
-from typing import Final, Protocol, runtime_checkable
+from typing import Final, Literal, Protocol, runtime_checkable
 
 from neurovis_spec import plugins
 from neurovis_spec.arrays import FloatArray
@@ -35,18 +35,20 @@ class BackendError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:
-    """What a backend can execute.
+    """What a backend can execute, and how exactly.
 
-    ``largest`` bounds neurons + connections, None without a bound; ``exact_sums`` promises that terms are added in the
-    order of the connections.
+    ``largest`` bounds neurons + connections, None without a bound. ``exactness``: its numbers are the reference's to
+    the ``bits``, where the C library is the same, or up to ``rounding``. ``exact_sums`` was asked for once, and may
+    still be given; it means nothing.
     """
 
     delays: bool = True
     plasticity: bool = True
     noise: bool = False
     episodes: bool = True
-    exact_sums: bool = True
     largest: int | None = None
+    exactness: Literal["bits", "rounding"] = "rounding"
+    exact_sums: InitVar[bool | None] = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,14 +143,24 @@ def available(name: str) -> Availability:
 
 
 def listing() -> tuple[str, ...]:
-    """A line for each backend: ``NAME available [note]`` or ``NAME unavailable: reason``."""
-    lines = []
-    for name in names():
-        found = available(name)
-        lines.append(
-            f"{name} available {found.note}".rstrip() if found.available else f"{name} unavailable: {found.note}"
-        )
-    return tuple(lines)
+    """A line for each backend: ``NAME available [note;] EXACTNESS`` or ``NAME unavailable: reason``."""
+    return tuple(map(_line, names()))
+
+
+def _line(name: str) -> str:
+    found = available(name)
+    if not found.available:
+        return f"{name} unavailable: {found.note}"
+    how = "the bits of the reference" if _is_exact(name) else "the numbers of the reference up to rounding"
+    return f"{name} available {'; '.join(filter(None, (found.note, how)))}"
+
+
+def _is_exact(name: str) -> bool:
+    """Whether the backend of this name promises the bits of the reference; one that cannot be loaded does not."""
+    try:
+        return load(name).capabilities.exactness == "bits"
+    except (BackendError, plugins.PluginError):
+        return False
 
 
 def choose_backend(network: Network) -> tuple[str, str]:
@@ -199,14 +211,15 @@ def ready(network: Network, backend: str | Backend | Ready | None = None, before
     code takes its place, which a RuntimeWarning says once.
 
     Raises BackendError where it is unknown, not available, or lacks something that the network asks for. Warns where
-    another one is asked for than has made the steps before.
+    another one is asked for than has made the steps before, and not both promise the same bits.
     """
     if isinstance(backend, Ready):
         return backend
     if backend is None or backend == AUTO:
         return _going_on(network, before) if before else _default(network)
-    made = _made(network, load(backend) if isinstance(backend, str) else backend)
-    if before not in ("", made.name):
+    chosen = load(backend) if isinstance(backend, str) else backend
+    made = _made(network, chosen)
+    if before not in ("", made.name) and not (_is_exact(before) and chosen.capabilities.exactness == "bits"):
         other = f"the backend '{before}' made the steps before, and '{made.name}' makes those to come"
         warnings.warn(f"{other}: their last bits may differ", stacklevel=callers_level())
     return made

@@ -397,7 +397,7 @@ class CBackend:
     """C made from the update program, compiled for this machine."""
 
     name = "c"
-    capabilities = Capabilities(noise=True)
+    capabilities = Capabilities(noise=True, exactness="bits")
 
     def availability(self) -> Availability:
         """Whether there is a compiler."""

@@ -27,7 +27,7 @@ class ReferenceBackend:
     """Executes anything, slowly."""
 
     name = "reference"
-    capabilities = Capabilities(noise=True)
+    capabilities = Capabilities(noise=True, exactness="bits")
 
     def availability(self) -> Availability:
         """Always there."""
