@@ -192,7 +192,7 @@ def at(array: object) -> ctypes.c_void_p:
 
 def rows_of(network: Network) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32], npt.NDArray[np.int64]]:
     """CSR: where each neuron's connections begin, their sources, and which connections they are."""
-    targets = network.connections.targets
+    targets = network.connections.targets.whole()
     order = np.argsort(targets, kind="stable")
     first = np.searchsorted(targets[order], np.arange(len(network.neurons) + 1)).astype(np.int32)
     return first, network.connections.sources[order].astype(np.int32), order
@@ -233,8 +233,8 @@ def tanh_alone(network: Network) -> Run:
     state, stepper = initial_state(network), CBackend().prepare(network)
     for _ in range(50):
         stepper.step(state, np.zeros(0))
-    arriving = links.weights * state.activity[links.sources]
-    u = np.tile(np.bincount(links.targets, arriving, n) + network.neurons.bias, 2)
+    arriving = links.weights.whole() * state.activity[links.sources.whole()]
+    u = np.tile(np.bincount(links.targets.whole(), arriving, n) + network.neurons.bias, 2)
 
     def made(steps: int) -> None:
         run(ctypes.c_int64(steps), ctypes.c_int64(n), at(u), at(ROOM))
@@ -244,7 +244,7 @@ def tanh_alone(network: Network) -> Run:
 
 def cpg_in_c(network: Network) -> Run:
     run = loaded(CPG_BY_HAND)
-    matrix, centres = network.connections.weights[[0, 2, 1, 3]].copy(), network.connections.centres
+    matrix, centres = network.connections.weights[np.array([0, 2, 1, 3])], network.connections.centres.whole()
     by_target = centres[4:20].reshape(2, 8).T.ravel().copy()
 
     def made(steps: int) -> None:
@@ -263,7 +263,7 @@ def hexapod_in_c(network: Network) -> Run:
     edges = [b.incoming[np.argsort(b.slots, kind="stable")] for b in blocks]
     counts = np.concatenate([np.bincount(b.slots, minlength=len(b.members)) for b in blocks])
     first, edge = np.cumsum([0, *counts]).astype(np.int32), np.concatenate(edges).astype(np.int32)
-    delay = links.delays.astype(np.int32)
+    delay = links.delays.whole().astype(np.int32)
     start = np.cumsum([0, *delay[:-1]]).astype(np.int32)
     one, two, v = np.zeros(n), np.zeros(n), np.zeros(n)
     for number, b in enumerate(blocks):
@@ -274,13 +274,13 @@ def hexapod_in_c(network: Network) -> Run:
     (rules,) = network.plasticity
     learned, reflex = rules.members.astype(np.int32), rules.signals["reflex"].astype(np.int32)
     rate = rules.parameters["rate"]
-    source, fed = links.sources.astype(np.int32), network.neurons.input.astype(np.int32)
+    source, fed = links.sources.whole().astype(np.int32), network.neurons.input.astype(np.int32)
 
     initial = network.neurons.initial
 
     def made(steps: int) -> None:
         given = INPUTS.setdefault("hexapod", vectors(network, 20000))
-        w, ring, a, last = links.weights.copy(), np.zeros(int(delay.sum())), np.zeros(n), np.zeros(4)
+        w, ring, a, last = links.weights.whole().copy(), np.zeros(int(delay.sum())), np.zeros(n), np.zeros(4)
         arrays = (
             group,
             neuron,
@@ -369,7 +369,8 @@ def brian(network: Network, steps: int) -> float:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "network.npz"
         links = network.connections
-        np.savez(path, sources=links.sources, targets=links.targets, weights=links.weights, bias=network.neurons.bias)
+        sources, targets, weights = links.sources.whole(), links.targets.whole(), links.weights.whole()
+        np.savez(path, sources=sources, targets=targets, weights=weights, bias=network.neurons.bias)
         command = [python, str(HERE / "brian_peer.py"), str(path), str(steps), str(int(bool(network.plasticity)))]
         done = [subprocess.run(command, capture_output=True, text=True, check=False) for _ in range(2)]
     if any(one.returncode for one in done):

@@ -47,8 +47,8 @@ def random_network(n: int, m: int) -> Network:
 def random_by_hand(network: Network) -> Run:
     """Eq. 1 over arrays."""
     connections, n = network.connections, len(network.neurons)
-    sources, targets = connections.sources.astype(np.intp), connections.targets.astype(np.intp)
-    weights, bias, tanh, bincount = connections.weights, network.neurons.bias, np.tanh, np.bincount
+    sources, targets = connections.sources.whole().astype(np.intp), connections.targets.whole().astype(np.intp)
+    weights, bias, tanh, bincount = connections.weights.whole(), network.neurons.bias, np.tanh, np.bincount
 
     def run(steps: int) -> None:
         activity, history = np.zeros(n), np.empty((steps, n))

@@ -1,11 +1,14 @@
 """The types of a network's arrays, which are read-only.
 
-In: an array. Out: the same, which nobody can write to any more; or what reads the elements that it names.
+In: an array. Out: the same, which nobody can write to any more; what reads the elements that it names; or a Column, in
+which what is equal over a stretch is kept once.
 """
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias, TypeVar
+from collections.abc import Iterable, Iterator
+from itertools import groupby
+from typing import Any, Generic, TypeAlias, TypeVar, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +19,11 @@ IntArray: TypeAlias = npt.NDArray[np.int64]
 Indices: TypeAlias = npt.NDArray[np.integer]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 Array = TypeVar("Array", bound="npt.NDArray[Any]")
+Number = TypeVar("Number", np.float64, np.int64)
+#: fewer equal numbers are kept as they are
+_SHORT = 8
+#: numbers that are made at once where a column is read from one end to the other
+_PIECE = 1 << 16
 
 
 def frozen(array: Array) -> Array:
@@ -24,9 +32,157 @@ def frozen(array: Array) -> Array:
     return array
 
 
+def narrow(array: Indices) -> Indices:
+    """The same integers in the least width that holds them.
+
+    >>> narrow(np.array([-1, 200])).dtype, narrow(np.arange(3)).dtype
+    (dtype('int16'), dtype('int8'))
+    """
+    low, high = (int(array.min()), int(array.max())) if array.size else (0, 0)
+    return array.astype(width(low, high), copy=False)
+
+
+def width(low: int, high: int) -> type[np.signedinteger]:
+    """The least width of integers from ``low`` to ``high``."""
+    for kind in (np.int8, np.int16, np.int32):
+        if np.iinfo(kind).min <= low and high <= np.iinfo(kind).max:
+            return kind
+    return np.int64
+
+
 def subscript(indices: IntArray) -> slice | IntArray | None:
     """A slice where the indices lie in a row, which is quicker; None without any."""
     if not len(indices):
         return None
     first, count = int(indices[0]), len(indices)
     return slice(first, first + count) if np.array_equal(indices, np.arange(first, first + count)) else indices
+
+
+class Column(Generic[Number]):
+    """Numbers, read-only: what is equal over a stretch is kept once, integers in the least width that holds them all.
+    What is taken from it has the full width.
+
+    >>> column = Column.of([np.full(1000, 7), np.arange(3)], np.int64)
+    >>> len(column), int(column[999]), column[np.array([0, 1002])], column.kept
+    (1003, 7, array([7, 2]), array([7, 0, 1, 2], dtype=int8))
+    """
+
+    __slots__ = ("_bounds", "_first", "_kind", "_step", "kept")
+
+    def __init__(
+        self, kind: type[Number], bounds: IntArray, first: IntArray, step: IntArray, kept: npt.NDArray[Any]
+    ) -> None:
+        self._kind: type[Number] = kind
+        #: number c of a stretch is kept[first + step·(c − bound)]: a step is 0 where all are equal, else 1
+        self._bounds, self._first, self._step = bounds, first, step
+        #: the numbers, those that are equal over a stretch once
+        self.kept = frozen(kept)
+
+    @classmethod
+    def of(cls, parts: Iterable[npt.NDArray[Any]], kind: type[Number]) -> Column[Number]:
+        """A column of these parts, one behind the other; one that is broadcast takes no more than its number."""
+        sizes: list[int] = []
+        steps: list[int] = []
+        kept: list[npt.NDArray[Any]] = []
+        run: Iterable[npt.NDArray[Any]]
+        for alike, run in groupby((part for part in parts if len(part)), _alike):
+            some = [*run]
+            kept.append(some[0][:1] if alike else some[0] if len(some) == 1 else np.concatenate(some))
+            sizes.append(sum(map(len, some)))
+            steps.append(0 if alike else 1)
+        values = kept[0] if len(kept) == 1 else np.concatenate([*kept, np.zeros(0, dtype=kind)])
+        bounds = np.concatenate(([0], np.cumsum(sizes, dtype=np.int64)))
+        first = np.concatenate(([0], np.cumsum([len(part) for part in kept], dtype=np.int64)))[:-1]
+        values = values.astype(np.float64, copy=False) if kind is np.float64 else narrow(values)
+        return cls(kind, bounds, first, np.array(steps, dtype=np.int64), np.ascontiguousarray(values))
+
+    @classmethod
+    def repeated(cls, values: npt.NDArray[Any], sizes: IntArray, kind: type[Number]) -> Column[Number]:
+        """A column of each value so many times."""
+        if len(values) and (values == values[0]).all():
+            return cls.of([np.broadcast_to(values[0], (int(sizes.sum()),))], kind)
+        if _SHORT * len(sizes) > sizes.sum():
+            return cls.of([np.repeat(values, sizes)], kind)
+        return cls.of(
+            [np.broadcast_to(value, (size,)) for value, size in zip(values, sizes.tolist(), strict=True)], kind
+        )
+
+    def __len__(self) -> int:
+        return int(self._bounds[-1])
+
+    @overload
+    def __getitem__(self, index: int) -> Number: ...
+    @overload
+    def __getitem__(self, index: Indices | BoolArray | slice) -> npt.NDArray[Number]: ...
+    def __getitem__(self, index: int | Indices | BoolArray | slice) -> Number | npt.NDArray[Number]:
+        if isinstance(index, slice):
+            index = np.arange(*index.indices(len(self)))
+        if isinstance(index, np.ndarray) and index.dtype == np.bool_:
+            index = np.flatnonzero(index)
+        if len(self._step) == 1:
+            at = index if self._step[0] else np.zeros_like(index)
+        else:
+            run = np.searchsorted(self._bounds, index, side="right") - 1
+            at = self._first[run] + self._step[run] * (index - self._bounds[run])
+        taken = self.kept[at]
+        return taken.astype(self._kind) if isinstance(index, np.ndarray) else self._kind(taken)
+
+    def whole(self) -> npt.NDArray[Number]:
+        """All of them, made anew where they are not kept so: a reader's own, for as long as it needs them."""
+        if len(self._step) == 1 and not self._step[0]:
+            return np.broadcast_to(self._kind(self.kept[0]), (len(self),))
+        if len(self._step) == 1:
+            return frozen(self.kept.astype(self._kind, copy=False))
+        result = np.empty(len(self), dtype=self._kind)
+        for start, stop, numbers in self.stretches():
+            result[start:stop] = numbers
+        return frozen(result)
+
+    def stretches(self) -> Iterator[tuple[int, int, npt.NDArray[Any]]]:
+        """What is kept of each stretch: where it begins and ends, and its numbers, one where all are equal."""
+        for start, stop, first, step in zip(
+            self._bounds.tolist(), self._bounds[1:].tolist(), self._first.tolist(), self._step.tolist(), strict=False
+        ):
+            yield start, stop, self.kept[first : first + (stop - start if step else 1)]
+
+    def pieces(self) -> Iterator[npt.NDArray[Number]]:
+        """All of them, some at a time."""
+        for start, stop, numbers in self.stretches():
+            for begin in range(0, stop - start, _PIECE):
+                size = min(_PIECE, stop - start - begin)
+                some = numbers[begin : begin + size] if len(numbers) > 1 else np.broadcast_to(numbers, (size,))
+                yield some.astype(self._kind)
+
+    @overload
+    def tolist(self: Column[np.int64]) -> list[int]: ...
+    @overload
+    def tolist(self: Column[np.float64]) -> list[float]: ...
+    def tolist(self) -> list[int] | list[float]:
+        """All of them, as Python's numbers."""
+        return [number for piece in self.pieces() for number in piece.tolist()]
+
+
+IntColumn: TypeAlias = Column[np.int64]
+FloatColumn: TypeAlias = Column[np.float64]
+
+
+def integers(*parts: Indices) -> IntColumn:
+    """A column of these parts, one behind the other."""
+    return Column.of(parts, np.int64)
+
+
+def reals(*parts: FloatArray) -> FloatColumn:
+    """A column of these parts, one behind the other."""
+    return Column.of(parts, np.float64)
+
+
+def _alike(part: npt.NDArray[Any]) -> bytes:
+    """The bits of the one number that is kept of a part, where it is long and all of it is equal in all bits; else
+    nothing."""
+    if len(part) < _SHORT:
+        return b""
+    if part.strides != (0,):
+        bits = np.ascontiguousarray(part).view(np.dtype(f"i{part.itemsize}"))
+        if (bits != bits[0]).any():
+            return b""
+    return part[:1].tobytes()

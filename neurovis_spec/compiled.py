@@ -83,7 +83,7 @@ class CompiledNetwork(Drawable):
         return (
             f"<network {network.name}: {plural(len(network.neurons), 'neuron')}, "
             f"{plural(len(network.connections), 'connection')}, "
-            f"{int((network.connections.rules >= 0).sum())} plastic>"
+            f"{int((network.connections.rules.whole() >= 0).sum())} plastic>"
         )
 
     def text(self) -> str:
@@ -417,5 +417,5 @@ class NetworkLayout:
         from neurovis_spec.runtime.recording import Snapshot
 
         network = self.compiled.network
-        snapshot = Snapshot(0, np.zeros(len(network.neurons)), network.connections.weights, None)
+        snapshot = Snapshot(0, np.zeros(len(network.neurons)), network.connections.weights.whole(), None)
         return svg(network, self.value, snapshot, self.compiled.gains)

@@ -190,7 +190,7 @@ def _check_run(compiled: CompiledNetwork) -> None:
     """Two backends give the same three steps."""
     network = compiled.network
     small = len(network.neurons) <= _MOST_NEURONS and len(network.connections) <= _MOST_CONNECTIONS
-    if not small or int(network.connections.delays.sum()) > _MOST_SIGNALS:
+    if not small or int(network.connections.delays.whole().sum()) > _MOST_SIGNALS:
         return
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

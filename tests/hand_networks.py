@@ -149,9 +149,11 @@ class Case:
     @property
     def reached(self) -> Reached:
         changing = self.network.changing
-        fixed = self.network.connections.weights.copy()
+        fixed = self.network.connections.weights.whole().copy()
         fixed[changing] = 0.0
-        return reached_by(self.network.connections.sources, fixed, self.activity, self.weights[:, changing], changing)
+        return reached_by(
+            self.network.connections.sources.whole(), fixed, self.activity, self.weights[:, changing], changing
+        )
 
 
 ALPHA, PHI, PERIOD, RATE, SIGMA = 1.0094, 0.049, 128.62, 0.01, 40.0
@@ -176,7 +178,7 @@ def use_case_1(steps: int = 1300) -> Case:
         groups, wires, name="cpg_rbf", title="Function approximation", dt=0.05,
         entries=("C -> C", "C -> K", "K -> O"), rules=[("delta", {"target": "T"})],
     )  # fmt: skip
-    activity, weights = _run(np.array(matrix), made.connections.weights, steps)
+    activity, weights = _run(np.array(matrix), made.connections.weights.whole(), steps)
     return Case(made, _layout_1(made), activity, weights)
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray, IntColumn, integers, reals
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
 from neurovis_spec.compiler.network import Connections, Group, Input, Network, Neurons, Output
 from neurovis_spec.compiler.program import (
@@ -176,19 +176,19 @@ def neurons(units: Sequence[Unit], groups: Sequence[Group]) -> Neurons:
 
 
 def connections(links: Sequence[Link]) -> Connections:
-    def integers(values: Sequence[int]) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-        return np.array(values, dtype=np.int64)
+    def whole(values: Sequence[int]) -> IntColumn:
+        return integers(np.array(values, dtype=np.int64))
 
     return Connections(
-        sources=integers([link.source for link in links]),
-        targets=integers([link.target for link in links]),
-        weights=floats([link.weight for link in links]),
-        centres=floats([link.centre for link in links]),
-        delays=integers([link.delay for link in links]),
-        rules=integers([link.learns for link in links]),
-        entry=integers([link.entry for link in links]),
-        low=floats([link.low for link in links]),
-        high=floats([link.high for link in links]),
+        sources=whole([link.source for link in links]),
+        targets=whole([link.target for link in links]),
+        weights=reals(floats([link.weight for link in links])),
+        centres=reals(floats([link.centre for link in links])),
+        delays=whole([link.delay for link in links]),
+        rules=whole([link.learns for link in links]),
+        entry=whole([link.entry for link in links]),
+        low=reals(floats([link.low for link in links])),
+        high=reals(floats([link.high for link in links])),
         entries=("all",),
         descriptions=(None,),
         learns=("rule" if any(link.learns >= 0 for link in links) else None,),
@@ -244,16 +244,17 @@ def learning(number: int, use: Use, links: Sequence[Link]) -> Plasticity:
 def rewired(network: Network, weights: Sequence[float], sources: Sequence[int], targets: Sequence[int]) -> Network:
     """A network of one block, all of its neurons alike, with these connections of delay 1 in place of its own."""
     links = connections([Link(0, 0, weight) for weight in weights])
-    links = replace(links, sources=np.array(sources, dtype=np.int64), targets=np.array(targets, dtype=np.int64))
+    slots = np.array(targets, dtype=np.int64)
+    links = replace(links, sources=integers(np.array(sources, dtype=np.int64)), targets=integers(slots))
     (one,) = network.blocks
-    one = replace(one, incoming=np.arange(len(links)), slots=links.targets)
+    one = replace(one, incoming=np.arange(len(links)), slots=slots)
     return replace(network, connections=links, blocks=(one,))
 
 
 def all_learning(network: Network, by: Rule) -> Network:
     """A network whose connections are fixed, and now all learn by a rule without parameters and signals."""
     count = len(network.connections)
-    links = replace(network.connections, rules=np.zeros(count, dtype=np.int64))
+    links = replace(network.connections, rules=integers(np.zeros(count, dtype=np.int64)))
     plasticity = (Plasticity(by, np.arange(count), {}, {}),)
     return replace(network, connections=links, plasticity=plasticity, program=(*network.program, Learn(0)))
 

@@ -85,7 +85,7 @@ def test_draws_depend_on_names_alone() -> None:
     assert not set(nv.compile_text(renamed).network.connections.weights.tolist()).intersection(first)
     twice = "[{A -> O: 'normal(0, 1)'}, {A -> O: 'normal(0, 1)'}]"
     assert len({weight for _, _, weight, _ in of(twice)}) == 4
-    reseeded = nv.compile_text(HEAD + AB + one, seed=3).network.connections.weights
+    reseeded = nv.compile_text(HEAD + AB + one, seed=3).network.connections.weights.whole()
     assert not set(reseeded.tolist()).intersection(first)
 
 

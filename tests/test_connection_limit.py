@@ -91,4 +91,4 @@ def test_no_pattern_makes_fewer_than_are_counted(n: int, m: int, what: str, size
         except nv.SpecError:
             continue
         assert RECIPES[name].least(n, m, settings) <= len(network.connections) + (name == "chain")
-        assert np.all(network.connections.sources < n)
+        assert np.all(network.connections.sources.whole() < n)

@@ -56,8 +56,8 @@ def network_of(compiled: CompiledNetwork) -> Plain:
     described = {key: plain(value) for key, value in compiled.describe().items() if key != "hash"}
     return {
         **described,
-        "bounds": plain(np.stack([network.connections.low, network.connections.high], axis=1)),
-        "centres": plain(network.connections.centres),
+        "bounds": plain(np.stack([network.connections.low.whole(), network.connections.high.whole()], axis=1)),
+        "centres": plain(network.connections.centres.whole()),
         "initial": plain(network.neurons.initial),
         "blocks": plain(network.blocks),
         "plasticity": plain(network.plasticity),

@@ -105,7 +105,7 @@ def test_a_rule_reads_something_exactly_where_something_arrives(
     rows = "".join(f"  - {{at: {at}, {'mend' if mend else 'lesion'}: {part}}}\n" for at, part, mend in lesions)
     network = network_of(f"events:\n{rows}" if rows else "", TEXT.replace("1 + pre / 1000", "1"))
     simulation = network.simulator(backend=backend)
-    delays, offsets = network.network.connections.delays, signal_layout(network.network).offsets
+    delays, offsets = network.network.connections.delays.whole(), signal_layout(network.network).offsets
     before = np.zeros(len(delays))
     for _ in range(16):
         kept = simulation.state()

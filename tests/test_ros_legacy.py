@@ -117,7 +117,7 @@ def test_lengths_must_agree() -> None:
 
 
 def weights_of(compiled: nv.CompiledNetwork) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
-    return compiled.network.connections.weights.astype(np.float32)
+    return compiled.network.connections.weights.whole().astype(np.float32)
 
 
 NAMES = st.text("ab1_-. é{}:#'\"on", min_size=1, max_size=7).filter(lambda name: "/" not in name)

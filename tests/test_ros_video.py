@@ -40,7 +40,7 @@ def how(path: Path, fps: float = 25.0) -> Shooting:
 
 
 def snapshot(step: int, value: float) -> Snapshot:
-    return Snapshot(step, np.full(4, value), NETWORK.connections.weights * (1 + step), None)
+    return Snapshot(step, np.full(4, value), NETWORK.connections.weights.whole() * (1 + step), None)
 
 
 def fragments(path: Path, count: int) -> None:

@@ -261,7 +261,7 @@ def test_neurons_with_different_numbers_of_connections_go_on_beside_each_other(
     more = ", plasticity: {oja: {rate: 0.01}}" if learns else ""
     text = LANES.replace("COMBINE", combine).replace("DELAY", str(delay)).replace(", PLASTIC", more)
     network = nv.compile_text(text).network
-    degrees = np.bincount(network.connections.targets, minlength=30)
+    degrees = np.bincount(network.connections.targets.whole(), minlength=30)
     assert len(set(degrees.tolist())) > 3
     follow(network, CBackend(), 12)
     runs = [record(network, 40, backend=name) for name in ("reference", "c")]
@@ -308,7 +308,7 @@ def test_the_weights_of_a_full_matrix_are_read_where_they_lie() -> None:
         "  A -> B: {weight: sin(i + j), pattern: all_to_all}\n"
         "  B -> A: {weight: cos(i * j) / 40, pattern: {band: {width: 25}}}\n"
     )
-    band = int((network.network.connections.entry == 1).sum())
+    band = int((network.network.connections.entry.whole() == 1).sum())
     assert written(network.network).packed == band < len(network.network.connections)
     runs = [network.run(50, backend=name) for name in ("c", "reference")]
     assert (runs[0].activity == runs[1].activity).all()

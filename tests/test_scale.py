@@ -15,7 +15,7 @@ def matrix(text: str, n: int, m: int, start: int = 0) -> FloatArray:
     """The weights as a matrix, rows are sources."""
     wires = nv.compile_text(text).network.connections
     result = np.zeros((n, m))
-    np.add.at(result, (wires.sources, wires.targets - start), wires.weights)
+    np.add.at(result, (wires.sources.whole(), wires.targets.whole() - start), wires.weights.whole())
     return result
 
 
@@ -58,7 +58,7 @@ def test_it_follows_when_a_parameter_is_set() -> None:
 def test_weights_of_any_size_have_the_norm(size: float, norm: float) -> None:
     """Their squares alone would overflow or vanish."""
     text = HEAD + f"  A1 + A2 + A3 + A4 -> B1: {{weight: {size!r}, pattern: all_to_all, scale: {{norm: {norm!r}}}}}"
-    weights = nv.compile_text(text).network.connections.weights
+    weights = nv.compile_text(text).network.connections.weights.whole()
     np.testing.assert_allclose(weights, norm / 2, rtol=1e-15)
 
 
@@ -67,7 +67,7 @@ def test_weights_of_any_size_have_the_norm(size: float, norm: float) -> None:
 @pytest.mark.parametrize("radius", [1e-300, 1.0, 1e300])
 def test_weights_of_any_size_have_the_radius(size: float, radius: float) -> None:
     body = f"{{weight: {size!r}, pattern: all_to_all, scale: {{spectral_radius: {radius!r}}}}}"
-    weights = nv.compile_text(HEAD + f"  B1 + B2 -> B1 + B2: {body}").network.connections.weights
+    weights = nv.compile_text(HEAD + f"  B1 + B2 -> B1 + B2: {body}").network.connections.weights.whole()
     np.testing.assert_allclose(weights, radius, rtol=1e-14)  # there and back
 
 
@@ -78,8 +78,8 @@ def test_small_weights_beside_large_ones_stay() -> None:
 
 def test_a_factor_is_what_it_would_be_in_one_multiplication() -> None:
     body = "{weight: 'normal(0, 1)', pattern: all_to_all%s}"
-    plain = nv.compile_text(HEAD + "  A -> B: " + body % "").network.connections.weights
-    scaled = nv.compile_text(HEAD + "  A -> B: " + body % ", scale: {norm: 0.7}").network.connections.weights
+    plain = nv.compile_text(HEAD + "  A -> B: " + body % "").network.connections.weights.whole()
+    scaled = nv.compile_text(HEAD + "  A -> B: " + body % ", scale: {norm: 0.7}").network.connections.weights.whole()
     assert scaled.tolist() == (plain * (0.7 / float(np.linalg.norm(plain)))).tolist()
 
 

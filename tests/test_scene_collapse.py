@@ -89,7 +89,7 @@ def test_a_glyph_has_the_mean_and_a_bundle_the_sums(step: int) -> None:
         own = [k for k in range(len(ends)) if (names[ends.sources[k]], names[ends.targets[k]]) == (source, target)]
         assert group.get("data-size") == (None if name == "C -> C" else str(len(own)))
         total = float(snapshot.weights[own].sum())
-        signal = float((snapshot.weights[own] * snapshot.activity[ends.sources[own]]).sum())
+        signal = float((snapshot.weights[own] * snapshot.activity[ends.sources[np.array(own)]]).sum())
         path = child(group, "path")
         assert float(path.attrib["stroke-width"]) == pytest.approx(max(0.6, abs(8 * total)))
         assert path.get("stroke") == colours(theme, np.clip([2 * signal], -1, 1))[0]

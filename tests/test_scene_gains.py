@@ -118,7 +118,7 @@ def thick(weights: list[list[float]], learning: set[int]) -> list[float]:
     made = network([numbered("A", 2)], lines, entries=[f"E{e}" for e in range(len(weights))], rules=rules)
     reached = np.array([w for some in weights for w in some])
     gains = choose_gains(made, RenderSettings(), reaches([1.0, 1.0], reached.tolist()))
-    return [float((gains.thickness * reached)[made.connections.entry == e].max()) for e in range(len(weights))]
+    return [float((gains.thickness * reached)[made.connections.entry.whole() == e].max()) for e in range(len(weights))]
 
 
 def test_weights_that_are_alike_can_be_compared_learned_or_not() -> None:
@@ -176,7 +176,7 @@ def test_whatever_entries_there_are_the_weak_are_told_and_none_is_too_wide(
     assert len(gains.signal_scales) <= 4
     assert len(gains.thickness_scales) <= 6
     for entry in range(len(weights)):
-        mine = net.connections.entry == entry
+        mine = net.connections.entry.whole() == entry
         assert len(set(gains.signal[mine])) == 1
         assert (gains.signal[mine] * peaks[mine]).min() >= 0.23
         assert (gains.thickness[mine] * peaks[mine]).max() <= 5.3
@@ -192,7 +192,7 @@ def test_any_run_gives_finite_gains(activity: list[float], other: list[float]) -
     weights = np.array([other, other[::-1]])
     fixed = np.where(np.arange(28) < 20, weights[0], 0.0)
     changing = CASE.network.changing
-    run = reached_by(CASE.network.connections.sources, fixed, rows, weights[:, changing], changing)
+    run = reached_by(CASE.network.connections.sources.whole(), fixed, rows, weights[:, changing], changing)
     gains = choose_gains(CASE.network, RenderSettings(), run)
     for values in (gains.activity, gains.signal, gains.thickness, gains.change):
         assert all(math.isfinite(gain) and gain > 0 for gain in values.tolist())

@@ -90,7 +90,7 @@ def test_of_connections_that_are_equally_thick_the_longest_are_left_out() -> Non
 @pytest.mark.parametrize("least", [0.0, 0.2, 1.0])
 def test_min_weight_leaves_out_what_is_weaker_and_nothing_else(least: float) -> None:
     scene = scene_at(WORM, replace(WORM.network.render, min_weight=least))
-    weights = np.abs(WORM.network.connections.weights)
+    weights = np.abs(WORM.network.connections.weights.whole())
     assert len(widths(scene)) == np.count_nonzero(weights >= least)
     weak = np.count_nonzero(weights < least)
     words = f"{weak:,} of 2,600 connections are left out: those with |w| < {least:g}"
@@ -122,7 +122,7 @@ def test_focus_shows_neurons_with_all_that_they_are_connected_to() -> None:
     whole = WORM.network
     chosen = whole.neuron_index["class1_neuron_1"]
     scene = scene_at(WORM, replace(whole.render, focus=("class1_neuron_1", (chosen,))))
-    ends = [(a, b) for a, b in zip(whole.connections.sources, whole.connections.targets, strict=True)]
+    ends = [(a, b) for a, b in zip(whole.connections.sources.whole(), whole.connections.targets.whole(), strict=True)]
     names = whole.neurons.names
     assert set(of_kind(scene, "connection")) == {f"{names[a]} -> {names[b]}" for a, b in ends if chosen in (a, b)}
     near = {names[chosen]} | {names[end] for pair in ends if chosen in pair for end in pair}
@@ -222,7 +222,7 @@ def test_lines_are_never_thicker_than_their_neurons_and_as_thick_as_eq_4_says(
     scene, whole = scene_at(network), network.network
     discs = [s.radius for g in of_kind(scene, "neuron").values() for s in g.shapes if isinstance(s, Disc)]
     assert max(widths(scene)) <= 2 * min(discs)
-    weights = np.abs(whole.connections.weights)
+    weights = np.abs(whole.connections.weights.whole())
     assert sorted(widths(scene)) == np.sort(np.maximum(0.6, 5 * weights))[-len(widths(scene)) :].tolist()
     assert scene.pixels == (320, 240)
     for group in scene.groups:

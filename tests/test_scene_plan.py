@@ -8,12 +8,12 @@ from itertools import combinations
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hand_networks import C, Case, G, loop, network, numbered, plain_gains, straight, straight_layout, use_case_1
 from scenes import scene_of
 
 import neurovis_spec as nv
+from neurovis_spec.arrays import IntColumn, integers
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.geometry import Rect, meet
@@ -39,7 +39,7 @@ def picture(case: Case = CASE, step: int = 160, settings: RenderSettings | None 
 
 
 def small(made: Network, layout: Layout, settings: RenderSettings | None = None) -> Scene:
-    weights = made.connections.weights
+    weights = made.connections.weights.whole()
     case = Case(made, layout, np.full((1, len(made.neurons)), 0.5), weights[None])
     return encode(made, layout, case.snapshot(0), plain_gains(made, *PLAIN), settings or RenderSettings())
 
@@ -227,10 +227,10 @@ def test_beads_that_are_too_small_to_be_seen_are_not_explained() -> None:
     assert "Bead" not in {t.text for t in all_texts(scene)}
 
 
-def _some_delayed(made: Network) -> npt.NDArray[np.int64]:
+def _some_delayed(made: Network) -> IntColumn:
     delays = np.ones(len(made.connections), np.int64)
     delays[:5] = 4
-    return delays
+    return integers(delays)
 
 
 def test_a_title_that_lines_have_to_cross_keeps_them_away_from_its_letters() -> None:
@@ -352,7 +352,7 @@ def grid(columns: int, rows: int) -> Case:
         [C(f"N{i + 1}", f"N{(i * 7) % count + 1}") for i in range(count) if (i * 7) % count != i],
     )
     places: dict[str, Point] = {f"N{i + 1}": (float(i % columns), 2.0 * (i // columns)) for i in range(count)}
-    return Case(made, straight_layout(made, places), np.full((1, count), 0.5), made.connections.weights[None])
+    return Case(made, straight_layout(made, places), np.full((1, count), 0.5), made.connections.weights.whole()[None])
 
 
 def test_a_large_network_stays_within_1280_by_960_and_drops_labels_rather_than_piling_them() -> None:

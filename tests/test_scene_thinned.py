@@ -59,7 +59,7 @@ def seen_of(network: CompiledNetwork, most: int | None = None) -> Shown:
     """What a picture shows of a network whose lines are all as long as each other."""
     whole = network.network
     wanted = replace(whole.render, most=most)
-    return shown(whole, wanted, np.abs(whole.connections.weights), np.ones(len(whole.connections)))
+    return shown(whole, wanted, np.abs(whole.connections.weights.whole()), np.ones(len(whole.connections)))
 
 
 def told(notes: tuple[str, ...]) -> dict[tuple[str, str], tuple[int, int]]:
@@ -128,17 +128,17 @@ def test_neurons_and_pathways_keep_their_strongest_and_the_notes_say_the_rest(
     least = min(count, len(touched) + len(there))
     most = least + int(room * (count - least))
     seen = seen_of(network, most)
-    lines, sizes = seen.lines, np.abs(ends.weights)
+    lines, sizes = seen.lines, np.abs(ends.weights.whole())
     assert lines.sum() == min(most, count)
     drawn = pathways(network, lines)
     assert set(drawn) == set(there)
     assert set(ends.sources[lines].tolist()) | set(ends.targets[lines].tolist()) == touched
-    for target in set(ends.targets.tolist()):
-        own = ends.targets == target
+    for neuron in set(ends.targets.tolist()):
+        own = ends.targets.whole() == neuron
         assert sizes[own & lines].max() == sizes[own].max()
     group = np.array([one.name for one in whole.neurons.groups for _ in one.indices])
     for source, target in there:
-        own = (group[ends.sources] == source) & (group[ends.targets] == target)
+        own = (group[ends.sources.whole()] == source) & (group[ends.targets.whole()] == target)
         assert sizes[own & lines].max() == sizes[own].max()
     if most < count:
         assert seen.notes[0].startswith(f"{count - most:,} of {count:,} connections are left out, the weakest that")

@@ -104,7 +104,7 @@ def test_the_same_scene_gives_the_same_bytes_and_few_of_them() -> None:
 def test_connections_that_share_both_ends_are_told_apart_by_data_index() -> None:
     made = network([G("A", ("A", "B"))], [C("A", "B", 0.5, 2), C("A", "B", 0.7, 1), C("B", "A")])
     layout = straight_layout(made, {"A": (0, 0), "B": (2, 0)})
-    case = Case(made, layout, np.zeros((1, 2)), made.connections.weights[None])
+    case = Case(made, layout, np.zeros((1, 2)), made.connections.weights.whole()[None])
     root = ET.fromstring(drawn(case, 0))
     told = {(g.attrib["data-connection"], g.attrib.get("data-index")) for g in groups(root, "data-connection")}
     assert told == {("A -> B", "1"), ("A -> B", "2"), ("B -> A", None)}
@@ -126,7 +126,7 @@ HOSTILE = [
 def test_hostile_texts_give_valid_xml_that_says_the_same(words: str) -> None:
     made = network([G("A", ("A",), labels=(words,), box=words)], [C("A", "A")], title=words)
     layout = straight_layout(made, {"A": (0, 0)})
-    case = Case(made, layout, np.zeros((1, 1)), made.connections.weights[None])
+    case = Case(made, layout, np.zeros((1, 1)), made.connections.weights.whole()[None])
     root = ET.fromstring(drawn(case, 0))
     title = root.find(NS + "title")
     assert title is not None

@@ -91,7 +91,7 @@ def check(simulation: Simulation, changes: list[Change], step: int, before: Mask
     assert np.flatnonzero(simulation.held | lesioned).tolist() == sorted(clamps)
     assert simulation.parameters == base.parameters
     sent, weights = simulation.activity, simulation.connection_weights
-    fixed = base.connections.rules < 0
+    fixed = base.connections.rules.whole() < 0
     np.testing.assert_array_equal(weights[fixed], base.connections.weights[fixed])
     simulation.step()
     held = {neuron: float(simulation.activity[neuron]) for neuron in clamps}
@@ -99,8 +99,8 @@ def check(simulation: Simulation, changes: list[Change], step: int, before: Mask
     changed, learns = simulation.connection_weights - weights, ~fixed & ~np.array(still)
     assert not changed[~fixed & ~learns].any()
     if step:  # what was sent while a connection was gone never arrives
-        arrived = np.where(before, 0.0, sent[base.connections.sources])
-        grown = 0.01 * base.parameters["g"] * arrived * simulation.activity[base.connections.targets]
+        arrived = np.where(before, 0.0, sent[base.connections.sources.whole()])
+        grown = 0.01 * base.parameters["g"] * arrived * simulation.activity[base.connections.targets.whole()]
         np.testing.assert_allclose(changed[learns], grown[learns], rtol=1e-9, atol=1e-9)
     return lost
 

@@ -133,9 +133,8 @@ def output_neurons(network: Network) -> IntArray:
     if not found:
         found = {index for group in network.neurons.groups if group.role == "output" for index in group.indices}
     if not found:
-        ends = network.connections
-        sending = set(ends.sources[ends.sources != ends.targets].tolist())
-        found = set(ends.targets.tolist()) - sending
+        sources, targets = network.connections.sources.whole(), network.connections.targets.whole()
+        found = set(targets.tolist()) - set(sources[sources != targets].tolist())
     return np.array(sorted(found), dtype=np.int64)
 
 

@@ -64,7 +64,7 @@ def _parts(compiled: CompiledNetwork, network: Network) -> Iterator[str]:
 
 def _head(network: Network) -> str:
     """The name, the sizes and the clock."""
-    plastic = int((network.connections.rules >= 0).sum())
+    plastic = int((network.connections.rules.whole() >= 0).sum())
     lines = [
         f"{network.name}: {network.title}" if network.title != network.name else network.name,
         f"{count(len(network.neurons), 'neuron')}, {count(len(network.connections), 'connection')}"
@@ -107,7 +107,7 @@ def _few(names: list[str], most: int = 12) -> str:
 
 def _entry(network: Network, index: int, name: str) -> tuple[str, ...]:
     connections = network.connections
-    members = np.flatnonzero(connections.entry == index)
+    members = np.flatnonzero(connections.entry.whole() == index)
     if not len(members):
         return name, "0", "", "", "", ""
     return (
@@ -170,7 +170,7 @@ def _matrix(network: Network) -> str:
     if size > _MATRIX or not len(network.connections):
         return ""
     matrix = np.zeros((size, size), dtype=np.int64)
-    np.add.at(matrix, (network.connections.sources, network.connections.targets), 1)
+    np.add.at(matrix, (network.connections.sources.whole(), network.connections.targets.whole()), 1)
     names = network.neurons.names
     rows = [(name, *(str(c) if c else "·" for c in row)) for name, row in zip(names, matrix.tolist(), strict=True)]
     return "connection matrix C (from row to column)\n" + table(rows, ("", *names), right=True)

@@ -107,7 +107,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         return None
     plasticity, rules = make_plasticity(bundles)
     connections = join(bundles, rules)
-    blocks = make_blocks(population, connections.sources, connections.targets, level)
+    blocks = make_blocks(population, connections.sources.whole(), connections.targets.whole(), level)
     program = make_program(blocks, plasticity)
     slots = tuple(constants.slots)
     network = Network(
@@ -133,7 +133,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         hash="",  # of all the rest
         noises=noises,
         instances=_instances(scopes, population),
-        numbering=own_weights(slots, bundles, connections.weights),
+        numbering=own_weights(slots, bundles, connections.weights.whole()),
         settable=make_settable(slots, population, bundles, connections, inputs, blocks, plasticity, noises),
         ros=ros,
         body=body,

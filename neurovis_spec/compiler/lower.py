@@ -150,12 +150,12 @@ def _column(
     return {name: frozen(np.concatenate([values[name][rows] for values, rows in parts])) for name in names}
 
 
-def make_plasticity(bundles: tuple[Bundle, ...]) -> tuple[tuple[Plasticity, ...], IntArray]:
-    """One Plasticity a rule, whichever entries learn by it, and for each connection the number of its Plasticity or −1:
-    what is learned by the same rule is computed together."""
+def make_plasticity(bundles: tuple[Bundle, ...]) -> tuple[tuple[Plasticity, ...], list[int]]:
+    """One Plasticity a rule, whichever entries learn by it, and for each entry the number of its Plasticity or −1: what
+    is learned by the same rule is computed together."""
     numbers: dict[str, int] = {}
     parts: list[list[tuple[Learning, IntArray]]] = []
-    rules: list[IntArray] = [np.zeros(0, dtype=np.int64)]
+    rules: list[int] = []
     start = 0
     for bundle in bundles:
         n, learning = len(bundle.sources), bundle.learning
@@ -165,9 +165,9 @@ def make_plasticity(bundles: tuple[Bundle, ...]) -> tuple[tuple[Plasticity, ...]
             if number == len(parts):
                 parts.append([])
             parts[number].append((learning, np.arange(start, start + n, dtype=np.int64)))
-        rules.append(np.full(n, number, dtype=np.int64))
+        rules.append(number)
         start += n
-    return tuple(_together(part) for part in parts), np.concatenate(rules)
+    return tuple(_together(part) for part in parts), rules
 
 
 def _together(parts: list[tuple[Learning, IntArray]]) -> Plasticity:

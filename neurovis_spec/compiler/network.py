@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, IntArray, frozen
+from neurovis_spec.arrays import FloatArray, FloatColumn, IntArray, IntColumn, frozen
 from neurovis_spec.compiler.body_settings import BodySettings
 from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
@@ -98,23 +98,23 @@ class Neurons:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Connections:
-    """All connections, in the order written, a matrix or pattern row by row (structure of arrays, m long)."""
+    """All connections, in the order written, a matrix or pattern row by row (structure of columns, m long)."""
 
-    sources: IntArray
-    targets: IntArray
+    sources: IntColumn
+    targets: IntColumn
     #: w[0]
-    weights: FloatArray
+    weights: FloatColumn
     #: c of a target that combines by distance, else 0
-    centres: FloatArray
+    centres: FloatColumn
     #: steps
-    delays: IntArray
+    delays: IntColumn
     #: index into ``Network.plasticity``, −1 where fixed
-    rules: IntArray
+    rules: IntColumn
     #: index into ``entries``
-    entry: IntArray
+    entry: IntColumn
     #: bounds of a plastic weight, ±inf without
-    low: FloatArray
-    high: FloatArray
+    low: FloatColumn
+    high: FloatColumn
     #: the names of the entries of ``connections`` (``K -> O``, the second with the same ends ``K -> O (2)``)
     entries: tuple[str, ...]
     #: what the spec says of each entry
@@ -266,7 +266,7 @@ class Network:
     @cached_property
     def changing(self) -> IntArray:
         """Indices of the connections whose weight can change in a run, by a rule or by an event (reached or not)."""
-        can = self.connections.rules >= 0
+        can = self.connections.rules.whole() >= 0
         for binding in self.set_by_events:
             if binding.weights:
                 can[binding.indices] = True
@@ -294,7 +294,7 @@ class Network:
         connections = self.connections
         rule = int(connections.rules[index])
         name = self.plasticity[rule].rule.name if rule >= 0 else ""
-        weights = connections.weights if self.numbering is None else self.numbering
+        weights: FloatColumn | FloatArray = connections.weights if self.numbering is None else self.numbering
         return (int(connections.delays[index]), name, float(weights[index]), index)
 
     def state_names(self, states: Iterable[StateOf]) -> tuple[str, ...]:

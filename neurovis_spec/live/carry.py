@@ -181,7 +181,7 @@ def _carry_signals(
 ) -> None:
     before, after = signal_layout(was).offsets, signal_layout(network).offsets
     same = was.connections.delays[connections[0]] == network.connections.delays[connections[1]]
-    for delay in np.unique(network.connections.delays).tolist():
+    for delay in np.unique(network.connections.delays.kept).tolist():
         own = same & (network.connections.delays[connections[1]] == delay)
         slots = np.arange(delay)
         one, other = before[connections[0][own]], after[connections[1][own]]

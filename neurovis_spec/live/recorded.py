@@ -100,7 +100,7 @@ class RecordedSource:
             lesioned = recording.lesioned_neurons, recording.lesioned_connections
             return After(weights, recording.reached, recording.set_parameters, *lesioned)
         if steps[row + 1] == steps[row] + 1:
-            learn = self.network.connections.rules >= 0
+            learn = self.network.connections.rules.whole() >= 0
             weights[learn] = recording.all_weights(row + 1)[learn]
         found = after(self.network, state)
         events = {slot for change in self.network.changes for slot, _ in change.parameters}

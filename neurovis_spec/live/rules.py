@@ -31,7 +31,7 @@ def rules(network: Network) -> tuple[Rule, ...]:
     connections = network.connections
     found: dict[str, tuple[list[str], IntArray]] = {}
     for number, (name, written) in enumerate(zip(connections.entries, connections.learns, strict=True)):
-        members = np.flatnonzero((connections.entry == number) & (connections.rules >= 0))
+        members = np.flatnonzero((connections.entry.whole() == number) & (connections.rules.whole() >= 0))
         if written is not None and len(members):
             reference = _reference(network, name, members)
             words, others = found.get(reference, ([], members[:0]))

@@ -197,7 +197,7 @@ def _scene(planned: Plan, gains: Gains) -> Scene:
     """All that stays: the picture before anything happens. No line glows, nothing is faint, and tooltips say no values:
     these come with each Look."""
     network = planned.network
-    activity, weights = np.zeros(len(network.neurons)), network.connections.weights
+    activity, weights = np.zeros(len(network.neurons)), network.connections.weights.whole()
     shown = looks(network, Snapshot(0, activity, weights, None), gains, planned.frame.widest)
     of_neurons, of_connections = tooltips(network, gains, activity[None], weights[None])
     words = [_without_value(text) for text in of_neurons], [_without_value(text) for text in of_connections]

@@ -247,7 +247,7 @@ class ReceivedSource:
         return Snapshot(row.step, row.activity, self._all_weights(row), previous, row.seen)
 
     def _all_weights(self, row: _Row) -> FloatArray:
-        weights: FloatArray = self.network.connections.weights.copy()
+        weights: FloatArray = self.network.connections.weights.whole().copy()
         weights[self._changing] = row.weights
         return weights
 

@@ -271,7 +271,10 @@ def lacking(network: Network, capabilities: Capabilities) -> tuple[str, ...]:
     """What the network asks for and the backend does not have."""
     size = len(network.neurons) + len(network.connections)
     asked = (
-        (not capabilities.delays and bool((network.connections.delays > 1).any()), "no delays of more than a step"),
+        (
+            not capabilities.delays and bool((network.connections.delays.kept > 1).any()),
+            "no delays of more than a step",
+        ),
         (not capabilities.plasticity and bool(network.plasticity), "no plasticity"),
         (not capabilities.noise and bool(network.noises), "no noise"),
         (not capabilities.episodes and network.episode is not None, "no episodes"),

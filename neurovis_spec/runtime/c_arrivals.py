@@ -215,7 +215,7 @@ class Arrivals:
             case "product":
                 code.line(f"{total} *= {term};")
             case "distance":
-                centres = self.network.connections.centres
+                centres = self.network.connections.centres.whole()
                 centre = code.settable("centres", centres, self.connections[column], edge)
                 difference = code.let("d", f"{term} - {self._operand(centre)}" if centre != 0.0 else term)
                 code.line(f"{total} += {difference}*{difference};")

@@ -298,7 +298,7 @@ class Exported:
             if any(mask.any() for mask in masks):
                 found[name] = "unsigned char", [mask.astype(np.uint8) for mask in masks]
         if any((phase.lost > NOTHING).any() for phase in phases):
-            first = -int(self.network.connections.delays.max())  # nothing is read of before
+            first = -int(self.network.connections.delays.kept.max())  # nothing is read of before
             found["lost"] = "int64_t", [np.maximum(phase.lost, first) for phase in phases]
         return found
 
@@ -403,7 +403,7 @@ class Exported:
 
     def _mend(self, code: Code, mended: Mask) -> None:
         """Nothing is under way on connections that are mended."""
-        delays, offsets = self.network.connections.delays, signal_layout(self.network).offsets
+        delays, offsets = self.network.connections.delays.whole(), signal_layout(self.network).offsets
         connections = np.flatnonzero(mended & (delays > 0))
         slots = [np.arange(offsets[c], offsets[c] + delays[c]) for c in connections.tolist()]
         if slots:

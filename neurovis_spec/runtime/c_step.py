@@ -330,7 +330,10 @@ class StepCode:
     def bounded(self, plasticity: Plasticity, place: Place, weight: Value) -> Value:
         """A new weight within its bounds."""
         code, connections, members = self.code, self.network.connections, plasticity.members
-        for function, array, values in (("nv_max", "low", connections.low), ("nv_min", "high", connections.high)):
+        for function, array, values in (
+            ("nv_max", "low", connections.low.whole()),
+            ("nv_min", "high", connections.high.whole()),
+        ):
             own = values[members] if not isinstance(place, int) else values[members[place : place + 1]]
             if code.is_set(array) or np.isfinite(own).any():
                 bound = code.text(code.settable(array, values, members, place))

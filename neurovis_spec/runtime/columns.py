@@ -195,9 +195,9 @@ def recording_of(
         weights=rows.weights,
         weights_static=all_weights[static],
         plastic=network.changing.copy(),
-        sources=connections.sources.copy(),
-        targets=connections.targets.copy(),
-        delays=connections.delays.copy(),
+        sources=connections.sources.whole().copy(),
+        targets=connections.targets.whole().copy(),
+        delays=connections.delays.whole().copy(),
         dt=network.dt,
         step=numbers.step,
         ranks=_ranks(network),
@@ -228,7 +228,7 @@ def _ranks(network: Network) -> IntArray:
     """1 for each connection, 2, 3, … for the further ones that share both ends."""
     connections = network.connections
     ranks = np.ones(len(connections), dtype=np.int64)
-    pairs = connections.sources * len(network.neurons) + connections.targets
+    pairs = connections.sources.whole() * len(network.neurons) + connections.targets.whole()
     if len(np.unique(pairs)) < len(pairs):
         for index, name in enumerate(network.connection_names):
             if name.endswith(")"):

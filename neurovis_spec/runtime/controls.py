@@ -23,7 +23,7 @@ from neurovis_spec.runtime.state import Conditions, State
 
 def lose(network: Network, state: State, connections: IntArray) -> None:
     """Nothing is under way on these connections: what they have sent so far never arrives."""
-    offsets, delays = signal_layout(network).offsets, network.connections.delays
+    offsets, delays = signal_layout(network).offsets, network.connections.delays.whole()
     for connection in connections.tolist():
         if delays[connection]:
             state.signals[offsets[connection] : offsets[connection] + delays[connection]] = 0.0
@@ -130,7 +130,7 @@ class Controls:
         """Work out what a step leaves out."""
         connections, now = self.network.connections, state.conditions
         silent = now.lesioned_neurons
-        gone = silent[connections.sources] | silent[connections.targets] | now.lesioned_connections
+        gone = silent[connections.sources.whole()] | silent[connections.targets.whole()] | now.lesioned_connections
         still = gone | now.paused
         if not (np.array_equal(gone, now.structure.gone) and np.array_equal(still, now.structure.still)):
             since = np.where(gone & ~now.structure.gone, state.k, now.structure.since)

@@ -21,8 +21,9 @@ def fitted(recording: Recording, network: Network) -> Recording:
     """A recording with all connections of the network: a ``.csv`` holds the changing ones alone, or none, and may hold
     some neurons alone; the others are the network's. Raises RecordingError for a recording of another network: its
     neurons and connections are not the same."""
-    ends, own = network.connections, recording.neurons == network.neurons.names
-    if own and np.array_equal(recording.sources, ends.sources) and np.array_equal(recording.targets, ends.targets):
+    sources, targets = network.connections.sources.whole(), network.connections.targets.whole()
+    own = recording.neurons == network.neurons.names
+    if own and np.array_equal(recording.sources, sources) and np.array_equal(recording.targets, targets):
         return recording
     table = of_table(recording, network)
     if table is None:
@@ -52,7 +53,7 @@ def of_table(recording: Recording, network: Network) -> Recording | None:
         sensors=None if recording.sensors is None else recording.sensor_names,
     )
     return recording_of(
-        network, columns, Numbers(recording.step, rows), network.connections.weights, after, recording.backend
+        network, columns, Numbers(recording.step, rows), network.connections.weights.whole(), after, recording.backend
     )
 
 

@@ -96,7 +96,7 @@ def _combined(code: Code, block: Block, network: Network, signals: str) -> str:
         return f"bincount({slots}, {signals}, {count})"
     centres = network.connections.centres[block.incoming]
     if code.is_set("centres") or any_given(centres):
-        taken = code.numbers("centres", network.connections.centres, block.incoming, share=False)
+        taken = code.numbers("centres", network.connections.centres.whole(), block.incoming, share=False)
         signals = code.let("g", f"{signals} - {taken}")
     return f"np.sqrt(bincount({slots}, {signals} * {signals}, {count}))"
 

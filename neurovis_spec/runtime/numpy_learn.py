@@ -85,8 +85,8 @@ def _change(
 def _bounded(code: Code, network: Network, plasticity: Plasticity, weight: str) -> str:
     members = plasticity.members
     for function, array, values in (
-        ("maximum", "low", network.connections.low),
-        ("minimum", "high", network.connections.high),
+        ("maximum", "low", network.connections.low.whole()),
+        ("minimum", "high", network.connections.high.whole()),
     ):
         if code.is_set(array) or np.isfinite(values[members]).any():
             weight = f"np.{function}({weight}, {code.numbers(array, values, members, share=False)})"

@@ -27,7 +27,7 @@ def remembering(network: Network) -> npt.NDArray[np.bool_]:
     reading = np.zeros(len(network.connections), dtype=np.bool_)
     for entry in _readers_of_pre(network):
         reading[entry.members] = True
-    return reading & (network.connections.delays > 0)
+    return reading & (network.connections.delays.whole() > 0)
 
 
 def rule_names(rule: Rule) -> frozenset[str]:

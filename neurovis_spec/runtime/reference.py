@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 
-from neurovis_spec.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray, FloatColumn
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Block, Gather, Learn, ReadInputs, Send, Update
 from neurovis_spec.language.expressions.evaluate import evaluate
@@ -80,7 +80,7 @@ class ReferenceStepper:
             drives.append(drive)
         return drives
 
-    def number(self, array: str, values: FloatArray, place: int, state: State) -> float:
+    def number(self, array: str, values: FloatArray | FloatColumn, place: int, state: State) -> float:
         """A number of the network; of an array that can be set, as it is by now."""
         variable = self.network.settable.variables.get(array)
         if variable is None:

@@ -99,4 +99,4 @@ def _wiring_of(network: Network) -> Wiring:
         for entry in network.plasticity
     )
     connections = network.connections
-    return Wiring(connections.sources, connections.targets, connections.entries, rules)
+    return Wiring(connections.sources.whole(), connections.targets.whole(), connections.entries, rules)

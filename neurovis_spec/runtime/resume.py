@@ -45,7 +45,7 @@ def resumed_state(network: Network, recording: Recording, by: Library = NUMPY) -
     controls = Controls(network, by)
     _set_again(network, recording, state, controls)
     _lesion_again(network, recording, state, controls)
-    depth = int(network.connections.delays.max(initial=1))
+    depth = int(network.connections.delays.kept.max(initial=1))
     columns, places = learned
     recorded, same = _same_connections(network, recording)
     for ago, row in _last_rows(recording, depth):
@@ -104,7 +104,7 @@ def _last_rows(recording: Recording, depth: int) -> list[tuple[int, int]]:
 
 def _send(network: Network, state: State, step: int, activity: FloatArray, weights: FloatArray) -> None:
     connections = network.connections
-    under_way = np.flatnonzero(connections.delays >= -step)
+    under_way = np.flatnonzero(connections.delays.whole() >= -step)
     offsets = signal_layout(network).offsets[under_way]
     with np.errstate(all="ignore"):
         signals = weights[under_way] * activity[connections.sources[under_way]]

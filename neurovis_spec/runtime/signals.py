@@ -46,13 +46,13 @@ def signal_layout(network: Network) -> SignalLayout:
     block_of = np.zeros(len(network.neurons), dtype=np.int64)
     for number, block in enumerate(network.blocks):
         block_of[block.members] = number
-    blocks = block_of[connections.targets]
+    blocks = block_of[connections.targets.whole()]
     offsets = np.full(len(connections), -1, dtype=np.int64)
     classes: list[DelayClass] = []
     size = 0
     # the counts take no more memory than the slots of one connection with the longest delay
-    for delay in (np.flatnonzero(np.bincount(connections.delays)[1:]) + 1).tolist():
-        members = np.flatnonzero(connections.delays == delay)
+    for delay in (np.flatnonzero(np.bincount(connections.delays.whole())[1:]) + 1).tolist():
+        members = np.flatnonzero(connections.delays.whole() == delay)
         members = members[np.argsort(blocks[members], kind="stable")]
         offsets[members] = size + delay * np.arange(len(members))
         classes.append(DelayClass(delay, size, members, blocks[members]))

@@ -176,7 +176,7 @@ def initial_state(network: Network) -> State:
     return State(
         k=0,
         activity=np.zeros(n),
-        weights=np.array(network.connections.weights, dtype=np.float64),
+        weights=np.array(network.connections.weights.whole(), dtype=np.float64),
         signals=np.zeros(signal_layout(network).size),
         history=np.zeros((history_depth(network), n)),
         cells=tuple(tuple(starts_of(block, network.neurons, network.dt).values()) for block in network.blocks),

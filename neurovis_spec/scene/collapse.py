@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, IntArray, integers, reals
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, Mirror, RenderSettings, StatedGain
 from neurovis_spec.compiler.events.changes import Change
 from neurovis_spec.compiler.events.settable import Settable
@@ -96,13 +96,13 @@ class Gathered:
             return None
         with np.errstate(over="ignore", invalid="ignore"):
             seen = snapshot.activity if snapshot.seen is None else snapshot.seen
-            return self.total(seen[self.whole.connections.sources] * snapshot.weights)
+            return self.total(seen[self.whole.connections.sources.whole()] * snapshot.weights)
 
     def reached(self, recording: Recording) -> Reached:
         """How far a recording of the whole takes what is drawn."""
         if not self.any:
             return reached(self.whole, recording)
-        changing, sources = self.network.changing, self.network.connections.sources
+        changing, sources = self.network.changing, self.network.connections.sources.whole()
         fixed = self.total(_weights(recording, slice(0, 0)))
         parts = [self.total(_weights(recording, rows))[:, changing] for rows in _rows(recording)]
         found = reached_by(sources, fixed[0], self.mean(recording.activity), np.concatenate(parts), changing)
@@ -178,8 +178,8 @@ class _Gatherer:
         self.members: list[list[int]] = [[] for _ in seen]
         for index, unit in enumerate(of):
             self.members[unit].append(index)
-        self.sources = self.unit[network.connections.sources].tolist()
-        self.targets = self.unit[network.connections.targets].tolist()
+        self.sources = self.unit[network.connections.sources.whole()].tolist()
+        self.targets = self.unit[network.connections.targets.whole()].tolist()
         self.bundles: list[list[int]] = []
         self.bundle = np.full(len(network.connections), -1, np.int64)
         found: dict[tuple[int, int], int] = {}
@@ -293,11 +293,11 @@ class _Gatherer:
         entries = list(old.entries)
         descriptions, learns = list(old.descriptions), list(old.learns)
         entry = old.entry[first].tolist()
-        weights = old.weights[first].tolist()
+        weights, weights_of, delays_of = old.weights[first].tolist(), old.weights.whole(), old.delays.whole()
         for place, (own, joined) in enumerate(zip(self.bundles, self.sheaf, strict=True)):
             if not joined:
                 continue
-            values = old.weights[own]
+            values = weights_of[own]
             weights[place] = float(values.sum())
             up, down = float(values[values > 0].sum()), float(values[values < 0].sum())
             parts = [f"{len(own):,} connection{'s' * (len(own) > 1)}, added up"]
@@ -309,17 +309,17 @@ class _Gatherer:
             descriptions.append(": ".join(parts))
             learns.append(", ".join(sorted(rule for rule in rules if rule)) or None)
         count = len(self.bundles)
-        delays = np.array([int(old.delays[own].min()) for own in self.bundles], np.int64)
+        delays = np.array([int(delays_of[own].min()) for own in self.bundles], np.int64)
         return Connections(
-            np.array([self.sources[own[0]] for own in self.bundles], np.int64),
-            np.array([self.targets[own[0]] for own in self.bundles], np.int64),
-            np.array(weights, float),
-            np.zeros(count),
-            delays,
-            np.full(count, -1, np.int64),
-            np.array(entry, np.int64),
-            np.full(count, -np.inf),
-            np.full(count, np.inf),
+            integers(np.array([self.sources[own[0]] for own in self.bundles], np.int64)),
+            integers(np.array([self.targets[own[0]] for own in self.bundles], np.int64)),
+            reals(np.array(weights, float)),
+            reals(np.zeros(count)),
+            integers(delays),
+            integers(np.full(count, -1, np.int64)),
+            integers(np.array(entry, np.int64)),
+            reals(np.full(count, -np.inf)),
+            reals(np.full(count, np.inf)),
             tuple(entries),
             tuple(descriptions),
             tuple(learns),
@@ -329,7 +329,7 @@ class _Gatherer:
     def _plasticity(self) -> tuple[Plasticity, ...]:
         """Rules whose signals and targets are neurons that are drawn: these are taught, and have an error."""
         count, result = len(self.whole.neurons), []
-        targets = self.whole.connections.targets
+        targets = self.whole.connections.targets.whole()
         for one in self.whole.plasticity:
             ends = [targets[one.members], *one.signals.values()]
             drawn = all(

@@ -26,7 +26,7 @@ _PLACES, _APART = (1 / 2, 0.42, 0.58, 0.34, 0.66), 2.8
 
 def delayed(network: Network) -> list[int]:
     """The connections with beads; none where there are too many to be marked."""
-    delays = network.connections.delays
+    delays = network.connections.delays.whole()
     found: list[int] = (delays > int(delays.min(initial=1))).nonzero()[0].tolist()
     return found if len(found) <= _MOST else []
 
@@ -62,7 +62,7 @@ def beads(network: Network, lines: Mapping[int, Line], disc: float, theme: Theme
 
 def label_of(network: Network) -> str:
     """Which delays have beads, and which have none: ``delay 3 … 10, else 1``; '' where nothing is marked."""
-    delays = network.connections.delays
+    delays = network.connections.delays.whole()
     chosen = delayed(network)
     if not chosen:
         return ""

@@ -67,7 +67,7 @@ def looks(
     changes = encoding.glow(snapshot.weights, snapshot.previous_weights, gains.change)
     seen = snapshot.activity if snapshot.seen is None else snapshot.seen
     if signals is None:
-        lines = encoding.connection_colour(seen[connections.sources], snapshot.weights, gains.signal)
+        lines = encoding.connection_colour(seen[connections.sources.whole()], snapshot.weights, gains.signal)
     else:
         lines = encoding.connection_colour(signals, np.ones_like(signals), gains.signal)
     return Looks(
@@ -204,7 +204,7 @@ def tooltips(network: Network, gains: Gains, activity: FloatArray, weights: Floa
     for index, (delay, entry) in enumerate(rows):
         parts = [
             network.connection_names[index].replace("->", "→")
-            + (f": {label}" if (label := connections.labels[entry]) else ""),
+            + (f": {called}" if (called := connections.labels[entry]) else ""),
             f"weight {_range(lows[index], highs[index])}",
             connections.learns[entry] or "",
             f"delay {delay}" if delay != 1 else "",

@@ -155,7 +155,7 @@ def _entries(network: Network, names: Names) -> _Units:
         number = numbers.setdefault(plain.reference(entry), len(numbers))
         called.setdefault(number, names.reference(entry))
         of_entries.append(number)
-    return _units(tuple(called.values()), np.array(of_entries, np.int64)[network.connections.entry])
+    return _units(tuple(called.values()), np.array(of_entries, np.int64)[network.connections.entry.whole()])
 
 
 def _units(names: tuple[str, ...], numbers: IntArray) -> _Units:

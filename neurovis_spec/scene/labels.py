@@ -184,7 +184,7 @@ def partners_of(network: Network) -> dict[int, int]:
 def rank_of(network: Network) -> list[int]:
     """The neurons by the number of their connections, those with the most first."""
     connections, count = network.connections, len(network.neurons)
-    ends = np.concatenate([connections.sources, connections.targets])
+    ends = np.concatenate([connections.sources.whole(), connections.targets.whole()])
     degrees = np.bincount(ends, minlength=count)
     for one, other in partners_of(network).items():
         degrees[one] = max(degrees[one], degrees[other])

@@ -34,7 +34,7 @@ def lesions_of(network: Network) -> Lesions:
     for change in network.changes:
         silent = np.zeros(len(network.neurons), dtype=bool)
         silent[change.lesioned_neurons] = True
-        gone = silent[connections.sources] | silent[connections.targets]
+        gone = silent[connections.sources.whole()] | silent[connections.targets.whole()]
         gone[change.lesioned_connections] = True
         for index in np.flatnonzero(gone).tolist():
             found.connections.setdefault(index, change.at)

@@ -119,7 +119,7 @@ def plan(
     network = drawn.network
     theme = theme_of(settings)
     positions, routes = _in_units(network, layout)
-    weights = np.abs(network.connections.weights) if peaks is None else peaks
+    weights = np.abs(network.connections.weights.whole()) if peaks is None else peaks
     widths = encoding.thickness(weights, gains.thickness)
     seen = shown(network, drawn.asked(settings), weights, _lengths(routes))
     factors = np.array([radius_of(size) for size in drawn.sizes.tolist()]) * np.where(seen.focus, 1.0, _UNFOCUSED)
@@ -138,7 +138,7 @@ def plan(
     radii = factors * frame.scale
     radius = RADIUS * frame.scale
     gap, head = _gap(radius), _head(radius)
-    ends = np.stack([radii[network.connections.sources], radii[network.connections.targets]], axis=1)
+    ends = np.stack([radii[network.connections.sources.whole()], radii[network.connections.targets.whole()]], axis=1)
     kept = np.flatnonzero(seen.lines).tolist()
     trim = trimmed([frame.map(routes[index]) for index in kept], ends[kept], gap, head)
     lines, reaches = dict(zip(kept, trim, strict=True)), _reaches(network, gains, frame.widest)
@@ -207,7 +207,7 @@ def plan(
         sizes=sizes,
         counts={line: count for line, count in enumerate(drawn.counts.tolist()) if drawn.sheaf[line]},
         lines=lines,
-        order=_order(network, encoding.thickness(network.connections.weights, gains.thickness), seen.lines),
+        order=_order(network, encoding.thickness(network.connections.weights.whole(), gains.thickness), seen.lines),
         beads=delays.beads(network, lines, radius, theme),
         lesions=lesions_of(network),
         labels=tuple(raised(labels, sizes)),
@@ -419,7 +419,7 @@ def _ends_of(seconds: FloatArray) -> tuple[float, ...]:
 def _inhibits(network: Network) -> bool:
     """Whether a weight is negative, or may become so by learning."""
     connections, changing = network.connections, network.changing
-    return bool((connections.weights < 0).any() or (connections.low[changing] < 0).any())
+    return bool((connections.weights.kept < 0).any() or (connections.low[changing] < 0).any())
 
 
 def _header(title: str, frame: Frame, theme: Theme) -> Group:
@@ -447,7 +447,7 @@ def _head(radius: float) -> float:
 
 def _reaches(network: Network, gains: Gains, widest: float) -> list[float]:
     """How far lines reach from their middle: half their width and a little air; those that learn glow as well."""
-    widths = encoding.line_width(network.connections.weights, gains.thickness, widest)
+    widths = encoding.line_width(network.connections.weights.whole(), gains.thickness, widest)
     reaches = np.maximum(2.5, 0.5 * widths + 1.5)
     reaches[network.changing] = np.maximum(reaches[network.changing], 3.5)
     result: list[float] = reaches.tolist()

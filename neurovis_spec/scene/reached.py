@@ -46,14 +46,14 @@ def reached(network: Network, recording: Recording) -> Reached:
     recording.check_whole("a picture cannot be drawn from")
     fixed = np.zeros(len(recording.sources))
     fixed[np.delete(np.arange(len(fixed)), recording.plastic)] = recording.weights_static
-    sources, follows = network.connections.sources, np.diff(recording.step) == 1
+    sources, follows = network.connections.sources.whole(), np.diff(recording.step) == 1
     return reached_by(sources, fixed, recording.activity, recording.weights, recording.plastic, follows)
 
 
 def nothing(network: Network) -> Reached:
     """What is known where nothing is run: the weights that stay as they are; the others may reach anything."""
     neurons, signals, changes = np.zeros(len(network.neurons)), *np.zeros((2, len(network.connections)))
-    weights = _largest(network.connections.weights[None].astype(np.float64))
+    weights = _largest(network.connections.weights.whole()[None])
     weights[network.changing] = changes[network.changing] = np.inf
     return Reached(neurons, neurons, neurons, weights, signals, changes)
 

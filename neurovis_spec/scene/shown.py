@@ -118,7 +118,7 @@ def _focused(network: Network, name: str, members: IntArray) -> tuple[BoolArray,
     connections = network.connections
     chosen = np.zeros(len(network.neurons), bool)
     chosen[members] = True
-    into, out = chosen[connections.targets], chosen[connections.sources]
+    into, out = chosen[connections.targets.whole()], chosen[connections.sources.whole()]
     lines, focus = into | out, chosen.copy()
     sources = np.unique(connections.sources[into & ~out])
     targets = np.unique(connections.targets[out & ~into])
@@ -131,7 +131,7 @@ def _paths(network: Network, name: str, sources: IntArray, targets: IntArray) ->
     """All shortest directed paths to each of ``targets`` from the nearest of ``sources``, of at least one connection.
     Raises RendererError where none of them is reached."""
     connections = network.connections
-    begin, end = connections.sources, connections.targets
+    begin, end = connections.sources.whole(), connections.targets.whole()
     far = np.full(len(network.neurons), -1, np.int64)  # connections from the nearest source
     reached = np.zeros(len(network.neurons), bool)
     reached[sources] = True
@@ -169,7 +169,7 @@ def _paths(network: Network, name: str, sources: IntArray, targets: IntArray) ->
 
 def _paths_lead(network: Network, sources: IntArray, targets: IntArray) -> bool:
     """Whether any of the targets is reached from the sources."""
-    begin, end = network.connections.sources, network.connections.targets
+    begin, end = network.connections.sources.whole(), network.connections.targets.whole()
     seen = np.zeros(len(network.neurons), bool)
     front = np.zeros(len(seen), bool)
     front[sources] = True

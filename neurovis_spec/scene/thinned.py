@@ -47,7 +47,7 @@ def _strongest_first(network: Network, lines: BoolArray, sizes: FloatArray, leng
 
 def _shares(network: Network, sizes: FloatArray) -> FloatArray:
     """Of each connection, how much of all |w| at its target it is; the same whatever order these stand in."""
-    targets, count = network.connections.targets, len(network.neurons)
+    targets, count = network.connections.targets.whole(), len(network.neurons)
     largest = np.zeros(count)
     np.maximum.at(largest, targets, sizes)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -91,7 +91,7 @@ def _groups(network: Network) -> IntArray:
 def _pathways(network: Network) -> IntArray:
     """Of each connection the number of its pathway: that of the group that it comes from, then of that it goes to."""
     ends, group = network.connections, _groups(network)
-    return group[ends.sources] * len(network.neurons.groups) + group[ends.targets]
+    return group[ends.sources.whole()] * len(network.neurons.groups) + group[ends.targets.whole()]
 
 
 def losses(network: Network, lines: BoolArray, kept: BoolArray) -> list[str]:

@@ -51,7 +51,7 @@ def check_neurons(compiled: Compiled, findings: Findings) -> None:
     network = compiled.network
     idle = _idle(network)
     driven = np.zeros(len(network.neurons), dtype=np.bool_)
-    driven[network.connections.targets] = True
+    driven[network.connections.targets.whole()] = True
     if not idle.any():
         return
     origin = {scope.called(name): (scope, name) for scope in compiled.scopes for name in scope.section.neurons}
@@ -109,7 +109,7 @@ def _idle(network: Network) -> Mask:
     for block in network.blocks:
         if block.combine == "distance":  # |c| away from a signal of 0
             quiet[connections.targets[block.incoming]] = False
-    if not len(connections.sources):
+    if not len(connections):
         quiet &= _needed(network)
     if not quiet.any():
         return quiet
@@ -121,8 +121,8 @@ def _idle(network: Network) -> Mask:
             quiet[binding.places] = False
         elif kind in ("activation", "model"):
             quiet[network.blocks[int(number.partition("/")[0])].members] = False
-    idle = _unreached(quiet, connections.sources, connections.targets)
-    return _first(idle, connections.sources, connections.targets) if idle.any() else idle
+    idle = _unreached(quiet, connections.sources.whole(), connections.targets.whole())
+    return _first(idle, connections.sources.whole(), connections.targets.whole()) if idle.any() else idle
 
 
 def _needed(network: Network) -> Mask:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import IntArray, frozen
+from neurovis_spec.arrays import Column, IntArray, integers, reals
 from neurovis_spec.compiler.connections.entries import Bundle, EntryBuilder, EntryContext
 from neurovis_spec.compiler.connections.plasticity import title_of
 from neurovis_spec.compiler.limits import Limits
@@ -87,19 +87,19 @@ def _ends(
     return arrow.normal, sources, targets
 
 
-def join(bundles: tuple[Bundle, ...], rules: IntArray) -> Connections:
-    """All entries as one structure of arrays; ``rules`` says, for each connection, which plasticity it has."""
-    sizes = [len(bundle.sources) for bundle in bundles]
+def join(bundles: tuple[Bundle, ...], rules: list[int]) -> Connections:
+    """All entries as one structure of columns; ``rules`` says, for each entry, which plasticity it has."""
+    sizes = np.array([len(bundle.sources) for bundle in bundles], dtype=np.int64)
     return Connections(
-        sources=frozen(np.concatenate([bundle.sources for bundle in bundles] or [_NONE])),
-        targets=frozen(np.concatenate([bundle.targets for bundle in bundles] or [_NONE])),
-        weights=frozen(np.concatenate([bundle.weights for bundle in bundles] or [np.zeros(0)])),
-        centres=frozen(np.concatenate([bundle.centres for bundle in bundles] or [np.zeros(0)])),
-        delays=frozen(np.concatenate([bundle.delays for bundle in bundles] or [_NONE])),
-        rules=frozen(rules),
-        entry=frozen(np.repeat(np.arange(len(bundles), dtype=np.int64), sizes)),
-        low=frozen(np.repeat(np.array([bundle.low for bundle in bundles], dtype=np.float64), sizes)),
-        high=frozen(np.repeat(np.array([bundle.high for bundle in bundles], dtype=np.float64), sizes)),
+        sources=integers(*(bundle.sources for bundle in bundles)),
+        targets=integers(*(bundle.targets for bundle in bundles)),
+        weights=reals(*(bundle.weights for bundle in bundles)),
+        centres=reals(*(bundle.centres for bundle in bundles)),
+        delays=integers(*(bundle.delays for bundle in bundles)),
+        rules=Column.repeated(np.array(rules, dtype=np.int64), sizes, np.int64),
+        entry=Column.repeated(np.arange(len(bundles)), sizes, np.int64),
+        low=Column.repeated(np.array([bundle.low for bundle in bundles]), sizes, np.float64),
+        high=Column.repeated(np.array([bundle.high for bundle in bundles]), sizes, np.float64),
         entries=tuple(bundle.name for bundle in bundles),
         descriptions=tuple(bundle.description for bundle in bundles),
         learns=tuple(None if bundle.learning is None else title_of(bundle.learning) for bundle in bundles),

@@ -41,9 +41,9 @@ def make_settable(
     """The bindings of a network, those of the same formula as one, and the arrays that they write to."""
     arrays: dict[str, FloatArray] = {
         "bias": population.neurons.bias,
-        "centres": connections.centres,
-        "low": connections.low,
-        "high": connections.high,
+        "centres": connections.centres.whole(),
+        "low": connections.low.whole(),
+        "high": connections.high.whole(),
     }
     for number, block in enumerate(blocks):
         for kind, values in (("activation", block.activation_parameters), ("model", block.model_parameters)):

@@ -133,7 +133,7 @@ class _Trial:
         self._patcher = Patcher(settable)
         self._parameters = settable.parameters.copy()
         self._chosen = np.zeros(len(settable.slots), dtype=np.bool_)
-        self._weights = self.network.connections.weights.copy()
+        self._weights = self.network.connections.weights.whole().copy()
         self._variables = settable.initial.copy()
         self._held = Held.none(len(self.network.neurons))
         self._arrays: dict[tuple[Binding, ...], tuple[_Written, ...]] = {}
