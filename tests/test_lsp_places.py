@@ -11,7 +11,7 @@ from lsp_marks import marked
 
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.yaml.reader import read_any, read_text
-from neurovis_spec.lsp.cursor import where
+from neurovis_spec.lsp.completion import where
 from neurovis_spec.lsp.outline import item_at, outline
 from neurovis_spec.lsp.rename import apply, rename
 from neurovis_spec.lsp.text import Place, Text, holds

@@ -18,11 +18,10 @@ from neurovis_spec.language.data.files import locate
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.yaml.reader import read_file
 from neurovis_spec.lsp.document import Document
-from neurovis_spec.lsp.names import Name
+from neurovis_spec.lsp.names import SECTIONS, Name
 from neurovis_spec.lsp.outline import Item, outline
 from neurovis_spec.lsp.outline import Path as Keys
 from neurovis_spec.lsp.rename import sharing
-from neurovis_spec.lsp.scopes import SECTIONS
 from neurovis_spec.lsp.text import Place
 
 

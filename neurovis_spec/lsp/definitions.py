@@ -12,8 +12,8 @@ from functools import cache
 
 from neurovis_spec.compiler.values.builtin import libraries
 from neurovis_spec.language.grammar import Kind
+from neurovis_spec.lsp.names import DEFINITIONS, SECTIONS
 from neurovis_spec.lsp.outline import Item, outline
-from neurovis_spec.lsp.scopes import DEFINITIONS, SECTIONS
 
 
 @dataclass(frozen=True, slots=True)

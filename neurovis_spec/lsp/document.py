@@ -2,17 +2,25 @@
 
 In: a text, the name that findings call it by, its folder, and the files around it. Out: the Items and Names of the
 text, which may lead to what other files declare: those that it includes and, of a file to be included, those that are
-open and include it.
+open and include it; and the sensors and actuators of its body, found as the compiler finds them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Literal
 
+from neurovis_spec import plugins
+from neurovis_spec.body.model import Port
+from neurovis_spec.compiler.body import Clock, find_body
+from neurovis_spec.compiler.body import Place as BodyPlace
+from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.located import Located
 from neurovis_spec.lsp.files import Files
 from neurovis_spec.lsp.index import Index
 from neurovis_spec.lsp.names import Name
@@ -108,3 +116,27 @@ class Document:
     def item_at(self, place: Place) -> Item | None:
         """The key or the text at a place."""
         return self.page.item_at(place)
+
+
+def ports_of(document: Document, use: Literal["sensor", "actuator"]) -> Sequence[Port]:
+    """The sensors, or the actuators, of the body that a document names; none where it cannot be opened as the text
+    stands."""
+    values = document.index.values
+    for kind in plugins.names(plugins.BODIES):
+        given = values.get(("body", kind))
+        if given is not None and given.text:
+            dt = values.get(("time", "dt"))
+            seconds = None if dt is None else dt.scalar.value
+            clock = Clock(float(seconds) if isinstance(seconds, (int, float)) and seconds > 0 else 1.0)
+            place = BodyPlace(document.path.parent, document.root)
+            _, body = find_body(kind, Located(given.text, given.scalar), place, clock, Findings())
+            return () if body is None else body.sensors if use == "sensor" else body.actuators
+    return ()
+
+
+def described(port: Port) -> str:
+    """How many numbers a port is, of what, and from where to where."""
+    size = plural(port.size, "number")
+    unit = f", {port.unit}" if port.unit else ""
+    limited = port.low > float("-inf") and port.high < float("inf")
+    return size + unit + (f", {port.low:g} … {port.high:g}" if limited else "")

@@ -18,13 +18,11 @@ from neurovis_spec.language.grammar import Role
 from neurovis_spec.language.patterns import PATTERNS
 from neurovis_spec.language.places import key_at, role_of
 from neurovis_spec.language.templates import Hole, pieces
-from neurovis_spec.lsp.bodies import described, ports_of
 from neurovis_spec.lsp.definitions import known
-from neurovis_spec.lsp.document import Document
+from neurovis_spec.lsp.document import Document, described, ports_of
 from neurovis_spec.lsp.index import Found, Index
-from neurovis_spec.lsp.names import Name
+from neurovis_spec.lsp.names import DEFINITIONS, Name
 from neurovis_spec.lsp.outline import Item
-from neurovis_spec.lsp.scopes import DEFINITIONS
 from neurovis_spec.lsp.text import Place, holds
 from neurovis_spec.manual.words import functions_of
 

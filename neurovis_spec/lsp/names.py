@@ -1,15 +1,17 @@
 """Every name in a document, at its very characters: where it is declared, and wherever it is used.
 
 In: Items. Out: Names, in the order of the document: those in references (``K3``, ``K3..K5``, ``left1.K -> O``), in
-expressions, and those that are a whole value or key.
+expressions, and those that are a whole value or key; each with its Scope, the module and the definition within which it
+is looked up. What a text is for is in the models of the language (``language/places.py``).
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
+from typing import Final
 
 from neurovis_spec.compiler.values.constants import ALWAYS
 from neurovis_spec.diagnostics import Span
@@ -17,9 +19,35 @@ from neurovis_spec.language.grammar import Kind, Role
 from neurovis_spec.language.places import role_of
 from neurovis_spec.language.references import Arrow, DottedName, NeuronRange, Part, RuleState, Sum, parse
 from neurovis_spec.language.templates import Hole, pieces
-from neurovis_spec.lsp.outline import Item
-from neurovis_spec.lsp.scopes import SECTIONS, Scope, scope_of
+from neurovis_spec.lsp.outline import Item, Path
 from neurovis_spec.lsp.text import Text
+
+
+@dataclass(frozen=True, slots=True)
+class Scope:
+    """Within which module (None: the spec itself) and which definition (section, name) a text stands."""
+
+    module: str | None = None
+    definition: tuple[str, str] | None = None
+
+
+#: The kinds that definitions declare, by section.
+DEFINITIONS: Final[Mapping[str, Kind]] = {"activations": "activation", "models": "model", "rules": "rule"}
+SECTIONS: Final[Mapping[Kind, str]] = {kind: section for section, kind in DEFINITIONS.items()}
+
+
+def scope_of(path: Path) -> Scope:
+    """The scope of a key or a value.
+
+    >>> scope_of(("modules", "leg", "parameters", "gain")).module
+    'leg'
+    """
+    if len(path) > 2 and path[0] == "modules" and isinstance(path[1], str):
+        return Scope(path[1])
+    if len(path) > 2 and path[0] in DEFINITIONS:
+        return Scope(None, (str(path[0]), str(path[1])))
+    return Scope()
+
 
 #: A name in an expression, and the parenthesis behind the name of a function.
 _IN_FORMULA = re.compile(r"(?<![\w.])([A-Za-z_]\w*)(\s*\()?", re.ASCII)
