@@ -18,9 +18,9 @@ from scenes import file_of, scene_of
 import neurovis_spec as nv
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.live.access import Access
+from neurovis_spec.live.commands import REQUESTS
 from neurovis_spec.live.hub import Hub
 from neurovis_spec.live.live import listen
-from neurovis_spec.live.requests import REQUESTS
 from neurovis_spec.live.run import Run
 from neurovis_spec.live.server import Server
 from neurovis_spec.live.simulated import SimulatedSource

@@ -20,7 +20,7 @@ from test_live_server import Eyes
 
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
-from neurovis_spec.live.requests import REQUESTS
+from neurovis_spec.live.commands import REQUESTS
 from neurovis_spec.live.view import FINENESS
 from neurovis_spec.live.watch import Watch
 

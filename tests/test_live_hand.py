@@ -21,10 +21,10 @@ from test_live_looking import places
 
 import neurovis_spec as nv
 from neurovis_spec.live.access import Access
+from neurovis_spec.live.commands import REQUESTS
 from neurovis_spec.live.desk import Desk, Written
 from neurovis_spec.live.hub import Hub
 from neurovis_spec.live.live import listen
-from neurovis_spec.live.requests import REQUESTS
 from neurovis_spec.live.run import Run
 from neurovis_spec.live.server import Server
 from neurovis_spec.live.show import Show

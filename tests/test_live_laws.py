@@ -26,20 +26,17 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.live import simulated
 from neurovis_spec.live.carry import carried
-from neurovis_spec.live.commands import Branch, Command, Pause, Play, Restart, Seek, Step
+from neurovis_spec.live.commands import REQUESTS, Branch, Command, Pause, Play, Restart, Seek, Step
 from neurovis_spec.live.commands import Event as ToEvent
 from neurovis_spec.live.desk import Desk
-from neurovis_spec.live.hub import Client, Hub
+from neurovis_spec.live.hub import Client, Hub, Reception
 from neurovis_spec.live.live import Edits
-from neurovis_spec.live.reception import Reception
-from neurovis_spec.live.requests import REQUESTS
-from neurovis_spec.live.rules import rules
 from neurovis_spec.live.run import Run, Shown
 from neurovis_spec.live.saving import told_by
 from neurovis_spec.live.show import Show
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import Seen, Source, SourceError
-from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn, fed_by, turn
+from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn, fed_by, rules, turn
 from neurovis_spec.live.view import View, view_of
 from neurovis_spec.notebook import widget as notebook
 from neurovis_spec.runtime.recording import Snapshot

@@ -10,8 +10,8 @@ import pytest
 
 import neurovis_spec as nv
 from neurovis_spec.layout.model import LayoutRefusalError
-from neurovis_spec.live.pins import Compile, Into, SavingError, saving
-from neurovis_spec.live.placing import STEP, Placed, placed
+from neurovis_spec.live.commands import Into
+from neurovis_spec.live.pins import STEP, Compile, Placed, SavingError, placed, saving
 
 SPECS = Path(__file__).parents[1] / "specs"
 MIRRORED = """neurovis: 1

@@ -13,9 +13,20 @@ import numpy as np
 import pytest
 
 import neurovis_spec as nv
-from neurovis_spec.live.appearance import Appearance
 from neurovis_spec.live.clock import FRAMES, Clock, Pace
-from neurovis_spec.live.commands import Branch, Command, Draw, Event, Pause, Play, Restart, Seek, Speed, Step
+from neurovis_spec.live.commands import (
+    Appearance,
+    Branch,
+    Command,
+    Draw,
+    Event,
+    Pause,
+    Play,
+    Restart,
+    Seek,
+    Speed,
+    Step,
+)
 from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.run import Run, Shown
 from neurovis_spec.live.simulated import SimulatedSource

@@ -25,13 +25,11 @@ from aiohttp import ClientWebSocketResponse, WSMsgType
 import neurovis_spec as nv
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.live.access import Access
-from neurovis_spec.live.appearance import Appearance
-from neurovis_spec.live.commands import Pause, Seek
+from neurovis_spec.live.commands import REQUESTS, Appearance, Pause, Seek
 from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.hub import AHEAD, Hub
 from neurovis_spec.live.live import listen
 from neurovis_spec.live.protocol import FRAME, LARGEST, MESSAGES, SCENE, TRACE
-from neurovis_spec.live.requests import REQUESTS
 from neurovis_spec.live.run import Run
 from neurovis_spec.live.server import BURST, MOST_CLIENTS, MOST_CONNECTIONS, Server
 from neurovis_spec.live.simulated import SimulatedSource

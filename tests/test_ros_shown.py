@@ -14,8 +14,8 @@ import pytest
 from test_live_server import Eyes
 
 import neurovis_spec as nv
+from neurovis_spec.live.commands import REQUESTS
 from neurovis_spec.live.live import listen
-from neurovis_spec.live.requests import REQUESTS
 from neurovis_spec.live.show import Show
 from neurovis_spec.ros.middleware import Node
 from neurovis_spec.ros.page import Page

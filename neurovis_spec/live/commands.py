@@ -1,15 +1,54 @@
-"""Commands: what a client asks of a live run, besides turns.
+"""Commands: what a client asks of a live run, besides turns; requests: what its owner asks of the desk.
 
-In: what ``protocol`` has checked. Out: frozen values that ``run`` carries out.
+In: what ``protocol`` has checked. Out: frozen values: commands, which ``run`` carries out, among them how the picture
+is drawn otherwise than the spec says (an Appearance); requests, neurons put by hand and files, which ``desk`` carries
+out.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TypeAlias
+from dataclasses import dataclass, replace
+from typing import Final, Literal, TypeAlias
 
-from neurovis_spec.live.appearance import Appearance
+from neurovis_spec.layout.model import Point
 from neurovis_spec.live.turns import Turn
+from neurovis_spec.scene.gains import Gains, Scale
+
+#: Gains become at most so many times as large, or as small.
+MOST = 64.0
+
+
+@dataclass(frozen=True, slots=True)
+class Appearance:
+    """The name of a theme ('': that of the spec), and how many times as large the gains of Eqs. 2–5 are."""
+
+    theme: str = ""
+    activity: float = 1.0
+    signal: float = 1.0
+    thickness: float = 1.0
+    change: float = 1.0
+
+    def gains(self, gains: Gains) -> Gains:
+        """These gains, so many times as large."""
+        return Gains(
+            activity=gains.activity * self.activity,
+            centre=gains.centre,
+            signal=gains.signal * self.signal,
+            thickness=gains.thickness * self.thickness,
+            change=gains.change * self.change,
+            activity_scales=_times(gains.activity_scales, self.activity),
+            signal_scales=_times(gains.signal_scales, self.signal),
+            thickness_scales=_times(gains.thickness_scales, self.thickness),
+            change_scales=_times(gains.change_scales, self.change),
+        )
+
+
+#: As the spec says.
+AS_IT_IS = Appearance()
+
+
+def _times(scales: tuple[Scale, ...], factor: float) -> tuple[Scale, ...]:
+    return tuple(replace(scale, gain=scale.gain * factor) for scale in scales)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,3 +112,49 @@ class Draw:
 
 
 Command: TypeAlias = Present | Draw | Play | Pause | Step | Seek | Event | Restart | Branch | Speed | Turn
+
+
+#: Where what was put by hand is written: into ``layout.positions`` of the spec, or into the layout file that the spec
+#: (then) names.
+Into: TypeAlias = Literal["spec", "file"]
+#: What can be had as a file.
+What: TypeAlias = Literal["svg", "film", "npz"]
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceNeuron:
+    """Put a neuron here (units of the layout); until ``done`` only the places and routes that follow are told."""
+
+    neuron: str
+    at: Point
+    done: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Unplace:
+    """Undo the last placing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Save:
+    """Say what would be written."""
+
+    into: Into
+
+
+@dataclass(frozen=True, slots=True)
+class Write:
+    """Write what was said."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fetch:
+    """Have the picture, a film of the last ``seconds``, or the recording."""
+
+    what: What
+    seconds: float
+
+
+Request: TypeAlias = PlaceNeuron | Unplace | Save | Write | Fetch
+#: the messages that ask for them
+REQUESTS: Final = frozenset(("place", "unplace", "save", "write", "fetch"))

@@ -16,7 +16,7 @@ from neurovis_spec.compiler.events.settable import Dependent
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.describe import wired
 from neurovis_spec.language.sections import InputModel
-from neurovis_spec.live.rules import rules
+from neurovis_spec.live.turns import rules
 
 
 def declared(compiled: CompiledNetwork) -> dict[str, list[dict[str, object]]]:

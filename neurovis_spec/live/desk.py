@@ -17,11 +17,9 @@ from typing import Final, TypeAlias
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.diagnostics import SpecError, show_text
 from neurovis_spec.layout.model import Layout
-from neurovis_spec.live.appearance import Appearance
-from neurovis_spec.live.pins import Compile, Saving, SavingError, saving
-from neurovis_spec.live.placing import Placed, placed
+from neurovis_spec.live.commands import Appearance, Fetch, PlaceNeuron, Request, Save, Unplace, Write
+from neurovis_spec.live.pins import Compile, Placed, Saving, SavingError, placed, saving
 from neurovis_spec.live.protocol import file_message, moved_message, placed_message, refused_message, saving_message
-from neurovis_spec.live.requests import Fetch, PlaceNeuron, Request, Save, Unplace, Write
 from neurovis_spec.live.run import Run, Stage
 from neurovis_spec.live.saving import Told, film, picture, recording, steps_for, told_by
 from neurovis_spec.live.source import Source, SourceError

@@ -1,7 +1,9 @@
-"""The drawing: a scene as a page gets it, once.
+"""The drawing: a scene as a page gets it, once; and what moves in it while a neuron is dragged.
 
-In: a Scene, its network. Out: JSON, compressed: the shapes as the renderers get them, the theme, and the constants of
-what depends on a step (heads, halos). Lengths are rounded to hundredths of a unit, as in an SVG.
+In: a Scene, its network; the plan that is shown, its layout and another. Out: JSON, compressed: the shapes as the
+renderers get them, the theme, and the constants of what depends on a step (heads, halos), with lengths rounded to
+hundredths of a unit, as in an SVG; the discs that stand elsewhere and the lines that run elsewhere before all is
+arranged anew, in units of the picture, which stays as large as it is.
 """
 
 from __future__ import annotations
@@ -10,10 +12,13 @@ import base64
 import gzip
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from types import MappingProxyType
 
+import numpy as np
+
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene import (
     FAMILIES,
     HALO,
@@ -36,6 +41,7 @@ from neurovis_spec.scene import (
 )
 from neurovis_spec.scene.lesions import FAINT
 from neurovis_spec.scene.matrix import Order
+from neurovis_spec.scene.plan import Plan, rerouted
 
 
 def content(
@@ -121,3 +127,36 @@ def _short(value: float) -> float:
 def _points(points: Sequence[tuple[float, float]]) -> list[float]:
     """Coordinates one after the other, to hundredths of a unit, as in an SVG."""
     return [_short(value) for point in points for value in point]
+
+
+#: A line: its points one after the other, the tip of its head, and the direction of this.
+Run = tuple[list[float], list[float], list[float]]
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """Centres and lines by the ids of their groups."""
+
+    discs: Mapping[str, tuple[float, float]]
+    lines: Mapping[str, Run]
+
+
+def moved(planned: Plan, before: Layout, after: Layout) -> Moved:
+    """What differs between two layouts of the same network."""
+    names = planned.network.neurons.names
+    discs = {}
+    for index, name in enumerate(names):
+        if after.positions[name] != before.positions[name]:
+            x, y = planned.frame.map(np.array(after.positions[name])).tolist()
+            discs[f"n{index}"] = (round(x, 2), round(y, 2))
+    other = [
+        index
+        for index, name in enumerate(planned.network.connection_names)
+        if index in planned.lines and after.routes.get(name) != before.routes.get(name)
+    ]
+    lines = {}
+    for index, line in zip(other, rerouted(planned, after, other), strict=True):
+        points = [round(value, 2) for point in line.points for value in point]
+        tip, along = ([round(value, 5) for value in point] for point in (line.tip, line.direction))
+        lines[f"c{index}"] = (points, tip, along)
+    return Moved(discs, lines)

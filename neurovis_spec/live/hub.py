@@ -1,8 +1,10 @@
-"""The hub: who looks on, and what each of them is sent: the latest frame that it has room for.
+"""The hub: who looks on, what each of them is sent, the latest frame that it has room for, and what its messages do.
 
 In: what a run shows, from its thread. Out: for each client the next messages, on the event loop. A client that has not
 drawn the frames that it was sent gets no more; what changes meanwhile it gets with the next one. So a slow client sees
 fewer frames, a stalled one none, and neither costs the others or the run anything. Many viewers see fewer frames each.
+The messages of clients, who are trusted with nothing, however they came: the Reception asks the hub, the run and the
+desk; what is refused is told.
 """
 
 from __future__ import annotations
@@ -17,9 +19,14 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.live.commands import Request
+from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.protocol import (
+    LookAt,
     Trace,
+    acknowledged,
     body_message,
+    command_of,
     frame_message,
     refused_message,
     scene_message,
@@ -27,7 +34,7 @@ from neurovis_spec.live.protocol import (
     trace_message,
     values_message,
 )
-from neurovis_spec.live.run import Shown
+from neurovis_spec.live.run import Run, Shown
 from neurovis_spec.live.source import NOTHING, Drawn
 
 #: Frames that a client may be sent before it has drawn them.
@@ -260,3 +267,29 @@ def _changed(before: Shown, now: Shown) -> npt.NDArray[np.bool_]:
     changed: npt.NDArray[np.bool_] = one.kinds != other.kinds
     changed[: len(other.lines)] |= (one.widths != other.widths) | (one.glows != other.glows)
     return changed
+
+
+class Reception:
+    """Takes messages, on the event loop of a hub."""
+
+    def __init__(self, hub: Hub, run: Run, desk: Desk | None = None) -> None:
+        self._hub, self._run, self._desk = hub, run, desk
+
+    def take(self, client: Client, message: bytes | str) -> None:
+        """Do what a message asks for. Raises ProtocolError for one that no page of ours sends."""
+        if isinstance(message, bytes):
+            self._hub.drawn(client, acknowledged(message).serial)
+            return
+        command = command_of(message)
+        if isinstance(command, LookAt):
+            self._hub.check(client, command.items)
+        elif isinstance(command, Trace):
+            self._hub.trace(client, command)
+        elif not client.owner:
+            client.tell(refused_message("this page only looks on"))
+        elif not isinstance(command, Request):
+            self._run.ask(command, lambda reason: self._hub.refuse(client, reason))
+        elif self._desk is not None:
+            self._desk.ask(command, lambda text: self._hub.answer(client, text))
+        else:
+            client.tell(refused_message("nothing is put by hand or saved here"))

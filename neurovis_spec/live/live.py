@@ -19,10 +19,10 @@ from neurovis_spec.diagnostics import Diagnostic, SpecError, show_text
 from neurovis_spec.interrupts import ENDING, Ended
 from neurovis_spec.layout.model import LayoutRefusalError
 from neurovis_spec.live.access import Access
+from neurovis_spec.live.commands import REQUESTS
 from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.hub import Hub
 from neurovis_spec.live.protocol import findings_message, refused_message
-from neurovis_spec.live.requests import REQUESTS
 from neurovis_spec.live.run import Change, Run, Stage
 from neurovis_spec.live.server import Server
 from neurovis_spec.live.show import Show

@@ -20,12 +20,29 @@ import numpy.typing as npt
 from neurovis_spec.body.skeletons import text_of
 from neurovis_spec.compiler.drawing.pins import FARTHEST
 from neurovis_spec.layout.model import Point
-from neurovis_spec.live.appearance import MOST, Appearance
 from neurovis_spec.live.clock import SPEEDS
-from neurovis_spec.live.commands import Branch, Command, Draw, Event, Pause, Play, Restart, Seek, Speed, Step
+from neurovis_spec.live.commands import (
+    MOST,
+    Appearance,
+    Branch,
+    Command,
+    Draw,
+    Event,
+    Fetch,
+    Pause,
+    PlaceNeuron,
+    Play,
+    Request,
+    Restart,
+    Save,
+    Seek,
+    Speed,
+    Step,
+    Unplace,
+    Write,
+)
+from neurovis_spec.live.drawing import Moved
 from neurovis_spec.live.history import Bins, Range
-from neurovis_spec.live.moved import Moved
-from neurovis_spec.live.requests import Fetch, PlaceNeuron, Request, Save, Unplace, Write
 from neurovis_spec.live.run import Status
 from neurovis_spec.live.saving import MOST_SECONDS
 from neurovis_spec.live.source import Drawn, Reach, Turned

@@ -16,9 +16,21 @@ from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import Final, ParamSpec, TypeAlias
 
-from neurovis_spec.live.appearance import Appearance
 from neurovis_spec.live.clock import FRAMES, Clock, Pace
-from neurovis_spec.live.commands import Branch, Command, Draw, Event, Pause, Play, Present, Restart, Seek, Speed, Step
+from neurovis_spec.live.commands import (
+    Appearance,
+    Branch,
+    Command,
+    Draw,
+    Event,
+    Pause,
+    Play,
+    Present,
+    Restart,
+    Seek,
+    Speed,
+    Step,
+)
 from neurovis_spec.live.history import History
 from neurovis_spec.live.source import Capabilities, Drawn, Reach, Seen, Source, SourceError, Turned
 from neurovis_spec.live.view import Look, View

@@ -19,9 +19,8 @@ from aiohttp import WSCloseCode, WSMsgType, web
 from neurovis_spec.live.access import PAGE, Access
 from neurovis_spec.live.commands import Present
 from neurovis_spec.live.desk import Desk
-from neurovis_spec.live.hub import Client, Hub
+from neurovis_spec.live.hub import Client, Hub, Reception
 from neurovis_spec.live.protocol import LARGEST, ProtocolError
-from neurovis_spec.live.reception import Reception
 from neurovis_spec.live.run import Run
 from neurovis_spec.live.shipped import page
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.layout.model import Layout
-from neurovis_spec.live.appearance import AS_IT_IS, Appearance
 from neurovis_spec.live.carry import carried
+from neurovis_spec.live.commands import AS_IT_IS, Appearance
 from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.run import Change, Stage
 from neurovis_spec.live.simulated import SimulatedSource

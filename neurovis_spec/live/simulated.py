@@ -23,9 +23,21 @@ from neurovis_spec.body import BodyError
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.history import Ring
 from neurovis_spec.live.past import EVERY, ROOM, Kept, Past
-from neurovis_spec.live.rules import carried_out, rules
 from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned, drawn, recalled
-from neurovis_spec.live.turns import TURNS, Feed, Hold, Lesion, Mend, Set, Turn, fed_by, same_value, turn
+from neurovis_spec.live.turns import (
+    TURNS,
+    Feed,
+    Hold,
+    Lesion,
+    Mend,
+    Set,
+    Turn,
+    carried_out,
+    fed_by,
+    rules,
+    same_value,
+    turn,
+)
 from neurovis_spec.runtime.columns import columns_of
 from neurovis_spec.runtime.recording import After, Snapshot
 from neurovis_spec.runtime.simulation import ParameterError, Simulation

@@ -18,11 +18,10 @@ from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.model import Layout
-from neurovis_spec.live.appearance import AS_IT_IS, Appearance
+from neurovis_spec.live.commands import AS_IT_IS, Appearance
 from neurovis_spec.live.declared import declared
-from neurovis_spec.live.drawing import content
+from neurovis_spec.live.drawing import Moved, content, moved
 from neurovis_spec.live.history import Members
-from neurovis_spec.live.moved import Moved, moved
 from neurovis_spec.live.source import Mask, Seen
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.scene import Scene

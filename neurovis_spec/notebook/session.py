@@ -12,9 +12,8 @@ from threading import Thread, current_thread
 from typing import Final, TypeAlias
 
 from neurovis_spec.live.commands import Command, Pause, Play, Present
-from neurovis_spec.live.hub import AHEAD, Client, Hub
+from neurovis_spec.live.hub import AHEAD, Client, Hub, Reception
 from neurovis_spec.live.protocol import ProtocolError, refused_message
-from neurovis_spec.live.reception import Reception
 from neurovis_spec.live.run import Done, Refuse, Run, Shown, Stage
 
 #: Frames of a notebook at once; of more, the one that came first is left.

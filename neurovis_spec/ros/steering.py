@@ -8,9 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from threading import Lock
 
-from neurovis_spec.live.rules import carried_out, rules
 from neurovis_spec.live.source import Mask, SourceError
-from neurovis_spec.live.turns import TURNS, Feed, Turn, fed_by, turn
+from neurovis_spec.live.turns import TURNS, Feed, Turn, carried_out, fed_by, rules, turn
 from neurovis_spec.runtime.simulation import Simulation
 
 

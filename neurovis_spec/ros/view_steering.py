@@ -14,9 +14,8 @@ from threading import Lock
 import numpy as np
 
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.live.rules import carried_out, rules
 from neurovis_spec.live.source import Mask, SourceError
-from neurovis_spec.live.turns import Set, Turn
+from neurovis_spec.live.turns import Set, Turn, carried_out, rules
 from neurovis_spec.ros.middleware import Node
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
 
