@@ -13,9 +13,9 @@ from rosbags.typesys import Stores, get_typestore
 
 from neurovis_spec.language.ros_types import all_types
 from neurovis_spec.ros.accept import ARRAY, STRING, Accepted, Stream, anything, arrays, headed, texts, time_of
-from neurovis_spec.ros.counts import Teller
 from neurovis_spec.ros.definitions import definition, md5sum, written
 from neurovis_spec.ros.middleware import Arrival, Ros
+from neurovis_spec.ros.summary import Teller
 from neurovis_spec.runtime.wire import ENCODINGS, ArrayForm, Encoding, WireError, array_of, text_message, text_of
 
 HASH = "0123456789abcdef"

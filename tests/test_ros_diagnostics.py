@@ -8,10 +8,9 @@ import pytest
 from ros_alone import Alone
 from rosbags.typesys import Stores, get_typestore
 
-from neurovis_spec.ros.counts import Counts
 from neurovis_spec.ros.diagnostics import Diagnostics
 from neurovis_spec.ros.middleware import Ros
-from neurovis_spec.ros.summary import Summary
+from neurovis_spec.ros.summary import Counts, Summary
 
 TYPE = "diagnostic_msgs/msg/DiagnosticArray"
 

@@ -15,9 +15,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import neurovis_spec as nv
-from neurovis_spec.ros import legacy_listener
-from neurovis_spec.ros.legacy import FLOATS, KINDS, TEXT, Kind, Legacy, layer_pairs, numbers_of, positions, types_of
-from neurovis_spec.ros.legacy_listener import LegacyListener
+from neurovis_spec.ros.legacy import (
+    FLOATS,
+    KINDS,
+    TEXT,
+    Kind,
+    Legacy,
+    LegacyListener,
+    layer_pairs,
+    numbers_of,
+    positions,
+    types_of,
+)
 from neurovis_spec.ros.listening import Listening, Wanted
 from neurovis_spec.ros.middleware import Arrival, Arrived, Node
 from neurovis_spec.runtime.wire import Encoding, WireError, text_message
@@ -218,7 +227,7 @@ def test_what_comes_before_the_network_is_known_is_recorded_with_it(tmp_path: Pa
 
 
 def test_no_more_waits_for_a_network_than_there_is_room_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(legacy_listener, "_WAITING", 10_000)
+    monkeypatch.setattr("neurovis_spec.ros.legacy._WAITING", 10_000)
     node, listener = listening_to()
     node.send("activity", *["1,2"] * 1000)
     listener.hear(0.2)

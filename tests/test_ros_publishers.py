@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from test_ros_recorder import HASH, LABEL, START, TOPIC, N, arrays_in, files, text_of_type
 
 from neurovis_spec.ros.accept import ARRAY, Stream, arrays
-from neurovis_spec.ros.counts import Teller
 from neurovis_spec.ros.middleware import Arrival, Origin
 from neurovis_spec.ros.publishers import Numbered, OnePublisher
 from neurovis_spec.ros.recorder import Recorder
+from neurovis_spec.ros.summary import Teller
 from neurovis_spec.runtime.wire import ENCODINGS, ArrayForm
 
 MS = 1_000_000

@@ -20,7 +20,7 @@ from neurovis_spec.live.show import Show
 from neurovis_spec.ros.middleware import Node
 from neurovis_spec.ros.page import Page
 from neurovis_spec.ros.received import ReceivedSource
-from neurovis_spec.ros.view_steering import ViewSteering
+from neurovis_spec.ros.steering import ViewSteering
 
 COMPILED = nv.compile_text("""
 neurovis: 1

@@ -14,8 +14,7 @@ from neurovis_spec.live.source import SourceError, Turned
 from neurovis_spec.live.turns import TURNS, Feed, Hold, Learn, Lesion, Mend, Set
 from neurovis_spec.ros.middleware import Node
 from neurovis_spec.ros.received import ReceivedSource
-from neurovis_spec.ros.steering import RunSteering
-from neurovis_spec.ros.view_steering import ViewSteering
+from neurovis_spec.ros.steering import RunSteering, ViewSteering
 
 SPEC = """
 neurovis: 1

@@ -20,7 +20,6 @@ from neurovis_spec.compiler.ros_settings import Subscription
 from neurovis_spec.ros import middleware
 from neurovis_spec.ros import pace as pace_module
 from neurovis_spec.ros.bags import Bag
-from neurovis_spec.ros.counts import Teller
 from neurovis_spec.ros.definitions import Definition
 from neurovis_spec.ros.definitions import definition as text_of
 from neurovis_spec.ros.fields import encode
@@ -30,6 +29,7 @@ from neurovis_spec.ros.pace import NO_CLOCK, Pace, clock_begins
 from neurovis_spec.ros.play import Course as Playing
 from neurovis_spec.ros.play import Player
 from neurovis_spec.ros.run import Course, NodeRun
+from neurovis_spec.ros.summary import Teller
 
 FLOAT, JOINTS = "std_msgs/Float64", "sensor_msgs/JointState"
 TEXT = "float64 data"

@@ -40,7 +40,7 @@ def command(output: str | None, namespace: str, network: str, desk: Desk, meetin
 
     Without -o and --record it is shown in the browser. Nothing in the controller has to be changed. Ctrl-C ends it.
     """
-    from neurovis_spec.ros.legacy_listener import LegacyListener
+    from neurovis_spec.ros.legacy import LegacyListener
     from neurovis_spec.ros.summary import Summary
     from neurovis_spec.runtime.files import replacing
 

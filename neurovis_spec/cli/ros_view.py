@@ -42,8 +42,8 @@ def command(spec: str | None, network: str | None, settings: dict[str, float], d
     from neurovis_spec.ros.announced import Others, find
     from neurovis_spec.ros.listening import ACTIVITY, SPEC, base_of
     from neurovis_spec.ros.middleware import DISPLAY, RECORDER
+    from neurovis_spec.ros.steering import ViewSteering
     from neurovis_spec.ros.summary import Summary
-    from neurovis_spec.ros.view_steering import ViewSteering
 
     desk = desk or desk.in_the_browser()
     desk.check()

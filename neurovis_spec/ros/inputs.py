@@ -15,10 +15,10 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.ros_settings import Subscription as Settings
 from neurovis_spec.likeness import nearest
-from neurovis_spec.ros.counts import REASONS, Counts, Reason, Teller
 from neurovis_spec.ros.definitions import Definition
 from neurovis_spec.ros.fields import numbers_at, texts_at
 from neurovis_spec.ros.middleware import Arrival, Arrived
+from neurovis_spec.ros.summary import REASONS, Counts, Reason, Teller
 from neurovis_spec.runtime.wire import Encoding, WireError
 
 #: names of a message that are listed, and characters of each

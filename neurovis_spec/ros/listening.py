@@ -13,7 +13,6 @@ from typing import Final
 
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.ros.accept import ARRAY, STRING, Accepted, Judge, Stream, anything, arrays, headed
-from neurovis_spec.ros.counts import Counts
 from neurovis_spec.ros.definitions import definition
 from neurovis_spec.ros.files import Files, Rotation
 from neurovis_spec.ros.logs import topic_of
@@ -21,6 +20,7 @@ from neurovis_spec.ros.middleware import Arrival, Ros
 from neurovis_spec.ros.publishers import OnePublisher
 from neurovis_spec.ros.received import ReceivedSource
 from neurovis_spec.ros.recorder import Recorder
+from neurovis_spec.ros.summary import Counts
 from neurovis_spec.ros.video import Video
 from neurovis_spec.runtime.columns import Probe, columns_of
 from neurovis_spec.runtime.npz_file import frame_bytes

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from neurovis_spec.ros.accept import STRING
 from neurovis_spec.ros.bags import Bag
 from neurovis_spec.ros.convert import ConversionError, Converter
-from neurovis_spec.ros.counts import Counts, Teller
 from neurovis_spec.ros.logs import Stored, Topic
 from neurovis_spec.ros.middleware import Arrival, Node, Publisher, Quality, Tell
 from neurovis_spec.ros.pace import NO_CLOCK, Clock, SimulatedClock, SteadyClock, clock_begins
+from neurovis_spec.ros.summary import Counts, Teller
 from neurovis_spec.runtime.wire import WireError, text_of
 
 #: Called with what is sent; must not wait.

@@ -14,10 +14,10 @@ from time import monotonic
 from typing import Final, TypeAlias
 
 from neurovis_spec.ros.accept import Accepted, Stream, Taken, time_of
-from neurovis_spec.ros.counts import Teller
 from neurovis_spec.ros.files import Files
 from neurovis_spec.ros.logs import Stored, Topic
 from neurovis_spec.ros.middleware import Arrival
+from neurovis_spec.ros.summary import Teller
 from neurovis_spec.runtime.mcap_records import LARGEST_CHUNK
 
 #: bytes of messages that the queue takes

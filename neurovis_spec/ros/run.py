@@ -21,7 +21,6 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.ros_settings import absolute
 from neurovis_spec.interrupts import deferred
 from neurovis_spec.ros.accept import ARRAY, STRING
-from neurovis_spec.ros.counts import Counts, Teller
 from neurovis_spec.ros.definitions import Definition
 from neurovis_spec.ros.diagnostics import Diagnostics
 from neurovis_spec.ros.fields import Form
@@ -30,7 +29,7 @@ from neurovis_spec.ros.listening import ACTIVITY, SPEC, WEIGHTS, Listening, base
 from neurovis_spec.ros.middleware import LATCHED, Arrival, MiddlewareError, Node, Parameter, Publisher, Quality, Tell
 from neurovis_spec.ros.pace import NO_CLOCK, Clock, Pace, SimulatedClock, SteadyClock
 from neurovis_spec.ros.steering import RunSteering
-from neurovis_spec.ros.summary import Summary
+from neurovis_spec.ros.summary import Counts, Summary, Teller
 from neurovis_spec.runtime.backend import Ready
 from neurovis_spec.runtime.ros_messages import label_of
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
