@@ -48,6 +48,24 @@ def kept(problem: LayoutProblem, fresh: Layout, pins: Mapping[int, Point] | None
     if problem.memory is None and not (around and problem.modules and len(drawn) <= _MOST_AROUND_PINS):
         problem = replace(problem, modules=(), boxes=())
     memory = problem.memory or Layout(problem.network, fresh.engine, {}, {})
+    problem, centres = _placed(problem, memory, fresh, own, now)
+    sides = {**fresh.labels, **memory.labels}
+    routes = _routed(problem, memory, fresh, _Ways(problem, centres, sides))
+    return Layout(
+        fresh.network,
+        fresh.engine,
+        dict(zip(problem.neurons, centres, strict=True)),
+        {edge.name: routes[i] for i, edge in enumerate(problem.edges)},
+        sides,
+    )
+
+
+def _placed(
+    problem: LayoutProblem, memory: Layout, fresh: Layout, own: Sequence[Sequence[int]], now: Mapping[int, Point]
+) -> tuple[LayoutProblem, Sequence[Point]]:
+    """Where everything stands, and the problem with pins on all that is pinned, and with what instances have new as
+    known. ``own`` are the instances whose origin is pinned, ``now`` is where what is pinned stands."""
+    drawn = [fresh.positions[name] for name in problem.neurons]
     there = {i: fresh.routes[edge.name] for i, edge in enumerate(problem.edges)}
     frames = Frames(problem, memory.labels)
     rects = frames.rects(dict(enumerate(drawn)), there)
@@ -66,9 +84,12 @@ def kept(problem: LayoutProblem, fresh: Layout, pins: Mapping[int, Point] | None
     held = {**now, **with_origins(problem, {m: known[m] for members in free for m in members if m in known})}
     lost = overlapping({m: held[m] for m in held.keys() - problem.pins.keys()}, problem.pins)
     problem = replace(problem, pins={m: held[m] for m in sorted(held.keys() - lost)})
-    centres = settled(problem, frames, drawn, wholes).at
-    sides = {**fresh.labels, **memory.labels}
-    ways = _Ways(problem, centres, sides)
+    return problem, settled(problem, frames, drawn, wholes).at
+
+
+def _routed(problem: LayoutProblem, memory: Layout, fresh: Layout, ways: _Ways) -> dict[int, Route]:
+    """The routes of all edges: as they were where that is still clear, else as in the fresh layout, else found anew."""
+    centres = ways.centres
     routes = _old_routes(problem, memory, ways)
     new = [i for i in range(len(problem.edges)) if i not in routes]
     twins = _Twins(problem, centres) if problem.modules or problem.mirrors else None
@@ -91,13 +112,7 @@ def kept(problem: LayoutProblem, fresh: Layout, pins: Mapping[int, Point] | None
     routes.update(_found(problem, ways, rest, routes))
     if twins is not None:
         ways.add_clear(twins.copied(new, routes), routes)
-    return Layout(
-        fresh.network,
-        fresh.engine,
-        dict(zip(problem.neurons, centres, strict=True)),
-        {edge.name: routes[i] for i, edge in enumerate(problem.edges)},
-        sides,
-    )
+    return routes
 
 
 class _Ways:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
 
 from neurovis_layouts.layered.folds import Folds
 from neurovis_layouts.layered.levels import Levels
@@ -24,19 +25,25 @@ _BEYOND, _FREE = 0.5, 0.2
 _LOW = 0.5
 
 
+@dataclass(frozen=True, slots=True)
+class PlacedRanks:
+    """Levels with the place of each node; ``spans`` say how far each rank reaches before its line and behind it,
+    ``uneven`` ranks are staggered."""
+
+    levels: Levels
+    places: Sequence[Point]
+    spans: Sequence[tuple[float, float]]
+    folds: Folds
+    uneven: AbstractSet[int]
+
+
 def with_exits(
-    problem: LayoutProblem,
-    edges: Sequence[int],
-    levels: Levels,
-    places: Sequence[Point],
-    spans: Sequence[tuple[float, float]],
-    folds: Folds,
-    uneven: AbstractSet[int],
-    ways: Mapping[int, list[Waypoint]],
+    problem: LayoutProblem, edges: Sequence[int], ranks: PlacedRanks, ways: Mapping[int, list[Waypoint]]
 ) -> tuple[dict[int, list[Waypoint]], set[int]]:
     """The waypoints of each edge, from above to below, those at the exits among them, and which edges need no others
-    to pass all frames; ``spans`` say how far each rank reaches before its line and behind it. ``uneven`` ranks are
-    staggered."""
+    to pass all frames."""
+    levels, places, spans = ranks.levels, ranks.places, ranks.spans
+    folds, uneven = ranks.folds, ranks.uneven
     found = {i: list(line) for i, line in ways.items()}
     if not folds.slots and not uneven:
         return found, set()

@@ -18,7 +18,8 @@ from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.label_room import roomy, sides_of
 from neurovis_layouts.layered.bands import FEW, Wanted
 from neurovis_layouts.layered.compact import NONE, RANKS, WHOLE, Fold, Shape, ShapeKey, compact, may_be_folded
-from neurovis_layouts.layered.component_layout import ComponentLayout, planned
+from neurovis_layouts.layered.component_layout import ComponentLayout, RankProblem
+from neurovis_layouts.layered.components import planned
 from neurovis_layouts.layered.drawing import Drawing, Piece, brought, piece_of
 from neurovis_layouts.layered.frame_routing import Standing
 from neurovis_layouts.layered.page_plan import facing, in_direction, parts_by_cell
@@ -159,7 +160,8 @@ class Composer:
         columns = {box for box in columns if _whole(units, problem.boxes[box][1])}
         few = FEW if kind >= 0 or problem.modules else 1
         wanted = Wanted(self._shape.bands(kind), few)
-        plan = planned(problem, units, bonds, pair, columns, wanted, behind, self._shape.draft)
+        edges = range(len(problem.edges))
+        plan = planned(RankProblem(problem, units, bonds, edges, pair, columns, behind, wanted, self._shape.draft))
         self._folds[kind, RANKS] = range(2, plan.cuts + 2)
 
         resting = [_resting(plan, piece) for piece in pieces]

@@ -99,12 +99,7 @@ class Insertion:
         self.cells: list[tuple[int, ...] | None] = [
             tuple(self._cell(number, nodes[n].rank) for n in link.passages) for number, link in enumerate(self.links)
         ]
-        cell_of = {
-            n: cell
-            for link, cells in zip(self.links, self.cells, strict=True)
-            for n, cell in zip(link.passages, cells or (), strict=True)
-        }
-        self.order = [[e for n in rank for e in ([cell_of[n]] if n in cell_of else self._points[n])] for rank in order]
+        self.order = self._entries(order)
         #: by rank (p, q): how many segments a line from slot p to slot q of the next rank crosses
         self._costs: list[Counts] = [
             np.zeros((len(a) + 1, len(b) + 1), dtype=np.int32) for a, b in pairwise(self.order)
@@ -114,17 +109,25 @@ class Insertion:
         self.cost = sum(self._threaded(c, 1) for c in range(len(self.links)))
         #: by rank, whether some of its slots are shut: within a box, a group that keeps its order, a block; beside an
         #: axis
-        self._tight = [
-            bool(levels.images)
-            or any(
-                self._points[n] and (self._box[n] >= 0 or self._kin[n] >= 0 or len(self._points[n]) > 1) for n in rank
-            )
-            for rank in order
-        ]
+        self._tight = [bool(levels.images) or any(map(self._shuts, rank)) for rank in order]
         self._out: set[int] = set()
         #: by rank the entries that were in it when slots were last found to be shut, and those by box and for what
         #: stands in the middle or not
         self._known: list[tuple[list[int], dict[tuple[int, bool], Counts]]] = [([], {}) for _ in order]
+
+    def _entries(self, order: Sequence[Sequence[int]]) -> list[list[int]]:
+        """By rank the points of its nodes, and the cells of those that are passages."""
+        cell_of = {
+            n: cell
+            for link, cells in zip(self.links, self.cells, strict=True)
+            for n, cell in zip(link.passages, cells or (), strict=True)
+        }
+        return [[e for n in rank for e in ([cell_of[n]] if n in cell_of else self._points[n])] for rank in order]
+
+    def _shuts(self, node: int) -> bool:
+        """Whether something stands beside a node that others may not come between."""
+        points = self._points[node]
+        return bool(points) and (self._box[node] >= 0 or self._kin[node] >= 0 or len(points) > 1)
 
     def _find_links(self, levels: Levels) -> None:
         """Points, links, and the links of each node on both sides."""

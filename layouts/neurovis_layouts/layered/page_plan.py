@@ -12,7 +12,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import TypeAlias
 
 import numpy as np
@@ -152,74 +151,8 @@ def facing(
     keep room for titles on their upper sides alone. Raises LayoutRefusalError where mirror images do not stand in
     mirrored cells."""
     _check_mirrors(problem, parts, where, pair)
-    slots = _slots(problem, parts, where)
-    owner = {m: k for k, part in enumerate(parts) for m in part.members}
-    between = [(e.source, e.target) for e in problem.edges if owner[e.source] != owner[e.target]]
-    apart = unrelated(between)
-    makes: dict[tuple[int, int], list[int]] = {}
-    for k, part in enumerate(parts):
-        if part.image_of < 0:
-            makes.setdefault((part.kind, -1 if part.kind >= 0 else k), []).append(k)
-    directions = {own[0]: _directions(problem, parts[own[0]], pair, sketched) for own in makes.values()}
-    column = {k: slot.across for slot in slots for line in slot.lines for k in line}
-
-    def stood(shape: _Shape, drawn: Drawn) -> list[tuple[Piece, Move]]:
-        pieces = [drawn(part, turn) for part, turn in zip(parts, shape.turns, strict=True)]
-        if upright:
-            pieces = [piece.titled_above(flip) for piece, flip in zip(pieces, shape.flips, strict=True)]
-        return _placed(problem, slots, parts, pieces, shape.flips, bool(pair))
-
-    @cache
-    def cost(shape: _Shape) -> float:
-        """How large the page is, how long straight lines between the ends of connections from part to part are
-        together, how often they cross and run over discs, and how far the whole page is from its proportions."""
-        moved = stood(shape, sketched)
-        at: dict[int, Point] = {}
-        for piece, move in moved:
-            at.update(zip(piece.part.members, map(move.point, piece.drawing.places), strict=True))
-        x0, y0, x1, y1 = united(move.rect(piece.rect) for piece, move in moved)
-        wide, high = (x1 - x0, y1 - y0) if problem.direction in ("down", "up") else (y1 - y0, x1 - x0)
-        lines = np.array([(at[a], at[b]) for a, b in between], dtype=np.float64).reshape(-1, 2, 2)
-        length = float(lengths(lines[:, 1] - lines[:, 0]).sum())
-        met = min(_CROSSING * crossings(lines, *apart), _CROSSED * length)
-        met += _CROSSING * run_over(lines, np.array([at[i] for i in range(len(at))]))
-        page = math.sqrt(stretched(problem, wide, high)) if max(wide, high) > _SMALL else 1.0
-        return (_SIDE * math.sqrt(wide * high) + length + met) * page
-
-    def flipped(shape: _Shape, own: Sequence[int]) -> _Shape:
-        """These parts drawn as their mirror images, all of one column, where that costs less."""
-        lead = parts[own[0]]
-        if sketched(lead, shape.turns[own[0]]).drawing.fixed or symmetric(lead.members, pair):
-            return shape
-        for across in dict.fromkeys(column[k] for k in own):
-            other = shape.flipped(both([k for k in own if column[k] == across]))
-            shape = other if cost(other) < cost(shape) - _NOTHING else shape
-        return shape
-
-    def both(own: Sequence[int]) -> set[int]:
-        """These parts and their mirror images."""
-        return {k for k, part in enumerate(parts) if k in own or part.image_of in own}
-
-    def settled(shape: _Shape) -> _Shape:
-        """The best that is found by turning one make of parts after the other."""
-        for _ in range(_ROUNDS):
-            before = shape
-            for own in makes.values():
-                for direction in directions[own[0]]:
-                    other = flipped(shape.turned(both(own), direction), own)
-                    shape = other if cost(other) < cost(shape) - _NOTHING else shape
-            if shape == before:
-                break
-        return shape
-
-    as_drawn = _Shape(tuple(problem.direction for _ in parts), tuple(part.image_of >= 0 for part in parts))
-    starts = [as_drawn]
-    for direction in _DIRECTIONS:
-        start = as_drawn
-        for own in makes.values():
-            start = start.turned(both(own), direction) if direction in directions[own[0]] else start
-        starts.append(start)
-    return stood(min(map(settled, dict.fromkeys(starts)), key=cost), drawn)
+    page = _Page(problem, parts, _slots(problem, parts, where), pair, sketched, upright)
+    return page.stood(page.best(), drawn)
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,6 +167,103 @@ class _Shape:
 
     def flipped(self, own: AbstractSet[int]) -> _Shape:
         return replace(self, flips=tuple(flip != (k in own) for k, flip in enumerate(self.flips)))
+
+
+class _Page:
+    """Parts in their slots, to be drawn in one direction or another."""
+
+    def __init__(
+        self,
+        problem: LayoutProblem,
+        parts: Sequence[Part],
+        slots: Sequence[Slot],
+        pair: Mapping[int, int],
+        sketched: Drawn,
+        upright: bool,
+    ) -> None:
+        self._problem, self._parts, self._slots, self._pair = problem, parts, slots, pair
+        self._sketched, self._upright = sketched, upright
+        owner = {m: k for k, part in enumerate(parts) for m in part.members}
+        #: the connections from part to part, and every two of them that have no end in common
+        self._between = [(e.source, e.target) for e in problem.edges if owner[e.source] != owner[e.target]]
+        self._apart = unrelated(self._between)
+        #: parts that are copies of each other
+        makes: dict[tuple[int, int], list[int]] = {}
+        for k, part in enumerate(parts):
+            if part.image_of < 0:
+                makes.setdefault((part.kind, -1 if part.kind >= 0 else k), []).append(k)
+        self._makes = list(makes.values())
+        self._directions = {own[0]: _directions(problem, parts[own[0]], pair, sketched) for own in self._makes}
+        self._column = {k: slot.across for slot in slots for line in slot.lines for k in line}
+        self._costs: dict[_Shape, float] = {}
+
+    def best(self) -> _Shape:
+        """The shape that costs least of those found from where all is drawn as it comes, or turned one way."""
+        as_drawn = _Shape(
+            tuple(self._problem.direction for _ in self._parts), tuple(p.image_of >= 0 for p in self._parts)
+        )
+        starts = [as_drawn]
+        for direction in _DIRECTIONS:
+            start = as_drawn
+            for own in self._makes:
+                start = start.turned(self._both(own), direction) if direction in self._directions[own[0]] else start
+            starts.append(start)
+        return min(map(self._settled, dict.fromkeys(starts)), key=self._cost)
+
+    def stood(self, shape: _Shape, drawn: Drawn) -> list[tuple[Piece, Move]]:
+        """The parts drawn in a shape, and where they stand."""
+        pieces = [drawn(part, turn) for part, turn in zip(self._parts, shape.turns, strict=True)]
+        if self._upright:
+            pieces = [piece.titled_above(flip) for piece, flip in zip(pieces, shape.flips, strict=True)]
+        return _placed(self._problem, self._slots, self._parts, pieces, shape.flips, bool(self._pair))
+
+    def _settled(self, shape: _Shape) -> _Shape:
+        """The best that is found by turning one make of parts after the other."""
+        for _ in range(_ROUNDS):
+            before = shape
+            for own in self._makes:
+                for direction in self._directions[own[0]]:
+                    shape = self._better(shape, self._flipped(shape.turned(self._both(own), direction), own))
+            if shape == before:
+                break
+        return shape
+
+    def _flipped(self, shape: _Shape, own: Sequence[int]) -> _Shape:
+        """These parts drawn as their mirror images, all of one column, where that costs less."""
+        lead = self._parts[own[0]]
+        if self._sketched(lead, shape.turns[own[0]]).drawing.fixed or symmetric(lead.members, self._pair):
+            return shape
+        for across in dict.fromkeys(self._column[k] for k in own):
+            shape = self._better(shape, shape.flipped(self._both([k for k in own if self._column[k] == across])))
+        return shape
+
+    def _both(self, own: Sequence[int]) -> set[int]:
+        """These parts and their mirror images."""
+        return {k for k, part in enumerate(self._parts) if k in own or part.image_of in own}
+
+    def _better(self, shape: _Shape, other: _Shape) -> _Shape:
+        return other if self._cost(other) < self._cost(shape) - _NOTHING else shape
+
+    def _cost(self, shape: _Shape) -> float:
+        if shape not in self._costs:
+            self._costs[shape] = self._cost_of(shape)
+        return self._costs[shape]
+
+    def _cost_of(self, shape: _Shape) -> float:
+        """How large the page is, how long straight lines between the ends of connections from part to part are
+        together, how often they cross and run over discs, and how far the whole page is from its proportions."""
+        moved = self.stood(shape, self._sketched)
+        at: dict[int, Point] = {}
+        for piece, move in moved:
+            at.update(zip(piece.part.members, map(move.point, piece.drawing.places), strict=True))
+        x0, y0, x1, y1 = united(move.rect(piece.rect) for piece, move in moved)
+        wide, high = (x1 - x0, y1 - y0) if self._problem.direction in ("down", "up") else (y1 - y0, x1 - x0)
+        lines = np.array([(at[a], at[b]) for a, b in self._between], dtype=np.float64).reshape(-1, 2, 2)
+        length = float(lengths(lines[:, 1] - lines[:, 0]).sum())
+        met = min(_CROSSING * crossings(lines, *self._apart), _CROSSED * length)
+        met += _CROSSING * run_over(lines, np.array([at[i] for i in range(len(at))]))
+        page = math.sqrt(stretched(self._problem, wide, high)) if max(wide, high) > _SMALL else 1.0
+        return (_SIDE * math.sqrt(wide * high) + length + met) * page
 
 
 def _directions(problem: LayoutProblem, part: Part, pair: Mapping[int, int], drawn: Drawn) -> tuple[Direction, ...]:

@@ -7,7 +7,7 @@ of one kind, and so are two that are mirror images of each other.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TypeAlias
 
@@ -18,6 +18,7 @@ from neurovis_spec.layout.model import (
     LayoutEdge,
     LayoutGroup,
     LayoutMirror,
+    LayoutModule,
     LayoutProblem,
     LayoutRefusalError,
 )
@@ -168,6 +169,39 @@ def restricted(problem: LayoutProblem, copies: Sequence[Sequence[int]], within: 
     """
     members = copies[0]
     place = {neuron: i for i, neuron in enumerate(members)}
+    edges, entries, exits = _connected(problem, copies)
+
+    def inside(neurons: Sequence[int]) -> tuple[int, ...]:
+        return tuple(place[n] for n in neurons if n in place)
+
+    groups = tuple(LayoutGroup(g.name, found) for g in problem.groups if (found := inside(g.members)))
+    arrange = tuple((found, how) for of, how in problem.arrange if len(found := inside(of)) == len(of))
+    boxes = tuple((name, found) for name, of in problem.boxes if len(found := inside(of)) == len(of) < len(members))
+    return LayoutProblem(
+        problem.network,
+        tuple(problem.neurons[n] for n in members),
+        groups,
+        edges,
+        direction=problem.direction,
+        arrange=arrange,
+        boxes=boxes,
+        neuron_spacing=problem.neuron_spacing,
+        rank_spacing=problem.rank_spacing,
+        entries=tuple(sorted(entries - exits)),
+        exits=tuple(sorted(exits - entries)),
+        inward=tuple(sorted(entries)),
+        outward=tuple(sorted(exits)),
+        modules=_instances(problem, place, within),
+        effort=problem.effort,
+        labels=tuple(problem.labels[n] for n in members) if problem.labels else (),
+    )
+
+
+def _connected(
+    problem: LayoutProblem, copies: Sequence[Sequence[int]]
+) -> tuple[tuple[LayoutEdge, ...], set[int], set[int]]:
+    """What connects neurons of a copy, by their places in it, with the delay in the first copy that has it; and who is
+    entered from outside of a copy, and left to there, in any."""
     where = {neuron: (number, i) for number, own in enumerate(copies) for i, neuron in enumerate(own)}
     edges: dict[Key, int] = {}
     entries = {where[n][1] for n in problem.entries if n in where}
@@ -181,44 +215,25 @@ def restricted(problem: LayoutProblem, copies: Sequence[Sequence[int]], within: 
             exits.add(source[1])
         if target:
             entries.add(target[1])
+    found = tuple(LayoutEdge(f"{key}", key[0], key[1], delay) for key, delay in sorted(edges.items()))
+    return found, entries, exits
 
-    def inside(neurons: Sequence[int]) -> tuple[int, ...]:
-        return tuple(place[n] for n in neurons if n in place)
 
-    groups = tuple(LayoutGroup(g.name, found) for g in problem.groups if (found := inside(g.members)))
-    arrange = tuple((found, how) for of, how in problem.arrange if len(found := inside(of)) == len(of))
-    boxes = tuple((name, found) for name, of in problem.boxes if len(found := inside(of)) == len(of) < len(members))
+def _instances(problem: LayoutProblem, place: Mapping[int, int], within: str) -> tuple[LayoutModule, ...]:
+    """The instances whose paths begin so, all of whose neurons have a ``place``, by these."""
     kept = [
         i
         for i, module in enumerate(problem.modules)
-        if module.members and module.path.startswith(within) and len(inside(module.members)) == len(module.members)
+        if module.members and module.path.startswith(within) and all(n in place for n in module.members)
     ]
     number = {old: new for new, old in enumerate(kept)}
-    modules = tuple(
+    return tuple(
         replace(
             module,
             parent=number.get(module.parent, -1),
-            members=inside(module.members),
+            members=tuple(place[n] for n in module.members),
             pins={place[n]: point for n, point in module.pins.items()},
             origin=None,
         )
         for module in (problem.modules[i] for i in kept)
-    )
-    return LayoutProblem(
-        problem.network,
-        tuple(problem.neurons[n] for n in members),
-        groups,
-        tuple(LayoutEdge(f"{key}", key[0], key[1], delay) for key, delay in sorted(edges.items())),
-        direction=problem.direction,
-        arrange=arrange,
-        boxes=boxes,
-        neuron_spacing=problem.neuron_spacing,
-        rank_spacing=problem.rank_spacing,
-        entries=tuple(sorted(entries - exits)),
-        exits=tuple(sorted(exits - entries)),
-        inward=tuple(sorted(entries)),
-        outward=tuple(sorted(exits)),
-        modules=modules,
-        effort=problem.effort,
-        labels=tuple(problem.labels[n] for n in members) if problem.labels else (),
     )
