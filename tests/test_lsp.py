@@ -1,4 +1,4 @@
-"""The language server as an editor sees it: a real client, over standard input and output."""
+"""The language server as an editor sees it: a real client, which speaks its protocol."""
 
 from __future__ import annotations
 
@@ -7,16 +7,21 @@ import json
 import subprocess
 import sys
 from collections.abc import Awaitable, Callable
+from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 
 import pytest
+from lsp_session import process, session
 from lsprotocol import types
 from pygls.exceptions import JsonRpcException
-from pytest_lsp import ClientServerConfig, LanguageClient
+from pytest_lsp import LanguageClient
 from test_lsp_answers import BASE, REST
 
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.format.canonical import format_text
+from neurovis_spec.lsp import server
+from neurovis_spec.lsp.check import Checked, check
+from neurovis_spec.lsp.document import Document
 
 SPEC = BASE + REST
 
@@ -59,33 +64,23 @@ class Editor:
         return types.Position(before.count("\n"), len(line.encode("utf-16-le")) // 2)
 
 
-COMMAND = ("-m", "neurovis_spec", "lsp", "--stdio")
-
-
 def edit(
     folder: Path,
     scenario: Callable[[Editor], Awaitable[None]],
-    capabilities: object = None,
-    command: tuple[str, ...] = COMMAND,
+    capabilities: types.ClientCapabilities | None = None,
+    begin: Callable[[], AbstractAsyncContextManager[LanguageClient]] = session,
 ) -> None:
-    """Start ``neurovis lsp``, run a scenario with it, and end it."""
+    """Run a scenario with a server that begins for it and ends after it."""
 
-    async def session() -> None:
-        config = ClientServerConfig(server_command=[sys.executable, *command])
-        client = await config.start()
-        assert isinstance(client, LanguageClient)
-        given = capabilities if isinstance(capabilities, types.ClientCapabilities) else types.ClientCapabilities()
-        result = await client.initialize_session(types.InitializeParams(capabilities=given))
-        assert result.server_info is not None
-        assert result.server_info.name == "neurovis"
-        try:
+    async def run() -> None:
+        async with begin() as client:
+            given = types.InitializeParams(capabilities=capabilities or types.ClientCapabilities())
+            result = await client.initialize_session(given)
+            assert result.server_info is not None
+            assert result.server_info.name == "neurovis"
             await scenario(Editor(client, folder / "spec.yaml"))
-        finally:
-            await client.shutdown_session()
-            stop: Callable[[], Awaitable[object]] = client.stop  # has no annotations of its own
-            await stop()
 
-    asyncio.run(session())
+    asyncio.run(run())
 
 
 def test_findings_follow_what_is_typed(tmp_path: Path) -> None:
@@ -107,7 +102,7 @@ def test_findings_follow_what_is_typed(tmp_path: Path) -> None:
         editor.client.text_document_did_close(types.DidCloseTextDocumentParams(editor.document))
         assert await editor.findings() == []
 
-    edit(tmp_path, scenario)
+    edit(tmp_path, scenario, begin=process)
 
 
 ODD_URIS = ("file:///tmp/a%00b.yaml", "file:///" + 3000 * "a/", "file:", "file:///%ff", "file:///a%2520b.yaml")
@@ -132,20 +127,16 @@ def test_a_uri_that_no_file_can_have_is_a_document_like_others(tmp_path: Path) -
     edit(tmp_path, scenario)
 
 
-#: The server with a compiler that has a mistake.
-STUMBLING = """
-from neurovis_spec.lsp import server
-check = server.check
-def stumbling(document):
-    if "stumble" in document.text.text:
-        raise IndexError("a mistake")
-    return check(document)
-server.check = stumbling
-server.serve()
-"""
+def test_a_mistake_of_the_compiler_is_said_and_leaves_no_old_findings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stumbling(document: Document) -> Checked:
+        if "stumble" in document.text.text:
+            raise IndexError("a mistake")
+        return check(document)
 
+    monkeypatch.setattr(server, "check", stumbling)
 
-def test_a_mistake_of_the_compiler_is_said_and_leaves_no_old_findings(tmp_path: Path) -> None:
     async def scenario(editor: Editor) -> None:
         (finding,) = await editor.open(SPEC.replace("activation: swish", "activation: tahn"))
         assert finding.code == "unknown-activation"
@@ -157,7 +148,7 @@ def test_a_mistake_of_the_compiler_is_said_and_leaves_no_old_findings(tmp_path: 
         editor.type(SPEC)
         assert await editor.findings() == []
 
-    edit(tmp_path, scenario, command=("-c", STUMBLING))
+    edit(tmp_path, scenario)
 
 
 def test_an_unsaved_document_reads_the_data_files_of_its_folder(tmp_path: Path) -> None:

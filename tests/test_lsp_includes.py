@@ -1,16 +1,16 @@
-"""Included files as an editor sees them: a real client, several documents, over standard input and output."""
+"""Included files as an editor sees them: a real client, several documents."""
 
 from __future__ import annotations
 
 import asyncio
-import sys
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import pytest
+from lsp_session import session
 from lsprotocol import types
 from pygls.exceptions import JsonRpcException
-from pytest_lsp import ClientServerConfig, LanguageClient
+from pytest_lsp import LanguageClient
 from test_lsp_modules import KNEES, LEGS, SPEC
 
 BROKEN = LEGS.replace("activation: soft, desc", "activation: sofd, desc")
@@ -92,33 +92,26 @@ def work(
     rooted: bool = True,
     watched: list[types.Registration] | None = None,
 ) -> None:
-    """Start ``neurovis lsp`` in a workspace, run a scenario with it, and end it. ``watched``: the client watches files
-    for the server, and this is what it is asked for."""
+    """Run a scenario in a workspace with a server that begins for it and ends after it. ``watched``: the client watches
+    files for the server, and this is what it is asked for."""
 
-    async def session() -> None:
-        config = ClientServerConfig(server_command=[sys.executable, "-m", "neurovis_spec", "lsp", "--stdio"])
-        client = await config.start()
-        assert isinstance(client, LanguageClient)
+    async def run() -> None:
         folders = [types.WorkspaceFolder(folder.as_uri(), "work")] if rooted else None
         capabilities = types.ClientCapabilities()
-        if watched is not None:
-            watches = types.DidChangeWatchedFilesClientCapabilities(dynamic_registration=True)
-            capabilities.workspace = types.WorkspaceClientCapabilities(did_change_watched_files=watches)
+        async with session() as client:
+            if watched is not None:
+                watches = types.DidChangeWatchedFilesClientCapabilities(dynamic_registration=True)
+                capabilities.workspace = types.WorkspaceClientCapabilities(did_change_watched_files=watches)
 
-            def register(params: types.RegistrationParams) -> None:
-                watched.extend(params.registrations)
+                def register(params: types.RegistrationParams) -> None:
+                    watched.extend(params.registrations)
 
-            feature: Callable[[str], Callable[[object], object]] = client.feature  # has no annotations of its own
-            feature(types.CLIENT_REGISTER_CAPABILITY)(register)
-        await client.initialize_session(types.InitializeParams(capabilities, workspace_folders=folders))
-        try:
+                feature: Callable[[str], Callable[[object], object]] = client.feature  # has no annotations of its own
+                feature(types.CLIENT_REGISTER_CAPABILITY)(register)
+            await client.initialize_session(types.InitializeParams(capabilities, workspace_folders=folders))
             await scenario(Workspace(client, folder))
-        finally:
-            await client.shutdown_session()
-            stop: Callable[[], Awaitable[object]] = client.stop  # has no annotations of its own
-            await stop()
 
-    asyncio.run(session())
+    asyncio.run(run())
 
 
 def test_findings_of_an_included_file_stand_in_that_file_and_go_away(tmp_path: Path) -> None:
