@@ -16,6 +16,8 @@ from neurovis_spec.runtime.recording import Recording
 
 STEPS = 40
 LAW = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+#: A layout takes longer than all else; that of any problem is held to the laws of test_layout_engines.py as well.
+LAID_OUT = settings(LAW, max_examples=12)
 
 
 def by_name(recording: Recording) -> tuple[dict[str, list[float]], dict[str, list[float]]]:
@@ -48,7 +50,7 @@ def test_the_order_of_the_spec_permutes_the_result_and_changes_nothing_else(spec
     assert_same(nv.compile(spec).run(STEPS), nv.compile(other).run(STEPS))
 
 
-@LAW
+@LAID_OUT
 @given(specs(), st.integers(0, 1000))
 def test_the_order_of_the_spec_does_not_show_in_the_layout(spec: Spec, seed: int) -> None:
     other = {
@@ -59,7 +61,7 @@ def test_the_order_of_the_spec_does_not_show_in_the_layout(spec: Spec, seed: int
     assert nv.compile(spec).layout().dump() == nv.compile(other).layout().dump()
 
 
-@LAW
+@LAID_OUT
 @given(specs())
 def test_renaming_changes_nothing_else(spec: Spec) -> None:
     """Every group takes a new name that keeps the order, and as wide a one, for which the same room is kept; draws,
@@ -82,7 +84,7 @@ def test_backends_agree_with_the_reference(spec: Spec) -> None:
     assert_same(network.run(STEPS, backend="reference"), network.run(STEPS, backend="numpy"))
 
 
-@LAW
+@LAID_OUT
 @given(specs())
 def test_every_neuron_is_placed_exactly_once_and_nothing_overlaps(spec: Spec) -> None:
     network = nv.compile(spec)
