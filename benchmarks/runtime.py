@@ -267,13 +267,13 @@ def hexapod_in_c(network: Network) -> Run:
     start = np.cumsum([0, *delay[:-1]]).astype(np.int32)
     one, two, v = np.zeros(n), np.zeros(n), np.zeros(n)
     for number, b in enumerate(blocks):
-        own = [*b.model_parameters.values(), *b.activation_parameters.values()]
+        own = [*b.model.parameters.values(), *b.activation.parameters.values()]
         for array, values in zip((one, two), own, strict=False):
             array[group[number] : group[number + 1]] = values
     v[group[6] : group[7]] = two[group[6] : group[7]]
     (rules,) = network.plasticity
     learned, reflex = rules.members.astype(np.int32), rules.signals["reflex"].astype(np.int32)
-    rate = rules.parameters["rate"]
+    rate = rules.rule.parameters["rate"]
     source, fed = links.sources.whole().astype(np.int32), network.neurons.input.astype(np.int32)
 
     initial = network.neurons.initial

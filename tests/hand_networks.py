@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from networks_by_hand import Link, Unit, Use, build, rule
+from networks_by_hand import Learns, Link, Unit, build, rule
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings, StatedGain
@@ -73,7 +73,9 @@ def network(
         start += len(group.names)
     links = [Link(index[c.source], index[c.target], c.weight, c.delay, learns=c.rule, entry=c.entry) for c in wires]
     uses = [
-        Use(rule(name=called, signals=tuple(signals)), signals={key: index[neuron] for key, neuron in signals.items()})
+        Learns(
+            rule(name=called, signals=tuple(signals)), signals={key: index[neuron] for key, neuron in signals.items()}
+        )
         for called, signals in rules
     ]
     whole = build([Unit(neuron) for neuron in names], links, uses, groups=made, dt=1.0 if dt is None else dt)

@@ -15,18 +15,21 @@ from neurovis_spec.arrays import FloatArray, IntColumn, integers, reals
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
 from neurovis_spec.compiler.network import Connections, Group, Input, Network, Neurons, Output
 from neurovis_spec.compiler.program import (
-    Activation,
+    ACTIVATION,
+    MODEL,
+    RULE,
     Block,
+    Definition,
     Gather,
     Learn,
-    Model,
     Operation,
+    Owner,
     Plasticity,
     Quantity,
     ReadInputs,
-    Rule,
     Send,
     Update,
+    Use,
 )
 from neurovis_spec.language.expressions.parser import parse
 from neurovis_spec.language.expressions.tree import Tree
@@ -46,17 +49,20 @@ def optional(text: str | None) -> Tree | None:
 
 def quantities(states: States) -> tuple[Quantity, ...]:
     return tuple(
-        Quantity(name, tree(initial), optional(step), optional(end)) for name, (initial, step, end) in states.items()
+        Quantity(name, optional(step), optional(end), tree(initial)) for name, (initial, step, end) in states.items()
     )
 
 
-def activation(value: str, **parameters: float) -> Activation:
-    return Activation(value, tuple(parameters), tree(value))
+def activation(value: str, **parameters: float) -> Definition:
+    return Definition(ACTIVATION, value, tuple(parameters), (Quantity("f", tree(value)),))
 
 
-def model(activity: str, states: States, parameters: Sequence[str] = (), let: Mapping[str, str] | None = None) -> Model:
+def model(
+    activity: str, states: States, parameters: Sequence[str] = (), let: Mapping[str, str] | None = None
+) -> Definition:
     lets = tuple((name, tree(text)) for name, text in (let or {}).items())
-    return Model(activity + repr(states), tuple(parameters), lets, quantities(states), tree(activity))
+    given = (Quantity("activity", tree(activity)),)
+    return Definition(MODEL, activity + repr(states), tuple(parameters), given, lets, quantities(states))
 
 
 def rule(
@@ -67,10 +73,10 @@ def rule(
     signals: Sequence[str] = (),
     let: Mapping[str, str] | None = None,
     name: str = "rule",
-) -> Rule:
+) -> Definition:
     lets = tuple((name, tree(text)) for name, text in (let or {}).items())
-    found = quantities(states or {})
-    return Rule(name, tuple(parameters), tuple(signals), lets, found, optional(step), optional(end))
+    given = (Quantity("weight", optional(step), optional(end)),)
+    return Definition(RULE, name, tuple(parameters), given, lets, quantities(states or {}), tuple(signals))
 
 
 IDENTITY = activation("x")
@@ -86,8 +92,8 @@ class Unit:
     """One neuron."""
 
     name: str
-    activation: Activation = IDENTITY
-    model: Model = STATIC
+    activation: Definition = IDENTITY
+    model: Definition = STATIC
     combine: Combine = "sum"
     bias: float = 0.0
     initial: float = float("nan")
@@ -98,7 +104,7 @@ class Unit:
 
 @dataclass(frozen=True)
 class Link:
-    """One connection; ``learns`` is the index of its Use."""
+    """One connection; ``learns`` is the index of its Learns."""
 
     source: int
     target: int
@@ -112,10 +118,10 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Use:
+class Learns:
     """A rule in use; a signal is an index into the activities followed by the inputs."""
 
-    rule: Rule
+    rule: Definition
     parameters: Mapping[str, float] = field(default_factory=dict)
     signals: Mapping[str, int] = field(default_factory=dict)
 
@@ -123,7 +129,7 @@ class Use:
 def build(
     units: Sequence[Unit],
     links: Sequence[Link] = (),
-    uses: Sequence[Use] = (),
+    uses: Sequence[Learns] = (),
     inputs: Sequence[Input] = (),
     outputs: Sequence[Output] = (),
     groups: Sequence[Group] = (),
@@ -212,31 +218,37 @@ def lowered(units: Sequence[Unit], links: Sequence[Link]) -> tuple[Block, ...]:
     for index, unit in enumerate(units):
         key = (level_of(index, links), unit.combine, unit.activation.name, unit.model.name)
         alike.setdefault(key, []).append(index)
-    return tuple(block(key[0], alike[key], units, links) for key in sorted(alike))
+    return tuple(block(number, key[0], alike[key], units, links) for number, key in enumerate(sorted(alike)))
 
 
-def block(level: int, members: list[int], units: Sequence[Unit], links: Sequence[Link]) -> Block:
+def block(number: int, level: int, members: list[int], units: Sequence[Unit], links: Sequence[Link]) -> Block:
     first = units[members[0]]
     incoming = [number for number, link in enumerate(links) if link.target in members]
     return Block(
         level=level,
         members=np.array(members, dtype=np.int64),
+        model=Use(
+            Owner("model", number),
+            first.model,
+            {name: floats([units[i].parameters[name] for i in members]) for name in first.parameters},
+        ),
+        activation=Use(
+            Owner("activation", number),
+            first.activation,
+            {name: floats([units[i].shape[name] for i in members]) for name in first.shape},
+        ),
         combine=first.combine,
-        activation=first.activation,
-        activation_parameters={name: floats([units[i].shape[name] for i in members]) for name in first.shape},
-        model=first.model,
-        model_parameters={name: floats([units[i].parameters[name] for i in members]) for name in first.parameters},
         incoming=np.array(incoming, dtype=np.int64),
-        slots=np.array([members.index(links[number].target) for number in incoming], dtype=np.int64),
+        slots=np.array([members.index(links[c].target) for c in incoming], dtype=np.int64),
     )
 
 
-def learning(number: int, use: Use, links: Sequence[Link]) -> Plasticity:
+def learning(number: int, use: Learns, links: Sequence[Link]) -> Plasticity:
     members = [index for index, link in enumerate(links) if link.learns == number]
+    parameters = {name: np.full(len(members), value) for name, value in use.parameters.items()}
     return Plasticity(
-        rule=use.rule,
         members=np.array(members, dtype=np.int64),
-        parameters={name: np.full(len(members), value) for name, value in use.parameters.items()},
+        rule=Use(Owner("rule", number), use.rule, parameters),
         signals={name: np.full(len(members), index, dtype=np.int64) for name, index in use.signals.items()},
     )
 
@@ -251,11 +263,11 @@ def rewired(network: Network, weights: Sequence[float], sources: Sequence[int], 
     return replace(network, connections=links, blocks=(one,))
 
 
-def all_learning(network: Network, by: Rule) -> Network:
+def all_learning(network: Network, by: Definition) -> Network:
     """A network whose connections are fixed, and now all learn by a rule without parameters and signals."""
     count = len(network.connections)
     links = replace(network.connections, rules=integers(np.zeros(count, dtype=np.int64)))
-    plasticity = (Plasticity(by, np.arange(count), {}, {}),)
+    plasticity = (Plasticity(np.arange(count), Use(Owner("rule", 0), by, {}), {}),)
     return replace(network, connections=links, plasticity=plasticity, program=(*network.program, Learn(0)))
 
 
@@ -271,7 +283,7 @@ def cpg_rbf(learns: bool = True) -> Network:
     links += [Link(0, 2 + i, 1.0, 0, 0.192 * np.cos(angle)) for i, angle in enumerate(angles)]
     links += [Link(1, 2 + i, 1.0, 0, 0.192 * np.sin(angle)) for i, angle in enumerate(angles)]
     links += [Link(2 + i, 10, 0.0, 0, learns=0 if learns else -1) for i in range(8)]
-    uses = [Use(DELTA, {"rate": 0.01}, {"target": 11})] if learns else []
+    uses = [Learns(DELTA, {"rate": 0.01}, {"target": 11})] if learns else []
     target = Input("target", 0, 1, tree("0.5*sin(2*pi*(k + 24)/128.62) + 0.2*sin(4*pi*(k + 24)/128.62)"))
     groups = [
         Group("C", 0, 2, "tanh", "static", "sum", {}, {}),

@@ -351,7 +351,7 @@ def test_signals_of_rules() -> None:
 
     def signal(target: str) -> list[int]:
         (rule,) = network_of(text % target).plasticity
-        assert rule.parameters["rate"].tolist() == [1, 2]
+        assert rule.rule.parameters["rate"].tolist() == [1, 2]
         found: list[int] = rule.signals["target"].tolist()
         return found
 
@@ -392,7 +392,7 @@ def rates(rate: str, pattern: str = "all_to_all") -> list[float]:
     text = "neurons: {A: {count: 3, bias: 1}, B: {count: 2, bias: 1}}\n"
     body = f"{{pattern: {pattern}, plasticity: {{hebbian: {{rate: {rate}}}}}}}"
     (rule,) = network_of(f"{text}connections: {{A -> B: {body}}}").plasticity
-    return list(rule.parameters["rate"])
+    return list(rule.rule.parameters["rate"])
 
 
 def test_parameters_of_rules_know_the_ends_of_a_connection() -> None:

@@ -347,9 +347,10 @@ def test_every_array_of_a_network_is_frozen() -> None:
     arrays = [getattr(network.connections, name) for name in ("sources", "targets", "weights", "delays", "centres")]
     arrays += [network.neurons.bias, network.neurons.initial, network.neurons.input, network.neurons.position]
     for block in network.blocks:
-        arrays += [block.members, block.incoming, block.slots, *block.activation_parameters.values()]
+        arrays += [block.members, block.incoming, block.slots]
     for entry in network.plasticity:
-        arrays += [entry.members, *entry.parameters.values(), *entry.signals.values()]
+        arrays += [entry.members, *entry.signals.values()]
+    arrays += [array for _, use in network.uses for array in use.parameters.values()]
     assert all(isinstance(array, np.ndarray) and not array.flags.writeable for array in arrays)
 
 

@@ -91,7 +91,7 @@ def test_values_of_a_group() -> None:
 def test_parameters_of_an_activation_may_differ_from_neuron_to_neuron() -> None:
     network = network_of("neurons: {K: {count: 3, activation: {gaussian: {sigma: i + 1}}}, L: {activation: gaussian}}")
     (block,) = network.blocks
-    assert block.activation_parameters["sigma"].tolist() == [1, 2, 3, 1]
+    assert block.activation.parameters["sigma"].tolist() == [1, 2, 3, 1]
 
 
 def test_blocks_join_neurons_that_are_updated_alike() -> None:
@@ -99,7 +99,7 @@ def test_blocks_join_neurons_that_are_updated_alike() -> None:
         "neurons: {A: {activation: tanh}, B: {}, C: {activation: tanh}}\nconnections: {A -> C: {delay: 0}, B -> A: 1}"
     )
     blocks = network_of(text).blocks
-    assert [(b.level, b.activation.name, b.members.tolist()) for b in blocks] == [
+    assert [(b.level, b.activation.definition.name, b.members.tolist()) for b in blocks] == [
         (0, "tanh", [0]),
         (0, "identity", [1]),
         (1, "tanh", [2]),

@@ -10,6 +10,7 @@ from click.testing import CliRunner
 from small_specs import codes, compiled
 
 from neurovis_spec.cli.commands import neurovis
+from neurovis_spec.compiler.program import ACTIVATION, MODEL, RULE
 from neurovis_spec.compiler.values.builtin import builtin_definitions, libraries
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.unknown import UNKNOWN
@@ -101,13 +102,13 @@ def test_the_built_in_ones_are_those_of_the_tables_with_their_parameters_and_sig
     """No more and no fewer, with these defaults."""
     known = builtin_definitions()
     found: dict[str, dict[str, float]] = {}
-    for section in (known.activations, known.models, known.rules):
-        for name, (_, defaults) in section.known().items():
+    for kind in (ACTIVATION, MODEL, RULE):
+        for name, (_, defaults) in known.of(kind).known().items():
             found[name] = {
                 default.name: evaluate(default.value, {}) for default in defaults if default.value is not UNKNOWN
             }
     assert found == DEFAULTS
-    assert {name: rule.signals for name, (rule, _) in known.rules.known().items() if rule.signals} == SIGNALS
+    assert {name: rule.signals for name, (rule, _) in known.of(RULE).known().items() if rule.signals} == SIGNALS
 
 
 def described() -> dict[str, str]:

@@ -22,6 +22,7 @@ from scenes import file_of, scene_of
 
 import neurovis_spec as nv
 from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.compiler.program import ACTIVATION, MODEL, Block, Definition, Plasticity
 from neurovis_spec.scene import Scene
 
 HERE = Path(__file__).parent
@@ -51,6 +52,49 @@ def plain(value: object) -> Plain:
     raise TypeError(f"no golden form for {type(value).__name__}")
 
 
+def record(kind: str, **fields: object) -> dict[str, Plain]:
+    """A record by the names that it had in the first golden files."""
+    return {"kind": kind, **{name: plain(value) for name, value in fields.items()}}
+
+
+def definition_of(made: Definition) -> dict[str, Plain]:
+    named = {"name": made.name, "parameters": made.parameters}
+    state = [
+        record(type(one).__name__, name=one.name, initial=one.initial, each_step=one.each_step,
+               each_episode=one.each_episode)
+        for one in made.state
+    ]  # fmt: skip
+    inner = {"let": made.let, "state": state}
+    given = made.given
+    if made.kind == ACTIVATION:
+        checked = {"undefined": made.gives[1].each_step} if len(made.gives) > 1 else {}
+        return record("CheckedActivation" if checked else "Activation", **named, value=given.each_step, **checked)
+    if made.kind == MODEL:
+        return record("Model", **named, **inner, activity=given.each_step, spikes=made.spikes)
+    steps = {"each_step": given.each_step, "each_episode": given.each_episode}
+    return record("Rule", **named, signals=made.signals, **inner, **steps)
+
+
+def block_of(block: Block) -> dict[str, Plain]:
+    return record(
+        "Block",
+        level=block.level,
+        members=block.members,
+        combine=block.combine,
+        activation=definition_of(block.activation.definition),
+        activation_parameters=block.activation.parameters,
+        model=definition_of(block.model.definition),
+        model_parameters=block.model.parameters,
+        incoming=block.incoming,
+        slots=block.slots,
+    )
+
+
+def plasticity_of(one: Plasticity) -> dict[str, Plain]:
+    rule, parameters = definition_of(one.rule.definition), one.rule.parameters
+    return record("Plasticity", rule=rule, members=one.members, parameters=parameters, signals=one.signals)
+
+
 def network_of(compiled: CompiledNetwork) -> Plain:
     network = compiled.network
     described = {key: plain(value) for key, value in compiled.describe().items() if key != "hash"}
@@ -59,8 +103,8 @@ def network_of(compiled: CompiledNetwork) -> Plain:
         "bounds": plain(np.stack([network.connections.low.whole(), network.connections.high.whole()], axis=1)),
         "centres": plain(network.connections.centres.whole()),
         "initial": plain(network.neurons.initial),
-        "blocks": plain(network.blocks),
-        "plasticity": plain(network.plasticity),
+        "blocks": [block_of(one) for one in network.blocks],
+        "plasticity": [plasticity_of(one) for one in network.plasticity],
         "program": plain(network.program),
     }
 

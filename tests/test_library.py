@@ -12,6 +12,7 @@ import numpy.typing as npt
 import pytest
 
 import neurovis_spec as nv
+from neurovis_spec.compiler.program import ACTIVATION, MODEL, RULE
 from neurovis_spec.compiler.values.builtin import builtin_definitions, libraries
 from neurovis_spec.runtime.recording import Recording
 
@@ -169,9 +170,9 @@ def test_a_model(model: Model, parameters: dict[str, float]) -> None:
 
 def test_every_model_and_rule_is_among_those_tested() -> None:
     definitions = builtin_definitions()
-    assert {model.__name__ for model, _ in MODELS} == set(definitions.models)
-    assert {learner.__name__ for learner, _ in RULES} == set(definitions.rules)
-    assert {name.strip("{").split(":")[0] for name in ACTIVATIONS} == set(definitions.activations)
+    assert {model.__name__ for model, _ in MODELS} == set(definitions.of(MODEL))
+    assert {learner.__name__ for learner, _ in RULES} == set(definitions.of(RULE))
+    assert {name.strip("{").split(":")[0] for name in ACTIVATIONS} == set(definitions.of(ACTIVATION))
 
 
 def test_every_definition_says_what_it_is() -> None:
@@ -398,7 +399,7 @@ connections: {{X -> Y: {{weight: 0.3 - 0.5*i, delay: {delay}, plasticity: {rule}
 @pytest.mark.parametrize("delay", [0, 1, 3])
 @pytest.mark.parametrize(("learner", "parameters"), RULES)
 def test_a_rule(learner: Learner, parameters: dict[str, float], delay: int) -> None:
-    names = builtin_definitions().rules.known()[learner.__name__][0].signals
+    names = builtin_definitions().of(RULE).known()[learner.__name__].definition.signals
     given = [f"{name}: {value}" for name, value in parameters.items()]
     given += [f"{name}: {source}" for name, source in zip(names, ("one", "Z"), strict=False)]
     episode = f", episode: {EPISODE}" if learner in (reward_modulated, policy_gradient) else ""

@@ -16,9 +16,9 @@ from networks_by_hand import (
     LEAKY,
     STATIC,
     TANH,
+    Learns,
     Link,
     Unit,
-    Use,
     activation,
     build,
     cpg_rbf,
@@ -30,7 +30,7 @@ from networks_by_hand import (
 from neurovis_spec.api import compile_text
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Input, Network
-from neurovis_spec.compiler.program import Activation, Model
+from neurovis_spec.compiler.program import Definition
 from neurovis_spec.language.words import Combine
 from neurovis_spec.runtime.backend import BackendError, Capabilities, listing, load, prepare
 from neurovis_spec.runtime.inputs import InputReader
@@ -65,18 +65,18 @@ TRACED = rule(
 )
 SEASONAL = rule(end="0.9 * weight + 0.01 * total / k", states={"total": ("0", "total + pre * post + 0*t", "0")})
 COPYING = rule(step="last", states={"last": ("0.5", "weight", None)})
-MODELS: Sequence[tuple[Model, dict[str, float]]] = (
+MODELS: Sequence[tuple[Definition, dict[str, float]]] = (
     (STATIC, {}),
     (LEAKY, {"leak": 0.3}),
     (ADAPTIVE, {"leak": 0.2, "start": 0.1}),
     (SWAPPING, {}),
 )
-BOUNDED: Sequence[tuple[Activation, dict[str, float]]] = (
+BOUNDED: Sequence[tuple[Definition, dict[str, float]]] = (
     (TANH, {}),
     (GAUSSIAN, {"sigma": 0.7}),
     (CLOCKED, {"slope": 0.5}),
 )
-USES = (Use(TRACED, {"rate": 0.05}, {"teacher": 0}), Use(SEASONAL), Use(COPYING))
+USES = (Learns(TRACED, {"rate": 0.05}, {"teacher": 0}), Learns(SEASONAL), Learns(COPYING))
 
 
 @st.composite
@@ -127,13 +127,13 @@ def networks(draw: st.DrawFn, gain: float = 0.9) -> Network:
     return build(units, links, uses, inputs, dt=0.1, episode=draw(st.sampled_from([None, 1, 3, 7])))
 
 
-def _teach(use: Use, signal: int) -> Use:
-    return Use(use.rule, use.parameters, dict.fromkeys(use.signals, signal))
+def _teach(use: Learns, signal: int) -> Learns:
+    return Learns(use.rule, use.parameters, dict.fromkeys(use.signals, signal))
 
 
 def parts(state: State) -> list[FloatArray]:
     """All arrays of a state."""
-    inner = [array for kind in (state.cells, state.traces) for entry in kind for array in entry]
+    inner = [array for own in state.cells.values() for array in own.values()]
     return [state.activity, state.weights, state.signals, state.history, *inner]
 
 
@@ -209,7 +209,7 @@ def test_a_signal_arrives_after_its_delay(delay: int, backend: str) -> None:
 @pytest.mark.parametrize("backend", BOTH)
 def test_a_signal_is_formed_with_the_weight_of_its_departure(backend: str) -> None:
     # the weight doubles each step: 1, 2, 4, 8; the source is 1 always; delay 2
-    doubling = Use(rule("2 * weight"))
+    doubling = Learns(rule("2 * weight"))
     network = build([Unit("S", bias=1.0), Unit("A")], [Link(0, 1, 1.0, 2, learns=0)], [doubling])
     recording = run(network, 6, backend)
     assert recording.weight("S -> A").tolist() == [1, 2, 4, 8, 16, 32]
@@ -250,7 +250,7 @@ def test_initial_reaches_delay_0_targets_at_step_0(backend: str) -> None:
 @pytest.mark.parametrize("delay", [0, 1, 3])
 def test_pre_is_the_activity_that_reaches_the_synapse(delay: int, backend: str) -> None:
     ramp = Input("ramp", 0, 1, tree("k + 1"))
-    follow = Use(rule("100 * pre + sent + post / 1000"))
+    follow = Learns(rule("100 * pre + sent + post / 1000"))
     units = [Unit("S", input=0), Unit("A", bias=1.0)]
     units, links = [*units, Unit("Sink")], [Link(0, 1, 0.0, delay, learns=0), Link(1, 2, 0.0, 5)]
     network = build(units, links, [follow], [ramp])
@@ -266,13 +266,13 @@ def test_mixed_delays_of_pre(backend: str) -> None:
     ramp = Input("ramp", 0, 1, tree("k + 1"))
     units = [Unit("S", input=0), Unit("A"), Unit("B"), Unit("D")]
     links = [Link(0, 1, 0.0, 2, learns=0), Link(0, 2, 0.0, 0, learns=0), Link(0, 3, 0.0, 4, learns=0)]
-    found = run(build(units, links, [Use(rule("pre"))], [ramp]), 8, backend)
+    found = run(build(units, links, [Learns(rule("pre"))], [ramp]), 8, backend)
     assert found.weights[1:].tolist() == [[max(t - 1, 0), t + 1, max(t - 3, 0)] for t in range(7)]
 
 
 @pytest.mark.parametrize("backend", BOTH)
 def test_bounds_hold_after_each_change(backend: str) -> None:
-    grow = Use(rule("weight + 0.4", "weight - 0.5"))
+    grow = Learns(rule("weight + 0.4", "weight - 0.5"))
     network = build([Unit("S"), Unit("A")], [Link(0, 1, 0.0, 1, learns=0, low=-0.25, high=1.0)], [grow], episode=4)
     # 0, .4, .8, 1 (clipped), then at the end of step 3: min(1.4, 1) − 0.5
     assert run(network, 6, backend).weight("S -> A").tolist() == pytest.approx([0, 0.4, 0.8, 1.0, 0.5, 0.9], rel=1e-15)
@@ -280,7 +280,7 @@ def test_bounds_hold_after_each_change(backend: str) -> None:
 
 @pytest.mark.parametrize("backend", BOTH)
 def test_right_hand_sides_use_old_values(backend: str) -> None:
-    swap = Use(rule("other", "weight + other", {"other": ("5", "weight", "10 * weight + other")}))
+    swap = Learns(rule("other", "weight + other", {"other": ("5", "weight", "10 * weight + other")}))
     network = build([Unit("S"), Unit("A")], [Link(0, 1, 2.0, learns=0)], [swap], episode=3)
     # (w, o): (2,5) (5,2) (2,5) → step (5,2) → end (7, 52) → (52, 7)
     assert run(network, 5, backend).weight("S -> A").tolist() == [2, 5, 2, 7, 52]
@@ -299,7 +299,7 @@ def test_reward_modulated_learning_against_a_plain_loop(backend: str) -> None:
         signals=["policy", "reward"],
     )
     inputs = [Input("policy", 0, 1, tree("sin(0.7 * k)")), Input("reward", 1, 1, tree("cos(0.3 * k)"))]
-    use = Use(learning, {"rate": 0.1, "smoothing": 0.9}, {"policy": 2, "reward": 3})
+    use = Learns(learning, {"rate": 0.1, "smoothing": 0.9}, {"policy": 2, "reward": 3})
     network = build([Unit("S", bias=0.5), Unit("A")], [Link(0, 1, 0.2, 1, learns=0)], [use], inputs, episode=5)
     weight, eligibility, baseline, sent, arriving, expected = 0.2, 0.0, 0.0, 0.5, 0.0, []
     for t in range(23):
@@ -331,7 +331,7 @@ def test_the_delta_rule_learns_the_target_of_use_case_1(backend: str) -> None:
 def test_k_t_and_dt_are_known_to_rules_and_models(backend: str) -> None:
     clock = model("f(k + t / 10 + dt / 1000 + drive)", {})
     network = build(
-        [Unit("A", model=clock), Unit("B")], [Link(0, 1, 0.0, learns=0)], [Use(rule("k + t + 0 * pi * e"))], dt=0.5
+        [Unit("A", model=clock), Unit("B")], [Link(0, 1, 0.0, learns=0)], [Learns(rule("k + t + 0 * pi * e"))], dt=0.5
     )
     recording = run(network, 4, backend)
     np.testing.assert_allclose(recording["A"], [k + k * 0.05 + 0.0005 for k in range(4)], rtol=1e-15)
@@ -420,7 +420,7 @@ def test_a_network_that_asks_for_more_is_refused_before_it_starts(capabilities: 
 
     Weak.capabilities = capabilities
     links = [Link(0, 1, 1.0, 3, learns=0), Link(0, 1), Link(1, 1)]
-    network = build([Unit("A"), Unit("B")], links, [Use(COPYING)], episode=3)
+    network = build([Unit("A"), Unit("B")], links, [Learns(COPYING)], episode=3)
     with pytest.raises(BackendError, match=words):
         prepare(network, Weak())
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
-from networks_by_hand import TANH, Link, Unit, Use, build, cpg_rbf, model, rule
+from networks_by_hand import TANH, Learns, Link, Unit, build, cpg_rbf, model, rule
 from random_specs import specs
 from test_runtime_backends import networks, parts
 
@@ -279,7 +279,7 @@ def test_a_weight_that_is_not_finite_for_one_step_is_told_in_whole_runs(place: i
     passing = rule("1e308*10 if k == 37 and pre == 1 else 0.5")
     units = [Unit(f"N{i}", TANH, bias=40 if i == place else 0.01 * i) for i in range(11)]
     links = [Link(i, (3 * i + 1) % 11, 0.1, learns=0) for i in range(11)]
-    network = build(units, links, [Use(passing)])
+    network = build(units, links, [Learns(passing)])
     with pytest.warns(RuntimeWarning, match=f"N{place} -> .* inf after step 37") as first:
         record(network, 90, backend="reference")
     with pytest.warns(RuntimeWarning) as second:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from networks_by_hand import Link, Unit, Use, build, cpg_rbf, rule
+from networks_by_hand import Learns, Link, Unit, build, cpg_rbf, rule
 
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime import files, formats
@@ -30,7 +30,7 @@ ARRAYS = ("activity", "weights", "weights_static", "plastic", "sources", "target
 def learning() -> Network:
     """Three connections share both ends; the one written last is first by delay."""
     links = [Link(0, 1, 0.5, 3, learns=0), Link(0, 1, 0.25, 2), Link(0, 1, 0.125, 1, learns=0)]
-    return build([Unit("A", bias=0.1), Unit("B")], links, [Use(rule("weight + pre"))], dt=0.1)
+    return build([Unit("A", bias=0.1), Unit("B")], links, [Learns(rule("weight + pre"))], dt=0.1)
 
 
 def parallel() -> Recording:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from networks_by_hand import TANH, Link, Unit, Use, build, cpg_rbf, rule, tree
+from networks_by_hand import TANH, Learns, Link, Unit, build, cpg_rbf, rule, tree
 
 import neurovis_spec as nv
 from neurovis_spec.compiler.network import Input, Network, Output
@@ -239,7 +239,7 @@ def test_one_warning_names_the_neuron_and_the_step(backend: str) -> None:
 
 @pytest.mark.parametrize("backend", BOTH)
 def test_one_warning_names_the_connection(backend: str) -> None:
-    bad = Use(rule("1 / (2 - k)"))
+    bad = Learns(rule("1 / (2 - k)"))
     network = build([Unit("A"), Unit("B")], [Link(0, 1, 1.0, learns=0)], [bad])
     with pytest.warns(RuntimeWarning, match="the weight of A -> B is inf after step 2") as caught:
         record(network, 10, backend=backend)
@@ -430,7 +430,7 @@ def test_what_was_learned_is_kept() -> None:
 
 def test_pre_goes_on_as_well() -> None:
     ramp = [Input("ramp", 0, 1, tree("k + 1"))]
-    network = build([Unit("S", input=0), Unit("A")], [Link(0, 1, 0.0, 3, learns=0)], [Use(rule("pre"))], ramp)
+    network = build([Unit("S", input=0), Unit("A")], [Link(0, 1, 0.0, 3, learns=0)], [Learns(rule("pre"))], ramp)
     rest = record(network, 5, start=record(network, 10))
     # w[10] = a[6] is the weight after the last step; then a[7], a[8], a[9] arrive, and a[0] of the new run
     assert rest.weight("S -> A").tolist() == [7, 8, 9, 10, 1]

@@ -18,7 +18,7 @@ from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.digest import TREES, Content, Record, content, digest
 from neurovis_spec.compiler.names.state_references import singles
 from neurovis_spec.compiler.network import Connections, Group, Input, Network, Neurons, Noise, Output
-from neurovis_spec.compiler.program import Activation, Block, Model, Plasticity, Quantity, Rule
+from neurovis_spec.compiler.program import Block, Definition, Plasticity, Quantity
 
 #: What of each type is content. What follows parameters shows by the parameters; ``starts`` and states of outputs are
 #: put behind the rest, where there are some.
@@ -84,10 +84,10 @@ def _block(block: Block) -> Record:
         "level": block.level,
         "members": block.members,
         "combine": block.combine,
-        "activation": _activation(block.activation),
-        "activation_parameters": block.activation_parameters,
-        "model": _model(block.model),
-        "model_parameters": block.model_parameters,
+        "activation": _activation(block.activation.definition),
+        "activation_parameters": block.activation.parameters,
+        "model": _model(block.model.definition),
+        "model_parameters": block.model.parameters,
         "incoming": block.incoming,
     }
     return Record("Block", fields)
@@ -96,28 +96,30 @@ def _block(block: Block) -> Record:
 def _plasticity(one: Plasticity, moved: IntArray) -> Record:
     """``moved``: where each place of all activities and inputs is here."""
     signals = {name: moved[indices] for name, indices in one.signals.items()}
-    fields = {"rule": _rule(one.rule), "members": one.members, "parameters": one.parameters, "signals": signals}
+    rule, parameters = _rule(one.rule.definition), one.rule.parameters
+    fields = {"rule": rule, "members": one.members, "parameters": parameters, "signals": signals}
     return Record("Plasticity", fields)
 
 
-def _activation(one: Activation) -> Record:
-    return Record("Activation", {"name": one.name, "parameters": sorted(one.parameters), "value": one.value})
+def _activation(one: Definition) -> Record:
+    value = one.given.each_step
+    return Record("Activation", {"name": one.name, "parameters": sorted(one.parameters), "value": value})
 
 
-def _model(one: Model) -> Record:
+def _model(one: Definition) -> Record:
     shared = {"name": one.name, "parameters": sorted(one.parameters), "let": one.let, "state": _states(one.state)}
-    return Record("Model", {**shared, "activity": one.activity})
+    return Record("Model", {**shared, "activity": one.given.each_step})
 
 
-def _rule(one: Rule) -> Record:
+def _rule(one: Definition) -> Record:
     fields: dict[str, object] = {
         "name": one.name,
         "parameters": sorted(one.parameters),
         "signals": sorted(one.signals),
         "let": one.let,
         "state": _states(one.state),
-        "each_step": one.each_step,
-        "each_episode": one.each_episode,
+        "each_step": one.given.each_step,
+        "each_episode": one.given.each_episode,
     }
     return Record("Rule", fields)
 

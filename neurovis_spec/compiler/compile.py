@@ -134,11 +134,11 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         noises=noises,
         instances=_instances(scopes, population),
         numbering=own_weights(slots, bundles, connections.weights.whole()),
-        settable=make_settable(slots, population, bundles, connections, inputs, blocks, plasticity, noises),
         ros=ros,
         body=body,
     )
-    network = replace(network, hash=content_hash(network))
+    settable = make_settable(network, slots, population, bundles)
+    network = replace(network, hash=content_hash(network), settable=settable)
     eventful = _eventful(spec, network, finder, constants)
     if eventful is not None and not findings.failed:  # the shape may have been invalid
         files = tuple(file.model for file in request.includes.files)

@@ -7,27 +7,29 @@ that learn by one rule) and the program, an ordered list of operations.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, IntArray, frozen
+from neurovis_spec.arrays import IntArray, frozen
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.connections.plasticity import Learning
-from neurovis_spec.compiler.neurons.groups import Built, Kind
 from neurovis_spec.compiler.neurons.populate import Population
 from neurovis_spec.compiler.program import (
     Block,
     Gather,
     Learn,
     Operation,
+    Owner,
     Plasticity,
     ReadInputs,
     Send,
     Update,
+    Use,
 )
+from neurovis_spec.compiler.values.arguments import Settled
 
 
 class Cycle(NamedTuple):
@@ -85,9 +87,9 @@ def _cycle(prompt: list[int], sources: IntArray, targets: IntArray, waiting: lis
 def make_blocks(population: Population, sources: IntArray, targets: IntArray, levels: IntArray) -> tuple[Block, ...]:
     """Neurons of the same level, activation, model and combination, in the order of the levels."""
     groups = population.groups
-    alike: dict[tuple[str, str, str], int] = {}
+    alike: dict[tuple[str, ...], int] = {}
     own = [
-        alike.setdefault((one.kind.activation.name, one.kind.model.name, one.group.combine), len(alike))
+        alike.setdefault((*(used.definition.name for used in one.kind), one.group.combine), len(alike))
         for one in groups
     ]
     counts = [one.group.count for one in groups]
@@ -97,17 +99,20 @@ def make_blocks(population: Population, sources: IntArray, targets: IntArray, le
     slot = np.zeros(len(home), dtype=np.int64)
     for some in members:
         slot[some] = np.arange(len(some))
+    chosen = [
+        [(one.group.start, used) for one, used in zip(groups, column, strict=True)]
+        for column in zip(*(one.kind for one in groups), strict=True)
+    ]
     blocks = []
-    for some, incoming in zip(members, _split(home[targets], len(members)), strict=True):
+    for number, (some, incoming) in enumerate(zip(members, _split(home[targets], len(members)), strict=True)):
         first = groups[group[some[0]]]
+        activation, model = (_use(number, some, group[some], settled) for settled in chosen)
         block = Block(
             level=int(levels[some[0]]),
             members=some,
+            model=model,
+            activation=activation,
             combine=first.group.combine,
-            activation=first.kind.activation,
-            activation_parameters=_column(some, group, groups, lambda kind: kind.activation_parameters),
-            model=first.kind.model,
-            model_parameters=_column(some, group, groups, lambda kind: kind.model_parameters),
             incoming=incoming,
             slots=slot[targets[incoming]],
         )
@@ -133,21 +138,23 @@ def _split(blocks: IntArray, number: int) -> list[IntArray]:
     return [order[start:end].astype(np.int64) for start, end in pairwise(ends)]
 
 
-def _column(
-    members: IntArray, owners: IntArray, groups: tuple[Built, ...], of: Callable[[Kind], Mapping[str, FloatArray]]
-) -> Mapping[str, FloatArray]:
-    """The parameters of a block, each from rows of its groups' arrays; ``owners`` are the groups of all neurons."""
-    own = owners[members]
-    names = tuple(of(groups[own[0]].kind))
-    if not names:
-        return {}
+def _use(number: int, members: IntArray, own: IntArray, settled: Sequence[tuple[int, Settled]]) -> Use:
+    """A definition in use at a block; ``own`` are the groups of its members, and ``settled`` of all groups where they
+    start and what they say of it."""
+    definition = settled[own[0]][1].definition
+    owner = Owner(definition.kind.name, number)
+    if not definition.parameters:
+        return Use(owner, definition, {})
     starts = np.flatnonzero(np.diff(own, prepend=-1))
     ends = pairwise((*starts.tolist(), len(own)))
     parts = [
-        (of(one.kind), members[start:end] - one.group.start)
-        for one, (start, end) in zip((groups[place] for place in own[starts].tolist()), ends, strict=True)
+        (used.parameters, members[start:end] - first)
+        for (first, used), (start, end) in zip((settled[place] for place in own[starts].tolist()), ends, strict=True)
     ]
-    return {name: frozen(np.concatenate([values[name][rows] for values, rows in parts])) for name in names}
+    parameters = {
+        name: frozen(np.concatenate([values[name][rows] for values, rows in parts])) for name in definition.parameters
+    }
+    return Use(owner, definition, parameters)
 
 
 def make_plasticity(bundles: tuple[Bundle, ...]) -> tuple[tuple[Plasticity, ...], list[int]]:
@@ -167,10 +174,10 @@ def make_plasticity(bundles: tuple[Bundle, ...]) -> tuple[tuple[Plasticity, ...]
             parts[number].append((learning, np.arange(start, start + n, dtype=np.int64)))
         rules.append(number)
         start += n
-    return tuple(_together(part) for part in parts), rules
+    return tuple(_together(number, part) for number, part in enumerate(parts)), rules
 
 
-def _together(parts: list[tuple[Learning, IntArray]]) -> Plasticity:
+def _together(number: int, parts: list[tuple[Learning, IntArray]]) -> Plasticity:
     """The connections of several entries that learn by one rule."""
     first = parts[0][0]
     members = np.concatenate([members for _, members in parts])
@@ -178,7 +185,7 @@ def _together(parts: list[tuple[Learning, IntArray]]) -> Plasticity:
     signals = {name: np.concatenate([one.signals[name] for one, _ in parts]) for name in first.signals}
     for array in (members, *parameters.values(), *signals.values()):
         frozen(array)
-    return Plasticity(first.rule, members, parameters, signals)
+    return Plasticity(members, Use(Owner(first.rule.kind.name, number), first.rule, parameters), signals)
 
 
 def make_program(blocks: tuple[Block, ...], plasticity: tuple[Plasticity, ...]) -> tuple[Operation, ...]:

@@ -8,7 +8,7 @@ carried out.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -21,7 +21,7 @@ from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, Rend
 from neurovis_spec.compiler.events.changes import Change
 from neurovis_spec.compiler.events.settable import Binding, ParameterFormula, Part, Settable
 from neurovis_spec.compiler.names.state_references import StateOf
-from neurovis_spec.compiler.program import Block, Operation, Plasticity
+from neurovis_spec.compiler.program import Block, Operation, Plasticity, Use
 from neurovis_spec.compiler.ros_settings import RosSettings
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.language.words import Combine, NeuronRole
@@ -225,6 +225,16 @@ class Network:
     #: the body that it senses and moves in a run; like ``ros``, no part of the hash
     body: BodySettings | None = None
 
+    @property
+    def holders(self) -> tuple[Block | Plasticity, ...]:
+        """Whatever has definitions in use, in the order in which their states are kept."""
+        return *self.blocks, *self.plasticity
+
+    @property
+    def uses(self) -> Iterator[tuple[Block | Plasticity, Use]]:
+        """All definitions in use, each with whoever has it."""
+        return ((holder, use) for holder in self.holders for use in holder.uses)
+
     @cached_property
     def neuron_index(self) -> Mapping[str, int]:
         """Name to index."""
@@ -253,7 +263,7 @@ class Network:
         """What networks have in common that can take on each other's states: the content hash, and which of their
         numbers follow parameters, which that hash does not see."""
         names = [slot.name for slot in self.settable.slots]
-        follow = [(binding.array, binding.places, sorted(binding.slots)) for binding in self.settable.bindings]
+        follow = [(binding.array.text, binding.places, sorted(binding.slots)) for binding in self.settable.bindings]
         return digest(self.hash, names, follow)
 
     @cached_property
@@ -293,7 +303,7 @@ class Network:
     def _parallel_key(self, index: int) -> tuple[int, str, float, int]:
         connections = self.connections
         rule = int(connections.rules[index])
-        name = self.plasticity[rule].rule.name if rule >= 0 else ""
+        name = self.plasticity[rule].rule.definition.name if rule >= 0 else ""
         weights: FloatColumn | FloatArray = connections.weights if self.numbering is None else self.numbering
         return (int(connections.delays[index]), name, float(weights[index]), index)
 

@@ -1,28 +1,31 @@
 """The update program: what a step does, and by which definitions.
 
-In: nothing; these are values of a Network. Definitions (activations, models, rules) are typed expressions; blocks and
-plasticities say which neurons and connections they are for; operations are what a step does, in order.
+In: nothing; these are values of a Network. A Definition is a set of typed expressions, of one Kind; blocks and
+plasticities say for which neurons and connections which are in use; operations are what a step does, in order.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 from neurovis_spec.arrays import FloatArray, IntArray
-from neurovis_spec.language.expressions.tree import Call, Tree, walk
+from neurovis_spec.language.expressions.tree import Call, Number, Tree, names, walk
 from neurovis_spec.language.words import Combine
+
+_ZERO = Number(0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A state of a model or rule; the expressions see the definition's names. Without ``each_step`` it stays."""
+    """A number that a definition keeps or gives, and what it becomes: its value at each step and at an episode's end;
+    where there is no such expression, it stays. ``initial`` is what a state begins with."""
 
     name: str
-    initial: Tree
     each_step: Tree | None = None
     each_episode: Tree | None = None
+    initial: Tree = _ZERO
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,62 +34,90 @@ class Check(Quantity):
     other number shows (``compiler/run_checks.py``), else 0. ``name`` says it: ``the model 'm' divides by 0``."""
 
 
-#: The function of a model's checks that says whether the neuron's activation is undefined for an argument.
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """What all definitions of a kind have in common. Its name is that of the owners of states and parameters, too."""
+
+    name: str
+    #: what there is one of its states and parameters for
+    each: Literal["neuron", "connection"]
+    #: what it gives
+    gives: str
+    #: whether that is kept from step to step, so that it is seen by its name and replaced as a state is; else it is
+    #: made anew from the new states
+    lasting: bool = False
+    #: whether it is a function of what is called ``x`` in it, for formulas of others
+    function: bool = False
+
+    @property
+    def section(self) -> str:
+        """Where it is defined in a spec."""
+        return f"{self.name}s"
+
+
+#: ``f``, the value for ``x``, the combined input.
+ACTIVATION = Kind("activation", "neuron", "f", function=True)
+#: How the activity follows from ``drive`` (u[t]); ``f`` in it is the neuron's activation.
+MODEL = Kind("model", "neuron", "activity")
+#: How a weight changes, within its bounds, from pre, sent, post and signals.
+RULE = Kind("rule", "connection", "weight", lasting=True)
+
+#: The function of an activation that says whether it is undefined for an argument.
 UNDEFINED_F = "f is undefined"
 
 
 @dataclass(frozen=True, slots=True)
-class Activation:
-    """``value`` is an expression of ``x``, the combined input, and the parameters."""
+class Definition:
+    """How numbers follow from others. All expressions see the clock, the parameters, the states, ``let``, the signals
+    and what its kind is given; ``let`` in order."""
 
+    kind: Kind
     name: str
     parameters: tuple[str, ...]
-    value: Tree
-
-    @property
-    def functions(self) -> Mapping[str, Tree]:
-        """What a model may call in its formulas, each with its formula, of x."""
-        return {"f": self.value}
-
-
-@dataclass(frozen=True, slots=True)
-class CheckedActivation(Activation):
-    """An activation that a model checks: ``undefined`` is true where it computes something undefined that its value
-    does not show."""
-
-    undefined: Tree
-
-    @property
-    def functions(self) -> Mapping[str, Tree]:
-        """Beside ``f`` whether it is undefined."""
-        return {"f": self.value, UNDEFINED_F: self.undefined}
-
-
-@dataclass(frozen=True, slots=True)
-class Model:
-    """How the activity follows from ``drive`` (u[t]); ``f`` in ``activity`` is the neuron's activation (a Call of
-    ``f`` with one argument)."""
-
-    name: str
-    parameters: tuple[str, ...]
-    let: tuple[tuple[str, Tree], ...]
-    state: tuple[Quantity, ...]
-    activity: Tree
-    #: whether its activity, of a step as the activation where it depends on one, is a spike or nothing
+    #: what it gives; the first is what its kind gives
+    gives: tuple[Quantity, ...]
+    let: tuple[tuple[str, Tree], ...] = ()
+    state: tuple[Quantity, ...] = ()
+    signals: tuple[str, ...] = ()
+    #: of a model whether its activity, of a step as the activation where it depends on one, is a spike or nothing
     spikes: bool = False
+
+    @property
+    def given(self) -> Quantity:
+        """What its kind gives."""
+        return self.gives[0]
+
+    @property
+    def lasting(self) -> tuple[Quantity, ...]:
+        """What lasts from step to step, and is replaced all at once, from old values."""
+        return (*self.state, *self.gives) if self.kind.lasting else self.state
+
+    @property
+    def fleeting(self) -> tuple[Quantity, ...]:
+        """What is made anew at each step, from the new states."""
+        return () if self.kind.lasting else self.gives
+
+    @property
+    def functions(self) -> Mapping[str, Tree]:
+        """What formulas of others may call, each an expression of x."""
+        return {one.name: one.each_step for one in self.gives if one.each_step is not None}
 
     @property
     def formulas(self) -> Iterator[Tree]:
         """All that is computed in a run."""
-        yield self.activity
         yield from (tree for _, tree in self.let)
-        for state in self.state:
-            yield from (tree for tree in (state.each_step, state.each_episode) if tree is not None)
+        for one in (*self.state, *self.gives):
+            yield from (tree for tree in (one.each_step, one.each_episode) if tree is not None)
+
+    @property
+    def read(self) -> frozenset[str]:
+        """All names that its formulas read in a run."""
+        return frozenset().union(*map(names, self.formulas))
 
     @property
     def reads_activation(self) -> bool:
-        """Whether its activity depends on the neuron's activation."""
-        return any(map(is_activation, walk(self.activity)))
+        """Whether what it gives depends on the neuron's activation."""
+        return any(is_activation(node) for tree in self.functions.values() for node in walk(tree))
 
 
 def is_activation(node: Tree) -> bool:
@@ -94,17 +125,34 @@ def is_activation(node: Tree) -> bool:
     return isinstance(node, Call) and node.function == "f"
 
 
-@dataclass(frozen=True, slots=True)
-class Rule:
-    """How a weight changes. The expressions see pre, sent, post, weight, k, t, dt, parameters, state, let, signals."""
+class Owner(NamedTuple):
+    """Whose states and parameters: those of the definition of a kind that is in use at the ``number``-th block or
+    plasticity."""
 
+    kind: str
+    number: int
+
+
+class Key(NamedTuple):
+    """An array of numbers of a network: a parameter of an owner by its name, or what the network has one of, such as
+    ``bias``."""
+
+    owner: Owner | None
     name: str
-    parameters: tuple[str, ...]
-    signals: tuple[str, ...]
-    let: tuple[tuple[str, Tree], ...]
-    state: tuple[Quantity, ...]
-    each_step: Tree | None
-    each_episode: Tree | None
+
+    @property
+    def text(self) -> str:
+        """How it is called in what outlives a run: ``bias``, ``model/3/leak``, ``table/0``."""
+        return "/".join((*map(str, self.owner or ()), *filter(None, [self.name])))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Use:
+    """A definition in use; ``parameters`` have a value for each member."""
+
+    owner: Owner
+    definition: Definition
+    parameters: Mapping[str, FloatArray]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,30 +161,35 @@ class Block:
 
     ``members`` are neuron indices, ascending. ``incoming`` are the connections into them, in the order of the
     connections, and ``slots`` says which member (position in ``members``) each of them goes to.
-    Parameters are arrays as long as ``members``.
     """
 
     level: int
     members: IntArray
+    model: Use
+    activation: Use
     combine: Combine
-    activation: Activation
-    activation_parameters: Mapping[str, FloatArray]
-    model: Model
-    model_parameters: Mapping[str, FloatArray]
     incoming: IntArray
     slots: IntArray
+
+    @property
+    def uses(self) -> tuple[Use, ...]:
+        """The definitions that its neurons are of."""
+        return self.activation, self.model
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plasticity:
     """Connections that learn by one rule. ``signals`` gives, for each signal of the rule, one index a
-    connection into the activities of all neurons followed by the vector of all inputs. Parameters are as long as
-    ``members``."""
+    connection into the activities of all neurons followed by the vector of all inputs."""
 
-    rule: Rule
     members: IntArray
-    parameters: Mapping[str, FloatArray]
+    rule: Use
     signals: Mapping[str, IntArray]
+
+    @property
+    def uses(self) -> tuple[Use, ...]:
+        """The definitions that its connections are of."""
+        return (self.rule,)
 
 
 # The update program: operations in the order of §5. Each sees what those before it have made in the same step.

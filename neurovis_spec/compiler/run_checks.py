@@ -14,13 +14,22 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
-from typing import TypeVar
+from types import MappingProxyType
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.events.settable import HIGH, LOW
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import UNDEFINED_F, Block, Check, CheckedActivation, Model, Plasticity, Rule
+from neurovis_spec.compiler.program import (
+    UNDEFINED_F,
+    Block,
+    Check,
+    Definition,
+    Key,
+    Plasticity,
+    Quantity,
+    Use,
+)
 from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS, Hidden
 from neurovis_spec.language.expressions.tree import (
@@ -34,102 +43,112 @@ from neurovis_spec.language.expressions.tree import (
     names,
     substitute,
 )
-from neurovis_spec.language.expressions.undefined import Hazard, Hazards, Read, either, hazards, together
-
-M = TypeVar("M", Model, Rule)
+from neurovis_spec.language.expressions.undefined import (
+    Called,
+    Hazard,
+    Hazards,
+    Read,
+    either,
+    hazards,
+    together,
+)
 
 
 def with_checks(network: Network) -> Network:
     """The network with the checks that it needs."""
-    blocks = tuple(_Settings(network, number).of_block(block) for number, block in enumerate(network.blocks))
-    rules = tuple(_Settings(network, number).of_rule(one) for number, one in enumerate(network.plasticity))
-    if all(new is old for new, old in zip(blocks + rules, network.blocks + network.plasticity, strict=True)):
+    checks = _Checks(network)
+    blocks = tuple(map(checks.of_block, network.blocks))
+    rules = tuple(map(checks.of_rule, network.plasticity))
+    if all(new is old for new, old in zip((*blocks, *rules), network.holders, strict=True)):
         return network
     return replace(network, blocks=blocks, plasticity=rules)
 
 
 def without_checks(network: Network) -> Network:
     """The network without them, for one that nobody watches."""
-    blocks = tuple(
-        replace(block, model=_unchecked(block.model)) if _checks(block.model) else block for block in network.blocks
-    )
-    rules = tuple(replace(one, rule=_unchecked(one.rule)) if _checks(one.rule) else one for one in network.plasticity)
+    blocks = tuple(replace(block, model=_unchecked(block.model)) for block in network.blocks)
+    rules = tuple(replace(one, rule=_unchecked(one.rule)) for one in network.plasticity)
     return replace(network, blocks=blocks, plasticity=rules)
 
 
-def _checks(definition: Model | Rule) -> bool:
-    return any(isinstance(state, Check) for state in definition.state)
+def _unchecked(use: Use) -> Use:
+    made = use.definition
+    state = tuple(state for state in made.state if not isinstance(state, Check))
+    return use if len(state) == len(made.state) else replace(use, definition=replace(made, state=state))
 
 
-def _unchecked(definition: M) -> M:
-    return replace(definition, state=tuple(state for state in definition.state if not isinstance(state, Check)))
+class _Checks:
+    """Makes the checks of a network, of whose settings some stay as they are in a run."""
 
+    def __init__(self, network: Network) -> None:
+        self.network = network
 
-class _Settings:
-    """A block or a plasticity, with the settings of its definitions that stay as they are in a run."""
-
-    def __init__(self, network: Network, number: int) -> None:
-        self.network, self.number = network, number
-
-    def known(self, owner: str, settings: Mapping[str, FloatArray]) -> dict[str, Value]:
-        """The values of the names that do not change; ``owner``: ``model``, ``activation`` or ``rule``."""
-        fixed = {name: values for name, values in settings.items() if not self.is_set(f"{owner}/{self.number}/{name}")}
+    def known(self, use: Use) -> dict[str, Value]:
+        """The values of the names that do not change."""
+        fixed = {name: values for name, values in use.parameters.items() if not self.is_set(Key(use.owner, name))}
         return {**CONSTANTS, "dt": self.network.dt, **fixed}
 
-    def is_set(self, array: str) -> bool:
+    def is_set(self, array: Key) -> bool:
         """Whether an array can be set in a run."""
         return array in self.network.settable.variables
 
     def of_block(self, block: Block) -> Block:
         """The block with the checks of its model and activation."""
-        model, activation = block.model, block.activation
-        active = _with_new(hazards(model.activity, functions={"f": activation.value}), model)
-        found = through_let([active, *self._of_states(model)], model.let)
-        last = through_let(_of_episode(model), model.let)
-        states = list(_check(f"model '{model.name}'", found, last, self.known("model", block.model_parameters)))
-        if active.calls:
-            inside = hazards(activation.value, max(call.hidden for call in active.calls)).found
-            inside = list(_open(inside, self.known("activation", block.activation_parameters)))
+        activation = block.activation.definition
+        states, calls = self.of_use(block.model, functions=activation.functions)
+        if calls and activation.given.each_step is not None:
+            inside = hazards(activation.given.each_step, max(call.hidden for call in calls)).found
+            inside = list(_open(inside, self.known(block.activation)))
             if inside:
-                undefined = either(hazard.formula for hazard in inside)
-                activation = CheckedActivation(activation.name, activation.parameters, activation.value, undefined)
-                calls = [Hazard(inside[0].what, Call(UNDEFINED_F, c.call.arguments), c.where) for c in active.calls]
-                states += _check(f"activation '{activation.name}'", _sized(calls), [], {})
+                undefined = Quantity(UNDEFINED_F, either(hazard.formula for hazard in inside))
+                activation = replace(activation, gives=(*activation.gives, undefined))
+                found = [Hazard(inside[0].what, Call(UNDEFINED_F, c.call.arguments), c.where) for c in calls]
+                states += _check(f"activation '{activation.name}'", _sized(found), [], {})
         if not states:
             return block
-        return replace(block, model=replace(model, state=(*model.state, *states)), activation=activation)
+        model = _with_states(block.model, states)
+        return replace(block, model=model, activation=replace(block.activation, definition=activation))
 
     def of_rule(self, plasticity: Plasticity) -> Plasticity:
         """The plasticity with the checks of its rule."""
-        rule, connections, members = plasticity.rule, self.network.connections, plasticity.members
+        connections, members = self.network.connections, plasticity.members
         bounded = any(
-            self.is_set(name) or bool(np.isfinite(values[members]).any())
-            for name, values in (("low", connections.low), ("high", connections.high))
+            self.is_set(array) or bool(np.isfinite(values[members]).any())
+            for array, values in ((LOW, connections.low), (HIGH, connections.high))
         )
-        hidden = Hidden.INFINITY if bounded else Hidden.NOTHING
-        first = Hidden.ALL if self._replaced(rule.each_episode) else hidden
-        steps = [] if rule.each_step is None else [hazards(rule.each_step, first)]
-        ends = [] if rule.each_episode is None else [hazards(rule.each_episode, hidden)]
-        found = through_let([*steps, *self._of_states(rule)], rule.let)
-        last = through_let([*ends, *_of_episode(rule)], rule.let)
-        states = list(_check(f"rule '{rule.name}'", found, last, self.known("rule", plasticity.parameters)))
-        return replace(plasticity, rule=replace(rule, state=(*rule.state, *states))) if states else plasticity
+        states, _ = self.of_use(plasticity.rule, Hidden.INFINITY if bounded else Hidden.NOTHING)
+        return replace(plasticity, rule=_with_states(plasticity.rule, states)) if states else plasticity
 
-    def _of_states(self, definition: Model | Rule) -> list[Hazards]:
-        """What the states compute at each step. It shows, but for one that an episode's end replaces."""
-        return [
-            hazards(state.each_step, Hidden.ALL if self._replaced(state.each_episode) else Hidden.NOTHING)
-            for state in definition.state
-            if state.each_step is not None
+    def of_use(
+        self, use: Use, hidden: Hidden = Hidden.NOTHING, functions: Mapping[str, Tree] = MappingProxyType({})
+    ) -> tuple[list[Check], list[Called]]:
+        """The checks of a definition, of which what it gives is ``hidden`` to this degree, and what it calls of
+        ``functions``. What is computed shows, but for what an episode's end replaces."""
+        made = use.definition
+        steps = [
+            _with_new(hazards(one.each_step, functions=functions), made)
+            for one in made.fleeting
+            if one.each_step is not None
         ]
+        calls = [call for formula in steps for call in formula.calls]
+        lasting = [(one, hidden) for one in made.gives if made.kind.lasting]
+        lasting += [(one, Hidden.NOTHING) for one in made.state]
+        steps += [
+            hazards(one.each_step, Hidden.ALL if self._replaced(one) else degree)
+            for one, degree in lasting
+            if one.each_step is not None
+        ]
+        ends = [hazards(one.each_episode, degree) for one, degree in lasting if one.each_episode is not None]
+        found, last = through_let(steps, made.let), through_let(ends, made.let)
+        return list(_check(f"{made.kind.name} '{made.name}'", found, last, self.known(use))), calls
 
-    def _replaced(self, each_episode: Tree | None) -> bool:
-        return self.network.episode is not None and each_episode is not None
+    def _replaced(self, one: Quantity) -> bool:
+        """Whether the end of an episode replaces what a step gives."""
+        return self.network.episode is not None and one.each_episode is not None
 
 
-def _of_episode(definition: Model | Rule) -> list[Hazards]:
-    """What the states compute at an episode's end."""
-    return [hazards(state.each_episode) for state in definition.state if state.each_episode is not None]
+def _with_states(use: Use, states: list[Check]) -> Use:
+    return replace(use, definition=replace(use.definition, state=(*use.definition.state, *states)))
 
 
 def through_let(read: Iterable[Hazards], let: tuple[tuple[str, Tree], ...]) -> list[Hazard]:
@@ -146,8 +165,8 @@ def through_let(read: Iterable[Hazards], let: tuple[tuple[str, Tree], ...]) -> l
     return _sized(found)
 
 
-def _with_new(made: Hazards, model: Model) -> Hazards:
-    """What an activity reads, over the old states: it sees the new ones."""
+def _with_new(made: Hazards, model: Definition) -> Hazards:
+    """What is given reads, over the old states: it sees the new ones."""
     new = {state.name: state.each_step for state in model.state if state.each_step is not None}
 
     def old(tree: Tree) -> Tree:
@@ -196,7 +215,7 @@ def _check(what: str, steps: list[Hazard], ends: list[Hazard], known: Mapping[st
     kinds = {hazard.what for hazard in (*at_step, *at_end)}
     name = f"the {what} {kinds.pop() if len(kinds) == 1 else 'has an undefined operation'}"
     step = _infinite(at_step, Number(0.0)) if at_step else Number(0.0)
-    yield Check(name, Number(0.0), step, _infinite(at_end, Name(name)) if at_end else None)
+    yield Check(name, step, _infinite(at_end, Name(name)) if at_end else None)
 
 
 def _infinite(found: list[Hazard], otherwise: Tree) -> Tree:

@@ -5,7 +5,9 @@ In: nodes. Out: frozen models whose leaves know their places.
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from abc import abstractmethod
+from collections.abc import Mapping as AnyMapping
+from typing import Annotated, ClassVar, NamedTuple
 
 from pydantic import Field, ValidationInfo
 
@@ -21,6 +23,7 @@ from neurovis_spec.language.grammar import (
 )
 from neurovis_spec.language.located import (
     BoolField,
+    Formula,
     FormulaField,
     Leaf,
     Located,
@@ -33,7 +36,7 @@ from neurovis_spec.language.located import (
 )
 from neurovis_spec.language.model import Model, Named
 from neurovis_spec.language.unknown import Unknown
-from neurovis_spec.language.values import ParameterField
+from neurovis_spec.language.values import ParameterField, ParameterModel
 from neurovis_spec.language.yaml.source import Mapping, Node, Scalar
 
 LANGUAGE_VERSION = 1
@@ -64,7 +67,28 @@ class StateModel(Model):
     each_episode: FormulaField | None = Field(None, description="Its new value at an episode's end.")
 
 
-class ActivationModel(Model):
+class Parts(NamedTuple):
+    """What a definition says, whatever its kind: what it gives at each step and at an episode's end, and of what that
+    is made. ``state`` is None where the kind has none."""
+
+    parameters: AnyMapping[str, ParameterModel]
+    let: AnyMapping[str, Formula]
+    each_step: Formula | None
+    each_episode: Formula | None = None
+    state: AnyMapping[str, StateModel] | None = None
+    signals: tuple[Located[str], ...] = ()
+    spikes: bool = False
+
+
+class DefinitionModel(Model):
+    """A definition of one's own, of any kind."""
+
+    @abstractmethod
+    def parts(self) -> Parts:
+        """What it says."""
+
+
+class ActivationModel(DefinitionModel):
     """An activation function of one's own."""
 
     BARE: ClassVar[str] = "value"
@@ -78,8 +102,12 @@ class ActivationModel(Model):
     )
     description: TextField | None = Field(None, description="What it is, its equation and its source.")
 
+    def parts(self) -> Parts:
+        """What it says."""
+        return Parts(self.parameters, self.let, self.value)
 
-class ModelModel(Model):
+
+class ModelModel(DefinitionModel):
     """A neuron model of one's own: how the activity follows from the drive."""
 
     parameters: Annotated[Named[ParameterField], LOCAL] = Field(default_factory=dict, description="Names and defaults.")
@@ -98,6 +126,11 @@ class ModelModel(Model):
     )
     description: TextField | None = Field(None, description="What it is, its equation and its source.")
 
+    def parts(self) -> Parts:
+        """What it says."""
+        spikes = self.spikes is not None and self.spikes.value
+        return Parts(self.parameters, self.let, self.activity, state=self.state, spikes=spikes)
+
 
 class WeightModel(Model):
     """How a rule changes the weight."""
@@ -112,7 +145,7 @@ class WeightModel(Model):
     each_episode: Annotated[FormulaField, IN_RULE] | None = Field(None, description="The weight after an episode.")
 
 
-class RuleModel(Model):
+class RuleModel(DefinitionModel):
     """A plasticity rule of one's own."""
 
     parameters: Annotated[Named[ParameterField], LOCAL] = Field(default_factory=dict, description="Names and defaults.")
@@ -127,6 +160,11 @@ class RuleModel(Model):
     )
     weight: WeightModel = Field(description="How the weight changes.")
     description: TextField | None = Field(None, description="What it is, its equation and its source.")
+
+    def parts(self) -> Parts:
+        """What it says."""
+        weight = self.weight
+        return Parts(self.parameters, self.let, weight.each_step, weight.each_episode, self.state, self.signals)
 
     @classmethod
     def _without(cls, name: str, data: Mapping) -> str:
@@ -150,3 +188,8 @@ class Library(Model):
     rules: Annotated[Named[RuleModel], declaring("rule")] = Field(
         default_factory=dict, description="Plasticity rules of one's own."
     )
+
+    @property
+    def definitions(self) -> AnyMapping[str, AnyMapping[str, DefinitionModel]]:
+        """All definitions, by section and name."""
+        return {"activations": self.activations, "models": self.models, "rules": self.rules}

@@ -143,25 +143,18 @@ def _carry_states(
     connections: tuple[IntArray, IntArray],
 ) -> None:
     """States of models and rules, by their names."""
-    cells: dict[str, FloatArray] = {}
-    for block, arrays in zip(was.blocks, old.cells, strict=True):
-        for quantity, array in zip(block.model.state, arrays, strict=True):
-            _spread(cells, quantity.name, block.members, array, len(was.neurons))
-    for block, arrays in zip(network.blocks, state.cells, strict=True):
-        for quantity, array in zip(block.model.state, arrays, strict=True):
-            _gather(cells.get(quantity.name), block.members, array, neurons, len(network.neurons))
-    traces: dict[str, FloatArray] = {}
-    for entry, arrays in zip(was.plasticity, old.traces, strict=True):
-        for quantity, array in zip(entry.rule.state, arrays, strict=True):
-            _spread(traces, quantity.name, entry.members, array, len(was.connections))
-    for entry, arrays in zip(network.plasticity, state.traces, strict=True):
-        for quantity, array in zip(entry.rule.state, arrays, strict=True):
-            _gather(traces.get(quantity.name), entry.members, array, connections, len(network.connections))
-
-
-def _spread(found: dict[str, FloatArray], name: str, members: IntArray, values: FloatArray, count: int) -> None:
-    """Put a state of some members into an array of all."""
-    found.setdefault(name, np.full(count, np.nan))[members] = values
+    shared = {"neuron": neurons, "connection": connections}
+    sizes = {"neuron": len(was.neurons), "connection": len(was.connections)}
+    found: dict[tuple[str, str], FloatArray] = {}
+    for holder, use in was.uses:
+        each = use.definition.kind.each
+        for name, array in old.cells[use.owner].items():
+            found.setdefault((each, name), np.full(sizes[each], np.nan))[holder.members] = array
+    sizes = {"neuron": len(network.neurons), "connection": len(network.connections)}
+    for holder, use in network.uses:
+        each = use.definition.kind.each
+        for name, array in state.cells[use.owner].items():
+            _gather(found.get((each, name)), holder.members, array, shared[each], sizes[each])
 
 
 def _gather(

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from neurovis_spec.arrays import IntArray
+from neurovis_spec.compiler.events.settable import CENTRES
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Block
 from neurovis_spec.language.expressions.emit_c import Value
@@ -216,7 +217,7 @@ class Arrivals:
                 code.line(f"{total} *= {term};")
             case "distance":
                 centres = self.network.connections.centres.whole()
-                centre = code.settable("centres", centres, self.connections[column], edge)
+                centre = code.settable(CENTRES, centres, self.connections[column], edge)
                 difference = code.let("d", f"{term} - {self._operand(centre)}" if centre != 0.0 else term)
                 code.line(f"{total} += {difference}*{difference};")
         if self.form.gone:

@@ -23,7 +23,7 @@ from neurovis_spec.language.expressions.functions import Library
 from neurovis_spec.runtime import c_functions, c_library
 from neurovis_spec.runtime.backend import Availability, BackendError, Capabilities
 from neurovis_spec.runtime.c_arrivals import incoming_of
-from neurovis_spec.runtime.c_code import Code, Form, Table, Tables, function, words_of
+from neurovis_spec.runtime.c_code import Code, Form, Table, Tables, function, state_name, words_of
 from neurovis_spec.runtime.c_step import StepCode
 from neurovis_spec.runtime.state import Conditions, Mask, State, Structure
 
@@ -55,7 +55,6 @@ typedef struct {
     const int64_t *lost;
     const void *const *given;
     double *const *cells;
-    double *const *traces;
     double *before, *packed;
 } nv_state;
 
@@ -210,41 +209,26 @@ def _taken(network: Network) -> dict[str, str]:
         ("const int64_t", ("lost",)),
     )
     taken = {name: f"{kind} *restrict const {name} = p->{name};" for kind, names in kinds for name in names}
-    for kind, counts in owned(network):
-        number = 0
-        for owner, count in enumerate(counts):
-            for i in range(count):
-                taken[f"{kind}{owner}_{i}"] = f"double *restrict const {kind}{owner}_{i} = p->{kind}[{number}];"
-                number += 1
-    return taken
-
-
-def owned(network: Network) -> tuple[tuple[str, list[int]], ...]:
-    """How many states each block (``cells``) and each plasticity (``traces``) has."""
-    return (
-        ("cells", [len(block.model.state) for block in network.blocks]),
-        ("traces", [len(plasticity.rule.state) for plasticity in network.plasticity]),
-    )
+    names = [state_name(use.owner, i) for _, use in network.uses for i in range(len(use.definition.state))]
+    return taken | {name: f"double *restrict const {name} = p->cells[{at}];" for at, name in enumerate(names)}
 
 
 def _look(network: Network) -> tuple[str, str]:
     """Whether anything that neurons, and that connections carry is not finite."""
-    neurons = [f"nv_odd(p->activity, {len(network.neurons)})"]
-    neurons += _odd("cells", [(len(block.model.state), len(block.members)) for block in network.blocks])
-    connections = [f"nv_odd(p->weights, {len(network.connections)})"] if network.plasticity else []
-    connections += _odd("traces", [(len(one.rule.state), len(one.members)) for one in network.plasticity])
-    return " || ".join(neurons), " || ".join(connections) or "0"
-
-
-def _odd(name: str, sizes: list[tuple[int, int]]) -> list[str]:
-    """The tests of states: of each owner how many there are, and their length."""
-    lengths = [length for count, length in sizes for _ in range(count)]
-    return [f"nv_odd(p->{name}[{number}], {length})" for number, length in enumerate(lengths)]
+    tests = {"neuron": [f"nv_odd(p->activity, {len(network.neurons)})"], "connection": list[str]()}
+    if network.plasticity:
+        tests["connection"].append(f"nv_odd(p->weights, {len(network.connections)})")
+    number = 0
+    for holder, use in network.uses:
+        for _ in use.definition.state:
+            tests[use.definition.kind.each].append(f"nv_odd(p->cells[{number}], {len(holder.members)})")
+            number += 1
+    return " || ".join(tests["neuron"]), " || ".join(tests["connection"]) or "0"
 
 
 _POINTERS: Final = (
     *("activity", "weights", "signals", "history", "x", "s", "holding"),
-    *("held", "gone", "still", "lost", "given", "cells", "traces", "before", "packed"),
+    *("held", "gone", "still", "lost", "given", "cells", "before", "packed"),
 )
 
 
@@ -359,9 +343,8 @@ class CStepper:
                 setattr(state, name, array)
             setattr(pointers, name, array.ctypes.data)
         pointers.x = now.variables.ctypes.data
-        self._cells = _addresses([array for block in state.cells for array in block])
-        self._traces = _addresses([array for rule in state.traces for array in rule])
-        pointers.cells, pointers.traces = ctypes.addressof(self._cells), ctypes.addressof(self._traces)
+        self._cells = _addresses([array for own in state.cells.values() for array in own.values()])
+        pointers.cells = ctypes.addressof(self._cells)
         if now.holds is not self._holds or now.structure is not self._structure:
             self._take_conditions(now)
         self._of = state  # what is kept alive cannot be mistaken for another array at the same address

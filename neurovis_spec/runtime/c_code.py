@@ -18,9 +18,10 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.settable import Variable
+from neurovis_spec.compiler.program import Key, Owner, Use
 from neurovis_spec.language.expressions.emit_c import Drawn, Emitter, Made, Value
 from neurovis_spec.language.expressions.tree import Tree, names
-from neurovis_spec.runtime.state import constants
+from neurovis_spec.runtime.state import constants, kept_as
 
 Place: TypeAlias = int | str
 Table: TypeAlias = npt.NDArray[np.float64] | npt.NDArray[np.int32] | npt.NDArray[np.uint16]
@@ -28,6 +29,11 @@ Table: TypeAlias = npt.NDArray[np.float64] | npt.NDArray[np.int32] | npt.NDArray
 #: items of a table in a line of the text
 _ROW = 16
 _NONE: Mapping[str, Made] = {}
+
+
+def state_name(owner: Owner, number: int) -> str:
+    """The identifier of the array of a state of an owner."""
+    return f"{kept_as(owner.kind)}{owner.number}_{number}"
 
 
 class Tables:
@@ -100,7 +106,7 @@ class Form:
 class Code:
     """Lines of a function, indented by one level."""
 
-    def __init__(self, emitter: Emitter, tables: Tables, dt: float, variables: Mapping[str, Variable]) -> None:
+    def __init__(self, emitter: Emitter, tables: Tables, dt: float, variables: Mapping[Key, Variable]) -> None:
         self.emitter, self.tables, self._variables = emitter, tables, variables
         self.lines: list[str] = []
         self.indent = 1
@@ -181,7 +187,7 @@ class Code:
         bits = np.ascontiguousarray(values, dtype=np.float64).view(np.int64)
         return float(values[0]) if (bits == bits[0]).all() else f"{self.tables.name(values)}[{place}]"
 
-    def settable(self, array: str, values: FloatArray, members: IntArray | None, place: Place) -> Value:
+    def settable(self, array: Key, values: FloatArray, members: IntArray | None, place: Place) -> Value:
         """An element of an array of the network, of its ``members`` or of all; its current value where it can be
         set in a run."""
         variable = self._variables.get(array)
@@ -192,13 +198,15 @@ class Code:
         places = np.arange(variable.size, dtype=np.int64) if members is None else members
         return f"x[{self.at(variable.start + places, place)}]"
 
-    def is_set(self, array: str) -> bool:
+    def is_set(self, array: Key) -> bool:
         """Whether an array can be set in a run."""
         return array in self._variables
 
-    def parameters(self, owner: str, arrays: Mapping[str, FloatArray], place: Place) -> dict[str, Value]:
+    def parameters(self, use: Use, place: Place) -> dict[str, Value]:
         """The parameters of a definition in use."""
-        return {name: self.settable(f"{owner}/{name}", values, None, place) for name, values in arrays.items()}
+        return {
+            name: self.settable(Key(use.owner, name), values, None, place) for name, values in use.parameters.items()
+        }
 
     def value(
         self, tree: Tree, known: Mapping[str, Value], calls: Mapping[str, Made] = _NONE, drawn: Drawn | None = None

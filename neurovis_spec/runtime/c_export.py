@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.changes import Change, Clamp
+from neurovis_spec.compiler.events.settable import table_of
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Input, Network, Noise
 from neurovis_spec.compiler.run_checks import without_checks
@@ -23,14 +24,14 @@ from neurovis_spec.language.expressions.emit_c import Emitter, Value
 from neurovis_spec.language.expressions.tree import Draw
 from neurovis_spec.runtime.c_arrivals import incoming_of
 from neurovis_spec.runtime.c_backend import SMALL
-from neurovis_spec.runtime.c_code import Code, Form, Tables, function, words_of
+from neurovis_spec.runtime.c_code import Code, Form, Tables, function, state_name, words_of
 from neurovis_spec.runtime.c_draws import drawing
 from neurovis_spec.runtime.c_names import LONGEST_STRING, identifiers, prefix, string, words
 from neurovis_spec.runtime.c_settable import ExportError, fixed, formula, write_follow
 from neurovis_spec.runtime.c_step import StepCode
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.signals import signal_layout
-from neurovis_spec.runtime.state import NOTHING, Mask, State, initial_state
+from neurovis_spec.runtime.state import NOTHING, Mask, State, by_kind, initial_state, kept_as
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,10 @@ class Member:
     name: str
     begin: FloatArray
     about: str
+
+
+#: What the members of the struct that hold states are of.
+_STATES = {"cells": "states of models", "traces": "states of rules"}
 
 
 class Exported:
@@ -116,21 +121,18 @@ class Exported:
 
     def _members(self) -> list[Member]:
         network, state = self.network, self.state
-        # without the checks of a run, which are the last ones
-        blocks, rules = (
-            zip(network.blocks, state.cells, strict=True),
-            zip(network.plasticity, state.traces, strict=True),
-        )
-        cells = [array for block, own in blocks for array in own[: len(block.model.state)]]
-        traces = [array for one, own in rules for array in own[: len(one.rule.state)]]
-        none = np.zeros(0)
+        # the state may have checks of a run, which this network has not
+        own = {use.owner: use.definition.state for _, use in network.uses}
+        cells = {owner: {one.name: state.cells[owner][one.name] for one in states} for owner, states in own.items()}
         found = [
             Member("activity", state.activity, "a[k - 1] of all neurons"),
             Member("weights", state.weights, "w[k] of all connections"),
             Member("signals", state.signals, "what is under way on delayed connections"),
             Member("history", state.history.ravel(), "past activities, for rules"),
-            Member("cells", np.concatenate([none, *cells]), "states of models"),
-            Member("traces", np.concatenate([none, *traces]), "states of rules"),
+            *(
+                Member(kept, np.concatenate([np.zeros(0), *arrays]), _STATES.get(kept, "states"))
+                for kept, arrays in by_kind(cells).items()
+            ),
             Member("parameters", state.conditions.parameters, "parameters of the spec and of its instances"),
             Member("variables", state.conditions.variables, "numbers that follow parameters"),
             Member("vector", np.zeros(network.vector_size), "the inputs and the noise of a step"),
@@ -278,16 +280,13 @@ class Exported:
         taken["holding"] = f"const {real} *{quick} const holding = state->holding;"
         taken["held"] = f"const unsigned char *{quick} const held = state->held;"
         taken["parameters"] = f"const {real} *const parameters = state->parameters;"
-        for kind, sizes in (
-            ("cells", [(len(block.model.state), len(block.members)) for block in network.blocks]),
-            ("traces", [(len(rule.rule.state), len(rule.members)) for rule in network.plasticity]),
-        ):
-            start = 0
-            for owner, (states, count) in enumerate(sizes):
-                for i in range(states):
-                    name = f"{kind}{owner}_{i}"
-                    taken[name] = f"{real} *{quick} const {name} = state->{kind} + {start};"
-                    start += count
+        starts: dict[str, int] = {}
+        for holder, use in network.uses:
+            kept = kept_as(use.owner.kind)
+            for i in range(len(use.definition.state)):
+                name, start = state_name(use.owner, i), starts.get(kept, 0)
+                taken[name] = f"{real} *{quick} const {name} = state->{kept} + {start};"
+                starts[kept] = start + len(holder.members)
         return taken
 
     def _left_out(self) -> dict[str, tuple[str, list[npt.NDArray[np.integer]]]]:
@@ -441,7 +440,7 @@ class Exported:
         rows, size = len(entry.table), entry.size
         with code.block(""):
             code.line(f"const int32_t row = k < {rows} ? (int32_t)k : {rows - 1};")
-            variable = self.network.settable.variables.get(f"table/{number}")
+            variable = self.network.settable.variables.get(table_of(number))
             if variable is None:
                 value = f"{code.tables.name(entry.table.ravel())}[row*{size} + i]"
             else:

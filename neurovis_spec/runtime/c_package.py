@@ -12,6 +12,7 @@ from pathlib import Path
 
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Definition
 from neurovis_spec.language.expressions.emit_c import INEXACT
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.expressions.tree import Call, Tree, walk
@@ -114,22 +115,24 @@ def _calls(trees: Iterable[Tree | None]) -> int:
     return sum(row is not None and row.agree == "rounding" for row in called)
 
 
+def _calls_a_step(made: Definition) -> int:
+    """The functions of the library that a definition calls at a step."""
+    first = made.gives[:1]  # without what checks an activation
+    return _calls([*(tree for _, tree in made.let), *(one.each_step for one in (*made.state, *first))])
+
+
 def _cost(made: Exported) -> str:
     network = made.network
     functions = 0
     for block in network.blocks:
-        model = block.model
-        trees = [*(tree for _, tree in model.let), *(q.each_step for q in model.state), model.activity]
-        each = _calls(trees)
-        if any(isinstance(node, Call) and node.function == "f" for node in walk(model.activity)):
-            each += _calls([block.activation.value])
+        each = _calls_a_step(block.model.definition)
+        if block.model.definition.reads_activation:
+            each += _calls_a_step(block.activation.definition)
         functions += each * len(block.members)
     learning = 0
     for plasticity in network.plasticity:
-        rule = plasticity.rule
         learning += len(plasticity.members)
-        trees = [*(tree for _, tree in rule.let), *(q.each_step for q in rule.state), rule.each_step]
-        functions += _calls(trees) * len(plasticity.members)
+        functions += _calls_a_step(plasticity.rule.definition) * len(plasticity.members)
     functions += _calls(entry.expression for entry in network.inputs)
     drawn = sum(len(noise.members) for noise in network.noises)
     lines = [

@@ -8,22 +8,24 @@ of a larger one, each block is a loop.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
 from neurovis_spec.arrays import IntArray
+from neurovis_spec.compiler.events.settable import BIAS, HIGH, LOW
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Block, Gather, Learn, Plasticity, ReadInputs, Send, Update
-from neurovis_spec.language.expressions.emit_c import Value
+from neurovis_spec.compiler.program import Block, Definition, Gather, Learn, Plasticity, ReadInputs, Send, Update, Use
+from neurovis_spec.language.expressions.emit_c import Made, Value
 from neurovis_spec.language.expressions.tree import Tree, names
 from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming
-from neurovis_spec.runtime.c_code import Code, Form, Place
-from neurovis_spec.runtime.presynaptic import history_depth, rule_names
+from neurovis_spec.runtime.c_code import Code, Form, Place, state_name
+from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import SignalLayout, signal_layout
 from neurovis_spec.runtime.state import Mask
 
+_NONE: Mapping[str, Made] = {}
 #: connections that learn beside each other: a compiler makes vectors of them
 _RULES = 4
 
@@ -125,16 +127,13 @@ class StepCode:
 
     def reads_drive(self, block: Block) -> bool:
         """Whether the model of a block takes what arrives."""
-        model = block.model
-        trees = [model.activity, *(tree for _, tree in model.let)]
-        trees += [tree for q in model.state for tree in (q.each_step, q.each_episode) if tree is not None]
-        return any("drive" in names(tree) for tree in trees)
+        return "drive" in block.model.definition.read
 
     def drive(self, block: Block, place: Place, arrivals: Arrivals, total: str) -> Value:
         """u[t]: what arrives, combined, + bias + input + noise."""
         code, network = self.code, self.network
         drive: Value = total or arrivals.combined(place)
-        bias = code.settable("bias", network.neurons.bias, block.members, place)
+        bias = code.settable(BIAS, network.neurons.bias, block.members, place)
         if isinstance(drive, float) and isinstance(bias, float):
             drive += bias
         elif isinstance(drive, float) or block.combine == "product" or bias != 0.0:
@@ -160,44 +159,79 @@ class StepCode:
     def advance(self, number: int, place: Place, neuron: Place, drive: Value) -> None:
         """The states of a neuron from old ones and the drive, its activity from the new ones; the episode's end."""
         code, block = self.code, self.network.blocks[number]
-        model = block.model
-        own = code.parameters(f"model/{number}", block.model_parameters, place) | {"drive": drive}
-        cells = {q.name: f"cells{number}_{i}[{place}]" for i, q in enumerate(model.state)}
-        steps = {q.name: q.each_step for q in model.state}
-        known = self.let(model.let, own | cells, [*steps.values(), model.activity])
 
         def activation(x: Value, formula: Tree) -> Value:
-            parameters = code.parameters(f"activation/{number}", block.activation_parameters, place)
+            parameters = code.parameters(block.activation, place)
             known = parameters | ({"x": code.let("x", x)} if "x" in names(formula) else {})
             return code.let("y", code.value(formula, known))
 
-        functions = {name: partial(activation, formula=tree) for name, tree in block.activation.functions.items()}
-        new: dict[str, Value] = {
-            name: code.let("n", code.value(tree, known, functions)) for name, tree in steps.items() if tree is not None
+        functions = {
+            name: partial(activation, formula=tree) for name, tree in block.activation.definition.functions.items()
         }
-        activity = code.let("y", code.value(model.activity, known | new, functions))
-        ends = {q.name: q.each_episode for q in model.state}
-        if self.network.episode is not None and any(tree is not None for tree in ends.values()):
-            new = {name: code.variable("e", new.get(name, cell)) for name, cell in cells.items()}
-            with code.block(f"if ({self.ends_episode()})"):
-                self.replace(new, self.let(model.let, own | new, list(ends.values())), ends)
-        for name, value in new.items():
-            code.line(f"{cells[name]} = {code.text(value)};")
-        code.line(f"activity[{neuron}] = {code.text(activity)};")
+        seen = code.parameters(block.model, place) | {"drive": drive}
+        stored = self.states(block.model, place)
+        new, given = self.change(block.model.definition, seen, stored, functions)
+        self.store([(stored[name], value) for name, value in new.items()])
+        self.store([(f"activity[{neuron}]", given["activity"])])
+
+    def states(self, use: Use, place: Place) -> dict[str, str]:
+        """The states of a definition in use, of one member."""
+        return {one.name: f"{state_name(use.owner, i)}[{place}]" for i, one in enumerate(use.definition.state)}
+
+    def change(
+        self,
+        made: Definition,
+        seen: Mapping[str, Value],
+        stored: Mapping[str, str],
+        functions: Mapping[str, Made] = _NONE,
+        bounded: Callable[[str, Value], Value] = lambda name, value: value,
+    ) -> tuple[dict[str, Value], dict[str, Value]]:
+        """What becomes of all that lasts of a definition, which is ``stored`` there, from old values at once, and once
+        more at an episode's end, ``bounded``; and what does not last, made from the new states. Nothing is stored
+        yet."""
+        code = self.code
+        steps = {one.name: one.each_step for one in made.lasting}
+        ends = {one.name: one.each_episode for one in made.lasting}
+        fleeting = {one.name: one.each_step for one in made.fleeting}
+        known = self.let(made.let, {**seen, **stored}, [*steps.values(), *fleeting.values()])
+        new = self.values(steps, known, "n", functions)
+        new = {name: bounded(name, value) for name, value in new.items()}
+        given = self.values(fleeting, known | new, "y", functions)
+        if self.network.episode is None or not any(tree is not None for tree in ends.values()):
+            return new, given
+        changed = {name for name in steps if steps[name] is not None or ends[name] is not None}
+        needed = changed | read_through(made.let, list(ends.values()))
+        if fleeting:  # all of them: so models have always been written
+            changed = needed = set(stored)
+        variables = {name: code.variable("e", new.get(name, cell)) for name, cell in stored.items() if name in needed}
+        with code.block(f"if ({self.ends_episode()})"):
+            last = self.values(ends, self.let(made.let, {**seen, **variables}, list(ends.values())), "n")
+            self.store([(variables[name], value) for name, value in last.items()])
+            for name in last:
+                within = bounded(name, variables[name])
+                if within != variables[name]:
+                    self.store([(variables[name], within)])
+        return {name: value for name, value in variables.items() if name in changed}, given
+
+    def values(
+        self,
+        trees: Mapping[str, Tree | None],
+        known: Mapping[str, Value],
+        prefix: str,
+        functions: Mapping[str, Made] = _NONE,
+    ) -> dict[str, Value]:
+        """What expressions give, those that there are."""
+        code = self.code
+        return {
+            name: code.let(prefix, code.value(tree, known, functions))
+            for name, tree in trees.items()
+            if tree is not None
+        }
 
     def ends_episode(self) -> str:
         """Whether (k + 1) mod m = 0."""
         self.code.head["ends"] = f"const int ends = (k + 1) % {self.network.episode} == 0;"
         return "ends"
-
-    def replace(
-        self, variables: Mapping[str, Value], known: Mapping[str, Value], trees: Mapping[str, Tree | None]
-    ) -> None:
-        """All right-hand sides, then all variables."""
-        code = self.code
-        made = {name: code.let("n", code.value(tree, known)) for name, tree in trees.items() if tree is not None}
-        for name, value in made.items():
-            code.line(f"{variables[name]} = {code.text(value)};")
 
     def let(
         self, let: tuple[tuple[str, Tree], ...], known: Mapping[str, Value], readers: list[Tree | None]
@@ -299,7 +333,7 @@ class StepCode:
         """The weight and the states of one connection, at a step and, where it has one, at an episode's end: where
         each is stored, and what."""
         code, plasticity = self.code, self.network.plasticity[number]
-        rule, connection = plasticity.rule, code.at(plasticity.members, place)
+        connection = code.at(plasticity.members, place)
         if self.form.still:
             if isinstance(place, int):
                 code.line(f"if (!still[{connection}]) {{")
@@ -307,32 +341,21 @@ class StepCode:
             else:
                 code.line(f"if (still[{connection}])")
                 code.line("    continue;")
-        own = code.parameters(f"rule/{number}", plasticity.parameters, place) | self.seen(plasticity, place)
-        stored = {q.name: f"traces{number}_{i}[{place}]" for i, q in enumerate(rule.state)}
-        stored["weight"] = f"weights[{connection}]"
-        steps = {q.name: q.each_step for q in rule.state} | {"weight": rule.each_step}
-        ends = {q.name: q.each_episode for q in rule.state} | {"weight": rule.each_episode}
-        known = self.let(rule.let, own | stored, list(steps.values()))
-        new = {name: code.let("n", code.value(tree, known)) for name, tree in steps.items() if tree is not None}
-        if "weight" in new:
-            new["weight"] = self.bounded(plasticity, place, new["weight"])
-        if self.network.episode is not None and any(tree is not None for tree in ends.values()):
-            changed = {name for name in steps if steps[name] is not None or ends[name] is not None}
-            needed = changed | read_through(rule.let, list(ends.values()))
-            new = {name: code.variable("e", new.get(name, cell)) for name, cell in stored.items() if name in needed}
-            with code.block(f"if ({self.ends_episode()})"):
-                self.replace(new, self.let(rule.let, own | new, list(ends.values())), ends)
-                if rule.each_episode is not None:
-                    code.line(f"{new['weight']} = {code.text(self.bounded(plasticity, place, new['weight']))};")
-            new = {name: value for name, value in new.items() if name in changed}
+        seen = code.parameters(plasticity.rule, place) | self.seen(plasticity, place)
+        stored = {**self.states(plasticity.rule, place), "weight": f"weights[{connection}]"}
+
+        def bounded(name: str, value: Value) -> Value:
+            return self.bounded(plasticity, place, value) if name == "weight" else value
+
+        new, _ = self.change(plasticity.rule.definition, seen, stored, bounded=bounded)
         return [(stored[name], value) for name, value in new.items()]
 
     def bounded(self, plasticity: Plasticity, place: Place, weight: Value) -> Value:
         """A new weight within its bounds."""
         code, connections, members = self.code, self.network.connections, plasticity.members
         for function, array, values in (
-            ("nv_max", "low", connections.low.whole()),
-            ("nv_min", "high", connections.high.whole()),
+            ("nv_max", LOW, connections.low.whole()),
+            ("nv_min", HIGH, connections.high.whole()),
         ):
             own = values[members] if not isinstance(place, int) else values[members[place : place + 1]]
             if code.is_set(array) or np.isfinite(own).any():
@@ -344,7 +367,7 @@ class StepCode:
         """What a rule may read besides its own: pre, sent, post, the signals."""
         code, connections, members = self.code, self.network.connections, plasticity.members
         sources, targets = connections.sources[members], connections.targets[members]
-        source, read = code.at(sources, place), rule_names(plasticity.rule)
+        source, read = code.at(sources, place), plasticity.rule.definition.read
         seen: dict[str, Value] = {
             "sent": f"activity[{source}]",
             "post": f"activity[{code.at(targets, place)}]",

@@ -26,7 +26,7 @@ from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.files import regular_size, replacing
 from neurovis_spec.runtime.npz_file import Array, put_arrays, read_array, recording_errors
-from neurovis_spec.runtime.state import BodyState, State, initial_state
+from neurovis_spec.runtime.state import BodyState, State, by_kind, initial_state
 
 #: bytes of the text, of the headers of all arrays, and of the archive's own
 _TEXT, _ROOM = 4096, 1 << 20
@@ -118,8 +118,7 @@ def _arrays(state: State) -> dict[str, Array]:
         "weights": state.weights,
         "signals": state.signals,
         "history": state.history,
-        "cells": _joined([array for block in state.cells for array in block]),
-        "traces": _joined([array for rule in state.traces for array in rule]),
+        **{kept: _joined(arrays) for kept, arrays in by_kind(state.cells).items()},
         "parameters": now.parameters,
         "chosen": now.chosen.astype(np.uint8),
         "variables": now.variables,
@@ -136,8 +135,10 @@ def _fill(state: State, found: Mapping[str, Array]) -> None:
     now = state.conditions
     state.activity, state.weights = _floats(found["activity"]), _floats(found["weights"])
     state.signals, state.history = _floats(found["signals"]), _floats(found["history"])
-    state.cells = _parted(_floats(found["cells"]), state.cells)
-    state.traces = _parted(_floats(found["traces"]), state.traces)
+    for kept, arrays in by_kind(state.cells).items():
+        ends = np.cumsum([len(array) for array in arrays])
+        for array, values in zip(arrays, np.split(_floats(found[kept]), ends), strict=False):
+            array[:] = values
     now.parameters, now.variables = _floats(found["parameters"]), _floats(found["variables"])
     now.chosen = found["chosen"].astype(np.bool_)
     now.held.order, now.held.value = found["held_order"].astype(np.int64), _floats(found["held_value"])
@@ -222,12 +223,6 @@ def _whole(about: Mapping[str, object], name: str, least: int = 0) -> int:
 
 def _joined(arrays: list[npt.NDArray[np.float64]] | list[IntArray]) -> Array:
     return np.concatenate(arrays) if arrays else np.zeros(0)
-
-
-def _parted(values: FloatArray, like: tuple[tuple[FloatArray, ...], ...]) -> tuple[tuple[FloatArray, ...], ...]:
-    """Values one behind the other, cut into pieces as long as those of another state."""
-    pieces = iter(np.split(values, np.cumsum([len(array) for group in like for array in group])))
-    return tuple(tuple(next(pieces).copy() for _ in group) for group in like)
 
 
 def _floats(array: Array) -> FloatArray:

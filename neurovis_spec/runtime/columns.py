@@ -16,6 +16,7 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.body import Skeleton
 from neurovis_spec.compiler.names.state_references import StateOf, singles
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Block, Owner, Plasticity
 from neurovis_spec.runtime.kinds import Rows, Widths
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.recording import After, Recording
@@ -49,12 +50,10 @@ ALL = Keep()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Part:
-    """State ``quantity`` of the rules of a plasticity (``learned``) or of the models of a block: of ``members``, into
-    ``columns``."""
+    """A state of an owner: of ``members``, into ``columns``."""
 
-    learned: bool
-    number: int
-    quantity: int
+    owner: Owner
+    state: str
     members: IntArray
     columns: IntArray
 
@@ -69,8 +68,7 @@ class Probe:
     def read(self, state: State, row: FloatArray) -> None:
         """The states as they are now, (columns,)."""
         for part in self.parts:
-            values = (state.traces if part.learned else state.cells)[part.number][part.quantity]
-            row[part.columns] = values[part.members]
+            row[part.columns] = state.cells[part.owner][part.state][part.members]
 
     def now(self, state: State) -> FloatArray:
         """The same as an array of its own."""
@@ -136,17 +134,15 @@ def probe_of(network: Network, states: Iterable[StateOf]) -> Probe:
 
 
 def _probe(network: Network, wanted: list[tuple[str, str, int]]) -> Probe:
-    places: dict[tuple[bool, int, int], tuple[list[int], list[int]]] = {}
-    located: dict[str, tuple[IntArray, IntArray]] = {}
+    places: dict[tuple[Owner, str], tuple[list[int], list[int]]] = {}
+    located: dict[str, tuple[Sequence[Block | Plasticity], IntArray, IntArray]] = {}
     for column, (state, what, index) in enumerate(wanted):
-        learned = what == "connection"
         if what not in located:
-            located[what] = _located(network, learned)
-        numbers, positions = located[what]
-        number = int(numbers[index])
-        kept = network.plasticity[number].rule.state if learned else network.blocks[number].model.state
-        quantity = [one.name for one in kept].index(state)
-        members, columns = places.setdefault((learned, number, quantity), ([], []))
+            located[what] = _located(network, what)
+        holders, numbers, positions = located[what]
+        uses = holders[int(numbers[index])].uses
+        owner = next(use.owner for use in uses if any(one.name == state for one in use.definition.state))
+        members, columns = places.setdefault((owner, state), ([], []))
         members.append(int(positions[index]))
         columns.append(column)
     parts = tuple(
@@ -162,15 +158,16 @@ def _probe(network: Network, wanted: list[tuple[str, str, int]]) -> Probe:
     return Probe(tuple(names), parts)
 
 
-def _located(network: Network, learned: bool) -> tuple[IntArray, IntArray]:
-    """For each neuron its block, or for each connection its plasticity, and its place there; −1 without one."""
-    count = len(network.connections) if learned else len(network.neurons)
+def _located(network: Network, what: str) -> tuple[Sequence[Block | Plasticity], IntArray, IntArray]:
+    """The blocks, for each neuron its own, and its place there; or the plasticities, for each connection; −1 without
+    one."""
+    holders: Sequence[Block | Plasticity] = network.plasticity if what == "connection" else network.blocks
+    count = len(network.connections if what == "connection" else network.neurons)
     numbers, positions = np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=np.int64)
-    members = [one.members for one in (network.plasticity if learned else network.blocks)]
-    for number, own in enumerate(members):
-        numbers[own] = number
-        positions[own] = np.arange(len(own))
-    return numbers, positions
+    for number, holder in enumerate(holders):
+        numbers[holder.members] = number
+        positions[holder.members] = np.arange(len(holder.members))
+    return holders, numbers, positions
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import BoolArray, FloatArray
+from neurovis_spec.compiler.events.settable import table_of
 from neurovis_spec.compiler.network import Input, Network, Noise
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.language.expressions.evaluate import evaluate_array
@@ -56,7 +57,7 @@ class InputReader:
         self._parameters, self._variables, self._drawn_before = network.settable.parameters, network.settable.initial, 0
         read = (*(entry.slots for entry in network.inputs), *(noise.slots for noise in network.noises))
         self._read = sorted({slot for slots in read for slot in slots.values()})
-        self._tables = any(name.startswith("table/") for name in network.settable.variables)
+        self._tables = any(table_of(number) in network.settable.variables for number in range(len(network.inputs)))
         self._first = -1
         self._rows: FloatArray = np.zeros((0, network.vector_size))
         together = min(STRETCH, max(1, _MOST_VALUES // max(1, network.vector_size)))
@@ -165,7 +166,7 @@ class InputReader:
         number = self.network.inputs.index(entry) if entry.parts else -1
         if entry.table is None or number < 0:
             return entry.table
-        start, size = self.network.settable.variables[f"table/{number}"]
+        start, size = self.network.settable.variables[table_of(number)]
         return np.broadcast_to(self._variables[start : start + size], (entry.table.size,)).reshape(entry.table.shape)
 
     def _drawn(self, noise: Noise, tree: Tree, steps: npt.NDArray[np.int64]) -> FloatArray | float:

@@ -9,10 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from neurovis_spec.arrays import IntArray
+from neurovis_spec.compiler.events.settable import BIAS, CENTRES
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Block, Gather, Update
+from neurovis_spec.compiler.program import Block, Gather, Update, Use
 from neurovis_spec.language.expressions.tree import Tree
-from neurovis_spec.runtime.numpy_code import Code, all_names, any_given
+from neurovis_spec.runtime.numpy_code import Cell, Code, any_given, emit_change
 from neurovis_spec.runtime.signals import SignalLayout
 
 FIRST = "k == 0 and not state.continued"
@@ -25,9 +26,9 @@ def emit_gather(code: Code, network: Network, layout: SignalLayout, operation: G
     if len(block.incoming):
         drive = code.let("u", _combined(code, block, network, _signals(code, network, layout, operation.block)))
         # a sum that begins with 0.0 is never −0.0, so adding 0.0 changes nothing; a product may be
-        if code.is_set("bias") or any_given(bias) or block.combine == "product":
+        if code.is_set(BIAS) or any_given(bias) or block.combine == "product":
             drive = code.let("u", f"{drive} + {_bias(code, network, block)}")
-    elif code.is_set("bias"):
+    elif code.is_set(BIAS):
         drive = code.let("u", f"{'1.0' if block.combine == 'product' else '0.0'} + {_bias(code, network, block)}")
     else:
         drive = code.constant((1.0 if block.combine == "product" else 0.0) + bias)
@@ -36,7 +37,7 @@ def emit_gather(code: Code, network: Network, layout: SignalLayout, operation: G
 
 
 def _bias(code: Code, network: Network, block: Block) -> str:
-    return code.numbers("bias", network.neurons.bias, block.members, share=False)
+    return code.numbers(BIAS, network.neurons.bias, block.members, share=False)
 
 
 def _with(code: Code, network: Network, fed: IntArray, drive: str) -> str:
@@ -95,8 +96,8 @@ def _combined(code: Code, block: Block, network: Network, signals: str) -> str:
     if block.combine == "sum":
         return f"bincount({slots}, {signals}, {count})"
     centres = network.connections.centres[block.incoming]
-    if code.is_set("centres") or any_given(centres):
-        taken = code.numbers("centres", network.connections.centres.whole(), block.incoming, share=False)
+    if code.is_set(CENTRES) or any_given(centres):
+        taken = code.numbers(CENTRES, network.connections.centres.whole(), block.incoming, share=False)
         signals = code.let("g", f"{signals} - {taken}")
     return f"np.sqrt(bincount({slots}, {signals} * {signals}, {count}))"
 
@@ -114,74 +115,36 @@ def _product(code: Code, block: Block, signals: str) -> str:
 
 
 def emit_update(code: Code, network: Network, operation: Update, drive: str) -> None:
-    """The states of a block from old states and the drive; activities from the new ones; the episode's end."""
+    """The states of a block from old states and the drive; activities from the new ones; the episode's end. At step 0,
+    neurons with ``initial`` take it, and their states stay."""
     block, number = network.blocks[operation.block], operation.block
-    model = block.model
-    own = code.parameters(f"model/{number}", block.model_parameters) | {"drive": drive}
-    functions = {
-        name: lambda argument, value=value: _activation(code, number, block, value, argument)
-        for name, value in block.activation.functions.items()
-    }
-    old = {q.name: code.let("v", f"cells[{number}][{i}]") for i, q in enumerate(model.state)}
-    known = emit_let(code, model.let, own | old, [q.each_step for q in model.state] + [model.activity])
-    steps = {q.name: q.each_step for q in model.state}
-    new = {name: code.fresh("n", tree, known, functions) for name, tree in steps.items() if tree is not None}
-    activity = code.let("y", code.expression(model.activity, known | new, functions))
-    _take_initial(code, network, block, activity, {old[name]: value for name, value in new.items()})
-    for name, value in new.items():
-        code.line(f"{old[name]}[:] = {value}")
-    code.line(f"activity{code.position(block.members, len(network.neurons))} = {activity}")
-    code.line(f"if holds and holds[{number}]: activity[holds[{number}][0]] = holds[{number}][1]")
-    ends = {q.name: q.each_episode for q in model.state if q.each_episode is not None}
-    if network.episode is not None and ends:
-        _end_episode(code, network, block, own | old, ends)
-
-
-def _take_initial(code: Code, network: Network, block: Block, activity: str, states: dict[str, str]) -> None:
-    """At step 0, neurons with ``initial`` take it, and their states stay."""
+    model, activation = block.model, block.activation
     initial = network.neurons.initial[block.members]
-    given = ~np.isnan(initial)
-    if not given.any():
-        return
-    mask = code.constant(given)
-    code.line(f"if {FIRST}:")
-    code.line(f"    {activity} = np.where({mask}, {code.constant(initial.copy())}, {activity})")
-    for old, new in states.items():
-        code.line(f"    {new} = np.where({mask}, {old}, {new})")
+    mask, first = ("", "") if np.isnan(initial).all() else map(code.constant, (~np.isnan(initial), initial.copy()))
+
+    def taken(value: str, kept: str) -> str:
+        return f"np.where({mask}, {kept}, {value}) if {FIRST} else {value}" if mask else value
+
+    def cell(name: str) -> Cell:
+        now = code.state(model, name)
+        return Cell(now, f"{now}[:]", lambda value: taken(value, now))
+
+    functions = {
+        name: lambda argument, value=value: _called(code, activation, value, argument)
+        for name, value in activation.definition.functions.items()
+    }
+    seen = code.parameters(model) | {"drive": drive}
+    cells = {one.name: cell(one.name) for one in model.definition.state}
+    activity = emit_change(code, model.definition, seen, cells, network.episode, functions)["activity"]
+    place = code.position(block.members, len(network.neurons))
+    code.line(f"activity{place} = {taken(activity, first)}")
+    code.line(f"if holds and holds[{number}]: activity[holds[{number}][0]] = holds[{number}][1]")
 
 
-def _end_episode(code: Code, network: Network, block: Block, known: dict[str, str], ends: dict[str, Tree]) -> None:
-    given = ~np.isnan(network.neurons.initial[block.members])
-    code.line(f"if (k + 1) % {network.episode} == 0:")
-    code.indent += 1
-    known = emit_let(code, block.model.let, known, list(ends.values()))
-    new = {name: code.fresh("n", tree, known) for name, tree in ends.items()}
-    if given.any():
-        mask = code.constant(given)
-        code.line(f"if {FIRST}:")
-        for name in new:
-            code.line(f"    {new[name]} = np.where({mask}, {known[name]}, {new[name]})")
-    for name, value in new.items():
-        code.line(f"{known[name]}[:] = {value}")
-    code.indent -= 1
-
-
-def emit_let(
-    code: Code, let: tuple[tuple[str, Tree], ...], known: dict[str, str], readers: list[Tree | None]
-) -> dict[str, str]:
-    """The intermediate values that somebody reads, in order, beside the names known."""
-    wanted = all_names([*readers, *(tree for _, tree in let)])
-    known = dict(known)
-    for name, tree in let:
-        if name in wanted:
-            known[name] = code.fresh("m", tree, known)
-    return known
-
-
-def _activation(code: Code, number: int, block: Block, value: Tree, argument: str) -> str:
+def _called(code: Code, activation: Use, value: Tree, argument: str) -> str:
     """A function of an activation of an argument, which gets an identifier of its own so that it is computed once."""
     x = argument if argument.isidentifier() else code.let("x", argument)
-    return code.expression(value, code.parameters(f"activation/{number}", block.activation_parameters) | {"x": x})
+    return code.expression(value, code.parameters(activation) | {"x": x})
 
 
 def emit_send(code: Code, network: Network, layout: SignalLayout) -> None:

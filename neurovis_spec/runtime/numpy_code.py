@@ -8,24 +8,25 @@ identifier made here.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.settable import Variable
+from neurovis_spec.compiler.program import Definition, Key, Use
 from neurovis_spec.language.expressions.emit import defined, emit
 from neurovis_spec.language.expressions.tree import Name, Tree, Unary, names
 from neurovis_spec.runtime.state import State, constants
 
-_NONE: Mapping[str, Variable] = {}
+_NONE: Mapping[Key, Variable] = {}
 Functions: TypeAlias = Mapping[str, Callable[[str], str]]
 #: makes steps from a state on, one for each vector of inputs; while it does, the arrays of the state stay the same ones
 Steps: TypeAlias = Callable[[State, Iterable[FloatArray]], Iterator[None]]
 
 
-_PARTS = ("activity", "weights", "signals", "history", "cells", "traces")
+_PARTS = ("activity", "weights", "signals", "history", "cells")
 #: the numbers that can be set, in the state
 _VARIABLES = "variables"
 
@@ -33,13 +34,14 @@ _VARIABLES = "variables"
 class Code:
     """Lines of a step, one level deep, and what they need."""
 
-    def __init__(self, dt: float, variables: Mapping[str, Variable] = _NONE) -> None:
+    def __init__(self, dt: float, variables: Mapping[Key, Variable] = _NONE) -> None:
         self._variables = variables
         self.namespace: dict[str, object] = {"np": np, "bincount": np.bincount, "multiply": np.multiply}
         self.lines: list[str] = []
         self.indent = 1
         self.used: set[str] = set()
         self._views: dict[str, str] = {}
+        self._states: dict[Key, str] = {}
         self._count = 0
         #: identifiers that stand for the names every expression knows
         self.clock = {name: self.constant(np.float64(value)) for name, value in constants(dt).items()}
@@ -66,11 +68,19 @@ class Code:
         self.namespace[name] = value
         return name
 
-    def parameters(self, owner: str, values: Mapping[str, FloatArray], some: IntArray | None = None) -> dict[str, str]:
+    def parameters(self, use: Use, some: IntArray | None = None) -> dict[str, str]:
         """The parameters of a definition in use, of ``some`` of its members or of all."""
-        return {name: self.numbers(f"{owner}/{name}", array, some) for name, array in values.items()}
+        return {name: self.numbers(Key(use.owner, name), array, some) for name, array in use.parameters.items()}
 
-    def numbers(self, array: str, values: FloatArray, some: IntArray | None = None, share: bool = True) -> str:
+    def state(self, use: Use, name: str) -> str:
+        """A state of a definition in use. It is looked up once, before the steps."""
+        key = Key(use.owner, name)
+        if key not in self._states:
+            place = f"cells[{self.constant(use.owner)}][{self.constant(name)}]"
+            self._states[key] = self._views[place] = f"v{len(self._views)}_"
+        return self._states[key]
+
+    def numbers(self, array: Key, values: FloatArray, some: IntArray | None = None, share: bool = True) -> str:
         """An array of the network, or ``some`` of it: where it can be set as it is by now, else a constant; with
         ``share`` one number where all are the same."""
         variable = self._variables.get(array)
@@ -83,7 +93,7 @@ class Code:
         whole = self.view(_VARIABLES, f"{start}:{start + size}")
         return whole if some is None else self.select(whole, some, size)
 
-    def is_set(self, array: str) -> bool:
+    def is_set(self, array: Key) -> bool:
         """Whether an array can be set in a run."""
         return array in self._variables
 
@@ -148,6 +158,65 @@ class Code:
         made = defined("steps", [self.text()], "steps of a network", namespace)
         assert callable(made)
         return made
+
+
+class Cell(NamedTuple):
+    """Where something that lasts is kept, for all members: the code of its value now, what is assigned to, and what is
+    kept of a new value."""
+
+    now: str
+    place: str
+    kept: Callable[[str], str] = str
+
+
+def emit_change(
+    code: Code,
+    made: Definition,
+    seen: Mapping[str, str],
+    cells: Mapping[str, Cell],
+    episode: int | None,
+    functions: Functions | None = None,
+) -> dict[str, str]:
+    """What becomes of all that lasts of a definition, from old values at once, and once more at an episode's end; gives
+    what does not last, made from the new states, by identifiers. ``seen`` is what formulas see besides their own."""
+    fleeting = {one.name: one.each_step for one in made.fleeting}
+    given = _emit_replace(
+        code, made, seen, cells, {one.name: one.each_step for one in made.lasting}, fleeting, functions
+    )
+    ends = {one.name: one.each_episode for one in made.lasting}
+    if episode is not None and any(tree is not None for tree in ends.values()):
+        code.line(f"if (k + 1) % {episode} == 0:")
+        code.indent += 1
+        _emit_replace(code, made, seen, cells, ends, {}, None)
+        code.indent -= 1
+    return given
+
+
+def _emit_replace(
+    code: Code,
+    made: Definition,
+    seen: Mapping[str, str],
+    cells: Mapping[str, Cell],
+    trees: Mapping[str, Tree | None],
+    fleeting: Mapping[str, Tree | None],
+    functions: Functions | None,
+) -> dict[str, str]:
+    """All right-hand sides, then all changes."""
+    known = dict(seen)
+    known |= {name: cell.now if cell.now.isidentifier() else code.let("v", cell.now) for name, cell in cells.items()}
+    wanted = all_names([*trees.values(), *fleeting.values(), *(tree for _, tree in made.let)])
+    for name, tree in made.let:
+        if name in wanted:
+            known[name] = code.fresh("m", tree, known)
+    new = {name: code.fresh("n", tree, known, functions) for name, tree in trees.items() if tree is not None}
+    given = {
+        name: code.let("y", code.expression(tree, known | new, functions))
+        for name, tree in fleeting.items()
+        if tree is not None
+    }
+    for name, value in new.items():
+        code.line(f"{cells[name].place} = {cells[name].kept(value)}")
+    return given
 
 
 def _may_alias(tree: Tree) -> bool:

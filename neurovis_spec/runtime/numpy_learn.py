@@ -11,12 +11,10 @@ from dataclasses import replace
 import numpy as np
 
 from neurovis_spec.arrays import IntArray
+from neurovis_spec.compiler.events.settable import HIGH, LOW
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Plasticity
-from neurovis_spec.language.expressions.tree import Tree
-from neurovis_spec.runtime.numpy_blocks import emit_let
-from neurovis_spec.runtime.numpy_code import Code
-from neurovis_spec.runtime.presynaptic import rule_names
+from neurovis_spec.runtime.numpy_code import Cell, Code, emit_change
 from neurovis_spec.runtime.state import NOTHING, Structure
 
 
@@ -37,56 +35,24 @@ def emit_learn(code: Code, network: Network, number: int, depth: int, structure:
             return
         signals = {name: indices[some] for name, indices in plasticity.signals.items()}
         plasticity = replace(plasticity, members=plasticity.members[some], signals=signals)
-    rule = plasticity.rule
-    known = code.parameters(f"rule/{number}", plasticity.parameters, some) | _seen(
-        code, network, plasticity, depth, structure.lost[plasticity.members]
+    rule, place = plasticity.rule, "" if some is None else f"[{code.constant(some)}]"
+    seen = code.parameters(rule, some) | _seen(code, network, plasticity, depth, structure.lost[plasticity.members])
+    states = {one.name: code.state(rule, one.name) for one in rule.definition.state}
+    cells = {name: Cell(f"{state}{place}", f"{state}{place or '[:]'}") for name, state in states.items()}
+    count = len(network.connections)
+    cells["weight"] = Cell(
+        code.select("weights", plasticity.members, count),
+        f"weights{code.position(plasticity.members, count)}",
+        lambda weight: _bounded(code, network, plasticity, weight),
     )
-    place = "" if some is None else f"[{code.constant(some)}]"
-    traces = {q.name: code.let("v", f"traces[{number}][{i}]{place}") for i, q in enumerate(rule.state)}
-    stored = {q.name: f"traces[{number}][{i}]{place}" if place else "" for i, q in enumerate(rule.state)}
-    weight = _weight(code, network, plasticity)
-    steps = {q.name: q.each_step for q in rule.state} | {"weight": rule.each_step}
-    ends = {q.name: q.each_episode for q in rule.state} | {"weight": rule.each_episode}
-    _change(code, network, plasticity, known | traces | {"weight": weight}, steps, stored)
-    if network.episode is not None and any(tree is not None for tree in ends.values()):
-        code.line(f"if (k + 1) % {network.episode} == 0:")
-        code.indent += 1
-        weight = _weight(code, network, plasticity)
-        if place:  # copies, which the step has not changed
-            traces = {name: code.let("v", stored[name]) for name in traces}
-        _change(code, network, plasticity, known | traces | {"weight": weight}, ends, stored)
-        code.indent -= 1
-
-
-def _weight(code: Code, network: Network, plasticity: Plasticity) -> str:
-    return code.let("w", code.select("weights", plasticity.members, len(network.connections)))
-
-
-def _change(
-    code: Code,
-    network: Network,
-    plasticity: Plasticity,
-    known: dict[str, str],
-    trees: dict[str, Tree | None],
-    stored: dict[str, str],
-) -> None:
-    """All right-hand sides, then all changes, the weight within its bounds. ``stored``: where states are kept, if what
-    is known of them is a copy."""
-    values = emit_let(code, plasticity.rule.let, known, list(trees.values()))
-    new = {name: code.fresh("n", tree, values) for name, tree in trees.items() if tree is not None}
-    for name, value in new.items():
-        if name != "weight":
-            code.line(f"{stored[name] or known[name] + '[:]'} = {value}")
-    if "weight" in new:
-        place = code.position(plasticity.members, len(network.connections))
-        code.line(f"weights{place} = {_bounded(code, network, plasticity, new['weight'])}")
+    emit_change(code, rule.definition, seen, cells, network.episode)
 
 
 def _bounded(code: Code, network: Network, plasticity: Plasticity, weight: str) -> str:
     members = plasticity.members
     for function, array, values in (
-        ("maximum", "low", network.connections.low.whole()),
-        ("minimum", "high", network.connections.high.whole()),
+        ("maximum", LOW, network.connections.low.whole()),
+        ("minimum", HIGH, network.connections.high.whole()),
     ):
         if code.is_set(array) or np.isfinite(values[members]).any():
             weight = f"np.{function}({weight}, {code.numbers(array, values, members, share=False)})"
@@ -96,7 +62,7 @@ def _bounded(code: Code, network: Network, plasticity: Plasticity, weight: str) 
 def _seen(code: Code, network: Network, plasticity: Plasticity, depth: int, lost: IntArray) -> dict[str, str]:
     """Arrays for pre, sent, post and the signals; only what the rule reads is gathered. What was sent before the steps
     ``lost`` never arrives."""
-    read, members = rule_names(plasticity.rule), plasticity.members
+    read, members = plasticity.rule.definition.read, plasticity.members
     connections, n = network.connections, len(network.neurons)
     sources, targets = connections.sources[members], connections.targets[members]
     made: dict[str, Callable[[], str]] = {

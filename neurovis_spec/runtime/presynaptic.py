@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Plasticity, Rule
-from neurovis_spec.language.expressions.tree import names
+from neurovis_spec.compiler.program import Plasticity
 
 
 def history_depth(network: Network) -> int:
@@ -30,12 +29,5 @@ def remembering(network: Network) -> npt.NDArray[np.bool_]:
     return reading & (network.connections.delays.whole() > 0)
 
 
-def rule_names(rule: Rule) -> frozenset[str]:
-    """All names that the expressions of a rule read at a step or at an episode's end."""
-    trees = [tree for _, tree in rule.let] + [rule.each_step, rule.each_episode]
-    trees += [tree for quantity in rule.state for tree in (quantity.each_step, quantity.each_episode)]
-    return frozenset().union(*(names(tree) for tree in trees if tree is not None))
-
-
 def _readers_of_pre(network: Network) -> list[Plasticity]:
-    return [entry for entry in network.plasticity if "pre" in rule_names(entry.rule)]
+    return [entry for entry in network.plasticity if "pre" in entry.rule.definition.read]

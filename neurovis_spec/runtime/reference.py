@@ -9,16 +9,27 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
+from typing import NamedTuple
 
 from neurovis_spec.arrays import FloatArray, FloatColumn
+from neurovis_spec.compiler.events.settable import BIAS, CENTRES, HIGH, LOW
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Block, Gather, Learn, ReadInputs, Send, Update
+from neurovis_spec.compiler.program import Block, Gather, Key, Learn, ReadInputs, Send, Update, Use
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.functions import PLAIN
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.backend import Availability, Capabilities
 from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.state import State, constants
+
+
+class Bounded(NamedTuple):
+    """A number that must stay within its bounds."""
+
+    value: float
+    low: float
+    high: float
+
 
 _NONE: Mapping[str, Callable[..., float]] = MappingProxyType({})
 
@@ -69,10 +80,10 @@ class ReferenceStepper:
         for connection, slot in zip(block.incoming.tolist(), block.slots.tolist(), strict=True):
             if not state.conditions.structure.gone[connection]:
                 signal = self.arriving(connection, state)
-                arriving[slot].append((signal, self.number("centres", connections.centres, connection, state)))
+                arriving[slot].append((signal, self.number(CENTRES, connections.centres, connection, state)))
         drives = []
         for neuron, signals in zip(block.members.tolist(), arriving, strict=True):
-            drive = combined(block.combine, signals) + self.number("bias", neurons.bias, neuron, state)
+            drive = combined(block.combine, signals) + self.number(BIAS, neurons.bias, neuron, state)
             if neurons.input[neuron] >= 0:
                 drive += float(inputs[neurons.input[neuron]])
             if self.network.noise_index[neuron] >= 0:
@@ -80,16 +91,20 @@ class ReferenceStepper:
             drives.append(drive)
         return drives
 
-    def number(self, array: str, values: FloatArray | FloatColumn, place: int, state: State) -> float:
+    def number(self, array: Key, values: FloatArray | FloatColumn, place: int, state: State) -> float:
         """A number of the network; of an array that can be set, as it is by now."""
         variable = self.network.settable.variables.get(array)
         if variable is None:
             return float(values[place])
         return float(state.conditions.variables[variable.start + (place if variable.size > 1 else 0)])
 
-    def numbers(self, owner: str, arrays: Mapping[str, FloatArray], place: int, state: State) -> dict[str, float]:
-        """The parameters of a definition in use, for one of its neurons or connections."""
-        return {name: self.number(f"{owner}/{name}", values, place, state) for name, values in arrays.items()}
+    def known(self, use: Use, place: int, state: State) -> dict[str, float]:
+        """What the formulas of a definition in use see, whatever its kind: the clock, and its parameters for one of the
+        members."""
+        numbers = {
+            name: self.number(Key(use.owner, name), values, place, state) for name, values in use.parameters.items()
+        }
+        return self.clock(state) | numbers
 
     def arriving(self, connection: int, state: State) -> float:
         """w[t−d]·a[t−d]: of this step for d = 0, else what was sent d steps ago."""
@@ -115,25 +130,38 @@ class ReferenceStepper:
     def advance(self, number: int, position: int, drive: float, state: State) -> float:
         """One neuron's step: its states are replaced, its activity is returned."""
         block = self.network.blocks[number]
-        model, cells = block.model, state.cells[number]
-        own = self.clock(state) | self.numbers(f"model/{number}", block.model_parameters, position, state)
-        own["drive"] = drive
-        shape = self.clock(state)
-        shape |= self.numbers(f"activation/{number}", block.activation_parameters, position, state)
+        shape = self.known(block.activation, position, state)
         functions = {
             name: lambda x, value=value: evaluate(value, shape | {"x": x})
-            for name, value in block.activation.functions.items()
+            for name, value in block.activation.definition.functions.items()
         }
-        old = {quantity.name: float(cells[i][position]) for i, quantity in enumerate(model.state)}
-        known = with_let(own | old, model.let)
-        new = changed(old, {q.name: q.each_step for q in model.state}, known, functions)
-        activity = evaluate(model.activity, known | new, functions)
+        seen = self.known(block.model, position, state) | {"drive": drive}
+        return self.change(block.model, position, seen, state, {}, functions)["activity"]
+
+    def change(
+        self,
+        use: Use,
+        position: int,
+        seen: Mapping[str, float],
+        state: State,
+        lasting: Mapping[str, Bounded],
+        functions: Mapping[str, Callable[..., float]] = _NONE,
+    ) -> dict[str, float]:
+        """What becomes of the states of a definition in use, and of what it gives, for one member: all from old values
+        at once, then what does not last from the new states; at an episode's end once more from what these gave.
+        ``lasting`` is what it gives and lasts, within its bounds. States are replaced, all is returned."""
+        made, cells = use.definition, state.cells[use.owner]
+        old = {quantity.name: float(cells[quantity.name][position]) for quantity in made.state}
+        old |= {name: one.value for name, one in lasting.items()}
+        known = with_let({**seen, **old}, made.let)
+        new = changed(old, {one.name: one.each_step for one in made.lasting}, known, lasting, functions)
+        fleeting = changed({}, {one.name: one.each_step for one in made.fleeting}, known | new, {}, functions)
         if self.ends_episode(state):
-            known = with_let(own | new, model.let)
-            new = changed(new, {q.name: q.each_episode for q in model.state}, known)
-        for i, quantity in enumerate(model.state):
-            cells[i][position] = new[quantity.name]
-        return activity
+            ends = {one.name: one.each_episode for one in made.lasting}
+            new = changed(new, ends, with_let({**seen, **new}, made.let), lasting)
+        for quantity in made.state:
+            cells[quantity.name][position] = new[quantity.name]
+        return new | fleeting
 
     def send(self, state: State) -> None:
         """w[t]·a[t] of every delayed connection leaves; a[t] is remembered."""
@@ -154,32 +182,15 @@ class ReferenceStepper:
 
     def learn_one(self, number: int, position: int, connection: int, state: State, inputs: FloatArray) -> None:
         """The weight and the states of one connection."""
-        plasticity, traces, connections = (
-            self.network.plasticity[number],
-            state.traces[number],
-            self.network.connections,
-        )
-        rule = plasticity.rule
-        low = self.number("low", connections.low, connection, state)
-        high = self.number("high", connections.high, connection, state)
-        own = self.clock(state) | self.numbers(f"rule/{number}", plasticity.parameters, position, state)
-        own |= self.seen(connection, state)
+        plasticity, connections = self.network.plasticity[number], self.network.connections
+        low = self.number(LOW, connections.low, connection, state)
+        high = self.number(HIGH, connections.high, connection, state)
+        seen = self.known(plasticity.rule, position, state) | self.seen(connection, state)
         both = (*state.activity.tolist(), *inputs.tolist())
-        own |= {signal: both[plasticity.signals[signal][position]] for signal in rule.signals}
-        old = {quantity.name: float(traces[i][position]) for i, quantity in enumerate(rule.state)}
-        old["weight"] = float(state.weights[connection])
-        steps = {quantity.name: quantity.each_step for quantity in rule.state} | {"weight": rule.each_step}
-        new = changed(old, steps, with_let(own | old, rule.let))
-        if rule.each_step is not None:
-            new["weight"] = min(max(new["weight"], low), high)
-        if self.ends_episode(state):
-            ends = {quantity.name: quantity.each_episode for quantity in rule.state} | {"weight": rule.each_episode}
-            new = changed(new, ends, with_let(own | new, rule.let))
-            if rule.each_episode is not None:
-                new["weight"] = min(max(new["weight"], low), high)
-        for i, quantity in enumerate(rule.state):
-            traces[i][position] = new[quantity.name]
-        state.weights[connection] = new["weight"]
+        seen |= {signal: both[indices[position]] for signal, indices in plasticity.signals.items()}
+        weight = Bounded(float(state.weights[connection]), low, high)
+        made = self.change(plasticity.rule, position, seen, state, {"weight": weight})
+        state.weights[connection] = made["weight"]
 
     def seen(self, connection: int, state: State) -> dict[str, float]:
         """``pre`` = a_j[t−d], 0 where what was sent then is lost, ``sent`` = a_j[t] and ``post`` = a_i[t] of a
@@ -229,13 +240,15 @@ def with_let(known: dict[str, float], let: tuple[tuple[str, Tree], ...]) -> dict
 
 
 def changed(
-    old: dict[str, float],
-    trees: dict[str, Tree | None],
+    old: Mapping[str, float],
+    trees: Mapping[str, Tree | None],
     known: dict[str, float],
+    bounds: Mapping[str, Bounded],
     functions: Mapping[str, Callable[..., float]] = _NONE,
 ) -> dict[str, float]:
-    """New values, all from ``known``; what has no expression stays."""
-    return {
-        name: value if (tree := trees[name]) is None else evaluate(tree, known, functions)
-        for name, value in old.items()
+    """New values, all from ``known``, within their bounds; what has no expression stays."""
+    new = {name: evaluate(tree, known, functions) for name, tree in trees.items() if tree is not None}
+    within = {
+        name: min(max(value, bounds[name].low), bounds[name].high) for name, value in new.items() if name in bounds
     }
+    return {**old, **new, **within}

@@ -17,6 +17,7 @@ from neurovis_spec.compiler.names.state_references import (
     model_state,
 )
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import MODEL, RULE, Kind
 from neurovis_spec.language.references import Arrow, Part, Sum, parse, parse_sum, state_of
 from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.likeness import suggest
@@ -77,26 +78,24 @@ def _state(network: Network, part: Part, names: Names) -> StateOf:
     if isinstance(name.owner, Arrow):
         one = connections_state(name, _between(network, name.owner, names), _wiring_of(network))
     else:
-        one = model_state(name, find_neurons(name.owner.text, names), _holders_of(network))
+        one = model_state(name, find_neurons(name.owner.text, names), _holders_of(network, MODEL))
     assert one is not UNKNOWN  # no connection of a network is invalid
     if isinstance(one, Refusal):
         raise UnknownNameError(f"'{text}': {one.message}" + (f"; {one.hint}" if one.hint else ""))
     return one
 
 
-def _holders_of(network: Network) -> tuple[Holder, ...]:
-    """The states of the models of all neurons."""
+def _holders_of(network: Network, kind: Kind) -> tuple[Holder, ...]:
+    """The states of all definitions of a kind, with those that have them."""
     return tuple(
-        Holder(block.members, block.model.name, tuple(quantity.name for quantity in block.model.state))
-        for block in network.blocks
+        Holder(holder.members, use.definition.name, tuple(state.name for state in use.definition.state))
+        for holder, use in network.uses
+        if use.definition.kind == kind
     )
 
 
 def _wiring_of(network: Network) -> Wiring:
     """All connections, with the states of their rules."""
-    rules = tuple(
-        Holder(entry.members, entry.rule.name, tuple(quantity.name for quantity in entry.rule.state))
-        for entry in network.plasticity
-    )
+    rules = _holders_of(network, RULE)
     connections = network.connections
     return Wiring(connections.sources.whole(), connections.targets.whole(), connections.entries, rules)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -18,16 +18,22 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.changes import Held
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.initial_states import starts_of
-from neurovis_spec.compiler.program import Quantity
-from neurovis_spec.language.expressions.evaluate import evaluate_array
-from neurovis_spec.language.expressions.functions import PLAIN
+from neurovis_spec.compiler.program import Owner
 from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import signal_layout
 
+#: Under which names states are kept in what outlives a version, by the kinds of their owners.
+_KEPT_AS: Mapping[str, str] = {"model": "cells", "rule": "traces"}
 Mask = npt.NDArray[np.bool_]
+Cells: TypeAlias = Mapping[Owner, Mapping[str, FloatArray]]
 
 #: a step before all others: nothing that was sent is lost
 NOTHING: Final = -(1 << 62)
+
+
+def kept_as(kind: str) -> str:
+    """The name under which the states of all owners of a kind are kept; of a later kind by its own."""
+    return _KEPT_AS.get(kind, kind)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,8 +132,8 @@ class State:
     """What a step reads and writes; n neurons, m connections.
 
     ``k`` is the step to compute next; ``activity`` (n,) is a[k−1], ``weights`` (m,) is w[k]; ``signals`` as in
-    ``SignalLayout``; row t mod (depth) of ``history`` (depth, n) is a[t], for ``pre``; ``cells[b][i]`` is state i of
-    the model of block b, ``traces[p][i]`` that of the rule of plasticity p, each as long as the members.
+    ``SignalLayout``; row t mod (depth) of ``history`` (depth, n) is a[t], for ``pre``; ``cells[owner][name]`` is a
+    state of a definition in use, as long as its members, in the order of the network's ``uses``.
     ``conditions`` are what events and callers have changed. ``continued`` says that a[−1] is given, so that
     ``initial`` is not used at step 0; ``drawn`` is how many steps earlier runs had, after which random numbers go on.
     """
@@ -137,8 +143,7 @@ class State:
     weights: FloatArray
     signals: FloatArray
     history: FloatArray
-    cells: tuple[tuple[FloatArray, ...], ...]
-    traces: tuple[tuple[FloatArray, ...], ...]
+    cells: Cells
     conditions: Conditions
     continued: bool = False
     drawn: int = 0
@@ -159,8 +164,7 @@ class State:
             weights=self.weights.copy(),
             signals=self.signals.copy(),
             history=self.history.copy(),
-            cells=tuple(tuple(array.copy() for array in block) for block in self.cells),
-            traces=tuple(tuple(array.copy() for array in rule) for rule in self.traces),
+            cells={owner: {name: array.copy() for name, array in own.items()} for owner, own in self.cells.items()},
             conditions=self.conditions.copy(),
         )
 
@@ -171,34 +175,32 @@ class State:
 
 
 def initial_state(network: Network) -> State:
-    """The state before step 0: nothing is under way, weights are w[0], model and rule states have their initials."""
-    n = len(network.neurons)
+    """The state before step 0: nothing is under way, weights are w[0], states have their initials."""
+    n, said = len(network.neurons), {"neuron": network.neurons.starts, "connection": {}}
     return State(
         k=0,
         activity=np.zeros(n),
         weights=np.array(network.connections.weights.whole(), dtype=np.float64),
         signals=np.zeros(signal_layout(network).size),
         history=np.zeros((history_depth(network), n)),
-        cells=tuple(tuple(starts_of(block, network.neurons, network.dt).values()) for block in network.blocks),
-        traces=tuple(
-            _initials(entry.rule.state, entry.parameters, len(entry.members), network.dt)
-            for entry in network.plasticity
-        ),
+        cells={
+            use.owner: starts_of(use, holder.members, network.dt, said[use.definition.kind.each])
+            for holder, use in network.uses
+        },
         conditions=first_conditions(network),
         network=network.mark,
     )
 
 
+def by_kind(cells: Cells) -> dict[str, list[FloatArray]]:
+    """All states one after the other, by the names under which those of a kind are kept."""
+    result: dict[str, list[FloatArray]] = {kept: [] for kept in _KEPT_AS.values()}
+    for owner, own in cells.items():
+        if own:
+            result.setdefault(kept_as(owner.kind), []).extend(own.values())
+    return result
+
+
 def constants(dt: float) -> dict[str, float]:
     """The constants that every expression may name."""
     return {"pi": math.pi, "e": math.e, "dt": dt}
-
-
-def _initials(
-    quantities: tuple[Quantity, ...], parameters: Mapping[str, FloatArray], count: int, dt: float
-) -> tuple[FloatArray, ...]:
-    known: dict[str, float | FloatArray] = {**constants(dt), **parameters}
-    return tuple(
-        np.array(np.broadcast_to(evaluate_array(quantity.initial, known, by=PLAIN), (count,)), dtype=np.float64)
-        for quantity in quantities
-    )

@@ -79,22 +79,17 @@ class Watch:
             yield f"the activity of {names[index]} is {state.activity[index]} at step {step}"
         for index in _wrong(state.weights):
             yield f"the weight of {network.connection_names[index]} is {state.weights[index]} after step {step}"
-        for block, cells in zip(network.blocks, state.cells, strict=True):
-            for quantity, values in zip(block.model.state, cells, strict=True):
-                for index in _wrong(values):
-                    name = names[block.members[index]]
+        for holder, use in network.uses:
+            of_neurons = use.definition.kind.each == "neuron"
+            when = f"{'at' if of_neurons else 'after'} step {step}"
+            for quantity in use.definition.state:
+                values = state.cells[use.owner][quantity.name]
+                for member, value in ((holder.members[index], values[index]) for index in _wrong(values)):
+                    name = names[member] if of_neurons else network.connection_names[member]
                     if not isinstance(quantity, Check):
-                        yield f"the state '{quantity.name}' of {name} is {values[index]} at step {step}"
-                    elif not lesioned[block.members[index]]:  # what a lesioned neuron computes is for nobody
-                        yield f"{quantity.name} for {name} at step {step}, {_HIDDEN}"
-        for plasticity, traces in zip(network.plasticity, state.traces, strict=True):
-            for quantity, values in zip(plasticity.rule.state, traces, strict=True):
-                for index in _wrong(values):
-                    name = network.connection_names[plasticity.members[index]]
-                    if isinstance(quantity, Check):
-                        yield f"{quantity.name} for {name} after step {step}, {_HIDDEN}"
-                    else:
-                        yield f"the state '{quantity.name}' of {name} is {values[index]} after step {step}"
+                        yield f"the state '{quantity.name}' of {name} is {value} {when}"
+                    elif not (of_neurons and lesioned[member]):  # what a lesioned neuron computes is for nobody
+                        yield f"{quantity.name} for {name} {when}, {_HIDDEN}"
         vector, hidden = self._odd.get(step, (np.zeros(0), None))
         for index in _wrong(vector):
             yield f"the {self._called(index)} is {vector[index]} at step {step}"
@@ -117,7 +112,7 @@ def carried_by(network: Network, state: State) -> list[FloatArray]:
     """What a state carries to the next step and may not be finite, in pieces. Where activities and weights are, the
     signals that leave, products of both, are as well."""
     learned = [state.weights] if network.plasticity else []
-    arrays = [state.activity, *learned, *chain.from_iterable(state.cells), *chain.from_iterable(state.traces)]
+    arrays = [state.activity, *learned, *chain.from_iterable(own.values() for own in state.cells.values())]
     return [piece for values in arrays for piece in _pieces(values)]
 
 

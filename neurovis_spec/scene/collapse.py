@@ -341,8 +341,8 @@ class _Gatherer:
                 continue
             members, first = np.unique(bundle, return_index=True)
             signals = {name: self.unit[index[first]] for name, index in one.signals.items()}
-            parameters = {name: values[first] for name, values in one.parameters.items()}
-            result.append(Plasticity(one.rule, members, parameters, signals))
+            parameters = {name: values[first] for name, values in one.rule.parameters.items()}
+            result.append(Plasticity(members, replace(one.rule, parameters=parameters), signals))
         return tuple(result)
 
     def _layout(self) -> LayoutSettings:

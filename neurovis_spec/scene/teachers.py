@@ -41,7 +41,7 @@ def teachers_of(network: Network) -> list[Teacher]:
             for source, target in zip(sources.tolist(), network.connections.targets[plasticity.members], strict=True):
                 if source < len(network.neurons) and source != target:
                     pair = (int(source), int(target))
-                    found.setdefault(pair, Teacher(*pair, signal, plasticity.rule.name))
+                    found.setdefault(pair, Teacher(*pair, signal, plasticity.rule.definition.name))
     return list(found.values())
 
 

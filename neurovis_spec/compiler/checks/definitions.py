@@ -9,42 +9,41 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from collections.abc import Mapping as AnyMapping
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.names.references import key_of, key_span
-from neurovis_spec.compiler.program import Rule
+from neurovis_spec.compiler.program import ACTIVATION, MODEL, RULE, Kind
 from neurovis_spec.compiler.values.builtin import installed
 from neurovis_spec.compiler.values.constants import value_of
-from neurovis_spec.compiler.values.definitions import Defaults
+from neurovis_spec.compiler.values.definitions import Defined
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.parser import parse
 from neurovis_spec.language.expressions.tree import Tree, names
 from neurovis_spec.language.grammar import ACTIVITIES
-from neurovis_spec.language.library import ActivationModel, ModelModel, RuleModel, StateModel
+from neurovis_spec.language.library import DefinitionModel
 from neurovis_spec.language.located import Formula
 from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.language.values import Choice
 from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
 
-_Definition: TypeAlias = ActivationModel | ModelModel | RuleModel
+#: What definitions of a kind give, in the author's words.
+_GIVEN: AnyMapping[Kind, str] = {ACTIVATION: "the value", MODEL: "the activity", RULE: "the weight"}
 _NOUNS = {"let": "intermediate value", "signals": "signal", "parameters": "parameter"}
 
 
 def check_definitions(compiled: Compiled, findings: Findings) -> None:
     """Warn of all such definitions."""
     for library in compiled.libraries:
-        for activation in library.activations.values():
-            _check_parts(activation, _read(activation.value), "the value", findings)
-        for model in library.models.values():
-            _check_parts(model, _read(model.activity), "the activity", findings)
-        for name, rule in library.rules.items():
-            _check_parts(rule, _read(rule.weight.each_step, rule.weight.each_episode), "the weight", findings)
-            _check_replaced(rule, *compiled.library.definitions.rules.known()[name], findings)
+        for kind, given in _GIVEN.items():
+            for name, model in library.definitions[kind.section].items():
+                _check_parts(model, given, findings)
+                if kind.lasting:
+                    _check_replaced(model, compiled.library.definitions.of(kind).known()[name], findings)
     _check_unused(compiled, findings)
     _check_modules(compiled, findings)
     _check_hidden(compiled, findings)
@@ -67,22 +66,21 @@ def _read(*formulas: Formula | None) -> frozenset[str]:
     return frozenset().union(*(names(parse(text, extra_functions={"f": 1})) for text in texts))
 
 
-def _parts_of(definition: _Definition) -> dict[str, _Part]:
+def _parts_of(definition: DefinitionModel) -> dict[str, _Part]:
     """What a definition declares, by name."""
     reads: dict[tuple[str, str], frozenset[str]] = {}
-    for name, value in definition.parameters.items():
+    parts = definition.parts()
+    for name, value in parts.parameters.items():
         reads["parameters", name] = _read(value.value, value.minimum, value.maximum)
-    for name, formula in definition.let.items():
+    for name, formula in parts.let.items():
         reads["let", name] = _read(formula)
-    states: AnyMapping[str, StateModel] = {} if isinstance(definition, ActivationModel) else definition.state
-    for name, state in states.items():
+    for name, state in (parts.state or {}).items():
         reads["state", name] = _read(state.initial, state.each_step, state.each_episode)
-    parts = {
+    found = {
         name: _Part(section, key_of(definition.source, section, name).span, read)
         for (section, name), read in reads.items()
     }
-    signals = definition.signals if isinstance(definition, RuleModel) else ()
-    return parts | {signal.value: _Part("signals", signal.span, frozenset()) for signal in signals}
+    return found | {signal.value: _Part("signals", signal.span, frozenset()) for signal in parts.signals}
 
 
 def _reached(names: Iterable[str], parts: AnyMapping[str, _Part]) -> set[str]:
@@ -97,11 +95,12 @@ def _reached(names: Iterable[str], parts: AnyMapping[str, _Part]) -> set[str]:
     return found
 
 
-def _check_parts(definition: _Definition, wanted: frozenset[str], what: str, findings: Findings) -> None:
+def _check_parts(definition: DefinitionModel, what: str, findings: Findings) -> None:
     """Each part on which neither the activity or the weight depends, nor a state: states can be recorded, by an output
     or whoever runs the network, so all of them count as read. A part that only such parts read is not reported: that
     follows from these."""
-    parts = _parts_of(definition)
+    parts, said = _parts_of(definition), definition.parts()
+    wanted = _read(said.each_step, said.each_episode)
     states = [name for name, part in parts.items() if part.section == "state"]
     used = _reached([*wanted, *states], parts)
     unused = {name: part for name, part in parts.items() if name not in used}
@@ -118,20 +117,20 @@ def _check_parts(definition: _Definition, wanted: frozenset[str], what: str, fin
 # Weights that are replaced where a change is meant
 
 
-def _check_replaced(model: RuleModel, rule: Rule, defaults: Defaults, findings: Findings) -> None:
+def _check_replaced(model: DefinitionModel, made: Defined, findings: Findings) -> None:
     """``weight: {each_step: 0.01 * pre * post}``: a formula that reads what is active but nothing that outlasts the
     step, neither the weight nor a state that builds up, and that is 0 where all activities are 0, as a change would be.
     A weight that follows states, the time or a signal, or that has a value then, is not reported."""
-    parts = _parts_of(model)
+    parts, said, weight = _parts_of(model), model.parts(), made.definition.given
     for formula, tree, when in (
-        (model.weight.each_step, rule.each_step, "each step"),
-        (model.weight.each_episode, rule.each_episode, "the end of each episode"),
+        (said.each_step, weight.each_step, "each step"),
+        (said.each_episode, weight.each_episode, "the end of each episode"),
     ):
         if formula is None or tree is None:
             continue
         found = _reached(_read(formula), parts)
         active = not found.isdisjoint(ACTIVITIES)
-        if active and not _lasts(found, parts) and _in_silence(tree, rule, defaults) == 0:
+        if active and not _lasts(found, parts) and _in_silence(tree, made) == 0:
             message = f"this replaces the weight at {when}: it does not read 'weight'"
             findings.warning("replaces-weight", formula.span, message, "for a change write weight + …")
 
@@ -142,11 +141,12 @@ def _lasts(found: set[str], parts: dict[str, _Part]) -> bool:
     return "weight" in found or any(name in _reached(parts[name].reads, parts) for name in states)
 
 
-def _in_silence(tree: Tree, rule: Rule, defaults: Defaults) -> Value:
+def _in_silence(tree: Tree, made: Defined) -> Value:
     """What a formula gives where nothing is active, with the default parameters."""
+    rule = made.definition
     values: dict[str, Value] = {**CONSTANTS, "dt": 1.0, "k": 1.0, "t": 1.0, "weight": 0.0}
     values |= dict.fromkeys((*ACTIVITIES, *rule.signals), 0.0)
-    for default in defaults:
+    for default in made.defaults:
         value = value_of(default.value, values)
         values[default.name] = 0.0 if value is UNKNOWN else value
     values |= {state.name: evaluate_array(state.initial, values) for state in rule.state}
@@ -164,9 +164,9 @@ def _check_unused(compiled: Compiled, findings: Findings) -> None:
     has no instance."""
     network = compiled.network
     used = {
-        "activations": {group.activation for group in network.neurons.groups},
-        "models": {group.model for group in network.neurons.groups},
-        "rules": {plasticity.rule.name for plasticity in network.plasticity},
+        ACTIVATION.section: {group.activation for group in network.neurons.groups},
+        MODEL.section: {group.model for group in network.neurons.groups},
+        RULE.section: {one.rule.definition.name for one in network.plasticity},
     }
     modules = [library.source.get("modules") for library in compiled.libraries]
     named = {text for node in modules if node is not None for text in _texts(node)}

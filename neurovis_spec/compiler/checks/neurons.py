@@ -17,14 +17,14 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import Indices, IntArray
 from neurovis_spec.compiler.checks.compiled import Compiled
+from neurovis_spec.compiler.events.settable import BIAS
 from neurovis_spec.compiler.names.references import key_span
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.initial_states import starts_of
-from neurovis_spec.compiler.program import Block, Model
+from neurovis_spec.compiler.program import Block, Definition
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
-from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.sections import GroupModel
 
 Mask = npt.NDArray[np.bool_]
@@ -41,8 +41,9 @@ def check_neurons(compiled: Compiled, findings: Findings) -> None:
     told: set[Span] = set()
     reads: dict[str, _Reads] = {}
     for kind, written in compiled.models:
-        read = reads.get(kind.model.name) or reads.setdefault(kind.model.name, _reads(kind.model))
-        for span, message, hint in _ignored(kind.model, read, written):
+        model = kind.model.definition
+        read = reads.get(model.name) or reads.setdefault(model.name, _reads(model))
+        for span, message, hint in _ignored(model, read, written):
             if span not in told:
                 told.add(span)
                 findings.warning("no-effect", span, message, hint)
@@ -58,8 +59,8 @@ def check_neurons(compiled: Compiled, findings: Findings) -> None:
     for group in network.neurons.groups:
         members = [member for member in group.indices if idle[member]]
         scope, own = origin[group.name]
-        model, span = scope.section.neurons[own], key_span(scope.section, "neurons", own)
-        if not members or span in told or model.bias is not None or model.initial is not None:
+        written, span = scope.section.neurons[own], key_span(scope.section, "neurons", own)
+        if not members or span in told or written.bias is not None or written.initial is not None:
             continue
         told.add(span)
         names = [network.neurons.names[member] for member in members]
@@ -81,11 +82,11 @@ class _Reads(NamedTuple):
     drive: bool
 
 
-def _reads(model: Model) -> _Reads:
-    return _Reads(model.reads_activation, any("drive" in names(tree) for tree in model.formulas))
+def _reads(model: Definition) -> _Reads:
+    return _Reads(model.reads_activation, "drive" in model.read)
 
 
-def _ignored(model: Model, reads: _Reads, group: GroupModel) -> Iterator[tuple[Span, str, str]]:
+def _ignored(model: Definition, reads: _Reads, group: GroupModel) -> Iterator[tuple[Span, str, str]]:
     """The place of each key that the model does not read, and what to say there."""
     activation = group.activation
     if activation is not None and not reads.activation:
@@ -116,11 +117,12 @@ def _idle(network: Network) -> Mask:
     for block in network.blocks:
         quiet[block.members] &= _stays_at_zero(block, network)
     for binding in network.set_by_events:  # what an event makes of a neuron is not checked
-        kind, _, number = binding.array.partition("/")
-        if kind == "bias":
+        if binding.array == BIAS:
             quiet[binding.places] = False
-        elif kind in ("activation", "model"):
-            quiet[network.blocks[int(number.partition("/")[0])].members] = False
+    owners = {binding.array.owner for binding in network.set_by_events}
+    for block in network.blocks:
+        if any(use.owner in owners for use in block.uses):
+            quiet[block.members] = False
     idle = _unreached(quiet, connections.sources.whole(), connections.targets.whole())
     return _first(idle, connections.sources.whole(), connections.targets.whole()) if idle.any() else idle
 
@@ -215,16 +217,16 @@ def _first(idle: Mask, sources: Indices, targets: Indices) -> Mask:
 def _stays_at_zero(block: Block, network: Network) -> Mask:
     """Whether the neurons of a block, never driven, surely keep their states and an activity of 0: then all that their
     formulas read stays what it is at the first step."""
-    count = len(block.members)
-    if block.combine == "product" or any(not names(tree).isdisjoint(("k", "t")) for tree in block.model.formulas):
+    count, model = len(block.members), block.model.definition
+    if block.combine == "product" or not model.read.isdisjoint(("k", "t")):
         return np.zeros(count, dtype=np.bool_)
     result = np.ones(count, dtype=np.bool_)
-    values: dict[str, Value] = {**CONSTANTS, "dt": network.dt, **block.model_parameters, "drive": 0.0}
-    states = starts_of(block, network.neurons, network.dt)
+    values: dict[str, Value] = {**CONSTANTS, "dt": network.dt, **block.model.parameters, "drive": 0.0}
+    states = starts_of(block.model, block.members, network.dt, network.neurons.starts)
     values |= states
-    for name, tree in block.model.let:
+    for name, tree in model.let:
         values[name] = evaluate_array(tree, values)
-    for state in block.model.state:
+    for state in model.state:
         for change in (state.each_step, state.each_episode):
             if change is not None:
                 result &= np.broadcast_to(evaluate_array(change, values) == states[state.name], (count,))
@@ -234,6 +236,11 @@ def _stays_at_zero(block: Block, network: Network) -> Mask:
 
 def _activity(block: Block, values: dict[str, Value]) -> Value:
     """The model's activity; f is the neurons' activation."""
-    given = {**values, **block.activation_parameters}
-    functions = {"f": lambda x: evaluate_array(block.activation.value, {**given, "x": x})}
-    return evaluate_array(block.model.activity, values, functions=functions)
+    given = {**values, **block.activation.parameters}
+    functions = {
+        name: lambda x, tree=tree: evaluate_array(tree, {**given, "x": x})
+        for name, tree in block.activation.definition.functions.items()
+    }
+    activity = block.model.definition.given.each_step
+    assert activity is not None
+    return evaluate_array(activity, values, functions=functions)

@@ -16,7 +16,7 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.checks.compiled import Compiled, WrittenEntry
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Rule
+from neurovis_spec.compiler.program import Definition
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
@@ -40,14 +40,14 @@ def check_rules(compiled: Compiled, findings: Findings) -> None:
         if watched.isdisjoint(bundle.name for bundle in entry.bundles):  # else it is there for its states
             _check_rate(entry, findings)
             _check_bounds(entry, findings)
-        if compiled.network.episode is None and learning.rule.each_step is None:
+        if compiled.network.episode is None and learning.rule.given.each_step is None:
             name = learning.rule.name
             message = f"'{name}' changes weights at the end of an episode, and there are none: no weight will change"
             hint = "say how many steps an episode has, as in time: {episode: 100}"
             findings.warning("no-effect", choice.name.span, message, hint)
 
 
-def changes(rule: Rule, parameters: Mapping[str, FloatArray], own: Collection[str] = ()) -> bool:
+def changes(rule: Definition, parameters: Mapping[str, FloatArray], own: Collection[str] = ()) -> bool:
     """Whether a weight changes in a few steps and episodes with arbitrary values, from the states' initial values; the
     signals of ``own`` are the target's activity."""
     generator = np.random.default_rng(0)  # the points of a test, not a draw of the network
@@ -63,7 +63,7 @@ def changes(rule: Rule, parameters: Mapping[str, FloatArray], own: Collection[st
             new: dict[str, Value] = {}
             for name, tree in rule.let:
                 values[name] = evaluate_array(tree, values)
-            weight = rule.each_episode if episode else rule.each_step
+            weight = rule.given.each_episode if episode else rule.given.each_step
             if weight is not None and not np.array_equal(evaluate_array(weight, values), values["weight"]):
                 return True
             for state in rule.state:

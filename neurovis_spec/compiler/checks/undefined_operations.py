@@ -8,12 +8,12 @@ conditional is not checked: the branch may never be taken. What depends on what 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
 from neurovis_spec.compiler.checks.compiled import Compiled
-from neurovis_spec.compiler.program import Activation, Model
+from neurovis_spec.compiler.program import Definition
 from neurovis_spec.compiler.run_checks import through_let
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
@@ -28,33 +28,36 @@ def check_undefined(compiled: Compiled, findings: Findings) -> None:
     clock: dict[str, Value] = {**CONSTANTS, "dt": compiled.network.dt}
     found: dict[tuple[str, str], tuple[list[Hazard], list[Hazard]]] = {}
     for kind, group in compiled.models:
-        if group.model is None and group.activation is None:
+        choices = group.model, group.activation
+        if not any(choices):
             continue
-        key = kind.model.name, kind.activation.name  # there may be very many groups of the same kind
+        model, activation = kind.model.definition, kind.activation.definition
+        key = model.name, activation.name  # there may be very many groups of the same kind
         if key not in found:
-            found[key] = _of_kind(kind.model, kind.activation)
-        outside, inside = found[key]
-        if outside:
-            _tell(group.model, "model", outside, clock | dict(kind.model_parameters), findings)
-        if inside:
-            _tell(group.activation, "activation", inside, clock | dict(kind.activation_parameters), findings)
+            found[key] = _of_kind(model, activation)
+        for hidden, used, choice in zip(found[key], (kind.model, kind.activation), choices, strict=True):
+            if hidden:
+                _tell(choice, used.definition.kind.name, hidden, clock | dict(used.parameters), findings)
     for _, body, bundles in compiled.entries.values():
         for learning in (bundle.learning for bundle in bundles if bundle.learning is not None):
-            rule = learning.rule
-            steps: Iterable[Tree | None] = (rule.each_step, *(state.each_step for state in rule.state))
-            made = [hazards(tree, Hidden.ALL) for tree in steps if tree is not None]
-            known = clock | dict(learning.parameters)
-            _tell(body.plasticity, "rule", through_let(made, rule.let), known, findings)
+            rule, known = learning.rule, clock | dict(learning.parameters)
+            made = [hazards(tree, Hidden.ALL) for tree in _at_steps(rule)]
+            _tell(body.plasticity, rule.kind.name, through_let(made, rule.let), known, findings)
 
 
-def _of_kind(model: Model, activation: Activation) -> tuple[list[Hazard], list[Hazard]]:
+def _at_steps(definition: Definition) -> Iterator[Tree]:
+    """What a definition computes at each step."""
+    for one in (*definition.gives, *definition.state):
+        if one.each_step is not None:
+            yield one.each_step
+
+
+def _of_kind(model: Definition, activation: Definition) -> tuple[list[Hazard], list[Hazard]]:
     """What may be undefined in the formulas of a model, and in an activation that it always computes."""
-    functions = {"f": activation.value}
-    trees = (model.activity, *(state.each_step for state in model.state))
-    made = [hazards(tree, Hidden.ALL, functions=functions) for tree in trees if tree is not None]
+    made = [hazards(tree, Hidden.ALL, functions=activation.functions) for tree in _at_steps(model)]
     computed = any(call.where is None for formula in made for call in formula.calls)
-    inside = hazards(activation.value, Hidden.ALL).found if computed else []
-    return list(through_let(made, model.let)), inside
+    inside = [hazard for tree in _at_steps(activation) for hazard in hazards(tree, Hidden.ALL).found]
+    return list(through_let(made, model.let)), inside if computed else []
 
 
 def _tell(

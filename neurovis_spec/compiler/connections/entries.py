@@ -134,8 +134,7 @@ class EntryBuilder:
             self.constants.follow(self._cells(centre, centre_cells, shape))
         with self.constants.following() as bounding:
             bounds = self._bounds(weights)
-        with self.constants.following() as ruled:
-            learning = self._learning(shape)
+        learning = self._learning(shape)
         if shape is UNKNOWN or weights is UNKNOWN or centres is UNKNOWN or bounds is UNKNOWN or learning is UNKNOWN:
             return UNKNOWN
         if self.sources is UNKNOWN or self.targets is UNKNOWN or not body.sound or findings.errors > before:
@@ -162,7 +161,7 @@ class EntryBuilder:
                 *(part._replace(field="weights" if learning is None else "first") for part in weighted),
                 *(part._replace(field="centres") for part in centred),
                 *bounding,
-                *(part._replace(field="rule") for part in ruled if learning is not None),
+                *(() if learning is None else learning.used.parts),
             ),
             None if body.label is None else body.label.value,
             None if len(shape.i) else (self.sources, self.targets),

@@ -16,8 +16,8 @@ from neurovis_spec.compiler.limits import PATIENCE
 from neurovis_spec.compiler.names.references import Directory, few, resolve_end
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import Input
-from neurovis_spec.compiler.program import Rule
-from neurovis_spec.compiler.values.arguments import Each, check_initials, check_settings, choose, parameters, settle
+from neurovis_spec.compiler.program import RULE, Definition
+from neurovis_spec.compiler.values.arguments import Each, Settled, check_initials, settled_of
 from neurovis_spec.diagnostics import shorten
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.places import formula_at
@@ -32,10 +32,19 @@ class Learning(NamedTuple):
     """A rule in use. ``signals`` are indices into all activities followed by all inputs, one a connection; ``texts``
     are what the author calls them."""
 
-    rule: Rule
-    parameters: Mapping[str, FloatArray]
+    used: Settled
     signals: Mapping[str, IntArray]
     texts: Mapping[str, str]
+
+    @property
+    def rule(self) -> Definition:
+        """The rule."""
+        return self.used.definition
+
+    @property
+    def parameters(self) -> Mapping[str, FloatArray]:
+        """Its parameters, one value a connection."""
+        return self.used.parameters
 
 
 class Wired(NamedTuple):
@@ -66,22 +75,18 @@ def learning_of(
 
     ``directory`` says what the names of the scope mean, ``neurons`` is how many the network has.
     """
-    constants, definitions = scope.constants, scope.definitions
-    found = choose(choice, definitions.rules, "rule", constants.findings)
-    if found is UNKNOWN:
-        check_settings(choice, constants, _SETTING.sees)
-        return UNKNOWN
-    rule, defaults = found
-    known = (*(default.name for default in defaults), *rule.signals)
-    settled = settle(choice, ("rules", rule.name), known, constants.findings)
-    targets = UNKNOWN if wired is UNKNOWN else wired.j
+    constants, targets = scope.constants, UNKNOWN if wired is UNKNOWN else wired.j
     each = Each("connection", dict.fromkeys(_SETTING.sees, UNKNOWN) if wired is UNKNOWN else wired._asdict())
-    values = parameters(choice, defaults, UNKNOWN if targets is UNKNOWN else len(targets), constants, settled, each)
+    count = UNKNOWN if targets is UNKNOWN else len(targets)
+    used = settled_of(choice, RULE, scope.definitions, constants, each, count)
+    if used is UNKNOWN:
+        return UNKNOWN
+    rule = used.definition
     signals: dict[str, IntArray] = {}
-    failed = values is UNKNOWN
+    failed = not used.sound
     told = constants.findings.is_invalid(choice.name.span)
     for signal in rule.signals:
-        entry = settled.get(signal)
+        entry = used.entries.get(signal)
         if entry is None or entry is UNKNOWN:
             failed = True
             if entry is None and not told:
@@ -94,9 +99,9 @@ def learning_of(
             failed = True
         else:
             signals[signal] = where
-    if failed or values is UNKNOWN or not check_initials(rule.state, values, choice, constants):
+    if failed or not check_initials(used, choice, constants):
         return UNKNOWN
-    return Learning(rule, values, signals, {name: _text(settled.known()[name].value) for name in rule.signals})
+    return Learning(used, signals, {name: _text(used.entries.known()[name].value) for name in rule.signals})
 
 
 def _signal(

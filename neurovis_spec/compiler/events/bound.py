@@ -1,11 +1,12 @@
 """What follows parameters, from all parts of a network, as bindings of its arrays (§9).
 
-In: the slots, the parts of groups, entries and inputs that follow formulas, the blocks and plasticities. Out: Settable.
+In: the slots, the parts of groups, entries and inputs that follow formulas, the network that was made of these. Out:
+Settable.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator
+from collections.abc import Hashable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -13,80 +14,91 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.events.changes import NO_INDICES
-from neurovis_spec.compiler.events.settable import Binding, Dependent, ParameterFormula, Part, Settable, Slot, Variable
-from neurovis_spec.compiler.network import Connections, Input, Noise
+from neurovis_spec.compiler.events.settable import (
+    BIAS,
+    CENTRES,
+    HIGH,
+    LOW,
+    NOISE,
+    WEIGHTS,
+    Binding,
+    Dependent,
+    ParameterFormula,
+    Part,
+    Settable,
+    Slot,
+    Variable,
+    table_of,
+)
+from neurovis_spec.compiler.network import Network, Noise
 from neurovis_spec.compiler.neurons.populate import Population
-from neurovis_spec.compiler.program import Block, Plasticity
+from neurovis_spec.compiler.program import Key, Owner
 from neurovis_spec.language.expressions.tree import Number
 
 
 class _Found(NamedTuple):
     """A formula for some numbers of an array."""
 
-    array: str
+    array: Key
     places: IntArray
     part: Part
 
 
 def make_settable(
-    slots: tuple[Slot, ...],
-    population: Population,
-    bundles: tuple[Bundle, ...],
-    connections: Connections,
-    inputs: tuple[Input, ...],
-    blocks: tuple[Block, ...],
-    plasticity: tuple[Plasticity, ...],
-    noises: tuple[Noise, ...],
+    network: Network, slots: tuple[Slot, ...], population: Population, bundles: tuple[Bundle, ...]
 ) -> Settable:
     """The bindings of a network, those of the same formula as one, and the arrays that they write to."""
-    arrays: dict[str, FloatArray] = {
-        "bias": population.neurons.bias,
-        "centres": connections.centres.whole(),
-        "low": connections.low.whole(),
-        "high": connections.high.whole(),
-    }
-    for number, block in enumerate(blocks):
-        for kind, values in (("activation", block.activation_parameters), ("model", block.model_parameters)):
-            arrays |= {f"{kind}/{number}/{name}": array for name, array in values.items()}
-    for number, rule in enumerate(plasticity):
-        arrays |= {f"rule/{number}/{name}": array for name, array in rule.parameters.items()}
-    for number, entry in enumerate(inputs):
-        if entry.table is not None:
-            arrays[f"table/{number}"] = entry.table.ravel()
-    found = [
-        *_of_neurons(population, blocks),
-        *_of_connections(bundles, connections, plasticity),
-        *_of_inputs(inputs),
-    ]
+    arrays = _arrays(network)
+    found = [*_of_neurons(population, network), *_of_connections(bundles, network), *_of_inputs(network)]
     merged = list(_merged([one for one in found if len(one.places)]))  # a cell may be of no connection
-    variables: dict[str, Variable] = {}
-    initial: list[FloatArray] = []
-    start = 0
-    by_array: dict[str, list[_Found]] = {}
+    by_array: dict[Key, list[_Found]] = {}
     for one in merged:
         by_array.setdefault(one.array, []).append(one)
-    for name in sorted(by_array.keys() - {"weights"}):
-        own = by_array[name]
-        whole = arrays[name]
+    variables: dict[Key, Variable] = {}
+    initial: list[FloatArray] = [np.zeros(0)]
+    start = 0
+    for array in sorted(by_array.keys() - {WEIGHTS}, key=lambda key: key.text):  # the order in checkpoints
+        whole, own = arrays[array], by_array[array]
         if len(own) == 1 and _is_one_number(own[0].part.formula) and len(own[0].places) == len(whole) > 0:
             whole = whole[:1]
-        variables[name] = Variable(start, len(whole))
+        variables[array] = Variable(start, len(whole))
         initial.append(np.asarray(whole, dtype=np.float64))
         start += len(whole)
-    bindings = []
-    for one in merged:
-        indices = one.places
-        if one.array != "weights":
-            place, size = variables[one.array]
-            indices = place + (one.places if size == len(arrays[one.array]) else one.places[:1])
-        part, places = one.part, frozen(one.places)
-        bindings.append(
-            Binding(part.formula, one.array == "weights", frozen(indices), one.array, places, part.low, part.high)
-        )
-    least = ParameterFormula(Number(0.0), {})
-    for noise in noises:
-        bindings += (Binding(width, False, NO_INDICES, "noise", NO_INDICES, least) for width in noise.widths)
-    return Settable(slots, tuple(bindings), variables, frozen(np.concatenate([*initial, np.zeros(0)])))
+    bindings = [_binding(one, variables.get(one.array), len(arrays.get(one.array, ()))) for one in merged]
+    bindings += [binding for noise in network.noises for binding in _of_noise(noise)]
+    return Settable(slots, tuple(bindings), variables, frozen(np.concatenate(initial)))
+
+
+def _arrays(network: Network) -> Mapping[Key, FloatArray]:
+    """The arrays of a network, all numbers of which can be set."""
+    connections = network.connections
+    arrays = {
+        BIAS: network.neurons.bias,
+        CENTRES: connections.centres.whole(),
+        LOW: connections.low.whole(),
+        HIGH: connections.high.whole(),
+    }
+    for _, use in network.uses:
+        arrays |= {Key(use.owner, name): values for name, values in use.parameters.items()}
+    for number, entry in enumerate(network.inputs):
+        if entry.table is not None:
+            arrays[table_of(number)] = entry.table.ravel()
+    return arrays
+
+
+def _binding(one: _Found, variable: Variable | None, size: int) -> Binding:
+    """Some numbers of an array of this size that follow a formula; of the weights where it is no variable."""
+    indices, part = one.places, one.part
+    if variable is not None:
+        indices = variable.start + (one.places if variable.size == size else one.places[:1])
+    weights = variable is None
+    return Binding(part.formula, weights, frozen(indices), one.array, frozen(one.places), part.low, part.high)
+
+
+def _of_noise(noise: Noise) -> Iterator[Binding]:
+    """The spreads of a noise, which nothing is written to, and none of which may become negative."""
+    for width in noise.widths:
+        yield Binding(width, False, NO_INDICES, NOISE, NO_INDICES, ParameterFormula(Number(0.0), {}))
 
 
 def own_weights(slots: tuple[Slot, ...], bundles: tuple[Bundle, ...], weights: FloatArray) -> FloatArray | None:
@@ -108,29 +120,28 @@ def own_weights(slots: tuple[Slot, ...], bundles: tuple[Bundle, ...], weights: F
     return frozen(result)
 
 
-def _of_neurons(population: Population, blocks: tuple[Block, ...]) -> Iterator[_Found]:
+def _of_neurons(population: Population, network: Network) -> Iterator[_Found]:
     n = len(population.neurons)
     home, position = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
-    for number, block in enumerate(blocks):
+    for number, block in enumerate(network.blocks):
         home[block.members] = number
         position[block.members] = np.arange(len(block.members))
     for group, part in ((one.group, part) for one in population.groups for part in one.parts):
-        if part.field == "bias":
-            yield _Found("bias", group.start + part.within(group.count), part)
-        elif part.field in ("activation", "model"):  # neurons of a group may belong to several blocks
-            members = group.start + part.within(group.count)
+        members = group.start + part.within(group.count)
+        if part.field == BIAS.name:
+            yield _Found(BIAS, members, part)
+        elif part.name:  # of a definition; neurons of a group may belong to several blocks
             blocked = np.unique(home[members])
             for number in blocked.tolist():
                 inside = np.flatnonzero(home[members] == number)
                 own = part if len(blocked) == 1 else part.some(inside)
-                yield _Found(f"{part.field}/{number}/{part.name}", position[members[inside]], own)
+                yield _Found(Key(Owner(part.field, number), part.name), position[members[inside]], own)
 
 
-def _of_connections(
-    bundles: tuple[Bundle, ...], connections: Connections, plasticity: tuple[Plasticity, ...]
-) -> Iterator[_Found]:
+def _of_connections(bundles: tuple[Bundle, ...], network: Network) -> Iterator[_Found]:
+    connections = network.connections
     position = np.zeros(len(connections), dtype=np.int64)
-    for rule in plasticity:
+    for rule in network.plasticity:
         position[rule.members] = np.arange(len(rule.members))
     start = 0
     for bundle in bundles:
@@ -139,18 +150,19 @@ def _of_connections(
             members = start + part.within(count)
             if part.field == "first":
                 continue
-            if part.field == "rule":
-                yield _Found(f"rule/{int(connections.rules[start])}/{part.name}", position[members], part)
+            if part.name:  # of a definition
+                owner = Owner(part.field, int(connections.rules[start]))
+                yield _Found(Key(owner, part.name), position[members], part)
             else:
-                yield _Found(part.field, members, part)
+                yield _Found(Key(None, part.field), members, part)
         start += count
 
 
-def _of_inputs(inputs: tuple[Input, ...]) -> Iterator[_Found]:
-    for number, entry in enumerate(inputs):
+def _of_inputs(network: Network) -> Iterator[_Found]:
+    for number, entry in enumerate(network.inputs):
         for part in entry.parts:
             assert entry.table is not None
-            yield _Found(f"table/{number}", part.within(entry.table.size), part)
+            yield _Found(table_of(number), part.within(entry.table.size), part)
 
 
 def _is_one_number(formula: Dependent) -> bool:

@@ -17,11 +17,12 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.events.settable import Binding, ParameterFormula, Settable
+from neurovis_spec.compiler.program import Key
 from neurovis_spec.language.expressions.emit import defined, emit
 from neurovis_spec.language.expressions.evaluate import Value
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 
-#: What the arrays of a network are called in messages.
+#: What the arrays of a network are called in messages, those that it has one of by their names.
 _CALLED: Mapping[str, str] = {
     "weights": "a weight",
     "bias": "a bias",
@@ -31,6 +32,8 @@ _CALLED: Mapping[str, str] = {
     "table": "a value of an input",
     "noise": "the spread of noise",
 }
+#: The letters before which it is 'an'.
+_VOWELS = "aeiou"
 
 
 #: Plans that are kept.
@@ -233,9 +236,8 @@ def _code(formula: object, space: dict[str, object], by: Library) -> str:
     return f"{name}.values(p, by)"
 
 
-def _called(array: str) -> str:
-    kind, _, rest = array.partition("/")
+def _called(array: Key) -> str:
+    kind = array.name if array.owner is None else array.owner.kind
     if kind in _CALLED:
         return _CALLED[kind]
-    owner = {"activation": "an activation", "model": "a model", "rule": "a rule"}[kind]
-    return f"the parameter '{rest.partition('/')[2]}' of {owner}"
+    return f"the parameter '{array.name}' of {'an' if kind[0] in _VOWELS else 'a'} {kind}"

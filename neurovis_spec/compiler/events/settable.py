@@ -16,9 +16,20 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.program import Key, Owner
 from neurovis_spec.language.expressions.evaluate import Drawing, Value, evaluate_array
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.language.expressions.tree import Number, Tree, names
+
+#: Arrays that a network has one of.
+BIAS, CENTRES, LOW, HIGH, WEIGHTS, NOISE = (
+    Key(None, name) for name in ("bias", "centres", "low", "high", "weights", "noise")
+)
+
+
+def table_of(number: int) -> Key:
+    """The rows of an input."""
+    return Key(Owner("table", number), "")
 
 
 class Dependent(Protocol):
@@ -181,7 +192,7 @@ class Binding:
     formula: Dependent
     weights: bool
     indices: IntArray
-    array: str
+    array: Key
     places: IntArray
     low: Dependent | None = None
     high: Dependent | None = None
@@ -202,13 +213,12 @@ class Variable(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Settable:
-    """All that can be set. ``variables`` are named ``bias``, ``centres``, ``low``, ``high`` (one number a neuron or a
-    connection), ``activation/B/NAME``, ``model/B/NAME`` (parameters of block B), ``rule/P/NAME`` (of plasticity P) and
-    ``table/I`` (rows of input I); ``initial`` is what they begin with."""
+    """All that can be set. ``variables`` are BIAS, CENTRES, LOW, HIGH (one number a neuron or a connection), parameters
+    of definitions in use, and the tables of inputs; ``initial`` is what they begin with."""
 
     slots: tuple[Slot, ...] = ()
     bindings: tuple[Binding, ...] = ()
-    variables: Mapping[str, Variable] = field(default_factory=dict)
+    variables: Mapping[Key, Variable] = field(default_factory=dict)
     initial: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @cached_property

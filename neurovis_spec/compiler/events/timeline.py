@@ -21,8 +21,9 @@ from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.events.changes import NO_INDICES, Change, Clamp, Held
 from neurovis_spec.compiler.events.events import Event
 from neurovis_spec.compiler.events.patch import Patch, Patcher, PatchError
-from neurovis_spec.compiler.events.settable import Binding, ParameterFormula
+from neurovis_spec.compiler.events.settable import Binding, ParameterFormula, table_of
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Key
 from neurovis_spec.compiler.values.constants import Constants, check_finite
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.tree import Number
@@ -240,18 +241,20 @@ class _Trial:
     def _written(self, bindings: tuple[Binding, ...]) -> tuple[_Written, ...]:
         """The arrays that these bindings write to, with the places in them."""
         if bindings not in self._arrays:
-            arrays: dict[str, list[int]] = defaultdict(list)
+            arrays: dict[Key, list[int]] = defaultdict(list)
             for number, binding in enumerate(bindings):
                 if len(binding.indices):
                     arrays[binding.array].append(number)
-            named = sorted((self._called(name), name) for name in arrays)
-            self._arrays[bindings] = tuple(_written(called, arrays[name], bindings) for called, name in named)
+            named = sorted((self._called(array), array) for array in arrays)
+            self._arrays[bindings] = tuple(_written(called, arrays[array], bindings) for called, array in named)
         return self._arrays[bindings]
 
-    def _called(self, array: str) -> str:
+    def _called(self, array: Key) -> str:
         """An array by a name in which no order of the spec shows."""
-        kind, _, number = array.partition("/")
-        return f"table/{self.network.inputs[int(number)].name}" if kind == "table" else array
+        owner = array.owner
+        if owner is None or array != table_of(owner.number):
+            return array.text
+        return f"{owner.kind}/{self.network.inputs[owner.number].name}"
 
     def _clamp(self, change: Change, changed: frozenset[int]) -> bytes:
         """Begin and end clamps; a finding, at what it is clamped to, where that is not finite."""

@@ -23,7 +23,7 @@ from neurovis_spec.compiler.names.state_references import (
     model_state,
 )
 from neurovis_spec.compiler.neurons.populate import Population
-from neurovis_spec.compiler.program import Model
+from neurovis_spec.compiler.program import Definition
 from neurovis_spec.diagnostics import Findings, shorten
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.references import Arrow, Part, StateName, state_of
@@ -140,9 +140,9 @@ def finder_of(population: Population, made: Connected, findings: Findings) -> Fi
 def _models(population: Population) -> tuple[Holder, ...]:
     """The states of the models of groups, by models; nothing is known of a group whose model is invalid."""
     members: dict[str, list[range]] = {}
-    models: dict[str, Model] = {}
+    models: dict[str, Definition] = {}
     for one in population.groups:
-        written, model = one.model, one.kind.model
+        written, model = one.model, one.kind.model.definition
         if (not written.sound and "model" in written.unknown) or (
             written.model is not None and written.model.name.value != model.name
         ):

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, NamedTuple, TypeAlias, TypeVar
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -21,10 +21,10 @@ from neurovis_spec.compiler.names.state_references import no_state
 from neurovis_spec.compiler.network import Group, Input
 from neurovis_spec.compiler.neurons.labels import labels_of
 from neurovis_spec.compiler.neurons.positions import positions_of
-from neurovis_spec.compiler.program import Activation, Model
-from neurovis_spec.compiler.values.arguments import check_initials, check_settings, choose, parameters, settle, spread
+from neurovis_spec.compiler.program import ACTIVATION, MODEL, Kind
+from neurovis_spec.compiler.values.arguments import Settled, check_initials, neurons, settled_of, spread
 from neurovis_spec.compiler.values.constants import Constants
-from neurovis_spec.compiler.values.definitions import Defaults, Definitions
+from neurovis_spec.compiler.values.definitions import Definitions
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import shorten
 from neurovis_spec.language.expressions.tree import Tree, draws
@@ -37,20 +37,19 @@ from neurovis_spec.language.yaml.source import AnyList, Scalar
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 from neurovis_spec.likeness import meant, nearest
 
-T = TypeVar("T", bound=Activation | Model)
-_SETTING = formula_at(GroupModel, "model", "NAME", "SETTING")
 _NOISE = formula_at(GroupModel, "noise")
 
 
-class Kind(NamedTuple):
+class Chosen(NamedTuple):
     """What the neurons of a group are: definitions with parameters, one value a neuron."""
 
-    activation: Activation
-    activation_parameters: Mapping[str, FloatArray]
-    model: Model
-    model_parameters: Mapping[str, FloatArray]
-    #: the parameters that follow those of a run (``activation``, ``model``)
-    parts: tuple[Part, ...] = ()
+    activation: Settled
+    model: Settled
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The parameters that follow those of a run."""
+        return *self.activation.parts, *self.model.parts
 
 
 class Built(NamedTuple):
@@ -59,7 +58,7 @@ class Built(NamedTuple):
 
     name: str
     group: Group
-    kind: Kind
+    kind: Chosen
     model: GroupModel
     names: tuple[str, ...]
     labels: tuple[str, ...]
@@ -96,7 +95,7 @@ def _unsaid(n: int) -> _Unsaid:
 
 
 #: What groups are that are the same in all instances of a module, by the module, the group and its count.
-Kinds: TypeAlias = dict[tuple[str | None, str, int], Kind]
+Kinds: TypeAlias = dict[tuple[str | None, str, int], Chosen]
 
 
 @dataclass(frozen=True)
@@ -142,11 +141,11 @@ class Builder:
             name=self.scope.called(name),
             start=start,
             count=n,
-            activation=kind.activation.name,
-            model=kind.model.name,
+            activation=kind.activation.definition.name,
+            model=kind.model.definition.name,
             combine=said(model.combine, "sum"),
-            activation_parameters=_numbers(kind.activation_parameters),
-            model_parameters=_numbers(kind.model_parameters),
+            activation_parameters=_numbers(kind.activation.parameters),
+            model_parameters=_numbers(kind.model.parameters),
             input=self._fed(model),
             box=None if model.box is None else self.scope.called(model.box.value),
             role=None if model.role is None else model.role.value,
@@ -189,15 +188,16 @@ class Builder:
         return position, [part._replace(field="position") for part in parts]
 
     def _starts(
-        self, given: Initial, n: int | Unknown, name: str, kind: Kind, model: GroupModel
+        self, given: Initial, n: int | Unknown, name: str, kind: Chosen, model: GroupModel
     ) -> dict[str, FloatArray]:
         """What states of the model begin with."""
         result: dict[str, FloatArray] = {}
-        sure = model.model is None or kind.model.name == model.model.name.value  # else it is invalid, and said so
-        states = tuple(state.name for state in kind.model.state)
+        neuron = kind.model.definition
+        sure = model.model is None or neuron.name == model.model.name.value  # else it is invalid, and said so
+        states = tuple(state.name for state in neuron.state)
         for state, formulas in given.states:
             if sure and state.value not in states:
-                found = no_state("model", kind.model.name, f"of '{name}'", state.value, states)
+                found = no_state("model", neuron.name, f"of '{name}'", state.value, states)
                 findings = self.constants.findings
                 findings.error("unknown-state", state.span, found.message, found.hint, undeclared=found.undeclared)
             values = self._drawn(formulas, n, "initial", name, state.value)
@@ -261,11 +261,11 @@ class Builder:
             return UNKNOWN
         return tuple(seen)
 
-    def _kind(self, name: str, model: GroupModel, n: int | Unknown) -> Kind:
+    def _kind(self, name: str, model: GroupModel, n: int | Unknown) -> Chosen:
         """The activation and the model of the neurons; ``identity`` and ``static`` where these are invalid."""
         if n is UNKNOWN or not (_fixed(model.activation) and _fixed(model.model)):
             return self._made(model, n)
-        if _plain(model.activation, self.definitions.activations) and _plain(model.model, self.definitions.models):
+        if self._plain(model.activation, ACTIVATION) and self._plain(model.model, MODEL):
             # what says no more than names is the same in every group: there may be very many of these
             name = f"{_called(model.activation)} {_called(model.model)}"
         key = self.scope.module, name, n
@@ -273,28 +273,25 @@ class Builder:
             self.kinds[key] = self._made(model, n)
         return self.kinds[key]
 
-    def _made(self, model: GroupModel, n: int | Unknown) -> Kind:
-        choices = model.activation or _default("identity", model), model.model or _default("static", model)
-        activation, activity, first = self._chosen(choices[0], "activation", self.definitions.activations, n)
-        neuron, settings, second = self._chosen(choices[1], "model", self.definitions.models, n)
-        check_initials(neuron.state, settings, choices[1], self.constants)
-        return Kind(activation, activity, neuron, settings, (*first, *second))
+    def _made(self, model: GroupModel, n: int | Unknown) -> Chosen:
+        activation = self._settled(model.activation or _default("identity", model), ACTIVATION, n)
+        choice = model.model or _default("static", model)
+        neuron = self._settled(choice, MODEL, n)
+        check_initials(neuron, choice, self.constants)
+        return Chosen(activation, neuron)
 
-    def _chosen(
-        self, choice: Choice, what: Literal["activation", "model"], known: Names[tuple[T, Defaults]], n: int | Unknown
-    ) -> tuple[T, dict[str, FloatArray], list[Part]]:
-        """The definition that a group names, the values of its parameters, and what of these follows parameters."""
-        found = choose(choice, known, what, self.constants.findings)
-        if found is UNKNOWN:
-            check_settings(choice, self.constants, _SETTING.sees)
-        else:
-            allowed = tuple(default.name for default in found[1])
-            settled = settle(choice, (f"{what}s", found[0].name), allowed, self.constants.findings)
-            with self.constants.following() as parts:
-                values = parameters(choice, found[1], n, self.constants, settled)
-            if values is not UNKNOWN:
-                return found[0], values, [part._replace(field=what) for part in parts]
-        return known.known()["identity" if what == "activation" else "static"][0], {}, []
+    def _settled(self, choice: Choice, kind: Kind, n: int | Unknown) -> Settled:
+        """The definition that a group names, with its settings; where it is invalid that of groups that name none."""
+        found = settled_of(choice, kind, self.definitions, self.constants, neurons(n), n)
+        if found is not UNKNOWN and found.sound:
+            return found
+        plain = self.definitions.of(kind).known()["identity" if kind == ACTIVATION else "static"]
+        return Settled(plain.definition, {}, (), Names())
+
+    def _plain(self, choice: Choice | None, kind: Kind) -> bool:
+        """Whether a choice is the name of a definition, or nothing."""
+        known = self.definitions.of(kind).known()
+        return choice is None or (not choice.settings.entries and choice.name.value in known)
 
     def _drawn(
         self, formulas: Formula | FormulaList, n: int | Unknown, purpose: str, name: str, state: str | None = None
@@ -351,9 +348,10 @@ def _numbers(parameters: Mapping[str, FloatArray]) -> Mapping[str, tuple[float, 
     return {name: tuple(values.tolist()) for name, values in parameters.items()} if parameters else _NO_PARAMETERS
 
 
-def _spikes(kind: Kind) -> bool:
+def _spikes(kind: Chosen) -> bool:
     """Whether neurons spike: their model does, and what its activity is of is no graded activation."""
-    return kind.model.spikes and (kind.activation.name == "step" or not kind.model.reads_activation)
+    model = kind.model.definition
+    return model.spikes and (kind.activation.definition.name == "step" or not model.reads_activation)
 
 
 def _default(name: str, model: GroupModel) -> Choice:
@@ -365,11 +363,6 @@ def _fixed(choice: Choice | None) -> bool:
     return choice is None or not any(
         not isinstance(entry.value, Scalar) or isinstance(entry.value.value, str) for entry in choice.settings.entries
     )
-
-
-def _plain(choice: Choice | None, definitions: Names[tuple[T, Defaults]]) -> bool:
-    """Whether a choice is the name of a definition, or nothing."""
-    return choice is None or (not choice.settings.entries and choice.name.value in definitions.known())
 
 
 def _called(choice: Choice | None) -> str:

@@ -1,30 +1,35 @@
-"""Starts: the values with which the states of models begin.
+"""Starts: the values with which the states of definitions in use begin.
 
-In: a block of a network. Out: the value of each state before step 0, one a member: what the group says
-(``initial: {v: …}``), else what the model says.
+In: a definition in use at neurons or connections. Out: the value of each state before step 0, one a member: what the
+group says (``initial: {v: …}``), else what the definition says.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray
-from neurovis_spec.compiler.network import Neurons
-from neurovis_spec.compiler.program import Block
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.program import Use
 from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS, PLAIN
 
 
-def starts_of(block: Block, neurons: Neurons, dt: float) -> dict[str, FloatArray]:
-    """By names of states, arrays of their own, as long as the members of the block."""
-    known: dict[str, Value] = {**CONSTANTS, "dt": dt, **block.model_parameters}
+def starts_of(
+    use: Use, members: IntArray, dt: float, said: Mapping[str, FloatArray] = MappingProxyType({})
+) -> dict[str, FloatArray]:
+    """By names of states, arrays of their own, as long as the members. ``said`` are those that neurons begin with, by
+    states, NaN where the definition says it."""
+    known: dict[str, Value] = {**CONSTANTS, "dt": dt, **use.parameters}
     result: dict[str, FloatArray] = {}
-    for state in block.model.state:
+    for state in use.definition.state:
         # by the functions of the C library, whatever computes the steps: all begin in the same state
         initial = evaluate_array(state.initial, known, by=PLAIN)
-        values = np.array(np.broadcast_to(initial, block.members.shape), dtype=np.float64)
-        if state.name in neurons.starts:
-            given = neurons.starts[state.name][block.members]
+        values = np.array(np.broadcast_to(initial, members.shape), dtype=np.float64)
+        if state.name in said:
+            given = said[state.name][members]
             values = np.where(np.isnan(given), values, given)
         result[state.name] = values
     return result

@@ -241,6 +241,6 @@ def _directories(settled: list[_Settled], total: int) -> tuple[Directory, ...]:
             one.scope.section.inputs,
             index,
             one.scope.module,
-            {item.name: tuple(state.name for state in item.kind.model.state) for item in one.built},
+            {item.name: tuple(state.name for state in item.kind.model.definition.state) for item in one.built},
         )
     return tuple(made[index] for index in range(len(settled)))

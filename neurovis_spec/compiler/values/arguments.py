@@ -8,16 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from functools import partial
-from typing import Final, NamedTuple, TypeVar
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.settable import Assembled, Dependent, ParameterFormula, Part, Subset
 from neurovis_spec.compiler.limits import PATIENCE, plural
-from neurovis_spec.compiler.program import Quantity
+from neurovis_spec.compiler.program import Definition, Kind
 from neurovis_spec.compiler.values.constants import Constants, Randomness, Value, value_of
-from neurovis_spec.compiler.values.definitions import Default, Defaults, check_bounds
+from neurovis_spec.compiler.values.definitions import Default, Defaults, Defined, Definitions, check_bounds
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Findings, Hint, Home, Undeclared, shorten
 from neurovis_spec.language.expressions.evaluate import evaluate_array
@@ -29,8 +29,6 @@ from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.values import Choice, FormulaList
 from neurovis_spec.language.yaml.source import AnyList, Entry, Scalar, one_or_more
 from neurovis_spec.likeness import did_you_mean, meant, suggest
-
-T = TypeVar("T")
 
 #: What other languages call activations, models and rules.
 _ELSEWHERE: Final[Mapping[str, str]] = {
@@ -70,28 +68,51 @@ def neurons(n: int | Unknown) -> Each:
     return Each("neuron", {"i": UNKNOWN if n is UNKNOWN else np.arange(n, dtype=np.int64), "n": n})
 
 
-def choose(
-    choice: Choice, known: Names[tuple[T, Defaults]], what: str, findings: Findings
-) -> tuple[T, Defaults] | Unknown:
+class Settled(NamedTuple):
+    """A definition where it is used: the values of its parameters, what of these follows parameters of the run, and
+    what is written for each of its parameters and signals."""
+
+    definition: Definition
+    parameters: Mapping[str, FloatArray]
+    parts: tuple[Part, ...]
+    entries: Names[Entry]
+    #: whether its parameters are known
+    sound: bool = True
+
+
+def settled_of(
+    choice: Choice, kind: Kind, definitions: Definitions, constants: Constants, each: Each, n: int | Unknown
+) -> Settled | Unknown:
+    """The definition that a choice names, with its settings for ``each`` of n; UNKNOWN where there is none."""
+    found = _chosen(choice, definitions.of(kind), kind, constants.findings)
+    if found is UNKNOWN:
+        check_settings(choice, constants, each.names)
+        return UNKNOWN
+    made = found.definition
+    known = (*(default.name for default in found.defaults), *made.signals)
+    home = Home((kind.section, made.name), ("parameters", "signals"))
+    entries = settings_of(choice.settings, known, "parameter", "it has no parameters", constants.findings, home)
+    with constants.following() as parts:
+        values = _parameters(choice, found.defaults, n, constants, entries, each)
+    if values is UNKNOWN:
+        return Settled(made, {}, (), entries, sound=False)
+    return Settled(made, values, tuple(part._replace(field=kind.name) for part in parts), entries)
+
+
+def _chosen(choice: Choice, known: Names[Defined], kind: Kind, findings: Findings) -> Defined | Unknown:
     """The definition that a choice names; an unknown name is answered with the nearest ones, and taken for the one that
     it can only be meant for."""
-    name = choice.name
+    name, what = choice.name, kind.name
     found = known.get(name.value)
     if found is None:
         right = None if findings.many else meant(name.value, known)
         message = f"there is no {what} '{shorten(name.value)}'"
-        lost = Undeclared(name.value, Home((), (f"{what}s",)))
+        lost = Undeclared(name.value, Home((), (kind.section,)))
         elsewhere = _ELSEWHERE.get(name.value.casefold(), "")
         hint: Hint = did_you_mean([elsewhere]) if elsewhere in known else partial(suggest, name.value, known, "known")
         findings.error(f"unknown-{what}", name.span, message, hint, undeclared=lost)
         found = UNKNOWN if right is None else known[right]
     return found
-
-
-def settle(choice: Choice, definition: tuple[str, str], known: Collection[str], findings: Findings) -> Names[Entry]:
-    """The settings of a choice by the names of its ``definition``: the section that this stands in, and its name."""
-    home = Home(definition, ("parameters", "signals"))
-    return settings_of(choice.settings, known, "parameter", "it has no parameters", findings, home)
 
 
 def check_settings(choice: Choice, constants: Constants, extra: Collection[str] = ()) -> None:
@@ -172,22 +193,16 @@ def _formulas(entry: Entry, constants: Constants) -> Formula | FormulaList | Unk
     return FormulaList(tuple(items), node.span) if len(items) == len(node) else UNKNOWN
 
 
-def parameters(
-    choice: Choice,
-    defaults: Defaults,
-    n: int | Unknown,
-    constants: Constants,
-    settled: Names[Entry],
-    each: Each | None = None,
+def _parameters(
+    choice: Choice, defaults: Defaults, n: int | Unknown, constants: Constants, entries: Names[Entry], each: Each
 ) -> dict[str, FloatArray] | Unknown:
-    """The value of every parameter of a definition, whose settings are ``settled``, for n neurons, or for ``each`` of n
-    connections; UNKNOWN where one is."""
+    """The value of every parameter of a definition with these settings, for ``each`` of n; UNKNOWN where one is."""
     findings = constants.findings
     values: dict[str, Value | Unknown] = {**CONSTANTS, "dt": constants.dt}
     result: dict[str, FloatArray] = {}
     following: dict[str, list[Part]] = {}
     for default in defaults:
-        entry = settled.get(default.name)
+        entry = entries.get(default.name)
         with constants.following() as parts:
             value = _default(default, n, values) if entry is None else _setting(entry, default.name, n, constants, each)
         values[default.name] = value
@@ -210,13 +225,13 @@ def parameters(
             constants.follow(_between(part, low, high)._replace(name=default.name) for part in parts)
         span = choice.name.span if entry is None or entry is UNKNOWN else entry.value.span
         # A default that lies outside by itself is a finding of the definition.
-        if not settled or check_bounds(value, default, values, span, findings):
+        if not entries or check_bounds(value, default, values, span, findings):
             result[default.name] = value
     return UNKNOWN if len(result) < len(defaults) else result
 
 
 def _setting(
-    entry: Entry | Unknown, name: str, n: int | Unknown, constants: Constants, each: Each | None
+    entry: Entry | Unknown, name: str, n: int | Unknown, constants: Constants, each: Each
 ) -> FloatArray | Unknown:
     formulas = UNKNOWN if entry is UNKNOWN else _formulas(entry, constants)
     return UNKNOWN if formulas is UNKNOWN else spread(formulas, n, constants, f"'{name}'", each=each)
@@ -263,12 +278,10 @@ def _assembled(
     return ParameterFormula(tree, {}, known)
 
 
-def check_initials(
-    states: tuple[Quantity, ...], values: Mapping[str, FloatArray], choice: Choice, constants: Constants
-) -> bool:
+def check_initials(used: Settled, choice: Choice, constants: Constants) -> bool:
     """Whether the states of a definition begin with finite numbers; a finding where one does not."""
-    known: dict[str, Value] = {**CONSTANTS, "dt": constants.dt, **values}
-    for state in states:
+    known: dict[str, Value] = {**CONSTANTS, "dt": constants.dt, **used.parameters}
+    for state in used.definition.state:
         if not np.isfinite(evaluate_array(state.initial, known)).all():
             message = f"with these settings the state '{state.name}' does not begin with a finite number"
             constants.findings.error("not-finite", choice.name.span, message)

@@ -23,7 +23,6 @@ from neurovis_spec.language.yaml.reader import read_text
 
 #: the entry point of our own library
 OURS = "builtin"
-_SECTIONS = ("activations", "models", "rules")
 _NOT_INSTALLED = "neurovis is not installed here, only found on the path: run 'pip install -e .' in its folder"
 
 
@@ -71,9 +70,9 @@ def _without_known(
     """The library without the definitions that ``owners`` has already, which are ``hidden``; the others are reported as
     of ``place``."""
     kept: dict[str, dict[str, object]] = {}
-    for section in _SECTIONS:
+    for section, definitions in library.definitions.items():
         kept[section] = {}
-        for name, definition in getattr(library, section).items():
+        for name, definition in definitions.items():
             owner = owners.setdefault((section, name), place)
             if owner == place:
                 kept[section][name] = definition

@@ -2,19 +2,19 @@
 
 In: the models of a library file or of a spec's own sections. Out: Definitions by name. A definition sees its own
 parameters, states and intermediate values, and what its kind is given (``x``; ``drive``; ``pre``, ``post``, …); never
-the spec's parameters. It is checked even if nobody uses it.
+the spec's parameters. It is checked even if nobody uses it. What is written of a kind, and where, is a Reading.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple, TypeAlias, TypeVar
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from neurovis_spec.compiler.limits import PATIENCE
-from neurovis_spec.compiler.program import Activation, Model, Quantity, Rule
+from neurovis_spec.compiler.program import ACTIVATION, MODEL, RULE, Definition, Kind, Quantity
 from neurovis_spec.compiler.values.constants import (
     ALWAYS,
     Outside,
@@ -28,18 +28,21 @@ from neurovis_spec.diagnostics import Findings, Home, Span
 from neurovis_spec.language.expressions.evaluate import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS, meaning
 from neurovis_spec.language.expressions.tree import ExpressionError, Name, Number, Tree, substitute
-from neurovis_spec.language.library import ActivationModel, Library, ModelModel, RuleModel, StateModel
-from neurovis_spec.language.located import IDENTIFIER, Formula, bad_name, name_hint
-from neurovis_spec.language.model import Model as LanguageModel
+from neurovis_spec.language.grammar import Role
+from neurovis_spec.language.library import (
+    ActivationModel,
+    DefinitionModel,
+    Library,
+    ModelModel,
+    RuleModel,
+    StateModel,
+)
+from neurovis_spec.language.located import IDENTIFIER, Formula, Located, bad_name, name_hint
 from neurovis_spec.language.model import names_of
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.values import ParameterModel
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
-
-_ACTIVATION = formula_at(ActivationModel, "value")
-_MODEL = formula_at(ModelModel, "activity")
-_RULE = formula_at(RuleModel, "weight", "each_step")
 
 
 class Default(NamedTuple):
@@ -54,27 +57,50 @@ class Default(NamedTuple):
 Defaults: TypeAlias = tuple[Default, ...]
 
 
+class Defined(NamedTuple):
+    """A definition, and the defaults of its parameters."""
+
+    definition: Definition
+    defaults: Defaults
+
+
+_NONE = Names[Defined]()
+
+
 @dataclass(frozen=True)
 class Definitions:
-    """All definitions in reach, with the defaults of their parameters."""
+    """All definitions in reach, by their kinds."""
 
-    activations: Names[tuple[Activation, Defaults]] = field(default_factory=Names)
-    models: Names[tuple[Model, Defaults]] = field(default_factory=Names)
-    rules: Names[tuple[Rule, Defaults]] = field(default_factory=Names)
+    kinds: Mapping[Kind, Names[Defined]] = field(default_factory=dict)
+
+    def of(self, kind: Kind) -> Names[Defined]:
+        """Those of a kind, by name."""
+        return self.kinds.get(kind, _NONE)
 
     def over(self, other: Definitions) -> Definitions:
         """These and others: of two of one name this one."""
-        return Definitions(
-            self.activations.over(other.activations), self.models.over(other.models), self.rules.over(other.rules)
-        )
+        return Definitions({kind: self.of(kind).over(other.of(kind)) for kind in {**self.kinds, **other.kinds}})
 
     def opened(self, is_open: bool) -> Definitions:
         """The same definitions; with ``is_open`` an unknown name is UNKNOWN, as some could not be read."""
-        return Definitions(self.activations.opened(is_open), self.models.opened(is_open), self.rules.opened(is_open))
+        return Definitions({kind: known.opened(is_open) for kind, known in self.kinds.items()})
 
 
-M = TypeVar("M", bound=LanguageModel)
-D = TypeVar("D")
+class Reading(NamedTuple):
+    """How definitions of a kind are read: what their formulas see (``role``), and whether intermediate values are put
+    into what is given (``inlined``)."""
+
+    kind: Kind
+    role: Role
+    inlined: bool = False
+
+
+_READINGS = (
+    Reading(ACTIVATION, formula_at(ActivationModel, "value"), inlined=True),
+    Reading(MODEL, formula_at(ModelModel, "activity")),
+    Reading(RULE, formula_at(RuleModel, "weight", "each_step")),
+)
+
 #: Keys of a definition that declare what is set where it is used, and those that declare names.
 _SET = frozenset({"parameters", "signals"})
 _SECTIONS = ("parameters", "signals", "let", "state")
@@ -105,7 +131,7 @@ class _Checker:
     """Checks one definition: the names that are taken, and the trees of its formulas."""
 
     def __init__(
-        self, given: tuple[str, ...], model: LanguageModel, findings: Findings, around: Around, place: tuple[str, str]
+        self, given: tuple[str, ...], model: DefinitionModel, findings: Findings, around: Around, place: tuple[str, str]
     ) -> None:
         self.model = model
         self.findings = findings
@@ -137,9 +163,9 @@ class _Checker:
                 return entry.key.span
         return self.model.source.span if node is None else node.span
 
-    def optional(self, formula: Formula | None) -> Tree | None:
+    def optional(self, formula: Formula | None, functions: Mapping[str, int] | None = None) -> Tree | None:
         """The tree of a formula that may be left out."""
-        return None if formula is None else self.tree(formula)
+        return None if formula is None else self.tree(formula, functions)
 
     def tree(
         self,
@@ -199,15 +225,48 @@ class _Checker:
             self.declare("let", name)
         return tuple(result)
 
+    def signals(self, signals: Sequence[Located[str]]) -> tuple[str, ...] | Unknown:
+        """Declare the signals; UNKNOWN where it is not known which there are."""
+        before = self.findings.errors
+        for signal in signals:
+            if not IDENTIFIER.fullmatch(signal.value):
+                self.findings.error("bad-name", signal.span, bad_name(signal.value), name_hint(signal.value))
+            elif signal.value in self.known.declared:
+                self.findings.error("duplicate-name", signal.span, self.taken(signal.value), "choose another name")
+            self.known.declared[signal.value] = signal.span
+            if self.findings.errors - before >= PATIENCE:
+                break
+        return UNKNOWN if self.findings.errors > before else tuple(signal.value for signal in signals)
+
+    def unfolded(self, let: tuple[tuple[str, Tree], ...]) -> dict[str, Tree] | Unknown:
+        """The intermediate values, each with those before it put in; UNKNOWN where one explodes."""
+        result: dict[str, Tree] = {}
+        before = self.findings.errors
+        for key, tree in let:
+            if self.findings.errors > before:  # what explodes once explodes again in all that uses it
+                return UNKNOWN
+            place = self.known[key]
+            result[key] = self.with_let(tree, result, place if isinstance(place, Span) else self.model.source.span)
+        return result
+
+    def with_let(self, tree: Tree, let: Mapping[str, Tree], span: Span) -> Tree:
+        """The tree with its intermediate values put in; a finding where that makes too much of it."""
+        try:
+            return substitute(tree, let)
+        except ExpressionError as error:
+            message = f"with its intermediate values put in, {error.message}"
+            self.findings.error(error.code, span, message, error.hint)
+            return Number(0.0)
+
     def states(self, state: Mapping[str, StateModel], defaults: Defaults) -> tuple[Quantity, ...]:
         """The states; their right-hand sides see everything, their initial values the parameters alone."""
         constant = (*ALWAYS, *(default.name for default in defaults))
         return tuple(
             Quantity(
                 name,
-                Number(0.0) if model.initial is None else self.tree(model.initial, None, constant, "known here"),
                 self.optional(model.each_step),
                 self.optional(model.each_episode),
+                Number(0.0) if model.initial is None else self.tree(model.initial, None, constant, "known here"),
             )
             for name, model in state.items()
         )
@@ -236,98 +295,48 @@ def _bound(default: Default, how: str, bound: Tree | None) -> str | None:
     return f"'{default.name}' is {how} '{bound.name}'" if isinstance(bound, Name) else None
 
 
-def _activation(
-    name: str, model: ActivationModel, findings: Findings, around: Around
-) -> tuple[Activation, Defaults] | Unknown:
-    """The activation; UNKNOWN where an intermediate value is invalid."""
-    checker = _Checker(_ACTIVATION.sees, model, findings, around, ("activations", name))
-    defaults = checker.parameters(model.parameters)
-    replaced: dict[str, Tree] = {}
-    let = checker.let(model.let)
-    before = findings.errors
-    for key, tree in let:
-        if findings.errors > before:  # what explodes once explodes again in all that uses it
-            return UNKNOWN
-        place = checker.known[key]
-        replaced[key] = _expanded(tree, replaced, place if isinstance(place, Span) else model.source.span, findings)
-    tree = _expanded(checker.tree(model.value), replaced, model.value.span, findings)
-    return Activation(name, tuple(default.name for default in defaults), tree), defaults
-
-
-def _expanded(tree: Tree, let: Mapping[str, Tree], span: Span, findings: Findings) -> Tree:
-    """The tree with its intermediate values put in; a finding where that makes too much of it."""
-    try:
-        return substitute(tree, let)
-    except ExpressionError as error:
-        findings.error(error.code, span, f"with its intermediate values put in, {error.message}", error.hint)
-        return Number(0.0)
-
-
-def _model(name: str, model: ModelModel, findings: Findings, around: Around) -> tuple[Model, Defaults]:
-    checker = _Checker(_MODEL.sees, model, findings, around, ("models", name))
-    defaults = checker.parameters(model.parameters)
-    for key in names_of(model, "state", model.state):
-        checker.declare("state", key)
-    let = checker.let(model.let)
-    state = checker.states(model.state, defaults)
-    activity = checker.tree(model.activity, dict.fromkeys(_MODEL.functions, 1))
-    names = tuple(default.name for default in defaults)
-    spikes = model.spikes is not None and model.spikes.value
-    return Model(name, names, let, state, activity, spikes), defaults
-
-
-def _rule(name: str, model: RuleModel, findings: Findings, around: Around) -> tuple[Rule, Defaults] | Unknown:
-    """The rule; UNKNOWN where it is not known which signals it has."""
-    checker = _Checker(_RULE.sees, model, findings, around, ("rules", name))
-    defaults = checker.parameters(model.parameters)
-    before = findings.errors
-    for signal in model.signals:
-        if not IDENTIFIER.fullmatch(signal.value):
-            findings.error("bad-name", signal.span, bad_name(signal.value), name_hint(signal.value))
-        elif signal.value in checker.known.declared:
-            findings.error("duplicate-name", signal.span, checker.taken(signal.value), "choose another name")
-        checker.known.declared[signal.value] = signal.span
-        if findings.errors - before >= PATIENCE:
-            break
-    if findings.errors > before:
+def definition_of(
+    reading: Reading, name: str, model: DefinitionModel, findings: Findings, around: Around = NOTHING_AROUND
+) -> Defined | Unknown:
+    """A definition; UNKNOWN where it is not known which signals it has, or an intermediate value that is put into
+    others is invalid."""
+    kind, parts = reading.kind, model.parts()
+    checker = _Checker(reading.role.sees, model, findings, around, (kind.section, name))
+    defaults = checker.parameters(parts.parameters)
+    signals = checker.signals(parts.signals)
+    if signals is UNKNOWN:
         return UNKNOWN
-    for key in names_of(model, "state", model.state):
+    for key in () if parts.state is None else names_of(model, "state", parts.state):
         checker.declare("state", key)
-    let = checker.let(model.let)
-    state = checker.states(model.state, defaults)
-    step = checker.optional(model.weight.each_step)
-    episode = checker.optional(model.weight.each_episode)
-    signals = tuple(signal.value for signal in model.signals)
-    return Rule(name, tuple(default.name for default in defaults), signals, let, state, step, episode), defaults
+    let = checker.let(parts.let)
+    state = checker.states(parts.state or {}, defaults)
+    unfolded = checker.unfolded(let) if reading.inlined else {}
+    if unfolded is UNKNOWN:
+        return UNKNOWN
+    functions = dict.fromkeys(reading.role.functions, 1)
+    each_step, each_episode = (checker.optional(one, functions) for one in (parts.each_step, parts.each_episode))
+    if reading.inlined and parts.each_step is not None and each_step is not None:
+        let, each_step = (), checker.with_let(each_step, unfolded, parts.each_step.span)
+    given = Quantity(kind.gives, each_step, each_episode)
+    names = tuple(default.name for default in defaults)
+    return Defined(Definition(kind, name, names, (given,), let, state, signals, parts.spikes), defaults)
 
 
 def define(library: Library, findings: Findings, builtin: Definitions, around: Around = NOTHING_AROUND) -> Definitions:
     """The definitions of a file. Who replaces a built-in one is warned."""
-    sections: tuple[tuple[str, Collection[str]], ...] = (
-        ("activations", builtin.activations), ("models", builtin.models), ("rules", builtin.rules)
-    )  # fmt: skip
-    for section, known in sections:
-        node = library.source.get(section)
+    for reading in _READINGS:
+        node = library.source.get(reading.kind.section)
         for entry in node.entries if isinstance(node, SourceMapping) else ():
-            if entry.name in known:
+            if entry.name in builtin.of(reading.kind):
                 message = f"'{entry.name}' replaces the built-in of that name"
                 findings.warning("replaces-builtin", entry.key.span, message)
-    return Definitions(
-        _defined("activations", library, library.activations, _activation, findings, around),
-        _defined("models", library, library.models, _model, findings, around),
-        _defined("rules", library, library.rules, _rule, findings, around),
-    )
+    return Definitions({reading.kind: _defined(reading, library, findings, around) for reading in _READINGS})
 
 
-def _defined(
-    section: str,
-    library: Library,
-    models: Mapping[str, M],
-    make: Callable[[str, M, Findings, Around], tuple[D, Defaults] | Unknown],
-    findings: Findings,
-    around: Around,
-) -> Names[tuple[D, Defaults]]:
+def _defined(reading: Reading, library: Library, findings: Findings, around: Around) -> Names[Defined]:
     """The definitions of a section. One of which it is not known which parameters and signals it has is UNKNOWN."""
-    made = {name: make(name, model, findings, around) for name, model in models.items()}
+    section = reading.kind.section
+    models = library.definitions[section]
+    made = {name: definition_of(reading, name, model, findings, around) for name, model in models.items()}
     sure = {name: made[name] if model.unknown.isdisjoint(_SET) else UNKNOWN for name, model in models.items()}
     return names_of(library, section, sure)
