@@ -24,10 +24,11 @@ sys.path.insert(0, str(HERE / "benchmarks"))
 from layout_peers import Timed, directed, nested  # noqa: E402
 
 import neurovis_spec as nv  # noqa: E402
-from neurovis_spec import pipeline  # noqa: E402
 from neurovis_spec.layout import LayoutProblem  # noqa: E402
 from neurovis_spec.layout.metrics import metrics  # noqa: E402
 from neurovis_spec.layout.problem import problem_of  # noqa: E402
+from neurovis_spec.scene.film import scene_of_step  # noqa: E402
+from neurovis_spec.scene.renderers import drawing  # noqa: E402
 from neurovis_spec.scene.shown import LeftOut  # noqa: E402
 
 #: A number in a picture; and how far two may be apart that differ by the last digits of a machine's functions.
@@ -350,14 +351,14 @@ def draw_as_dot(picture: Picture, path: Path) -> None:
         snapshot = network.run(picture.step + 1).snapshot(picture.step)
     title = f"{network.network.title or network.name}: by dot"
     settings = replace(network.network.render, title=title, size=None)
-    scene = pipeline.picture(network.network, layout, snapshot, network.gains, settings)
+    scene = scene_of_step(network.network, layout, snapshot, network.gains, settings)
     size = network.network.render.size
     if size is not None:  # as high as ours, and as wide as dot's then is
         wide, high = scene.pixels
         settings = replace(settings, size=(round(wide * size[1] / high), size[1]))
-        scene = pipeline.picture(network.network, layout, snapshot, network.gains, settings)
+        scene = scene_of_step(network.network, layout, snapshot, network.gains, settings)
     groups = tuple(replace(group, data={}, title="") for group in scene.groups)
-    drawn = pipeline.draw(replace(scene, groups=groups), ".svg")
+    drawn = drawing(replace(scene, groups=groups), ".svg")
     if not path.exists() or not alike(path.read_text(encoding="utf-8"), drawn.decode()):
         path.write_bytes(drawn)
     _say(path)

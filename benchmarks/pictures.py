@@ -25,10 +25,11 @@ from neurovis_renderers.canvas import paint
 from neurovis_renderers.frames import frames
 from neurovis_renderers.raster import PillowRenderer
 
-from neurovis_spec import api, pipeline
+from neurovis_spec import api
 from neurovis_spec.scene import Film, Scene
-from neurovis_spec.scene.film import still
-from neurovis_spec.snapshots import snapshots_from
+from neurovis_spec.scene.film import film, scene_of_step, still
+from neurovis_spec.scene.look import Look
+from neurovis_spec.scene.shots import shots_of
 
 #: neurons and connections, about: those of networks that are drawn at random
 SIZES = ((12, 28), (200, 400), (448, 7379), (5000, 96651))
@@ -61,11 +62,11 @@ def prepared(neurons: int, connections: int, folder: Path) -> Path:
     recording, layout, settings = network.run(_STEPS), network.drawn().value, network.network.render
     snapshot = recording.snapshot(_STEPS - 1)
     path = folder / str(neurons)
-    scene = pipeline.picture(network.network, layout, snapshot, network.gains, settings)
+    scene = scene_of_step(network.network, layout, snapshot, network.gains, settings)
     (path.with_suffix(".scene")).write_bytes(pickle.dumps(scene))
-    snapshots = snapshots_from(network.network, 0, _STEPS, recording)
-    film = pipeline.moving(network.network, layout, snapshots, network.gains, settings, 25.0)
-    (path.with_suffix(".film")).write_bytes(pickle.dumps(film))
+    shots = shots_of(network.network, recording, Look(settings, first=0, count=_STEPS, fps=25.0))
+    moving = film(network.network, layout, shots.snapshots(network.network), network.gains, settings, 25.0)
+    (path.with_suffix(".film")).write_bytes(pickle.dumps(moving))
     counts = len(network.network.neurons), len(network.network.connections)
     print(f"\n{counts[0]:,}/{counts[1]:,}, {scene.pixels[0]} × {scene.pixels[1]} pixels, engine {layout.engine}")
     return path

@@ -33,6 +33,7 @@ import neurovis_spec as nv
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime import c_library
 from neurovis_spec.runtime.c_backend import CBackend
+from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.numpy_backend import NumpyBackend
 from neurovis_spec.runtime.record import record
@@ -346,7 +347,7 @@ def one_by_one(network: Network) -> Run:
 
 def recorded(network: Network, backend: str) -> Run:
     def made(steps: int) -> None:
-        record(network, steps, backend=backend)
+        record(network, Course(steps, backend=backend))
 
     return made
 

@@ -21,11 +21,13 @@ from networks_by_hand import TANH, Unit, build, cpg_rbf, rewired
 from toy_bodies import Cart, carted
 
 import neurovis_spec as nv
-from neurovis_spec import pipeline
-from neurovis_spec.compiler.compile import Request
+from neurovis_spec.compiler.compile import Request, compile_spec
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.shape import read_spec
+from neurovis_spec.language.yaml.reader import read_text
 from neurovis_spec.runtime.backend import load
+from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.embodied import Embodied
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.record import record
@@ -101,7 +103,7 @@ def recording(network: Network) -> Run:
     """``record``: inputs, step, watch and record."""
 
     def run(steps: int) -> None:
-        record(network, steps, backend="numpy")
+        record(network, Course(steps, backend="numpy"))
 
     return run
 
@@ -145,11 +147,11 @@ def many_events(count: int) -> tuple[float, float]:
     text = "neurovis: 1\nname: x\nparameters: {g: 1}\nneurons: {A: {count: 12, bias: g}}\nevents:\n" + events
     begin = time.process_time()
     findings = Findings()
-    document = pipeline.read_string(text, "x", findings)
-    spec = None if document is None else pipeline.shape(document, findings)
+    document = read_text(text, "x", findings)
+    spec = None if document is None else read_spec(document, findings)
     assert spec is not None
     read = time.process_time()
-    assert pipeline.build(spec, Request(Path(), Path()), findings) is not None
+    assert compile_spec(spec, Request(Path(), Path()), findings) is not None
     return read - begin, time.process_time() - read
 
 

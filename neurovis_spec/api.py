@@ -14,7 +14,6 @@ from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.compile import Request
 from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span, SpecError
-from neurovis_spec.language.yaml.source import SourceDocument
 
 if TYPE_CHECKING:
     from neurovis_spec.runtime.recording import Recording
@@ -45,12 +44,10 @@ def compile(
         from neurovis_spec.plain import text_of
 
         request = _request(Path(), root, parameters, more, seed, limit, body)
-        return _compile_text(text_of(source), "<mapping>", request)
+        return _compiled(text_of(source), "<mapping>", request)
     path = arguments.path("source", source)
     request = _request(path.parent, root, parameters, more, seed, limit, body)
-    findings = Findings()
-    document = pipeline.read(path, str(source), findings)
-    return _finish(document, request, findings, str(source))
+    return _compiled(path, str(source), request)
 
 
 def compile_text(
@@ -74,7 +71,7 @@ def compile_text(
     arguments.text("text", text)
     base = arguments.path("folder", "." if folder is None else folder)
     request = _request(base, root, parameters, more, seed, limit, body)
-    return _compile_text(text, arguments.text("file", file), request)
+    return _compiled(text, arguments.text("file", file), request)
 
 
 def load(path: str | Path, *, run: int | None = None) -> Recording:
@@ -120,13 +117,9 @@ def _request(
     return Request(folder, inside, values, whole, limits, body=arguments.body(body))
 
 
-def _compile_text(text: str, file: str, request: Request) -> CompiledNetwork:
+def _compiled(source: str | Path, file: str, request: Request) -> CompiledNetwork:
     findings = Findings()
-    return _finish(pipeline.read_string(text, file, findings), request, findings, file)
-
-
-def _finish(document: SourceDocument | None, request: Request, findings: Findings, file: str) -> CompiledNetwork:
-    spec, request, network, memory = pipeline.compile(document, request, findings)
+    spec, request, network, memory = pipeline.compile(source, file, request, findings)
     findings.check()
     if spec is None or network is None:
         span = Span(file, 1, 1, 1, 2)

@@ -1,7 +1,8 @@
-"""A compiled network, as users hold it: ``.run``, ``.layout``, ``.export``; what draws it is in ``pictures``.
+"""A compiled network, as users hold it: ``.run``, ``.layout``, ``.render``, ``.export``.
 
-In: what the compiler made of a spec. Out: recordings, layouts, files. What runs, lays out and draws is imported by who
-does so: a spec is compiled, and thereby checked, without it.
+In: what the compiler made of a spec, and what a caller gives by name. Out: recordings, layouts, pictures, files; each
+of these by one value, a Course or a Look (``keywords``). What runs, lays out and draws is imported by who does so: a
+spec is compiled, and thereby checked, without it.
 """
 
 from __future__ import annotations
@@ -10,68 +11,55 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Unpack
 
-import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec import arguments, pipeline
-from neurovis_spec.compiler.compile import Request
+from neurovis_spec.compilation import Compilation
+from neurovis_spec.compiler.compile import compile_spec
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.diagnostics import Diagnostic, Findings
-from neurovis_spec.language.spec import Spec
-from neurovis_spec.pictures import Drawable, check, svg
+from neurovis_spec.gc_paused import uncollected
+from neurovis_spec.keywords import (
+    FILM,
+    KEEP,
+    MEMORY,
+    RUN,
+    STILL,
+    FilmKeywords,
+    KeepKeywords,
+    MemoryKeywords,
+    PictureKeywords,
+    RunKeywords,
+    StillKeywords,
+    check,
+    completed,
+    course_of,
+    film_of,
+    keep_of,
+    keywords,
+    panels_of,
+    still_of,
+)
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.files import replacing
 
 if TYPE_CHECKING:
     from neurovis_spec.arrays import FloatArray
-    from neurovis_spec.layout import Layout, LayoutProblem, Point, Route
+    from neurovis_spec.layout import Layout, Point, Route
     from neurovis_spec.notebook.widget import LiveWidget
     from neurovis_spec.runtime.columns import Keep
-    from neurovis_spec.runtime.record import Course
     from neurovis_spec.runtime.recording import Recording
     from neurovis_spec.runtime.simulation import Simulation
     from neurovis_spec.runtime.until import Until
-
-
-def _keep(states: str | Sequence[str], neurons: str | Sequence[str], weights: str) -> Keep:
-    """What of a step is recorded. Raises ValueError."""
-    from neurovis_spec.runtime.columns import Keep
-
-    if weights not in ("plastic", "none"):
-        raise ValueError(f"weights are 'plastic' or 'none', not {weights!r}")
-    return Keep(arguments.texts("neurons", neurons), weights == "plastic", arguments.texts("states", states))
+    from neurovis_spec.scene.look import Look
+    from neurovis_spec.scene.panels import View
 
 
 @dataclass(frozen=True, eq=False)
-class CompiledNetwork(Drawable):
+class CompiledNetwork(Compilation):
     """A compiled network: run it, lay it out, draw it. ``network`` holds its arrays, ``warnings`` what was noticed."""
-
-    spec: Spec
-    request: Request
-    warnings: tuple[Diagnostic, ...]
-    sources: Mapping[str, str]
-    #: the earlier layout that the spec names (``layout.file``)
-    memory: Layout | None = None
-    #: the files that the spec names, of data, included, and of the layout
-    files: frozenset[Path] = frozenset()
-
-    @property
-    def layout_file(self) -> Path | None:
-        """The file of the earlier layout that the spec names, which need not be there."""
-        layout = self.spec.layout
-        return None if layout is None or layout.file is None else self.request.base / layout.file.value
-
-    @property
-    def name(self) -> str:
-        """The name that the spec gives it."""
-        return self.network.name
-
-    @property
-    def hash(self) -> str:
-        """SHA-256 of the canonical network."""
-        return self.network.hash
 
     @property
     def parameters(self) -> Mapping[str, float]:
@@ -93,17 +81,15 @@ class CompiledNetwork(Drawable):
 
         return whole_text(self.spec, self.request, self.sources)
 
+    @keywords(KeepKeywords, KEEP)
     def simulator(
         self,
         backend: str | None = None,
         *,
         start: Recording | None = None,
         record: str | Path | bool = False,
-        every: int = 1,
-        states: str | Sequence[str] = (),
-        neurons: str | Sequence[str] = (),
-        weights: Literal["plastic", "none"] = "plastic",
         body: str | Path | bool = True,
+        **kept: Unpack[KeepKeywords],
     ) -> Simulation:
         """Step by step, for a control loop; ``start`` is a recording to go on from, ``body`` as in ``run``.
 
@@ -112,29 +98,20 @@ class CompiledNetwork(Drawable):
         as in ``run``. Raises what ``run`` raises."""
         from neurovis_spec.runtime.simulation import Simulation
 
+        given = completed("simulator", kept, KEEP)
         check(backend=backend, start=start)
         made = Simulation(self.with_body(body).network, backend, start)
         if record is not False:
             target = None if record is True else arguments.path("record", record)
-            made.record(target, every, self._kept_in(target, _keep(states, neurons, weights)))
+            made.record(target, given["every"], self._kept_in(target, keep_of(given)))
         return made
 
+    @keywords(MemoryKeywords, MEMORY)
     def run(
         self,
         steps: int | None = None,
         inputs: Mapping[str, npt.ArrayLike] | None = None,
-        *,
-        backend: str | None = None,
-        every: int = 1,
-        start: Recording | None = None,
-        until: str | Until | None = None,
-        progress: Progress | None = None,
-        states: str | Sequence[str] = (),
-        neurons: str | Sequence[str] = (),
-        weights: Literal["plastic", "none"] = "plastic",
-        checkpoint: str | Path | None = None,
-        last: bool = False,
-        body: str | Path | bool = True,
+        **options: Unpack[MemoryKeywords],
     ) -> Recording:
         """Run ``steps`` steps (default ``time.steps``) and record every ``every``-th.
 
@@ -148,14 +125,13 @@ class CompiledNetwork(Drawable):
         InputError, BackendError, BodyError, RecordingError, KeyError for a name that there is not, SpecError where
         ``until`` or the file of a body is invalid.
         """
-        check(backend=backend, start=start, progress=progress)
-        keep = replace(_keep(states, neurons, weights), last=arguments.truth("last", last))
-        course = self._course(steps, inputs, backend, every, until, keep)
-        kept = None if checkpoint is None else arguments.path("checkpoint", checkpoint)
         from neurovis_spec.notebook.recording import played
+        from neurovis_spec.runtime.record import record
 
-        network = self.with_body(body).network
-        return played(pipeline.simulate(network, course, start, progress, kept), self)
+        given = completed("run", options, MEMORY)
+        course = course_of(self.network, steps, inputs, given)
+        of = self.with_body(given["body"])
+        return played(record(of.network, course, given["progress"]), self)
 
     def live(
         self,
@@ -171,12 +147,13 @@ class CompiledNetwork(Drawable):
         parameters are traits: ``widget.mix = 0.4`` turns one, and one that is turned in the picture changes. ``start``
         is a recording to go on from; with ``play`` it plays as soon as it is shown. Raises ImportError without the
         extra ``jupyter``, and what ``layout``, ``run`` and ``simulator`` raise."""
-        from neurovis_spec.notebook.widget import live
+        from neurovis_spec.live.show import Show
+        from neurovis_spec.notebook.widget import LiveWidget
 
         check(recording=recording, start=start, theme=theme, engine=engine, backend=backend)
         if recording is not None and (start is not None or backend is not None):
             raise ValueError("'start' and 'backend' are for a run, and a 'recording' is played: give one of the two")
-        return live(self, recording, start, theme, engine, backend, arguments.truth("play", play))
+        return LiveWidget(self, Show(recording, start, theme, engine, backend), arguments.truth("play", play))
 
     def until(self, text: str) -> Until:
         """A measure that ends runs, ``rms(O - T, last=129) < 0.01``: its ``ending`` says how the last one ended. Raises
@@ -188,39 +165,32 @@ class CompiledNetwork(Drawable):
     def measure(self, text: str, recording: Recording) -> FloatArray:
         """What a measure (``rms(O - T, last=129)``) is after each step of a recording of every step, (steps,): NaN
         while it has no value. Raises SpecError, RecordingError."""
+        from neurovis_spec.runtime.gauge import over
         from neurovis_spec.runtime.recording import Recording
 
         arguments.instance("recording", recording, Recording, "a recording")
-        return pipeline.gauge(self.network, arguments.text("text", text), recording)
+        return over(arguments.text("text", text), self.network, recording)
 
+    @keywords(RunKeywords, RUN)
     def run_to(
         self,
         path: str | Path,
         steps: int | None = None,
         inputs: Mapping[str, npt.ArrayLike] | None = None,
-        *,
-        backend: str | None = None,
-        every: int = 1,
-        start: Recording | None = None,
-        until: str | Until | None = None,
-        progress: Progress | None = None,
-        states: str | Sequence[str] = (),
-        neurons: str | Sequence[str] = (),
-        weights: Literal["plastic", "none"] = "plastic",
-        checkpoint: str | Path | None = None,
-        body: str | Path | bool = True,
+        **options: Unpack[RunKeywords],
     ) -> str:
         """Run as ``run`` does and write the recording to a file while it is made, in memory that does not grow with the
         steps; gives the name of the backend. What was there stays until the end. Raises what ``run`` and
         ``Recording.save`` raise, RecordingError where the disk has not the room, and after Ctrl-C a KeyboardInterrupt;
         the file holds the steps until then. After any other exception a part beside the file holds them, which is read
         where the file is not there."""
-        check(backend=backend, start=start, progress=progress)
+        from neurovis_spec.runtime.stream import record_to
+
+        given = completed("run_to", options, RUN)
         target = arguments.path("path", path)
-        keep = self._kept_in(target, _keep(states, neurons, weights))
-        course = self._course(steps, inputs, backend, every, until, keep)
-        kept = None if checkpoint is None else arguments.path("checkpoint", checkpoint)
-        return pipeline.simulate_to(self.with_body(body).network, target, course, start, progress, kept)
+        course = course_of(self.network, steps, inputs, {**given, "last": False})
+        course = replace(course, keep=self._kept_in(target, course.keep))
+        return record_to(self.with_body(given["body"]).network, target, course, given["progress"])
 
     def _kept_in(self, path: Path | None, keep: Keep) -> Keep:
         """What of a step is recorded in a file of this format."""
@@ -236,32 +206,12 @@ class CompiledNetwork(Drawable):
         if given is False:
             return replace(self, request=request, network=replace(self.network, body=None))
         findings = Findings(dict(self.sources))
-        network = pipeline.build(self.spec, request, findings)
+        with uncollected():
+            network = compile_spec(self.spec, request, findings)
         findings.check()
         assert network is not None
         files, sources = self.files | findings.files, dict(findings.sources)
         return replace(self, request=request, network=network, sources=sources, files=files)
-
-    def _course(
-        self,
-        steps: int | None,
-        inputs: Mapping[str, npt.ArrayLike] | None,
-        backend: str | None,
-        every: int,
-        until: str | Until | None,
-        keep: Keep,
-    ) -> Course:
-        from neurovis_spec.runtime.record import Course
-
-        ends = self.until(until) if isinstance(until, str) else until
-        if ends is not None:
-            from neurovis_spec.runtime.until import Until
-
-            arguments.instance("until", ends, Until, "a text or an Until")
-        if inputs is not None:
-            arguments.mapping("inputs", inputs)
-        whole = self.network.steps if steps is None else arguments.integer("steps", steps, 0, arguments.MOST_STEPS)
-        return Course(whole, arguments.integer("every", every, 1, arguments.MOST_STEPS), inputs, backend, ends, keep)
 
     def refusal(self) -> Diagnostic | None:
         """What ``layout`` and all that draws would refuse, as far as that is known before an engine begins; None where
@@ -281,48 +231,88 @@ class CompiledNetwork(Drawable):
         LayoutRefusalError where an engine cannot do what is asked; its ``diagnostic`` says where the spec asks for
         it."""
         check(engine=engine, effort=effort, earlier=earlier, progress=progress)
-        return NetworkLayout(self, self._arranged(engine, effort, earlier, progress))
-
-    def _arranged(
-        self,
-        engine: str | None = None,
-        effort: str | None = None,
-        earlier: Layout | None = None,
-        progress: Progress | None = None,
-    ) -> Layout:
-        from neurovis_spec.layout.model import LayoutRefusalError, effort_of
-
-        try:
-            problem = replace(self.problem, effort=effort_of(effort or "normal"))
-            if earlier is not None:
-                problem = replace(problem, memory=earlier)
-            return pipeline.arrange(problem, engine or self.network.layout.engine, progress)
-        except LayoutRefusalError as refusal:
-            span = pipeline.locate(refusal, self.spec, self.request, self.network, engine)
-            if span is not None:
-                refusal.locate(span, self.sources)
-            raise
-
-    @cached_property
-    def problem(self) -> LayoutProblem:
-        """What a layout engine is given."""
-        return pipeline.pose(self.network, self.memory)
-
-    @cached_property
-    def _layouts(self) -> dict[tuple[str | None, str], NetworkLayout]:
-        return {}
+        return NetworkLayout(self, self.arranged(engine, effort, earlier, progress))
 
     def drawn(self, engine: str | None = None, effort: str | None = None) -> NetworkLayout:
         """The layout that pictures are drawn in, by this engine or the spec's; computed once. Raises what ``layout``
         raises."""
-        key = engine, effort or "normal"
-        if key not in self._layouts:
-            self._layouts[key] = self.layout(engine, effort=effort)
-        return self._layouts[key]
+        check(engine=engine, effort=effort)
+        return NetworkLayout(self, self.placed(engine, effort))
 
-    def placed(self, engine: str | None = None, effort: str | None = None) -> Layout:
-        """The value of ``drawn``."""
-        return self.drawn(engine, effort).value
+    @keywords(StillKeywords, STILL)
+    def render(self, path: str | Path, **options: Unpack[StillKeywords]) -> None:
+        """Draw one step into a file whose suffix says what kind.
+
+        Without ``step`` it is the last of the recording, or of a default run. Without ``recording`` the network runs
+        as far as the step; ``inputs`` replace the sources of inputs, as in ``run``, and the gains are those of this
+        run. ``view`` says what is shown, from top to bottom: ``network``, ``matrix``, ``traces``, ``raster``,
+        ``weights``, alone or with references (``traces: C1, C2`` or {"traces": ["C1", "C2"]}), and ``body``; by default
+        it is the spec's ``figure``, else the network, with its body where there is one. Views over time show the whole
+        recording or run, or ``window`` steps around the one that is drawn. ``effort`` is that of ``layout``. ``dpi``
+        are the pixels of an inch, 96 of which are a picture's usual size on the screen.
+
+        ``collapse`` names groups and instances that are one glyph each in the picture of the network, ``focus``
+        neurons that are shown with all they are connected to, ``paths`` (``"A -> B"``) what the shortest paths are
+        shown of; connections below ``min_weight`` are left out. Of very many connections, and of those that would make
+        an SVG larger than 5 MB, the weakest are left out, with a warning, unless it is to be ``full``. Raises
+        RendererError for a kind that nobody draws, for a view, a name to be shown and a path that there is not,
+        KeyError for an unknown reference, before anything is run.
+        """
+        given = completed("render", options, STILL)
+        place = arguments.path("path", path)
+        look = still_of(self, place, given)
+        pipeline.draw(self, look, self._run_of(look, given), place, given["progress"])
+
+    @keywords(FilmKeywords, FILM)
+    def animate(self, path: str | Path, **options: Unpack[FilmKeywords]) -> None:
+        """Draw ``steps`` steps from step ``start`` on, one in ``every`` a frame, into a file whose suffix says what
+        kind.
+
+        ``fps`` defaults to 1/dt, at most 60, and to 25 where the spec writes no dt. Without ``every`` all steps are
+        drawn, of more than 3,000 (or ``frames``) one in so many that no more frames come out; a warning says which.
+        ``inputs``, ``view`` and what is shown as in ``render``; views over time show the steps. Raises RendererError
+        for a kind that nobody makes, for a film that is too long and a view that there is not, KeyError for an unknown
+        reference, before anything is run.
+        """
+        given = completed("animate", options, FILM)
+        place = arguments.path("path", path)
+        look = film_of(self, place, given)
+        pipeline.draw(self, look, self._run_of(look, given), place, given["progress"])
+
+    def _run_of(self, look: Look, given: PictureKeywords) -> pipeline.Run:
+        """The run that is drawn: the recording that is given, or one of its own."""
+        recording = given["recording"]
+        return pipeline.run_of(self, look, given["inputs"]) if recording is None else recording
+
+    def needs_layout(self, view: View | Sequence[View] | None = None) -> bool:
+        """Whether a picture of these views (default: the spec's ``figure``) needs the layout."""
+        return self._look(view).shows("network", "matrix")
+
+    def steps_to_draw(
+        self,
+        step: int | None = None,
+        recording: Recording | None = None,
+        inputs: Mapping[str, npt.ArrayLike] | None = None,
+        view: View | Sequence[View] | None = None,
+    ) -> int:
+        """How many steps ``render`` will run: none with a recording, else those up to the step and those that the gains
+        take, in one run; with a view over time the whole default run."""
+        if recording is not None:
+            return 0
+        return pipeline.run_of(self, replace(self._look(view), first=step), inputs).length(self.network)
+
+    def _look(self, view: View | Sequence[View] | None = None) -> Look:
+        """A picture of these views, as the spec has it."""
+        from neurovis_spec.scene.look import Look
+
+        return Look(self.network.render, panels_of(self.network, view))
+
+    def _repr_svg_(self) -> str:
+        """The network at the last step of its default run, for a notebook."""
+        from neurovis_spec.scene.look import Look
+
+        look = Look(self.network.render)
+        return pipeline.svg(pipeline.filmed(self, look, pipeline.run_of(self, look, None)), look.settings)
 
     def export(
         self, folder: str | Path, to: str = "c", *, start: Recording | None = None, real: str = "double"
@@ -392,8 +382,18 @@ class NetworkLayout:
     @cached_property
     def warnings(self) -> tuple[Diagnostic, ...]:
         """What was noticed about it, such as frames that pins put on each other (``frames-overlap``)."""
+        from neurovis_spec.layout.clashes import clashes
+
         own = self.compiled
-        return pipeline.examine(self.value, own.problem, own.spec, own.request, own.network, own.sources).sorted()
+        findings = Findings(dict(own.sources))
+        found = clashes(own.problem, self.value)
+        if found:
+            from neurovis_spec.language.allow import drop_allowed
+            from neurovis_spec.layout.where import note_clashes
+
+            note_clashes(found, own.spec, own.request, own.network, findings)
+            drop_allowed(findings)
+        return findings.sorted()
 
     def metrics(self) -> dict[str, float | int]:
         """What ``neurovis layout --metrics`` prints, but for the seconds."""
@@ -414,8 +414,4 @@ class NetworkLayout:
 
     def _repr_svg_(self) -> str:
         """The network in this layout, before anything happens, for a notebook."""
-        from neurovis_spec.runtime.recording import Snapshot
-
-        network = self.compiled.network
-        snapshot = Snapshot(0, np.zeros(len(network.neurons)), network.connections.weights.whole(), None)
-        return svg(network, self.value, snapshot, self.compiled.gains)
+        return pipeline.svg_at_rest(self.compiled, self.value)

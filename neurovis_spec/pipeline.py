@@ -1,26 +1,38 @@
 """The whole way, from a text to a picture, on one page.
 
-Each function is one stage: it takes a value, gives a new one, and reaches back to none before it.
+Each stage takes a value, gives a new one, and reaches back to none before it.
 
-    text ─read─▶ SourceDocument ─shape─▶ Spec ─include─▶ Includes
-    Spec + Includes ─build─▶ Network ─simulate─▶ Recording ─▶ Snapshot
-                                └─pose─▶ LayoutProblem ─arrange─▶ Layout                │
-    Network + Layout + Snapshot ─encode (Eqs. 2–5)─▶ Scene ─draw─▶ bytes of a picture
-    Network + Layout + Snapshots ─film─▶ Film ─animate─▶ bytes of a moving one
+    text ─read─▶ SourceDocument ─shape─▶ Spec ─include─▶ Request, with what it includes
+    Spec + Request ─build─▶ Network                                              (``compile``)
 
-``compile`` is the first four in their order. What they find invalid goes into Findings, all at once;
-``Findings.check`` raises SpecError.
+    Network + Course ─record─▶ Recording
+    Network ─arrange─▶ Layout
+    Network + Recording ─measure─▶ gains of Eqs. 2–5
+    Network + Layout + Look + Recording + gains ─figure─▶ Film                   (``film``)
+    Film, or one frame of it ─animate, draw─▶ bytes ─▶ file                      (``draw``)
+
+What is invalid in a text goes into Findings, all at once; ``Findings.check`` raises SpecError. A picture raises what
+its stages raise, before anything is run where that is known. What only one half needs is imported there: a spec is
+validated without all that runs and draws.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+import math
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.callers import callers_level
+from neurovis_spec.compilation import Compilation
 from neurovis_spec.compiler.compile import Request, compile_spec
-from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, Panel, RenderSettings
+from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span
 from neurovis_spec.gc_paused import uncollected
@@ -28,44 +40,33 @@ from neurovis_spec.language.includes import read_includes
 from neurovis_spec.language.shape import read_spec
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.language.yaml.reader import read_file, read_text
-from neurovis_spec.language.yaml.source import SourceDocument
 from neurovis_spec.progress import Progress
+from neurovis_spec.runtime.files import replacing
 
-if TYPE_CHECKING:  # what only some stages need is imported there: a spec is validated without all of it
-    from neurovis_spec.arrays import FloatArray
-    from neurovis_spec.layout.model import Layout, LayoutProblem, LayoutRefusalError
-    from neurovis_spec.runtime.record import Course
+if TYPE_CHECKING:
+    from neurovis_spec.layout.model import Layout, LayoutProblem
+    from neurovis_spec.runtime.course import Course
     from neurovis_spec.runtime.recording import Recording, Snapshot
     from neurovis_spec.scene import Film, Scene
+    from neurovis_spec.scene.figure import PageGains
     from neurovis_spec.scene.gains import Gains
-    from neurovis_spec.scene.shots import Shots
+    from neurovis_spec.scene.look import Look
+    from neurovis_spec.scene.model import Renderer
+
+    #: A run: one that was recorded, or one that is to be made.
+    Run: TypeAlias = Recording | Course
+    #: A picture, in whatever settings.
+    Filmed: TypeAlias = Callable[[RenderSettings], Film]
 
 
-def read(path: Path, name: str, findings: Findings) -> SourceDocument | None:
-    """YAML becomes values that know their line."""
-    return read_file(path, name, findings)
-
-
-def read_string(text: str, name: str, findings: Findings) -> SourceDocument | None:
-    """The same for a text in memory."""
-    return read_text(text, name, findings)
-
-
-def shape(document: SourceDocument, findings: Findings) -> Spec | None:
-    """The shape as written: known keys, the right kind of value at each."""
-    with uncollected():
-        return read_spec(document, findings)
-
-
-def include(spec: Spec, request: Request, findings: Findings) -> Request:
-    """The request with the files whose modules and definitions the spec uses."""
-    return replace(request, includes=read_includes(spec, request.base, request.root, findings, request.read))
-
-
-def build(spec: Spec, request: Request, findings: Findings) -> Network | None:
-    """Expand, connect, check, lower: frozen arrays and an update program."""
-    with uncollected():
-        return compile_spec(spec, request, findings)
+#: Frames of a film that are held at once, and how many numbers they are about.
+_FEWEST_AT_ONCE, _MOST_AT_ONCE, _NUMBERS_AT_ONCE = 16, 512, 4_000_000
+#: The largest SVG, in bytes, with as many connections as there are.
+_LARGEST_SVG = 5_000_000
+#: How wide a picture is in a notebook at most, in pixels: JupyterLab cuts off what is wider than its column.
+_CELL = 900.0
+#: Pixels of an inch where a user unit is one pixel, and the most that are drawn of a picture.
+CSS, _MOST_PIXELS = 96.0, 1 << 28
 
 
 class Outcome(NamedTuple):
@@ -78,20 +79,43 @@ class Outcome(NamedTuple):
     memory: Layout | None = None
 
 
-def compile(document: SourceDocument | None, request: Request, findings: Findings) -> Outcome:
-    """All stages up to the network, in their order."""
-    spec = None if document is None else shape(document, findings)
-    network = memory = None
+def compile(source: str | Path, name: str, request: Request, findings: Findings) -> Outcome:
+    """A text, or the file at a path, which findings call ``name``: all stages up to the network, in their order."""
+    document = read_file(source, name, findings) if isinstance(source, Path) else read_text(source, name, findings)
+    spec, network, memory = None, None, None
+    with uncollected():
+        if document is not None:
+            spec = read_spec(document, findings)
+        if spec is not None:
+            includes = read_includes(spec, request.base, request.root, findings, request.read)
+            request = replace(request, includes=includes)
+            network = compile_spec(spec, request, findings)
+    if spec is not None and network is not None:
+        memory = remember(spec, request, network, findings)
+        foresee(spec, network, findings)
     if spec is not None:
-        request = include(spec, request, findings)
-        network = build(spec, request, findings)
-        if network is not None:
-            memory = remember(spec, request, network, findings)
-            foresee(spec, network, findings)
         gather(spec, request, findings)
     explain(findings)
     allow(findings)
     return Outcome(spec, request, network, memory)
+
+
+def remember(spec: Spec, request: Request, network: Network, findings: Findings) -> Layout | None:
+    """The earlier layout that the spec names, if it names one."""
+    if spec.layout is None or spec.layout.file is None:
+        return None
+    from neurovis_spec.layout.remember import read_memory
+
+    return read_memory(spec.layout.file, request.base, request.root, network, findings)
+
+
+def foresee(spec: Spec, network: Network, findings: Findings) -> None:
+    """What the layout will surely not be as it is meant."""
+    if spec.layout is None or spec.layout.engine is None or not network.instances:
+        return
+    from neurovis_spec.layout.foreseen import foresee_frames
+
+    foresee_frames(spec.layout.engine, network, findings)
 
 
 def gather(spec: Spec, request: Request, findings: Findings) -> None:
@@ -119,58 +143,6 @@ def allow(findings: Findings) -> None:
         silence(findings)
 
 
-def simulate(
-    network: Network,
-    course: Course,
-    start: Recording | None = None,
-    progress: Progress | None = None,
-    checkpoint: Path | None = None,
-) -> Recording:
-    """Run the update program, record activities and weights."""
-    from neurovis_spec.runtime.record import record_course
-
-    return record_course(network, course, start, progress, checkpoint)
-
-
-def simulate_to(
-    network: Network,
-    path: Path,
-    course: Course,
-    start: Recording | None = None,
-    progress: Progress | None = None,
-    checkpoint: Path | None = None,
-) -> str:
-    """The same, written to a file while it runs; gives the name of the backend."""
-    from neurovis_spec.runtime.stream import record_to
-
-    return record_to(network, path, course, start, progress, checkpoint)
-
-
-def gauge(network: Network, text: str, recording: Recording) -> FloatArray:
-    """A measure after each step of a recording."""
-    from neurovis_spec.runtime.gauge import over
-
-    return over(text, network, recording)
-
-
-def remember(spec: Spec, request: Request, network: Network, findings: Findings) -> Layout | None:
-    """The earlier layout that the spec names, if it names one."""
-    if spec.layout is None or spec.layout.file is None:
-        return None
-    from neurovis_spec.layout.remember import read_memory
-
-    return read_memory(spec.layout.file, request.base, request.root, network, findings)
-
-
-def foresee(spec: Spec, network: Network, findings: Findings) -> None:
-    """What the layout will surely not be as it is meant."""
-    if spec.layout is None or spec.layout.engine is None or not network.instances:
-        return
-    from neurovis_spec.layout.foreseen import foresee_frames
-
-    foresee_frames(spec.layout.engine, network, findings)
-
-
 def refusal(spec: Spec, request: Request, network: Network, problem: Callable[[], LayoutProblem]) -> Diagnostic | None:
     """What laying it out would refuse before the engine begins, and where the spec asks for it. The ``problem`` is
     asked for where the spec says anything of its layout."""
@@ -181,161 +153,208 @@ def refusal(spec: Spec, request: Request, network: Network, problem: Callable[[]
     found = foreseen(network, problem)
     if found is None:
         return None
-    span = locate(found, spec, request, network) or Span(*spec.name.span)
+    from neurovis_spec.layout.where import where
+
+    span = where(found, spec, request, network) or Span(*spec.name.span)
     return Diagnostic(found.code, str(found), span, "error", found.hint)
 
 
-def pose(network: Network, memory: Layout | None = None) -> LayoutProblem:
-    """What a layout engine is given: neurons, connections, what the spec asks for, an earlier layout (``memory``)."""
-    from neurovis_spec.layout.problem import problem_of
+def run_of(of: Compilation, look: Look, inputs: Mapping[str, npt.ArrayLike] | None) -> Course:
+    """The run that a picture takes where no recording is given: a still as far as its step, the whole default run where
+    it has views over time, and as far as its gains take, which come of the same run."""
+    from neurovis_spec.runtime.columns import Keep
+    from neurovis_spec.runtime.course import Course
+    from neurovis_spec.scene.probe import probe_steps
+    from neurovis_spec.scene.series import states_of
 
-    return problem_of(network, memory)
-
-
-def arrange(problem: LayoutProblem, engine: str = "auto", progress: Progress | None = None) -> Layout:
-    """A position for every neuron, a route for every connection."""
-    from neurovis_spec.layout.arrange import lay_out_problem
-
-    return lay_out_problem(problem, engine, progress)
-
-
-def examine(
-    layout: Layout,
-    problem: LayoutProblem,
-    spec: Spec,
-    request: Request,
-    network: Network,
-    sources: Mapping[str, str],
-) -> Findings:
-    """What in a layout is surely not as it is meant: warnings, but for those that are allowed."""
-    from neurovis_spec.layout.clashes import clashes
-
-    findings = Findings(dict(sources))
-    found = clashes(problem, layout)
-    if found:
-        from neurovis_spec.language.allow import drop_allowed
-        from neurovis_spec.layout.where import note_clashes
-
-        note_clashes(found, spec, request, network, findings)
-        drop_allowed(findings)
-    return findings
+    network = of.network
+    if look.moving:
+        steps = (look.first or 0) + look.count
+    else:
+        steps = network.steps if look.first is None else look.first + 1
+        steps = max(steps, network.steps if look.timed else 0)
+        steps = max(steps, 0 if inputs is None and seen_by(of, look).measured else probe_steps(network))
+    states = states_of(look.panels, network) if look.panels else ()
+    return Course(steps, inputs=inputs, keep=Keep(states=states))
 
 
-def locate(
-    refusal: LayoutRefusalError, spec: Spec, request: Request, network: Network, engine: str | None = None
-) -> Span | None:
-    """Where the spec says what an engine refuses; ``engine`` is the one that was chosen in place of the spec's."""
-    from neurovis_spec.layout.where import where
+def draw(of: Compilation, look: Look, run: Run, path: Path, progress: Progress | None = None) -> None:
+    """A picture of a run as a file. Warns of what it leaves out. Raises RendererError, and what ``filmed`` raises."""
+    from neurovis_spec.scene.renderers import renderer_for, streaming_renderer
 
-    return where(refusal, spec, request, network, engine)
-
-
-def measure(network: Network, progress: Progress | None = None, made: Recording | None = None) -> Gains:
-    """The gains of Eqs. 2–5: the author's, else such that the range of a default run shows, which may be ``made``."""
-    from neurovis_spec.scene.probe import probe
-
-    return probe(network, progress, made)
-
-
-def measure_recording(network: Network, recording: Recording) -> Gains:
-    """The same for a recording that is drawn: from all of its steps."""
-    from neurovis_spec.scene.probe import gains_of
-
-    return gains_of(network, recording)
+    renderer = renderer_for(look.suffix, moving=look.moving)
+    if look.moving and look.suffix in renderer.capabilities.streams:
+        films = films_of(of, look, run, progress)
+        with replacing(path, "part") as file:
+            streaming_renderer(look.suffix).stream(_noting(films), look.frames, look.suffix, file, progress)
+        return
+    made = filmed(of, look, run, progress)
+    with replacing(path) as file:
+        draws = partial(drawn, look=look, renderer=renderer, progress=progress)
+        file.write(bounded(lambda settings: draws(made(settings)), look.settings, look.suffix))
 
 
-def picture(network: Network, layout: Layout, snapshot: Snapshot, gains: Gains, settings: RenderSettings) -> Scene:
-    """One step as discs, splines and texts."""
-    from neurovis_spec.scene.encode import encode
-
-    return encode(network, layout, snapshot, gains, settings)
-
-
-def moving(
-    network: Network,
-    layout: Layout,
-    snapshots: Collection[Snapshot],
-    gains: Gains,
-    settings: RenderSettings,
-    fps: float,
-) -> Film:
-    """Several steps as a scene whose colours and widths change."""
-    from neurovis_spec.scene.film import film
-
-    return film(network, layout, snapshots, gains, settings, fps)
-
-
-def moving_in_parts(
-    network: Network,
-    layout: Layout,
-    parts: Iterable[Collection[Snapshot]],
-    gains: Gains,
-    settings: RenderSettings,
-    fps: float,
-) -> Iterator[Film]:
-    """The same, each part made when it is asked for."""
-    from neurovis_spec.scene.film import films
-
-    return films(network, layout, parts, gains, settings, fps)
-
-
-def shot_of(network: Network, recording: Recording, step: int | None, window: int | None) -> Shots:
-    """A step, by default the last, and those around it that views over time show: ``window`` of them, or all."""
-    from neurovis_spec.scene.shots import shot_of
-
-    return shot_of(network, recording, step, window)
-
-
-def shots_of(recording: Recording, steps: Sequence[int]) -> Shots:
-    """The steps of a film, which views over time show."""
+def filmed(of: Compilation, look: Look, run: Run, progress: Progress | None = None) -> Filmed:
+    """The Film of a network, a Look and a run, as it is with whatever settings: a still is its only frame. Raises
+    LayoutRefusalError, RecordingError, and what ``record`` raises."""
+    from neurovis_spec.scene.figure import figure
     from neurovis_spec.scene.shots import shots_of
 
-    return shots_of(recording, steps)
+    network = of.network
+    layout = of.placed(look.engine, look.effort) if look.shows("network", "matrix") else None
+    recording = recorded(network, run, progress)
+    seen = with_body_if_any(look, recording)
+    shots = shots_of(network, recording, seen)
+    gains = page_gains(of, seen, run, recording)
+    return lambda settings: figure(network, layout, replace(seen, settings=settings), shots, gains)
 
 
-def page(
-    network: Network,
-    layout: Layout | None,
-    panels: Sequence[Panel],
-    shots: Shots,
-    gains: Gains | None,
-    settings: RenderSettings,
-    fps: float,
-    glyphs: Gains | None = None,
-) -> Film:
-    """Several views on one page, as a film; of one step a film of one frame. ``glyphs`` are the gains of the picture of
-    the network where something is collapsed in it."""
-    from neurovis_spec.scene.figure import figure
+def films_of(of: Compilation, look: Look, run: Run, progress: Progress | None = None) -> Iterator[Film]:
+    """The same film in parts, each made when it is asked for; of the network alone the run is made meanwhile, so that
+    there may be any number of frames."""
+    if look.panels:
+        return map(filmed(of, look, run, progress), [look.settings])
+    from neurovis_spec.runtime.recording import Recording
+    from neurovis_spec.runtime.simulation import Simulation
+    from neurovis_spec.scene.film import films
+    from neurovis_spec.scene.shots import in_parts, shots_of, snapshots_of_run
 
-    return figure(network, layout, panels, shots, gains, settings, fps, glyphs)
+    network, layout = of.network, of.placed(look.engine, look.effort)
+    gains = gains_by(seen_by(of, look), look, run)
+    snapshots: Iterable[Snapshot]
+    if isinstance(run, Recording):
+        snapshots = shots_of(network, run, look).snapshots(network)
+    else:
+        snapshots = snapshots_of_run(Simulation(network, inputs=run.inputs), look)
+    wide = len(network.neurons) + 3 * len(network.connections)
+    many = max(_FEWEST_AT_ONCE, min(_MOST_AT_ONCE, _NUMBERS_AT_ONCE // wide))
+    return films(network, layout, in_parts(snapshots, many), gains, look.settings, look.fps or 1.0)
 
 
-def frame(moving_scene: Film, number: int) -> Scene:
-    """A frame of a film as a scene."""
+def recorded(network: Network, run: Run, progress: Progress | None = None) -> Recording:
+    """A run, made unless it is there."""
+    from neurovis_spec.runtime.record import record
+    from neurovis_spec.runtime.recording import Recording
+
+    return run if isinstance(run, Recording) else record(network, run, progress)
+
+
+def with_body_if_any(look: Look, recording: Recording) -> Look:
+    """A look without the body where nobody asks for it and the run has shown that it has none that can be drawn."""
+    from neurovis_spec.scene.poses import posed_of
+
+    if look.asked or posed_of(recording) is not None:
+        return look
+    return replace(look, panels=tuple(panel for panel in look.panels if panel.view != "body"))
+
+
+def seen_by(of: Compilation, look: Look) -> Compilation:
+    """The same network, whose gains are those of what is collapsed in a picture."""
+    if look.settings.collapse == of.network.render.collapse:
+        return of
+    return replace(of, network=replace(of.network, render=look.settings))
+
+
+def page_gains(of: Compilation, look: Look, run: Run, recording: Recording) -> PageGains:
+    """The gains of a picture, where one of its views needs them: what was recorded in part serves the others."""
+    from neurovis_spec.runtime.fitting import fitted
+    from neurovis_spec.scene.figure import PageGains
+    from neurovis_spec.scene.probe import gains_of
+
+    if not look.shows("network", "matrix", "raster"):
+        return PageGains(None, None)
+    seen = seen_by(of, look)
+    each = picture = gains_by(seen, look, run, recording)
+    if look.settings.collapse and look.shows("matrix", "raster"):
+        whole = replace(seen.network, render=replace(seen.network.render, collapse=()))
+        each = gains_of(whole, fitted(recording, whole))
+    return PageGains(each, picture)
+
+
+def gains_by(of: Compilation, look: Look, run: Run, made: Recording | None = None) -> Gains:
+    """The gains of what a picture shows: of a recording those of all its steps; of a run that is ``made`` for a still
+    those of this run; of a film those of a run of their own, perhaps with other inputs."""
+    from neurovis_spec.runtime.course import Course
+    from neurovis_spec.runtime.record import record
+    from neurovis_spec.runtime.recording import Recording
+    from neurovis_spec.scene.probe import probe, probe_steps
+
+    if isinstance(run, Recording):
+        return of.gains_for(run)
+    still = None if look.moving else made
+    if run.inputs is None:
+        return of.gains if still is None else of.gains_by(still)
+    if still is None:
+        still = record(of.network, Course(probe_steps(of.network), inputs=run.inputs))
+    return probe(of.network, still)
+
+
+def drawn(film: Film, look: Look, renderer: Renderer, progress: Progress | None = None) -> tuple[Scene, bytes]:
+    """A film, or its only frame, as the content of a file; and the scene that it begins with. Raises RendererError for
+    a picture that is too large."""
     from neurovis_spec.scene.film import still
+    from neurovis_spec.scene.renderers import RendererError
 
-    return still(moving_scene, number)
-
-
-def draw(scene: Scene, suffix: str) -> bytes:
-    """A scene as the content of a file of this kind. Raises RendererError where nobody draws such files."""
-    from neurovis_spec.scene.renderers import renderer_for
-
-    return renderer_for(suffix, moving=False).draw(scene, suffix.lower())
-
-
-def animate(moving_scene: Film, suffix: str, progress: Progress | None = None) -> bytes:
-    """A film as the content of a file of this kind. Raises RendererError where nobody makes such films."""
-    from neurovis_spec.scene.renderers import renderer_for
-
-    return renderer_for(suffix, moving=True).animate(moving_scene, suffix.lower(), progress)
+    if look.moving:
+        return film.scene, renderer.animate(film, look.suffix, progress)
+    scene = still(film, 0)
+    if look.density is not None:
+        scene = replace(scene, density=look.density)
+        wide, high = scene.pixels
+        if wide * high > _MOST_PIXELS:
+            most = int(CSS * math.sqrt(_MOST_PIXELS / (scene.width * scene.height)))
+            raise RendererError(f"a picture of {wide:,} × {high:,} pixels is too large", f"take at most {most} an inch")
+    return scene, renderer.draw(scene, look.suffix)
 
 
-def stream(films: Iterator[Film], frames: int, suffix: str, file: BinaryIO, progress: Progress | None = None) -> None:
-    """A film in parts as a file of this kind, written while it is made. Raises RendererError."""
-    from neurovis_spec.scene.model import StreamingRenderer
-    from neurovis_spec.scene.renderers import renderer_for
+def svg(film: Filmed, settings: RenderSettings) -> str:
+    """A picture for a notebook: a pixel a unit, but no wider than a cell, and no larger than a file."""
+    from neurovis_spec.scene.film import still
+    from neurovis_spec.scene.renderers import drawing
 
-    renderer = renderer_for(suffix, moving=True)
-    assert isinstance(renderer, StreamingRenderer)
-    renderer.stream(films, frames, suffix.lower(), file, progress)
+    def draws(settings: RenderSettings) -> tuple[Scene, bytes]:
+        scene = still(film(settings), 0)
+        return scene, drawing(replace(scene, density=min(1.0, _CELL / scene.width)), ".svg")
+
+    return bounded(draws, settings, ".svg").decode()
+
+
+def svg_at_rest(of: Compilation, layout: Layout) -> str:
+    """The network in a layout before anything happens, for a notebook."""
+    from neurovis_spec.runtime.recording import Snapshot
+    from neurovis_spec.scene.film import film
+
+    network = of.network
+    snapshot = Snapshot(0, np.zeros(len(network.neurons)), network.connections.weights.whole(), None)
+    return svg(lambda settings: film(network, layout, [snapshot], of.gains, settings), network.render)
+
+
+def bounded(draws: Callable[[RenderSettings], tuple[Scene, bytes]], settings: RenderSettings, suffix: str) -> bytes:
+    """The file of a picture, an SVG with so many connections as make it no larger than 5 MB, unless all are asked for,
+    or it is larger without any; and a warning for each note in it."""
+    scene, content = draws(settings)
+    if suffix == ".svg" and not settings.full and len(content) > _LARGEST_SVG:
+        lines = sum("connection" in group.data for group in scene.groups)
+        bare = len(draws(replace(settings, most=0))[1]) if lines else len(content)
+        for _ in range(3 if bare <= _LARGEST_SVG else 0):  # strong lines may take more room than weak ones
+            if len(content) <= _LARGEST_SVG or not lines:
+                break
+            lines = max(0, int(0.98 * lines * (_LARGEST_SVG - bare) / max(len(content) - bare, 1)))
+            scene, content = draws(replace(settings, most=lines))
+    _note(scene)
+    return content
+
+
+def _noting(films: Iterator[Film]) -> Iterator[Film]:
+    """The parts of a film; of the first one the notes are warned of."""
+    for place, film in enumerate(films):
+        if place == 0:
+            _note(film.scene)
+        yield film
+
+
+def _note(scene: Scene) -> None:
+    from neurovis_spec.scene.shown import LeftOut
+
+    for note in scene.notes:
+        warnings.warn(note, LeftOut, stacklevel=callers_level())

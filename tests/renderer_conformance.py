@@ -32,8 +32,7 @@ from neurovis_spec.scene import (
     Text,
     colours,
 )
-from neurovis_spec.scene.encode import encode
-from neurovis_spec.scene.film import film
+from neurovis_spec.scene.film import film, scene_of_step
 from neurovis_spec.scene.gains import choose_gains
 
 #: How alike two drawings of a scene are at least.
@@ -108,7 +107,7 @@ def _glowing() -> list[Shape]:
 
 def use_case(step: int, theme: str) -> Scene:
     """Use case 1 at a step."""
-    return encode(CASE.network, CASE.layout, CASE.snapshot(step), GAINS, RenderSettings(theme=theme))
+    return scene_of_step(CASE.network, CASE.layout, CASE.snapshot(step), GAINS, RenderSettings(theme=theme))
 
 
 SCENES = {

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from neurovis_spec import pipeline
+from neurovis_spec.compilation import Compilation
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.layout import Layout
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.scene import Film, Scene
+from neurovis_spec.scene.film import film, scene_of_step
+from neurovis_spec.scene.renderers import drawing
 
 
 def scene_of(
-    network: CompiledNetwork, snapshot: Snapshot, layout: Layout | None = None, settings: RenderSettings | None = None
+    network: Compilation, snapshot: Snapshot, layout: Layout | None = None, settings: RenderSettings | None = None
 ) -> Scene:
     """One step, in the layout that pictures of the network have, or in another one."""
-    layout, settings = layout or network.drawn().value, settings or network.network.render
-    return pipeline.picture(network.network, layout, snapshot, network.gains, settings)
+    layout, settings = layout or network.placed(), settings or network.network.render
+    return scene_of_step(network.network, layout, snapshot, network.gains, settings)
 
 
 def film_of(
@@ -25,9 +27,9 @@ def film_of(
 ) -> Film:
     """Several steps."""
     whole, layout = network.network, layout or network.drawn().value
-    return pipeline.moving(whole, layout, snapshots, network.gains, whole.render, fps)
+    return film(whole, layout, snapshots, network.gains, whole.render, fps)
 
 
 def file_of(scene: Scene, suffix: str) -> bytes:
     """A scene as the content of a file of this kind."""
-    return pipeline.draw(scene, suffix)
+    return drawing(scene, suffix)

@@ -20,14 +20,14 @@ from PIL import Image as Pillow
 from toy_bodies import carted, registered
 
 import neurovis_spec as nv
-from neurovis_spec import pipeline
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.body.model import Link, Skeleton, Solid
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiler.drawing.drawing_settings import Panel
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.scene import THEMES, Disc, Film, Point, Polyline, Rectangle, Scene, Shape, Text, still
-from neurovis_spec.scene.figure import figure
+from neurovis_spec.scene.figure import PageGains, figure
+from neurovis_spec.scene.look import Look
 from neurovis_spec.scene.panels import ViewError
 from neurovis_spec.scene.shots import Shots
 
@@ -62,7 +62,8 @@ def film(
     """The body alone, a frame a row."""
     settings = replace(WALKER.settings_for(theme), size=size)
     steps = np.arange(len(recording) if rows is None else rows)
-    return figure(WALKER.network, None, [Panel("body")], Shots(recording, steps, steps), None, settings, 20.0)
+    look = Look(settings, (Panel("body"),), fps=20.0)
+    return figure(WALKER.network, None, look, Shots(recording, steps, steps), PageGains(None, None))
 
 
 def shapes(scene: Scene, name: str) -> tuple[Shape, ...]:
@@ -452,15 +453,8 @@ def test_a_page_of_a_stated_size_keeps_it_with_the_body_in_it() -> None:
     run = walked()
     settings = replace(WALKER.settings_for("default"), size=(1000, 900))
     rows = np.arange(3)
-    made = pipeline.page(
-        WALKER.network,
-        WALKER.drawn().value,
-        [Panel("network"), Panel("body")],
-        Shots(run, rows, rows),
-        WALKER.gains_for(run),
-        settings,
-        20.0,
-    )
+    look, gains = Look(settings, (Panel("network"), Panel("body")), fps=20.0), WALKER.gains_for(run)
+    made = figure(WALKER.network, WALKER.placed(), look, Shots(run, rows, rows), PageGains(gains, gains))
     assert made.scene.pixels == (1000, 900)
 
 
@@ -468,7 +462,7 @@ def test_of_a_long_film_no_connection_is_left_out_for_the_room_that_the_body_tak
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     target = tmp_path / "x.svg"
-    monkeypatch.setattr("neurovis_spec.pictures._LARGEST_SVG", 60_000)
+    monkeypatch.setattr("neurovis_spec.pipeline._LARGEST_SVG", 60_000)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         WALKER.animate(target, recording=walked())

@@ -32,8 +32,7 @@ from test_body_view import walked
 import neurovis_spec as nv
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.scene import THEMES, Disc, Film, Group, Scene, channels, colours, still
-from neurovis_spec.scene.encode import encode
-from neurovis_spec.scene.film import film
+from neurovis_spec.scene.film import film, scene_of_step
 from neurovis_spec.scene.gains import choose_gains
 
 pytestmark = pytest.mark.browser
@@ -64,7 +63,7 @@ def browser(tmp_path: Path) -> Browser:
 
 
 def scene(step: int, theme: str, case: Case = CASE) -> Scene:
-    return encode(case.network, case.layout, case.snapshot(step), GAINS, RenderSettings(theme=theme))
+    return scene_of_step(case.network, case.layout, case.snapshot(step), GAINS, RenderSettings(theme=theme))
 
 
 def moving(theme: str = "default") -> Film:

@@ -18,6 +18,7 @@ from neurovis_spec.compiler.body_settings import Moved
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.parser import parse
 from neurovis_spec.runtime.backend import available
+from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.embodied import Embodied, seed_of
 from neurovis_spec.runtime.kinds import Rows
 from neurovis_spec.runtime.record import record
@@ -232,7 +233,7 @@ def test_a_reward_that_is_sensed_belongs_to_the_episode_that_ends() -> None:
     assert body is not None
     clock = replace(body.sensed[0], sensors=("clock",))
     network = replace(compiled.network, body=replace(body, sensed=(clock, body.sensed[1])))
-    recording = record(network, 90)
+    recording = record(network, Course(90))
     weight = recording.weight("W -> O1")
     last = np.tanh(recording.sensor("clock")[39])
     assert last == pytest.approx(np.tanh(39 * 0.05))

@@ -84,7 +84,7 @@ def test_validating_imports_nothing_that_runs_lays_out_or_draws() -> None:
     modules = loaded(command("validate", "specs/cpg_rbf.yaml"))
     assert not modules & {"networkx", "scipy", "PIL", "rich", "neurovis_renderers"}
     assert {name for name in modules if name.startswith("neurovis_layouts.")} == {"neurovis_layouts.layered"}
-    later = ("runtime.", "layout.", "scene.", "describe", "snapshots")
+    later = ("runtime.", "layout.", "scene.", "describe")
     parts = ("engines", "foreseen", "geometry", "labels", "makes", "model", "naming", "problem", "refusals")
     asking = {f"layout.{name}" for name in parts}
     found = {name.removeprefix("neurovis_spec.") for name in modules}
@@ -128,7 +128,7 @@ def test_every_public_name_is_found_where_it_is_looked_for() -> None:
 
 #: What an author calls: what it says that it raises can be caught as ``nv.NAME``.
 CALLED = (
-    "api", "compiled", "pictures", "runtime/recorder", "runtime/recording", "runtime/simulation", "snapshots",
+    "api", "compiled", "keywords", "pipeline", "runtime/recorder", "runtime/recording", "runtime/simulation",
     "sweeps/sweep", "sweeps/table",
 )  # fmt: skip
 

@@ -28,6 +28,8 @@ from neurovis_spec.live.live import listen
 from neurovis_spec.live.run import Run
 from neurovis_spec.live.server import Server
 from neurovis_spec.live.show import Show
+from neurovis_spec.runtime.course import Course
+from neurovis_spec.runtime.record import record
 
 pytestmark = pytest.mark.browser
 
@@ -360,7 +362,7 @@ def test_the_whole_picture_is_saved_as_png(tmp_path: Path) -> None:
                     break
                 await asyncio.sleep(0.02)
             picture, compiled = Image.open(saved).convert("RGB"), desk.placed.compiled
-            scene = scene_of(compiled, compiled.run(8).snapshot(7), desk.placed.layout)
+            scene = scene_of(compiled, record(compiled.network, Course(8)).snapshot(7), desk.placed.layout)
             drawn = Image.open(io.BytesIO(file_of(scene, ".png"))).convert("RGB")
             assert picture.size == drawn.size
             assert similarity(picture, drawn) >= 0.95, "the step is about the same"
@@ -387,7 +389,7 @@ def test_the_owner_has_the_picture_a_film_and_the_recording_as_files(tmp_path: P
             (tmp_path / "cpg_rbf.svg").unlink()
             assert len(await saved("film", "cpg_rbf.svg")) > len(picture)
             await saved("npz", "cpg_rbf.npz")
-            found, run = nv.load(tmp_path / "cpg_rbf.npz"), desk.placed.compiled.run(step + 1)
+            found, run = nv.load(tmp_path / "cpg_rbf.npz"), record(desk.placed.compiled.network, Course(step + 1))
             assert (found.activity == run.activity).all()
 
     asyncio.run(main())

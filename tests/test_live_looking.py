@@ -15,6 +15,7 @@ from PIL import Image
 from test_live_browser import pause, shown
 
 import neurovis_spec as nv
+from neurovis_spec.compilation import Compilation
 from neurovis_spec.live.view import view_of
 
 pytestmark = pytest.mark.browser
@@ -22,7 +23,7 @@ pytestmark = pytest.mark.browser
 TIP = "document.querySelector('#tip')"
 
 
-def places(compiled: nv.CompiledNetwork) -> dict[str, tuple[float, float]]:
+def places(compiled: Compilation) -> dict[str, tuple[float, float]]:
     """Where the window of ``shown`` has each neuron, and the end of each connection."""
     scene = json.loads(gzip.decompress(view_of(compiled, compiled.gains).content))
     result = {}

@@ -23,6 +23,7 @@ import pytest
 from aiohttp import ClientWebSocketResponse, WSMsgType
 
 import neurovis_spec as nv
+from neurovis_spec.compilation import Compilation
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.live.access import Access
 from neurovis_spec.live.commands import REQUESTS, Appearance, Pause, Seek
@@ -50,7 +51,7 @@ render: {gain: {activity: 1, signal: 1, thickness: 4, change: 10}}
 VIEW = view_of(COMPILED, COMPILED.gains)
 
 
-def draw(compiled: nv.CompiledNetwork, appearance: Appearance, layout: Layout) -> View:
+def draw(compiled: Compilation, appearance: Appearance, layout: Layout) -> View:
     return view_of(compiled, compiled.gains, appearance=appearance, layout=layout)
 
 

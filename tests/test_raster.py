@@ -43,8 +43,7 @@ from neurovis_spec.scene import (
     still,
     texts,
 )
-from neurovis_spec.scene.encode import encode
-from neurovis_spec.scene.film import film
+from neurovis_spec.scene.film import film, scene_of_step
 from neurovis_spec.scene.gains import choose_gains
 
 SIZE = (200, 160)
@@ -53,7 +52,7 @@ GAINS = choose_gains(CASE.network, RenderSettings(), CASE.reached)
 
 
 def scene(step: int = 160, theme: str = "default") -> Scene:
-    return encode(CASE.network, CASE.layout, CASE.snapshot(step), GAINS, RenderSettings(theme=theme))
+    return scene_of_step(CASE.network, CASE.layout, CASE.snapshot(step), GAINS, RenderSettings(theme=theme))
 
 
 def short_film(frames: int = 6) -> Film:

@@ -33,6 +33,7 @@ from neurovis_spec.compiler.network import Input, Network
 from neurovis_spec.compiler.program import Definition
 from neurovis_spec.language.words import Combine
 from neurovis_spec.runtime.backend import BackendError, Capabilities, listing, load, prepare
+from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.numpy_backend import NumpyBackend, step_code
 from neurovis_spec.runtime.record import record
@@ -161,7 +162,7 @@ def test_contracting_networks_agree_for_2000_steps(seed: int) -> None:
     weights, delays = random.uniform(-0.2, 0.2, 16).tolist(), random.integers(1, 4, 16).tolist()
     links = [Link(i // 4, i % 4, weights[i], delays[i]) for i in range(16)]
     network = build(units, links)
-    runs = [record(network, 2000, backend=name) for name in BOTH]
+    runs = [record(network, Course(2000, backend=name)) for name in BOTH]
     np.testing.assert_allclose(runs[1].activity, runs[0].activity, rtol=0, atol=1e-12)
 
 
@@ -176,7 +177,7 @@ def test_terms_are_combined_in_the_order_of_the_connections_bit_for_bit(seed: in
         for _ in range(200)
     ]
     network = build(units, links)
-    runs = [record(network, 1, backend=name) for name in BOTH]
+    runs = [record(network, Course(1, backend=name)) for name in BOTH]
     assert runs[0].activity.tobytes() == runs[1].activity.tobytes()
     assert runs[0]["B"][0] not in (0.0, 1.0)
 
@@ -185,7 +186,7 @@ def test_terms_are_combined_in_the_order_of_the_connections_bit_for_bit(seed: in
 
 
 def run(network: Network, steps: int, backend: str) -> Recording:
-    return record(network, steps, backend=backend)
+    return record(network, Course(steps, backend=backend))
 
 
 @pytest.mark.parametrize("backend", BOTH)
@@ -367,7 +368,7 @@ def test_a_recorded_step_of_array_code_calls_little_else() -> None:
 
         sys.setprofile(count)
         try:
-            record(network, steps, backend="numpy")
+            record(network, Course(steps, backend="numpy"))
         finally:
             sys.setprofile(None)
         return found
@@ -380,7 +381,7 @@ def test_a_recorded_step_of_array_code_calls_little_else() -> None:
 @pytest.mark.parametrize("every", [1, 3])
 def test_many_steps_of_array_code_are_those_made_one_by_one(every: int) -> None:
     network, stepper = cpg_rbf(), NumpyBackend().prepare(cpg_rbf())
-    together = record(network, 300, backend="numpy", every=every)
+    together = record(network, Course(300, backend="numpy", every=every))
     state, rows, weights = initial_state(network), [], []
     for k, vector in enumerate(InputReader(network).rows(0, 300)):
         weights.append(state.weights[network.changing].copy())

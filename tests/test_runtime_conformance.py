@@ -23,6 +23,7 @@ from neurovis_spec.runtime import c_backend, c_library
 from neurovis_spec.runtime.backend import Backend, Stepper, load
 from neurovis_spec.runtime.c_backend import CBackend, written
 from neurovis_spec.runtime.c_code import Tables
+from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.numpy_backend import NumpyBackend
 from neurovis_spec.runtime.record import record
@@ -123,7 +124,7 @@ def test_each_step_of_a_random_spec_agrees(spec: dict[str, object], backend: str
 @pytest.mark.parametrize("path", SPECS, ids=lambda path: path.stem)
 def test_the_examples_run_alike_in_c(path: Path) -> None:
     network = nv.compile(path).network
-    runs = [record(network, 60, backend=name) for name in ("reference", "c")]
+    runs = [record(network, Course(60, backend=name)) for name in ("reference", "c")]
     assert runs[0].activity.tobytes() == runs[1].activity.tobytes()
     assert runs[0].weights.tobytes() == runs[1].weights.tobytes()
 
@@ -132,7 +133,7 @@ def test_the_examples_run_alike_in_c(path: Path) -> None:
 @pytest.mark.parametrize("every", [1, 4])
 def test_events_apply_alike_in_whole_runs(every: int) -> None:
     network = nv.compile_text(EVENTS).network
-    runs = [record(network, 30, backend=name, every=every) for name in ("reference", "c")]
+    runs = [record(network, Course(30, backend=name, every=every)) for name in ("reference", "c")]
     assert runs[0].activity.tobytes() == runs[1].activity.tobytes()
     assert runs[0].weights.tobytes() == runs[1].weights.tobytes()
 
@@ -197,9 +198,9 @@ def test_what_is_not_finite_is_told_at_its_step(backend: str) -> None:
     growing = model("f(v)", {"v": ("1", "v^2 * 10 + 1e300 * (v > 1e9)", None)})
     network = build([Unit("A", model=growing), Unit("B", input=0)], inputs=[Input("s", 0, 1)])
     with pytest.warns(RuntimeWarning, match=r"A is inf at step 5") as first:
-        record(network, 600, backend="reference")
+        record(network, Course(600, backend="reference"))
     with pytest.warns(RuntimeWarning) as second:
-        record(network, 600, backend=backend)
+        record(network, Course(600, backend=backend))
     assert [str(w.message) for w in second] == [str(w.message) for w in first]
 
 
@@ -264,7 +265,7 @@ def test_neurons_with_different_numbers_of_connections_go_on_beside_each_other(
     degrees = np.bincount(network.connections.targets.whole(), minlength=30)
     assert len(set(degrees.tolist())) > 3
     follow(network, CBackend(), 12)
-    runs = [record(network, 40, backend=name) for name in ("reference", "c")]
+    runs = [record(network, Course(40, backend=name)) for name in ("reference", "c")]
     assert runs[0].activity.tobytes() == runs[1].activity.tobytes()
     assert runs[0].weights.tobytes() == runs[1].weights.tobytes()
     assert runs[0].weights_after.tobytes() == runs[1].weights_after.tobytes()
@@ -281,9 +282,9 @@ def test_a_weight_that_is_not_finite_for_one_step_is_told_in_whole_runs(place: i
     links = [Link(i, (3 * i + 1) % 11, 0.1, learns=0) for i in range(11)]
     network = build(units, links, [Learns(passing)])
     with pytest.warns(RuntimeWarning, match=f"N{place} -> .* inf after step 37") as first:
-        record(network, 90, backend="reference")
+        record(network, Course(90, backend="reference"))
     with pytest.warns(RuntimeWarning) as second:
-        record(network, 90, backend="c")
+        record(network, Course(90, backend="c"))
     assert [str(w.message) for w in second] == [str(w.message) for w in first]
 
 

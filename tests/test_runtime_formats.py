@@ -19,6 +19,7 @@ from networks_by_hand import Learns, Link, Unit, build, cpg_rbf, rule
 
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime import files, formats
+from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.recording import After, Recording, after_rows, ended
@@ -34,7 +35,7 @@ def learning() -> Network:
 
 
 def parallel() -> Recording:
-    return record(learning(), 7, every=2)
+    return record(learning(), Course(7, every=2))
 
 
 def same(one: Recording, other: Recording) -> None:
@@ -54,7 +55,7 @@ def same(one: Recording, other: Recording) -> None:
 
 
 def test_npz_keeps_everything(tmp_path: Path) -> None:
-    for number, recording in enumerate((record(cpg_rbf(), 50), parallel(), record(build([]), 0))):
+    for number, recording in enumerate((record(cpg_rbf(), Course(50)), parallel(), record(build([]), Course(0)))):
         path = tmp_path / f"{number}.npz"
         recording.save(path)
         same(recording, formats.load(path))
@@ -75,8 +76,8 @@ def test_a_recording_knows_the_weights_after_its_last_step(tmp_path: Path) -> No
     whole = parallel()
     for steps, every in ((5, 1), (5, 2), (6, 5)):
         network = learning()
-        recording = record(network, steps, every=every)
-        longer = record(network, steps + 1)
+        recording = record(network, Course(steps, every=every))
+        longer = record(network, Course(steps + 1))
         assert recording.weights_after.tolist() == longer.weights[-1].tolist()
         assert recording.reached == steps
     assert whole.weights_after.tolist() != whole.weights[-1].tolist()
@@ -89,14 +90,14 @@ def test_going_on_keeps_the_last_update_and_counts_on() -> None:
     network = learning()
     start = None
     for run in range(1, 6):
-        start = record(network, 1, start=start)
+        start = record(network, Course(1, start=start))
         assert start.reached == run
     assert start is not None
     assert start.weights[0].tolist() != [0.5, 0.125]
 
 
 def test_npz_holds_the_arrays_of_the_contract(tmp_path: Path) -> None:
-    recording = record(cpg_rbf(), 5)
+    recording = record(cpg_rbf(), Course(5))
     recording.save(tmp_path / "x.npz")
     with np.load(tmp_path / "x.npz", allow_pickle=False) as arrays:
         assert {"activity", "neurons", "weights", "weights_static", "plastic", "sources", "targets", "delays", "dt",
@@ -133,10 +134,10 @@ def test_csv_is_a_table_that_reads_back_exactly(tmp_path: Path) -> None:
 
 def test_a_csv_is_enough_to_go_on_from_but_for_the_last_update(tmp_path: Path) -> None:
     network = cpg_rbf()
-    recording = record(network, 100)
+    recording = record(network, Course(100))
     recording.save(tmp_path / "x.csv")
     known = ended(recording, after_rows(recording.step, recording.weights))
-    on = [record(network, 10, start=start) for start in (known, formats.load(tmp_path / "x.csv"))]
+    on = [record(network, Course(10, start=start)) for start in (known, formats.load(tmp_path / "x.csv"))]
     assert np.array_equal(on[0].activity, on[1].activity)
     assert on[0].weights[0].any()
 

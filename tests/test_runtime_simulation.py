@@ -19,6 +19,7 @@ from networks_by_hand import TANH, Learns, Link, Unit, build, cpg_rbf, rule, tre
 
 import neurovis_spec as nv
 from neurovis_spec.compiler.network import Input, Network, Output
+from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.inputs import STRETCH, InputError, InputReader
 from neurovis_spec.runtime.record import record
@@ -93,7 +94,7 @@ def test_wrong_values_are_refused_and_no_step_is_made(values: Mapping[str, objec
 @pytest.mark.parametrize("value", [np.zeros((4, 2)), np.zeros((0, 3)), np.zeros((1, 3, 1)), [[0, 0, math.nan]], 3.0])
 def test_wrong_arrays_are_refused(value: object) -> None:
     with pytest.raises(InputError, match="torque"):
-        record(three_inputs(), 3, {"torque": cast("npt.ArrayLike", value)})
+        record(three_inputs(), Course(3, inputs={"torque": cast("npt.ArrayLike", value)}))
 
 
 # ---- step by step ------------------------------------------------------------------------------------------------
@@ -103,7 +104,7 @@ def test_wrong_arrays_are_refused(value: object) -> None:
 def test_stepping_is_running_bit_for_bit(backend: str) -> None:
     network = cpg_rbf()
     steps = 40 if backend == "reference" else 2 * STRETCH + 5
-    recording = record(network, steps, backend=backend)
+    recording = record(network, Course(steps, backend=backend))
     simulation = Simulation(network, backend)
     for k in range(steps):
         assert simulation.weights.tolist() == recording.weights[k].tolist()
@@ -223,7 +224,7 @@ def test_one_warning_names_the_neuron_and_the_step(backend: str) -> None:
     network = build([Unit("Calm"), Unit("Wild", bias=1.0)], [Link(1, 1, 1e200)])
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        recording = record(network, 10, backend=backend)
+        recording = record(network, Course(10, backend=backend))
         simulation = Simulation(network, backend)
         for _ in range(2):
             simulation.step()
@@ -242,7 +243,7 @@ def test_one_warning_names_the_connection(backend: str) -> None:
     bad = Learns(rule("1 / (2 - k)"))
     network = build([Unit("A"), Unit("B")], [Link(0, 1, 1.0, learns=0)], [bad])
     with pytest.warns(RuntimeWarning, match="the weight of A -> B is inf after step 2") as caught:
-        record(network, 10, backend=backend)
+        record(network, Course(10, backend=backend))
     assert len(caught) == 1
 
 
@@ -325,14 +326,14 @@ def test_large_but_finite_is_no_reason_to_warn(backend: str) -> None:
     network = build([Unit("A", bias=1e300), Unit("B", bias=-1e300)])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        record(network, 5, backend=backend)
+        record(network, Course(5, backend=backend))
 
 
 # ---- recording ---------------------------------------------------------------------------------------------------
 
 
 def test_a_recording_holds_what_the_contract_says() -> None:
-    recording = record(cpg_rbf(), 300)
+    recording = record(cpg_rbf(), Course(300))
     assert recording.activity.shape == (300, 12)
     assert recording.weights.shape == (300, 8)
     assert recording.weights[0].tolist() == [0.0] * 8
@@ -351,7 +352,7 @@ def test_a_recording_holds_what_the_contract_says() -> None:
 
 
 def test_names_that_a_recording_does_not_know() -> None:
-    recording = record(cpg_rbf(), 3)
+    recording = record(cpg_rbf(), Course(3))
     with pytest.raises(KeyError, match="no neuron, group or output 'K9'; did you mean"):
         recording["K9"]
     with pytest.raises(KeyError, match="no connection 'K1->O'; did you mean 'K1 -> O'"):
@@ -361,7 +362,7 @@ def test_names_that_a_recording_does_not_know() -> None:
 
 
 def test_snapshots_hold_all_weights_and_those_before() -> None:
-    recording = record(cpg_rbf(), 20)
+    recording = record(cpg_rbf(), Course(20))
     now, first = recording.snapshot(7), recording.snapshot(0)
     assert first.previous_weights is None
     assert now.previous_weights is not None
@@ -374,7 +375,7 @@ def test_snapshots_hold_all_weights_and_those_before() -> None:
 @given(st.integers(0, 30), st.integers(1, 12))
 @settings(max_examples=25, deadline=None)
 def test_every_kth_step_is_recorded(steps: int, every: int) -> None:
-    whole, some = record(cpg_rbf(), steps), record(cpg_rbf(), steps, every=every)
+    whole, some = record(cpg_rbf(), Course(steps)), record(cpg_rbf(), Course(steps, every=every))
     assert some.step.tolist() == list(range(0, steps, every))
     assert np.array_equal(some.activity, whole.activity[::every])
     assert np.array_equal(some.weights, whole.weights[::every])
@@ -384,16 +385,16 @@ def test_every_kth_step_is_recorded(steps: int, every: int) -> None:
 
 def test_progress_is_told_and_reaches_the_end() -> None:
     told: list[tuple[int, int]] = []
-    record(cpg_rbf(), 600, progress=lambda done, total: told.append((done, total)))
+    record(cpg_rbf(), Course(600), lambda done, total: told.append((done, total)))
     assert told == [(256, 600), (512, 600), (600, 600)]
 
 
 def test_the_default_length_is_the_networks_and_nonsense_is_refused() -> None:
     assert len(record(replace(cpg_rbf(), steps=17))) == 17
     with pytest.raises(ValueError, match="at least"):
-        record(cpg_rbf(), -1)
+        record(cpg_rbf(), Course(-1))
     with pytest.raises(ValueError, match="at least"):
-        record(cpg_rbf(), 1, every=0)
+        record(cpg_rbf(), Course(1, every=0))
 
 
 # ---- going on ----------------------------------------------------------------------------------------------------
@@ -407,22 +408,22 @@ def test_a_run_goes_on_as_if_it_had_not_been_cut(seed: int, cut: int) -> None:
     units = [Unit(f"N{i}", TANH, bias=0.1 * i, initial=0.3 if i == 0 else math.nan) for i in range(4)]
     delays, weights = random.integers(1, 6, 16).tolist(), random.normal(size=16).tolist()
     network = build(units, [Link(i // 4, i % 4, weights[i], delays[i]) for i in range(16)])
-    whole, part = record(network, cut + 10), record(network, cut)
-    rest = record(network, 10, start=part)
+    whole, part = record(network, Course(cut + 10)), record(network, Course(cut))
+    rest = record(network, Course(10, start=part))
     assert rest.step[0] == 0
     assert np.array_equal(rest.activity, whole.activity[cut:])
 
 
 def test_what_was_learned_is_kept() -> None:
     network = cpg_rbf()
-    before = record(network, 500)
-    after = record(network, 5, start=before)
+    before = record(network, Course(500))
+    after = record(network, Course(5, start=before))
     assert np.array_equal(after.weights[0], before.weights_after)
     assert not np.array_equal(after.weights[0], before.weights[-1])
     rhythm = before["C"][-1]
     matrix = network.connections.weights[:4].reshape(2, 2)
     np.testing.assert_allclose(after["C"][0], np.tanh(rhythm @ matrix), rtol=0, atol=1e-15)
-    frozen = record(cpg_rbf(learns=False), 5, start=before)
+    frozen = record(cpg_rbf(learns=False), Course(5, start=before))
     assert np.array_equal(frozen.weights_static[20:], before.weights_after)
     assert len(frozen.plastic) == 0
     assert np.array_equal(Simulation(network, start=before).weights, before.weights_after)
@@ -431,7 +432,7 @@ def test_what_was_learned_is_kept() -> None:
 def test_pre_goes_on_as_well() -> None:
     ramp = [Input("ramp", 0, 1, tree("k + 1"))]
     network = build([Unit("S", input=0), Unit("A")], [Link(0, 1, 0.0, 3, learns=0)], [Learns(rule("pre"))], ramp)
-    rest = record(network, 5, start=record(network, 10))
+    rest = record(network, Course(5, start=record(network, Course(10))))
     # w[10] = a[6] is the weight after the last step; then a[7], a[8], a[9] arrive, and a[0] of the new run
     assert rest.weight("S -> A").tolist() == [7, 8, 9, 10, 1]
 
@@ -440,14 +441,14 @@ def test_recordings_of_another_network_are_refused() -> None:
     network = cpg_rbf()
     other = build([Unit("A")])
     with pytest.raises(RecordingError, match="has no neuron 'C1'"):
-        record(network, 1, start=record(other, 2))
+        record(network, Course(1, start=record(other, Course(2))))
     with pytest.raises(RecordingError, match="'by_hand' has no neuron 'C1'"):
-        record(build([]), 1, start=record(network, 2))
+        record(build([]), Course(1, start=record(network, Course(2))))
     with pytest.raises(RecordingError, match="no step to go on from"):
-        record(network, 1, start=record(network, 0))
+        record(network, Course(1, start=record(network, Course(0))))
     fewer = replace(network, connections=build([], [Link(0, 0)]).connections, plasticity=(), blocks=(), program=())
     with pytest.raises(RecordingError, match="has no connection 'K1 -> O'"):
-        record(fewer, 1, start=record(network, 2))
+        record(fewer, Course(1, start=record(network, Course(2))))
 
 
 @pytest.mark.parametrize("backend", BOTH)

@@ -18,8 +18,7 @@ from test_animated_svg import tokens_at
 
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.scene import Arrowhead, Film, Scene, Spline, Text, still
-from neurovis_spec.scene.encode import encode
-from neurovis_spec.scene.film import film
+from neurovis_spec.scene.film import film, scene_of_step
 from neurovis_spec.scene.gains import choose_gains
 from neurovis_spec.scene.model import ended
 
@@ -57,7 +56,7 @@ def drawn(weights: list[float]) -> Scene:
     layout = straight_layout(network, {name: (float(i), 2.0 * (i > 0)) for i, name in enumerate(names)})
     w = np.array(weights)
     case = Case(network, layout, np.ones((1, count + 1)), w[None])
-    return encode(network, layout, case.snapshot(0), plain_gains(network, 1, 1, 2, 1), RenderSettings())
+    return scene_of_step(network, layout, case.snapshot(0), plain_gains(network, 1, 1, 2, 1), RenderSettings())
 
 
 def test_a_bar_means_less_than_nothing() -> None:
@@ -85,7 +84,7 @@ def test_a_films_frames_end_as_the_stills_do() -> None:
     made = moving()
     assert len(TURNING) >= 4
     for frame in (0, 1, 60, 100, 139):
-        alone = encode(CASE.network, CASE.layout, CASE.snapshot(frame), GAINS, RenderSettings())
+        alone = scene_of_step(CASE.network, CASE.layout, CASE.snapshot(frame), GAINS, RenderSettings())
         assert ends(still(made, frame)) == ends(alone)
         for name, end in ends(alone).items():
             weight = CASE.weights[frame, CASE.network.connection_index[name]]

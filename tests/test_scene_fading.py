@@ -16,8 +16,9 @@ from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.runtime.simulation import Simulation
 from neurovis_spec.scene import Disc, Scene, Text, still
 from neurovis_spec.scene.fading import seconds_of, snapshots_of
+from neurovis_spec.scene.look import Look
+from neurovis_spec.scene.shots import shots_of, snapshots_of_run
 from neurovis_spec.scene.themes import THEMES, colours
-from neurovis_spec.snapshots import snapshot_at, snapshots_from, snapshots_of_run
 
 TIME = "time: {dt: 0.001, steps: 300}\n"
 SPIKING = (
@@ -87,7 +88,7 @@ def test_the_trace_is_the_activity_furthest_from_0_each_faded_by_its_age() -> No
     for now in recording["E"]:
         shown = np.where(np.abs(now) >= np.abs(left * shown), now, left * shown)
         by_hand.append(shown)
-    run = snapshots_of_run(Simulation(network.network), 0, 300, 1)
+    run = snapshots_of_run(Simulation(network.network), Look(network.network.render, count=300, fps=1.0))
     for row, (recorded, made) in enumerate(zip(snapshots_of(network.network, recording, range(300)), run, strict=True)):
         for seen in (recorded.seen, made.seen):
             assert seen is not None
@@ -113,8 +114,9 @@ def test_it_goes_by_steps_where_a_recording_has_not_all_of_them() -> None:
 def pictures(network: CompiledNetwork) -> tuple[Scene, Scene]:
     """Step 250 as a still, and as a frame of a film."""
     recording = network.run()
-    alone = snapshot_at(network.network, 250, recording, network.run)
-    steps = list(snapshots_from(network.network, 230, 40, recording))
+    own = network.network
+    (alone,) = shots_of(own, recording, Look(own.render, first=250)).snapshots(own)
+    steps = list(shots_of(own, recording, Look(own.render, first=230, count=40, fps=60.0)).snapshots(own))
     return scene_of(network, alone), still(film_of(network, steps), 20)
 
 
@@ -159,7 +161,10 @@ def test_the_legend_and_the_tooltip_say_so() -> None:
 def test_a_trace_changes_nothing_but_the_picture() -> None:
     assert network_of(SPIKING).hash == network_of(SPIKING + "render: {trace: {R: 1}}").hash
     network = compiled(TIME + "neurons: {A: {bias: 1}}")
-    assert snapshot_at(network.network, 5, network.run(), network.run).seen is None
+    (snapshot,) = shots_of(network.network, network.run(), Look(network.network.render, first=5)).snapshots(
+        network.network
+    )
+    assert snapshot.seen is None
 
 
 def test_what_is_no_number_leaves_no_trace() -> None:

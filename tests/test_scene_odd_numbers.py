@@ -20,9 +20,10 @@ from neurovis_spec.runtime.recording import Recording, Snapshot
 from neurovis_spec.scene import Disc, RendererCapabilities, Spline, encoding
 from neurovis_spec.scene.film import film, still
 from neurovis_spec.scene.film_size import MOST_COLOURS, check_film
+from neurovis_spec.scene.look import Look
 from neurovis_spec.scene.reached import reached
 from neurovis_spec.scene.renderers import RendererError, renderer_for
-from neurovis_spec.snapshots import snapshots_from
+from neurovis_spec.scene.shots import shots_of
 
 TEXT = """neurovis: 1
 name: x
@@ -129,7 +130,8 @@ def test_a_film_takes_snapshots_one_after_the_other(monkeypatch: pytest.MonkeyPa
         return take(recording, step)
 
     monkeypatch.setattr(Recording, "snapshot", counted)
-    found = snapshots_from(network.network, 2, 5, network.run(7))
+    look = Look(network.network.render, first=2, count=5, fps=1.0)
+    found = shots_of(network.network, network.run(7), look).snapshots(network.network)
     assert (len(found), made) == (5, [])
     assert [snapshot.step for snapshot, _ in zip(found, range(3), strict=False)] == [2, 3, 4]
     assert len(made) <= 4

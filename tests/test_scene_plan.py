@@ -21,8 +21,7 @@ from neurovis_spec.layout.labels import parts_of
 from neurovis_spec.layout.model import Layout, Point
 from neurovis_spec.scene import Arrowhead, Disc, Group, Rectangle, Scene, Spline, Text, legend, still, texts
 from neurovis_spec.scene.called import names_of
-from neurovis_spec.scene.encode import encode
-from neurovis_spec.scene.film import film
+from neurovis_spec.scene.film import film, scene_of_step
 from neurovis_spec.scene.gains import choose_gains
 from neurovis_spec.scene.geometry import sample, samples
 from neurovis_spec.scene.legend_entry import LegendEntry
@@ -35,13 +34,13 @@ PLAIN = (1.0, 1.0, 4.0, 100.0)
 
 
 def picture(case: Case = CASE, step: int = 160, settings: RenderSettings | None = None) -> Scene:
-    return encode(case.network, case.layout, case.snapshot(step), GAINS, settings or RenderSettings())
+    return scene_of_step(case.network, case.layout, case.snapshot(step), GAINS, settings or RenderSettings())
 
 
 def small(made: Network, layout: Layout, settings: RenderSettings | None = None) -> Scene:
     weights = made.connections.weights.whole()
     case = Case(made, layout, np.full((1, len(made.neurons)), 0.5), weights[None])
-    return encode(made, layout, case.snapshot(0), plain_gains(made, *PLAIN), settings or RenderSettings())
+    return scene_of_step(made, layout, case.snapshot(0), plain_gains(made, *PLAIN), settings or RenderSettings())
 
 
 def with_data(scene: Scene, key: str) -> dict[str, Group]:
@@ -290,7 +289,7 @@ def test_the_rows_of_a_legend_are_even() -> None:
 def test_the_legend_states_the_gains() -> None:
     made = use_case_1(3)
     gains = plain_gains(made.network, 2.0, 4.0, 5.0, 200.0)
-    scene = encode(made.network, made.layout, made.snapshot(2), gains, RenderSettings())
+    scene = scene_of_step(made.network, made.layout, made.snapshot(2), gains, RenderSettings())
     words = [t.text for t in all_texts(scene)]
     assert {"−0.5", "+0.5", "−0.25", "+0.25", "|Δw| 0.005 a step"} <= set(words)
     legend = next(g for g in scene.groups if g.id == "legend")
@@ -317,7 +316,7 @@ def test_the_caption_says_step_time_and_error() -> None:
 
 
 def test_without_a_written_dt_there_are_no_seconds() -> None:
-    scene = encode(replace(CASE.network, dt_given=False), CASE.layout, CASE.snapshot(7), GAINS, RenderSettings())
+    scene = scene_of_step(replace(CASE.network, dt_given=False), CASE.layout, CASE.snapshot(7), GAINS, RenderSettings())
     assert any(t.text.startswith("step 7 · error") for t in all_texts(scene))
 
 
@@ -357,7 +356,9 @@ def grid(columns: int, rows: int) -> Case:
 
 def test_a_large_network_stays_within_1280_by_960_and_drops_labels_rather_than_piling_them() -> None:
     case = grid(60, 12)
-    scene = encode(case.network, case.layout, case.snapshot(0), plain_gains(case.network, *PLAIN), RenderSettings())
+    scene = scene_of_step(
+        case.network, case.layout, case.snapshot(0), plain_gains(case.network, *PLAIN), RenderSettings()
+    )
     assert scene.pixels <= (1280, 960)
     assert scene.pixels[1] <= 960
     assert len(with_data(scene, "neuron")) == 720

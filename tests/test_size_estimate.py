@@ -17,9 +17,9 @@ from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.parameters import make_parameters
 from neurovis_spec.diagnostics import Diagnostic, Findings
 from neurovis_spec.language.includes import read_includes
+from neurovis_spec.language.shape import read_spec
 from neurovis_spec.language.unknown import Names
 from neurovis_spec.language.yaml.reader import read_text
-from neurovis_spec.pipeline import shape
 
 COUNTS = ["1", "2", "p", "q", "p + 1", "q % 3 + 1", "'min(p, 2)'", "floor(p/2) + 1"]
 SETS = ["", "", ", set: {p: i + 1}", ", set: {q: n - i}", ", set: {p: q + i % 2, q: p}", ", set: {q: 2}"]
@@ -50,7 +50,7 @@ def counted(text: str, most: int = 10**6) -> tuple[int | None, tuple[Diagnostic,
     findings = Findings()
     document = read_text(HEAD + text, "x", findings)
     assert document is not None
-    spec = shape(document, findings)
+    spec = read_spec(document, findings)
     assert spec is not None
     folder = Path()
     constants = Constants(Names(), 1.0, findings)

@@ -16,7 +16,7 @@ from neurovis_renderers.svg import SvgRenderer
 
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.scene import encoding
-from neurovis_spec.scene.encode import encode
+from neurovis_spec.scene.film import scene_of_step
 from neurovis_spec.scene.themes import THEMES, channels
 
 NS = "{http://www.w3.org/2000/svg}"
@@ -26,7 +26,7 @@ ACTIVITY, SIGNAL, THICKNESS, CHANGE = 2.5, 3.5, 5.3, 310.0
 
 def drawn(case: Case = CASE, step: int = 160, theme: str = "default") -> bytes:
     gains = plain_gains(case.network, ACTIVITY, SIGNAL, THICKNESS, CHANGE)
-    scene = encode(case.network, case.layout, case.snapshot(step), gains, RenderSettings(theme=theme))
+    scene = scene_of_step(case.network, case.layout, case.snapshot(step), gains, RenderSettings(theme=theme))
     return SvgRenderer().draw(scene, ".svg")
 
 

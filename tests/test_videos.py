@@ -25,12 +25,13 @@ from neurovis_renderers.video import VideoRenderer, ffmpeg
 from PIL import Image
 from test_raster import short_film
 
-from neurovis_spec import api, compiled, pictures, pipeline
+from neurovis_spec import api, compiled, pipeline
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.scene import Film, film, still
+from neurovis_spec.scene import film as scene_film
 from neurovis_spec.scene import plan as scene_plan
 from neurovis_spec.scene.film_size import thinned
 from neurovis_spec.scene.renderers import RendererError
@@ -225,7 +226,7 @@ def test_a_film_is_made_of_parts_that_hold_few_frames(
     """So memory does not grow with the frames; what is shown is the same, from a run and from a recording."""
     network, held = api.compile(spec), list[int]()
     network.animate(tmp_path / f"whole{suffix}", fps=50, steps=40)
-    moving = pipeline.moving_in_parts
+    moving = scene_film.films
 
     def seen(parts: Iterable[Collection[Snapshot]]) -> Iterator[Collection[Snapshot]]:
         for part in parts:
@@ -235,8 +236,8 @@ def test_a_film_is_made_of_parts_that_hold_few_frames(
     def counted(network: Network, layout: Layout, parts: Iterable[Collection[Snapshot]], *more: object) -> object:
         return moving(network, layout, seen(parts), *more)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(pipeline, "moving_in_parts", counted)
-    monkeypatch.setattr(pictures, "_MOST_AT_ONCE", 25)
+    monkeypatch.setattr(scene_film, "films", counted)
+    monkeypatch.setattr(pipeline, "_MOST_AT_ONCE", 25)
     network.animate(tmp_path / f"parts{suffix}", fps=50, steps=40)
     assert held == [25, 15]
     whole, parts = ((tmp_path / f"{name}{suffix}").read_bytes() for name in ("whole", "parts"))

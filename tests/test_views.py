@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import re
+from dataclasses import replace
 from functools import partial
 from itertools import combinations
 from pathlib import Path
@@ -23,13 +24,14 @@ from neurovis_spec.language.words import VIEWS
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.scene import THEMES, Disc, Film, Group, Image, Polyline, Rectangle, Scene, Text, colours, still
-from neurovis_spec.scene.figure import figure
+from neurovis_spec.scene.figure import PageGains, figure
 from neurovis_spec.scene.heat import strongest
+from neurovis_spec.scene.look import Look
 from neurovis_spec.scene.matrix import order_of
 from neurovis_spec.scene.palette import MOST, distinct
 from neurovis_spec.scene.panels import ViewError, panels_of
 from neurovis_spec.scene.series import chosen, full_name
-from neurovis_spec.scene.shots import Shots, shot_of
+from neurovis_spec.scene.shots import Shots, shots_of
 from neurovis_spec.scene.shown import LeftOut
 from neurovis_spec.scene.texts import width
 from neurovis_spec.scene.themes import contrast
@@ -71,13 +73,12 @@ def film(
     theme: str = "default",
 ) -> Film:
     """The views of a run as a film of these steps, by default of the last."""
-    from dataclasses import replace
-
     run = recording or (RUN if network is PAIR else network.run())
-    settings = replace(network.network.render, size=size, theme=theme)
     panels = panels_of(network.network, view) or (Panel("network"),)  # type: ignore[arg-type]
+    look = Look(replace(network.network.render, size=size, theme=theme), panels, fps=10.0)
     shots = Shots(run, np.arange(len(run))[rows], np.array(frames or [len(run) - 1]))
-    return figure(network.network, network.drawn().value, panels, shots, network.gains, settings, 10.0)
+    gains = PageGains(network.gains, network.gains)
+    return figure(network.network, network.drawn().value, look, shots, gains)
 
 
 def groups(scene: Scene, key: str) -> dict[str, Group]:
@@ -543,7 +544,8 @@ def test_a_window_shows_the_steps_around_the_one_that_is_drawn() -> None:
         (119, 20, range(100, 120)),
         (5, None, range(120)),
     ):
-        shots = shot_of(PAIR.network, RUN, step, window)
+        look = Look(replace(PAIR.network.render, window=window), first=step)
+        shots = shots_of(PAIR.network, RUN, look)
         assert shots.rows.tolist() == list(wanted)
         assert shots.frames.tolist() == [step]
 

@@ -14,7 +14,6 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec import pipeline
 from neurovis_spec.analysis import pictures
 from neurovis_spec.analysis.catalogue import catalogue
 from neurovis_spec.analysis.gait import gait, stretches
@@ -45,6 +44,7 @@ from neurovis_spec.runtime.named_array import Axis, NamedArray, csv_of, json_of
 from neurovis_spec.runtime.pairwise import THRESHOLD, coactivation, cross_correlation, mutual_information
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.scene.model import Scene, Theme
+from neurovis_spec.scene.renderers import drawing
 from neurovis_spec.scene.themes import theme_of
 
 #: The most curves of a picture, bars of a ranking, rows of a table over time, and neurons of a gait diagram.
@@ -172,7 +172,7 @@ class _Report:
         yield from self._trials()
 
     def _draw(self, scene: Scene) -> bytes:
-        return pipeline.draw(scene, ".svg")
+        return drawing(scene, ".svg")
 
     def _view(self, view: str) -> bytes:
         """A view that the pictures of a network have as well."""

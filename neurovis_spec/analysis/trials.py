@@ -19,9 +19,10 @@ from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.network import Input, Network
 from neurovis_spec.runtime.backend import Stepper, ready
 from neurovis_spec.runtime.columns import ALL, columns_of
+from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.embodied import embodied
 from neurovis_spec.runtime.errors import RecordingError
-from neurovis_spec.runtime.record import Course, InMemory, Last, go
+from neurovis_spec.runtime.record import InMemory, Last, go
 from neurovis_spec.runtime.rows import RowSink, Steps
 from neurovis_spec.runtime.simulation import Simulation
 from neurovis_spec.runtime.state import State, initial_state
@@ -65,7 +66,7 @@ class Trials:
         self._simulation = Simulation(network, self._made, inputs=inputs, body=self._body)
         self._state = initial_state(network)
         self._widths = columns_of(network, ALL, self._body).widths(network)
-        course = Course(first, 1, inputs, self._made, body=self._body)
+        course = Course(first, inputs=inputs, backend=self._made, body=self._body)
         _go(network, self._state, course, Last(self._widths))
         if self._body is not None:
             self._body.put(self._state)
@@ -115,7 +116,7 @@ class Trials:
     def _run(self, state: State, seen: Callable[[FloatArray], FloatArray] | None = None) -> FloatArray:
         rows = InMemory(self._widths, self.steps)
         made = self._made if seen is None else replace(self._made, stepper=_Turned(self._made.stepper, seen))
-        course = Course(self.steps, 1, self._inputs, made, body=self._body)
+        course = Course(self.steps, inputs=self._inputs, backend=made, body=self._body)
         _go(self.network, state, course, rows)
         return rows.numbers(Steps(self.steps, 1, self.start)).rows.activity
 

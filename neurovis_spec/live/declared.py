@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.compilation import Compilation
 from neurovis_spec.compiler.events.settable import Dependent
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.describe import wired
@@ -19,7 +19,7 @@ from neurovis_spec.language.sections import InputModel
 from neurovis_spec.live.turns import rules
 
 
-def declared(compiled: CompiledNetwork) -> dict[str, list[dict[str, object]]]:
+def declared(compiled: Compilation) -> dict[str, list[dict[str, object]]]:
     """All that can be changed."""
     network, written = compiled.network, compiled.spec.inputs
     inputs = [entry for entry in network.inputs if entry.expression is None and entry.table is None]
@@ -51,7 +51,7 @@ def _sensed(network: Network) -> dict[str, str]:
     return result
 
 
-def parameters(compiled: CompiledNetwork) -> list[dict[str, object]]:
+def parameters(compiled: Compilation) -> list[dict[str, object]]:
     """The parameters in the order written; bounds that follow other parameters are as these begin."""
     network, written = compiled.network, compiled.spec.parameters
     settable = network.settable

@@ -14,7 +14,7 @@ from queue import Empty, SimpleQueue
 from threading import Condition, RLock, Thread
 from typing import Final, TypeAlias
 
-from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.compilation import Compilation
 from neurovis_spec.diagnostics import SpecError, show_text
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.live.commands import Appearance, Fetch, PlaceNeuron, Request, Save, Unplace, Write
@@ -49,9 +49,9 @@ class Desk:
 
     def __init__(
         self,
-        compiled: CompiledNetwork,
+        compiled: Compilation,
         engine: str | None,
-        draw: Callable[[CompiledNetwork, Appearance, Layout], View],
+        draw: Callable[[Compilation, Appearance, Layout], View],
         run: Run,
         tell: Callable[[str], object],
         spec: Written | None = None,
@@ -94,7 +94,7 @@ class Desk:
         """What is put by hand."""
         return self._placed
 
-    def renew(self, compiled: CompiledNetwork) -> Layout:
+    def renew(self, compiled: Compilation) -> Layout:
         """The layout of an edited network, with what was put by hand. Raises LayoutRefusalError."""
         with self._work_lock:
             self._earlier, self._placed = self._placed, self._placed.carried(compiled)

@@ -14,7 +14,7 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import TypeAlias
 
-from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.compilation import Compilation
 from neurovis_spec.diagnostics import Diagnostic, SpecError, show_text
 from neurovis_spec.interrupts import ENDING, Ended
 from neurovis_spec.layout.model import LayoutRefusalError
@@ -56,9 +56,9 @@ class Edits:
     def __init__(
         self,
         show: Show,
-        compile: Callable[[], CompiledNetwork],
-        files: Callable[[CompiledNetwork], Iterable[Path]],
-        known: CompiledNetwork,
+        compile: Callable[[], Compilation],
+        files: Callable[[Compilation], Iterable[Path]],
+        known: Compilation,
         run: Run,
         tell: Tell,
         desk: Desk,

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, TypeAlias
 
-from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.compilation import Compilation
 from neurovis_spec.differences import difference
 from neurovis_spec.language.format.edit import Path as Keys
 from neurovis_spec.language.format.edit import Value, put
@@ -32,7 +32,7 @@ STEP: Final = 1 / 16
 class Placed:
     """The layout of a network, and the neurons that were put somewhere by hand since it was saved."""
 
-    compiled: CompiledNetwork
+    compiled: Compilation
     engine: str | None
     layout: Layout
     moved: tuple[str, ...] = ()
@@ -48,7 +48,7 @@ class Placed:
         place = (round(at[0] / STEP) * STEP, round(at[1] / STEP) * STEP)
         return replace(self, layout=self._with(moved, {neuron: place}), moved=moved)
 
-    def carried(self, compiled: CompiledNetwork) -> Placed:
+    def carried(self, compiled: Compilation) -> Placed:
         """The same in an edited network: what is there still stays where it was put. Raises LayoutRefusalError."""
         begun = placed(compiled, self.engine)
         moved = tuple(name for name in self.moved if name in compiled.network.neuron_index)
@@ -71,22 +71,22 @@ class Placed:
             if neuron in by_hand or neuron not in images
         }
         compiled = replace(self.compiled, network=replace(network, layout=replace(network.layout, positions=pins)))
-        return compiled.layout(self.engine, earlier=replace(self.layout, positions=positions)).value
+        return compiled.arranged(self.engine, earlier=replace(self.layout, positions=positions))
 
 
-def placed(compiled: CompiledNetwork, engine: str | None = None) -> Placed:
+def placed(compiled: Compilation, engine: str | None = None) -> Placed:
     """A network as it is laid out. Raises LayoutRefusalError."""
-    return Placed(compiled, engine, compiled.drawn(engine).value)
+    return Placed(compiled, engine, compiled.placed(engine))
 
 
-def _images(compiled: CompiledNetwork, neuron: int) -> set[int]:
+def _images(compiled: Compilation, neuron: int) -> set[int]:
     """The neurons whose places follow from that of this one."""
     pairs = (pair for mirror in compiled.network.layout.mirrors for pair in mirror.pairs)
     return {b if a == neuron else a for a, b in pairs if neuron in (a, b) and a != b}
 
 
 #: Compiles a text in place of that of the spec's file. Raises SpecError.
-Compile: TypeAlias = Callable[[str], CompiledNetwork]
+Compile: TypeAlias = Callable[[str], Compilation]
 
 #: Places nearer than this are the same.
 _SAME: Final = 16 * GRID
@@ -146,7 +146,7 @@ def saving(shown: Placed, spec: Path, compile: Compile, into: Into) -> Saving:
     written = put(text, values) if values else text
     files = [File(spec, data, written)] if values else []
     if into == "file":
-        _check(shown, compile(written).layout(shown.engine, earlier=shown.layout).value)
+        _check(shown, compile(written).arranged(shown.engine, earlier=shown.layout))
         path = now.layout_file or _beside(spec)
         files.insert(0, File(path, _bytes(path), dump(shown.layout)))
     return Saving(tuple(file for file in files if file.before != file.after.encode()))
@@ -164,7 +164,7 @@ def _beside(spec: Path) -> Path:
     return spec.with_name(f"{spec.stem}.layout.yaml")
 
 
-def _file(shown: Placed, now: CompiledNetwork, spec: Path) -> dict[Keys, Value]:
+def _file(shown: Placed, now: Compilation, spec: Path) -> dict[Keys, Value]:
     """What the spec must say so that the layout file is heard: its name, and no other places."""
     values = _positions(shown, now, set(_moved(shown, _stated(now))))
     if now.layout_file is None:
@@ -175,13 +175,13 @@ def _file(shown: Placed, now: CompiledNetwork, spec: Path) -> dict[Keys, Value]:
     return values
 
 
-def _pins(shown: Placed, now: CompiledNetwork, text: str, compile: Compile) -> dict[Keys, Value]:
+def _pins(shown: Placed, now: Compilation, text: str, compile: Compile) -> dict[Keys, Value]:
     """Pins that reproduce the layout that is shown: those made by hand and, as the rest of the network is fitted to
     pins, those of all neurons that would otherwise stand elsewhere."""
     names = {*shown.moved, *_moved(shown, _stated(now))}
     for _ in range(_ROUNDS):
         values = _positions(shown, now, names)
-        made = compile(put(text, values) if values else text).layout(shown.engine).value
+        made = compile(put(text, values) if values else text).arranged(shown.engine)
         others = _moved(shown, made.positions)
         if not others:
             return values
@@ -189,7 +189,7 @@ def _pins(shown: Placed, now: CompiledNetwork, text: str, compile: Compile) -> d
     raise SavingError("pins in the spec do not give this layout: save a layout file")
 
 
-def _stated(now: CompiledNetwork) -> dict[str, Point]:
+def _stated(now: Compilation) -> dict[str, Point]:
     """The places that the spec says."""
     names = now.network.neurons.names
     return {names[index]: point for index, point in now.network.layout.positions.items()}
@@ -206,7 +206,7 @@ def _check(shown: Placed, made: Layout) -> None:
         raise SavingError(f"'{others[0]}' would not stand where it is shown")
 
 
-def _positions(shown: Placed, now: CompiledNetwork, names: set[str]) -> dict[Keys, Value]:
+def _positions(shown: Placed, now: Compilation, names: set[str]) -> dict[Keys, Value]:
     """Pins of these neurons, by the keys that the spec has for them; in the order of the network."""
     written = () if now.spec.layout is None else tuple(now.spec.layout.positions)
     groups = {group.name: group.indices for group in now.network.neurons.groups}

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from neurovis_spec import pipeline
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.as_turned import as_turned
@@ -24,9 +23,10 @@ from neurovis_spec.runtime.kinds import Rows
 from neurovis_spec.runtime.recording import After, Recording
 from neurovis_spec.scene import Film
 from neurovis_spec.scene.figure import PAGE, with_body
-from neurovis_spec.scene.film import filmed
+from neurovis_spec.scene.film import filmed, still
 from neurovis_spec.scene.film_size import frames_a_second
 from neurovis_spec.scene.poses import Poses
+from neurovis_spec.scene.renderers import drawing, renderer_for
 
 #: The most steps that are looked back, the most numbers in them, and the most seconds of a film.
 MOST_STEPS, _NUMBERS, MOST_SECONDS = 10_000, 8_000_000, 60
@@ -58,12 +58,12 @@ def told_by(source: Source, steps: int) -> Told:
 
 def picture(view: View, told: Told) -> bytes:
     """The last step as SVG, with the body that is drawn."""
-    return pipeline.draw(pipeline.frame(_film(view, replace(told, seen=told.seen[-1:])), 0), ".svg")
+    return drawing(still(_film(view, replace(told, seen=told.seen[-1:])), 0), ".svg")
 
 
 def film(view: View, told: Told) -> bytes:
     """Steps as a moving SVG, with the body that is drawn."""
-    return pipeline.animate(_film(view, told), ".svg")
+    return renderer_for(".svg", moving=True).animate(_film(view, told), ".svg")
 
 
 def _film(view: View, told: Told) -> Film:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.compilation import Compilation
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.live.carry import carried
 from neurovis_spec.live.commands import AS_IT_IS, Appearance
@@ -17,6 +17,7 @@ from neurovis_spec.live.run import Change, Stage
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import Source
 from neurovis_spec.live.view import View, view_of
+from neurovis_spec.runtime.simulation import Simulation
 
 if TYPE_CHECKING:
     from neurovis_spec.runtime.recording import Recording
@@ -32,13 +33,11 @@ class Show:
     engine: str | None = None
     backend: str | None = None
 
-    def stage(self, compiled: CompiledNetwork) -> Stage:
+    def stage(self, compiled: Compilation) -> Stage:
         """The source and its view. Raises RecordingError, BackendError, LayoutRefusalError."""
         return self._source(compiled), self.view(compiled)
 
-    def changed(
-        self, compiled: CompiledNetwork, appearance: Appearance = AS_IT_IS, layout: Layout | None = None
-    ) -> Change:
+    def changed(self, compiled: Compilation, appearance: Appearance = AS_IT_IS, layout: Layout | None = None) -> Change:
         """What shows an edited network, in this layout, at the step that is shown. Raises as ``stage`` does."""
         view = self.view(compiled, appearance, layout)
         if self.recording is not None:
@@ -49,7 +48,7 @@ class Show:
                 return recorded, view
 
             return same_row
-        simulation = compiled.simulator(self.backend, start=self.start)
+        simulation = Simulation(compiled.network, self.backend, self.start)
 
         def same_step(old: Source) -> Stage:
             assert isinstance(old, SimulatedSource)
@@ -57,11 +56,11 @@ class Show:
 
         return same_step
 
-    def _source(self, compiled: CompiledNetwork) -> Source:
+    def _source(self, compiled: Compilation) -> Source:
         if self.recording is not None:
             return RecordedSource(compiled.network, self.recording)
-        return SimulatedSource(compiled.simulator(self.backend, start=self.start))
+        return SimulatedSource(Simulation(compiled.network, self.backend, self.start))
 
-    def view(self, compiled: CompiledNetwork, appearance: Appearance = AS_IT_IS, layout: Layout | None = None) -> View:
+    def view(self, compiled: Compilation, appearance: Appearance = AS_IT_IS, layout: Layout | None = None) -> View:
         """How a network is drawn, by default in its own layout. Raises LayoutRefusalError."""
         return view_of(compiled, compiled.gains_for(self.recording), self.theme, self.engine, appearance, layout)

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.compilation import Compilation
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.model import Layout
@@ -150,7 +150,7 @@ class View:
 
 
 def view_of(
-    compiled: CompiledNetwork,
+    compiled: Compilation,
     gains: Gains,
     theme: str | None = None,
     engine: str | None = None,
@@ -163,7 +163,7 @@ def view_of(
     settings = compiled.settings_for(appearance.theme or theme)
     drawn = gathered(network, settings.collapse)
     seen = appearance.gains(gains)
-    stands = laid_out(drawn, compiled.drawn(engine).value if layout is None else layout)
+    stands = laid_out(drawn, compiled.placed(engine) if layout is None else layout)
     planned = plan(drawn, stands, seen, settings)
     largest = np.ones(len(seen.thickness))
     for scale in seen.thickness_scales:

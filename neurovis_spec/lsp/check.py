@@ -10,6 +10,7 @@ import json
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from neurovis_spec import pipeline
 from neurovis_spec.compiler.compile import Request
@@ -18,6 +19,9 @@ from neurovis_spec.diagnostics import Diagnostic, Findings, Span
 from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.files import Files
 from neurovis_spec.real_paths import real_path
+
+if TYPE_CHECKING:
+    from neurovis_spec.layout.model import Layout, LayoutProblem
 
 #: The spec within which a file to be included is checked; no file has such a name.
 _STAND_IN = "<stand-in>"
@@ -46,14 +50,19 @@ def stumbled(document: Document) -> Checked:
     return Checked((Diagnostic("internal", message, span, hint="please report it with this text"),), None)
 
 
+def _problem(network: Network, memory: Layout | None) -> LayoutProblem:
+    from neurovis_spec.layout.problem import problem_of
+
+    return problem_of(network, memory)
+
+
 def _compiled(text: str, file: str, folder: Path, root: Path, files: Files) -> Checked:
     findings = Findings()
-    document = pipeline.read_string(text, file, findings)
-    spec, request, network, memory = pipeline.compile(document, Request(folder, root, read=files.read), findings)
+    asked = Request(folder, root, read=files.read)
+    spec, request, network, memory = pipeline.compile(text, file, asked, findings)
     refusal = None
     if spec is not None and network is not None and not findings.failed:
-        pose = partial(pipeline.pose, network, memory)
-        refusal = pipeline.refusal(spec, request, network, pose)
+        refusal = pipeline.refusal(spec, request, network, partial(_problem, network, memory))
     others = frozenset(place_of(name, folder) for name in findings.sources if name != file)
     found = findings.sorted()
     return Checked(found if refusal is None else (*found, refusal), None if findings.failed else network, others)

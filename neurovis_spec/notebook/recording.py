@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from neurovis_spec.runtime.recording import Recording
 
 if TYPE_CHECKING:
-    from neurovis_spec.compiled import CompiledNetwork
+    from neurovis_spec.compilation import Compilation
     from neurovis_spec.notebook.widget import LiveWidget
 
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 class PlayedRecording(Recording):
     """A recording, and the network that made it. What is copied or pickled of it is the recording."""
 
-    compiled: CompiledNetwork = field(kw_only=True)
+    compiled: Compilation = field(kw_only=True)
 
     def __reduce__(self) -> tuple[type[Recording], tuple[object, ...]]:
         return Recording, tuple(getattr(self, entry.name) for entry in fields(Recording))
@@ -31,9 +31,11 @@ class PlayedRecording(Recording):
     def _widget(self) -> LiveWidget | None:
         """What plays it; None where it cannot be played: a partial one, an empty one, a network that is not drawn."""
         from neurovis_spec.layout.model import LayoutRefusalError
+        from neurovis_spec.live.show import Show
+        from neurovis_spec.notebook.widget import LiveWidget
 
         try:
-            return self.compiled.live(self, play=False)
+            return LiveWidget(self.compiled, Show(self), play=False)
         except (ValueError, LayoutRefusalError):
             return None
 
@@ -45,7 +47,7 @@ class PlayedRecording(Recording):
         return None if found is None else ({**found[0], "text/plain": repr(self)}, found[1])
 
 
-def played(recording: Recording, compiled: CompiledNetwork) -> PlayedRecording:
+def played(recording: Recording, compiled: Compilation) -> PlayedRecording:
     """A recording with the network that made it."""
     values = {entry.name: getattr(recording, entry.name) for entry in fields(Recording)}
     return PlayedRecording(**values, compiled=compiled)

@@ -13,12 +13,13 @@ from keyword import iskeyword
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.compilation import Compilation
 from neurovis_spec.live.commands import Command, Pause, Play, Restart, Seek
 from neurovis_spec.live.shipped import page
 from neurovis_spec.live.show import Show
 from neurovis_spec.live.turns import Set
 from neurovis_spec.notebook.session import Session
+from neurovis_spec.pipeline import svg_at_rest
 
 if find_spec("anywidget") is None:
     raise ImportError(
@@ -30,7 +31,7 @@ import numpy as np
 import traitlets
 
 if TYPE_CHECKING:
-    from neurovis_spec.runtime.recording import Recording
+    pass
 
 #: Seconds that whoever asks for something waits for its answer: a step may take long.
 _PATIENCE: Final = 10.0
@@ -72,11 +73,11 @@ class LiveWidget(anywidget.AnyWidget):
     step = traitlets.Int(0, read_only=True, help="the step that is shown")
     playing = traitlets.Bool(False, read_only=True, help="whether it plays")
 
-    def __init__(self, compiled: CompiledNetwork, show: Show, play: bool = True) -> None:
+    def __init__(self, compiled: Compilation, show: Show, play: bool = True) -> None:
         super().__init__()
         stage = show.stage(compiled)
         frame = stage[1].plan.frame
-        self._picture = compiled.drawn(show.engine)
+        self._compiled, self._layout = compiled, compiled.placed(show.engine)
         self.title = f"{stage[1].plan.title} – NeuroVis"
         self.height = min(max(round(frame.height * frame.density) + _BAR, _LEAST), _MOST)
         self._known: dict[str, float] = {}
@@ -87,11 +88,11 @@ class LiveWidget(anywidget.AnyWidget):
         self.on_msg(self._take_message)
 
     def __repr__(self) -> str:
-        return f"<live view of {self._picture.compiled.name}>"
+        return f"<live view of {self._compiled.name}>"
 
     def _repr_svg_(self) -> str:
         """The network before anything happens, for where a notebook is read that does not run."""
-        return self._picture._repr_svg_()
+        return svg_at_rest(self._compiled, self._layout)
 
     def play(self) -> None:
         """Go on."""
@@ -115,7 +116,7 @@ class LiveWidget(anywidget.AnyWidget):
             self._session.end()
         super().close()
 
-    def _declare(self, compiled: CompiledNetwork, parameters: dict[str, float]) -> None:
+    def _declare(self, compiled: Compilation, parameters: dict[str, float]) -> None:
         """A trait for each parameter."""
         traits: dict[str, Parameter] = {}
         for name, value in parameters.items():
@@ -187,16 +188,3 @@ class LiveWidget(anywidget.AnyWidget):
                 self._session.take(view, text)
             case _ if len(buffers) == 1:
                 self._session.take(view, bytes(buffers[0]))
-
-
-def live(
-    compiled: CompiledNetwork,
-    recording: Recording | None = None,
-    start: Recording | None = None,
-    theme: str | None = None,
-    engine: str | None = None,
-    backend: str | None = None,
-    play: bool = True,
-) -> LiveWidget:
-    """A widget of a run, or of a recording. Raises RecordingError, BackendError, LayoutRefusalError."""
-    return LiveWidget(compiled, Show(recording, start, theme, engine, backend), play)

@@ -14,11 +14,11 @@ from itertools import chain, repeat
 from threading import Condition, Thread
 from typing import IO, Final
 
-from neurovis_spec import pipeline
 from neurovis_spec.ros.video import Shooting
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.scene import Film
-from neurovis_spec.scene.renderers import RendererError
+from neurovis_spec.scene.film import films
+from neurovis_spec.scene.renderers import RendererError, streaming_renderer
 
 #: seconds of a film that are drawn together, at least and at most; what each has in common is worked out once
 _LEAST, _MOST = 1.0, 10.0
@@ -82,14 +82,12 @@ class Shots:
 def film(shooting: Shooting, pipe: IO[bytes]) -> None:
     """Draw what comes until nothing more does. Raises RendererError, OSError."""
     parts = Shots(pipe, shooting.fps).parts()
-    films = pipeline.moving_in_parts(
-        shooting.network, shooting.layout, parts, shooting.gains, shooting.settings, shooting.fps
-    )
-    first = next(films, None)
+    made = films(shooting.network, shooting.layout, parts, shooting.gains, shooting.settings, shooting.fps)
+    first = next(made, None)
     if first is not None:
         with shooting.path.open("wb") as file:
-            together: Iterator[Film] = chain([first], films)
-            pipeline.stream(together, 0, shooting.path.suffix, file)
+            together: Iterator[Film] = chain([first], made)
+            streaming_renderer(shooting.path.suffix).stream(together, 0, shooting.path.suffix.lower(), file)
 
 
 def main() -> int:

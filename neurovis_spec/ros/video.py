@@ -43,7 +43,7 @@ class Shooting:
 
 def shooting(compiled: CompiledNetwork, path: Path, fps: float, theme: str | None, engine: str | None) -> Shooting:
     """A film of a network, drawn as its page is. Raises LayoutRefusalError."""
-    layout, settings = compiled.drawn(engine).value, compiled.settings_for(theme)
+    layout, settings = compiled.placed(engine), compiled.settings_for(theme)
     return Shooting(compiled.network, layout, compiled.gains_for(None), settings, fps, path)
 
 

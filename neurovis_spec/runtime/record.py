@@ -1,19 +1,17 @@
 """Running and recording: many steps in one loop, into arrays taken beforehand.
 
-In: a Network, inputs, a number of steps. Out: a Recording of steps 0 … steps − 1, or of every K-th of them. ``go``
-hands the rows on while it runs.
+In: a Network and the Course of a run. Out: a Recording of its steps, or of every K-th of them. ``go`` hands the rows on
+while it runs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, subscript
 from neurovis_spec.body import BodyError
@@ -22,10 +20,11 @@ from neurovis_spec.compiler.events.patch import PatchError
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.interrupts import Asked, deferred
 from neurovis_spec.progress import Progress
-from neurovis_spec.runtime.backend import Backend, Ready, Runner, Stepper, ready
+from neurovis_spec.runtime.backend import Runner, Stepper, ready
 from neurovis_spec.runtime.checkpoint import load_state, save_state
-from neurovis_spec.runtime.columns import ALL, Columns, Keep, Numbers, columns_of, recording_of
+from neurovis_spec.runtime.columns import Columns, Numbers, columns_of, recording_of
 from neurovis_spec.runtime.controls import Controls
+from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.embodied import Embodied
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.inputs import STRETCH, InputReader
@@ -35,93 +34,69 @@ from neurovis_spec.runtime.recording import After, Recording
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.rows import RowSink, Steps
 from neurovis_spec.runtime.state import State, initial_state
-from neurovis_spec.runtime.until import Until, Watched
+from neurovis_spec.runtime.until import Watched
 from neurovis_spec.runtime.watch import Watch
 
-
-def record(
-    network: Network,
-    steps: int | None = None,
-    inputs: Mapping[str, npt.ArrayLike] | None = None,
-    backend: str | Backend | None = None,
-    every: int = 1,
-    start: Recording | None = None,
-    progress: Progress | None = None,
-    until: Until | None = None,
-    keep: Keep = ALL,
-    checkpoint: Path | None = None,
-) -> Recording:
-    """Run a network for ``steps`` steps (by default ``time.steps``) as ``record_course`` does."""
-    steps = checked_steps(network, steps, every)
-    return record_course(network, Course(steps, every, inputs, backend, until, keep), start, progress, checkpoint)
+#: A run as long as the spec says, of which everything is kept.
+AS_IT_IS = Course()
 
 
-def record_course(
-    network: Network,
-    course: Course,
-    start: Recording | None = None,
-    progress: Progress | None = None,
-    checkpoint: Path | None = None,
-) -> Recording:
-    """Run a network and record steps 0, ``every``, 2·``every``, …; ``until`` may end it earlier.
+def record(network: Network, course: Course = AS_IT_IS, progress: Progress | None = None) -> Recording:
+    """Run a network and record steps 0, ``every``, 2·``every``, … of its course.
 
-    ``inputs`` as in ``InputReader``; ``start`` as in ``resume``; ``keep`` is what of a step is recorded;
-    ``checkpoint`` a file from which the run goes on exactly, if it is there, and which holds its state at the end, also
-    after a signal (then KeyboardInterrupt is raised). Warns once (RuntimeWarning) when something is no longer finite.
-    Raises InputError, BackendError, RecordingError (also where there is not the memory), KeyError for a name that
-    there is not, ValueError.
+    After a signal the checkpoint of the course holds the state at which the run ended (then KeyboardInterrupt is
+    raised). Warns once (RuntimeWarning) when something is no longer finite. Raises InputError, BackendError,
+    RecordingError (also where there is not the memory), BodyError, KeyError for a name that there is not.
     """
-    steps = checked_steps(network, course.steps, course.every)
-    course, state = begun(network, course, start, checkpoint)
+    course, state = begun(network, course)
     columns = columns_of(network, course.keep, course.body)
-    kept, widths = Steps(steps, course.every, state.k), columns.widths(network)
+    kept, widths = Steps(course.length(network), course.every, state.k), columns.widths(network)
     if not course.keep.last:
-        check_room(steps, course.every, sum(widths))
+        check_room(kept.total, kept.every, sum(widths))
     rows: InMemory | Last = Last(widths) if course.keep.last else InMemory(widths, len(kept))
-    if checkpoint is None:
+    if course.checkpoint is None:
         go(network, state, course, rows, progress)
     else:
         with deferred() as rows.asked:
             go(network, state, course, rows, progress)
-            keep_state(state, course, checkpoint)
+            keep_state(state, course)
     return recording_of(network, columns, rows.numbers(kept), state.weights, after(network, state), state.backend)
 
 
-def with_body(network: Network, course: Course) -> Course:
-    """The course with the network's body opened, if it has one. Raises BodyError."""
-    return course if network.body is None or course.body is not None else replace(course, body=Embodied(network))
-
-
-def begun(network: Network, course: Course, start: Recording | None, checkpoint: Path | None) -> tuple[Course, State]:
+def begun(network: Network, course: Course) -> tuple[Course, State]:
     """The course with its body opened and its backend made ready, and the state that the run begins in: that of a
     checkpoint, if there is one, after a recording, or the first. What goes on goes on with its backend. Raises
     RecordingError, BackendError, BodyError where a checkpoint is wanted and the body cannot be kept."""
-    course = with_body(network, course)
-    kept = None if checkpoint is None else _kept_state(network, start, checkpoint, course.body)
-    before = kept or start
+    course = course.embodied(network)
+    kept = _kept_state(network, course)
+    before = kept or course.start
     made = ready(network, course.backend, "" if before is None else before.backend)
     if kept is None:
-        kept = initial_state(network) if start is None else resumed_state(network, start, made.functions)
+        kept = initial_state(network) if course.start is None else resumed_state(network, course.start, made.functions)
     kept.backend = made.name
     return replace(course, backend=made), kept
 
 
-def _kept_state(network: Network, start: Recording | None, checkpoint: Path, body: Embodied | None) -> State | None:
-    """The state in a checkpoint, None where there is none yet. Raises RecordingError, BodyError."""
-    if body is not None:
-        body.check_kept()
+def _kept_state(network: Network, course: Course) -> State | None:
+    """The state in the checkpoint of a course, None where there is none yet. Raises RecordingError, BodyError."""
+    checkpoint = course.checkpoint
+    if checkpoint is None:
+        return None
+    if course.body is not None:
+        course.body.check_kept()
     if not checkpoint.exists():
         return None
-    if start is not None:
+    if course.start is not None:
         raise RecordingError(f"{checkpoint} is there: go on from a checkpoint or from a recording, not from both")
     return load_state(network, checkpoint)
 
 
-def keep_state(state: State, course: Course, checkpoint: Path) -> None:
-    """Write the state at the end of a run to a checkpoint. Raises OSError."""
-    if course.body is not None:
-        course.body.put(state)
-    save_state(state, checkpoint)
+def keep_state(state: State, course: Course) -> None:
+    """Write the state at the end of a run to the checkpoint of its course, if it has one. Raises OSError."""
+    if course.checkpoint is not None:
+        if course.body is not None:
+            course.body.put(state)
+        save_state(state, course.checkpoint)
 
 
 def after(network: Network, state: State) -> After:
@@ -205,33 +180,10 @@ class Last:
         return bool(self.asked)
 
 
-@dataclass(frozen=True)
-class Course:
-    """How long a run is, which steps of it are kept, and what it runs on."""
-
-    steps: int
-    every: int = 1
-    inputs: Mapping[str, npt.ArrayLike] | None = None
-    backend: str | Backend | Ready | None = None
-    #: what may end it earlier
-    until: Until | None = None
-    keep: Keep = ALL
-    #: the network's body, opened; None where it has none
-    body: Embodied | None = None
-
-
-def checked_steps(network: Network, steps: int | None, every: int) -> int:
-    """The steps of a run. Raises ValueError."""
-    steps = network.steps if steps is None else steps
-    if steps < 0 or every < 1:
-        raise ValueError(f"{steps} steps, every {every}: at least 0 and at least 1 are needed")
-    return steps
-
-
 def go(network: Network, state: State, course: Course, rows: RowSink, progress: Progress | None = None) -> None:
-    """Run a network from a state, and hand on the rows that are kept. Its body (``with_body``) is taken to where the
-    state says, and left where the run ends."""
-    every, steps, body = course.every, course.steps, course.body
+    """Run a network from a state, and hand on the rows that are kept. Its body (``Course.embodied``) is taken to where
+    the state says, and left where the run ends."""
+    steps, body = course.length(network), course.body
     assert (body is None) == (network.body is None)
     if body is not None:
         body.take(state)
@@ -241,7 +193,8 @@ def go(network: Network, state: State, course: Course, rows: RowSink, progress: 
     columns = columns_of(network, course.keep, body)
     made = ready(network, course.backend)
     reader, stepper = InputReader(network, course.inputs, watch.given, made.functions), made.stepper
-    make: _Make = _OneByOne(columns, stepper, body, frozenset(course.inputs or ()))
+    hands = _Hands(course.every, rows, reader, watch)
+    make: _Make = _OneByOne(hands, columns, stepper, body, frozenset(course.inputs or ()))
     plain = columns.neurons is None and not columns.probe.names and len(columns.weights) == len(network.changing)
     if (
         isinstance(stepper, Runner)
@@ -249,7 +202,7 @@ def go(network: Network, state: State, course: Course, rows: RowSink, progress: 
         and body is None
         and (course.until is None or course.until.measure.together)
     ):
-        make = _Together(stepper, watched)
+        make = _Together(hands, stepper, watched)
     controls, origin, last = Controls(network, made.functions), state.k, state.k + steps
     changes = [change for change in network.changes if origin <= change.at < last]
     _check_events(controls, state, changes)
@@ -259,18 +212,25 @@ def go(network: Network, state: State, course: Course, rows: RowSink, progress: 
             controls.begin(state)
             reader.use(state)
             for first, stop in _stretches(begin, end):
-                if rows.over() or not make.steps(state, first, stop, every, rows, reader, watch):
+                if rows.over() or not make.steps(state, first, stop):
                     return
                 if progress is not None:
                     progress(stop - origin, steps)
 
 
+class _Hands(NamedTuple):
+    """What the steps of a run take from and give to: one row in ``every`` steps, inputs, and who looks at numbers."""
+
+    every: int
+    rows: RowSink
+    reader: InputReader
+    watch: Watch
+
+
 class _Make(Protocol):
     """A way to make the steps of a stretch."""
 
-    def steps(
-        self, state: State, first: int, stop: int, every: int, rows: RowSink, reader: InputReader, watch: Watch
-    ) -> bool:
+    def steps(self, state: State, first: int, stop: int) -> bool:
         """Make the steps from ``first`` to ``stop``; False where the rows say that the run is over."""
         ...
 
@@ -279,15 +239,15 @@ class _Make(Protocol):
 class _OneByOne:
     """Each step by a call."""
 
+    hands: _Hands
     columns: Columns
     stepper: Stepper
     body: Embodied | None = None
     #: the inputs that are given, and not sensed
     given: frozenset[str] = frozenset()
 
-    def steps(
-        self, state: State, first: int, stop: int, every: int, rows: RowSink, reader: InputReader, watch: Watch
-    ) -> bool:
+    def steps(self, state: State, first: int, stop: int) -> bool:
+        every, rows, reader, watch = self.hands
         step, look, due, columns = self.stepper.step, watch.look, rows.due, self.columns
         changing, chosen = subscript(columns.weights), columns.neurons
         probe = columns.probe if columns.probe.names else None
@@ -332,12 +292,12 @@ class _Together:
     """Many steps by a call. What may end the run between them (``watched``) is asked behind them: where it ends before
     the last of them, the state of before is taken, and the steps up to there are made again."""
 
+    hands: _Hands
     runner: Runner
     watched: Watched | None = None
 
-    def steps(
-        self, state: State, first: int, stop: int, every: int, rows: RowSink, reader: InputReader, watch: Watch
-    ) -> bool:
+    def steps(self, state: State, first: int, stop: int) -> bool:
+        every, rows, reader, watch = self.hands
         wanted, most = _kept(first, stop, every), self.runner.at_once
         activity, weights, *_ = rows.begin(wanted)
         row, k = 0, first

@@ -18,8 +18,8 @@ import numpy as np
 from neurovis_spec.arrays import subscript
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.real_paths import real_path
-from neurovis_spec.runtime.columns import Keep, Numbers, columns_of, recording_of
-from neurovis_spec.runtime.embodied import Embodied
+from neurovis_spec.runtime.columns import Numbers, columns_of, recording_of
+from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.formats import StreamingFormat, load, settle
 from neurovis_spec.runtime.inputs import STRETCH
@@ -35,22 +35,16 @@ _ENDLESS = 1 << 53
 
 
 class Recorder:
-    """Records from a state on, one step in ``every``; into a file at ``path``, else in memory. ``told`` says what was
+    """Records from a state on what a ``course`` keeps; into a file at ``path``, else in memory. ``told`` says what was
     true after the last step, with the weights of all connections (m,). Raises KeyError for a name that there is not,
     RecordingError, OSError."""
 
     def __init__(
-        self,
-        network: Network,
-        state: State,
-        body: Embodied | None,
-        path: Path | None,
-        every: int,
-        keep: Keep,
-        told: Callable[[], After],
+        self, network: Network, state: State, course: Course, path: Path | None, told: Callable[[], After]
     ) -> None:
-        self._network, self._body, self._path, self._told = network, body, path, told
-        self._columns, self._steps = columns_of(network, keep, body), Steps(_ENDLESS, every, state.k)
+        self._network, self._body, self._path, self._told = network, course.body, path, told
+        self._columns = columns_of(network, course.keep, course.body)
+        self._steps = Steps(_ENDLESS, course.every, state.k)
         self._changing = subscript(self._columns.weights)
         self._last, self._row, self._closed = state, -1, False
         self._widths = self._columns.widths(network)

@@ -31,6 +31,7 @@ from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.backend import Backend, Ready, ready
 from neurovis_spec.runtime.columns import ALL, Keep, Probe, probe_of
 from neurovis_spec.runtime.controls import Controls
+from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.embodied import Embodied, embodied
 from neurovis_spec.runtime.errors import RecordingError, UnknownNameError, unknown
 from neurovis_spec.runtime.inputs import InputReader
@@ -101,9 +102,8 @@ class Simulation:
             raise RecordingError("this simulation is recorded already")
         place = None if path is None else arguments.path("path", path)
         step = arguments.integer("every", every, 1, arguments.MOST_STEPS)
-        self._recorder = Recorder(
-            self.network, self._state, self._body, place, step, keep, lambda: self._ended or self.after()
-        )
+        course = Course(every=step, keep=keep, body=self._body)
+        self._recorder = Recorder(self.network, self._state, course, place, lambda: self._ended or self.after())
 
     @property
     def recording(self) -> Recording:

@@ -1,9 +1,9 @@
 """Recordings that are written while the network runs: some rows at a time, so that no run is too long and none is lost.
 
-In: a Network, a path, how to run. Out: a file, which is there when the run has come to its end, or when a signal has
-ended it (Ctrl-C, SIGTERM, SIGHUP, SIGQUIT), with the steps until then. After anything else there is what was there
-before, and a part beside it with what was recorded. A format that writes in streams says so by having ``stream``; of
-the others the whole recording is saved.
+In: a Network, a path, the Course of a run. Out: a file, which is there when the run has come to its end, or when a
+signal has ended it (Ctrl-C, SIGTERM, SIGHUP, SIGQUIT), with the steps until then. After anything else there is what was
+there before, and a part beside it with what was recorded. A format that writes in streams says so by having ``stream``;
+of the others the whole recording is saved.
 """
 
 from __future__ import annotations
@@ -16,20 +16,12 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.interrupts import Asked, Ended, deferred
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.columns import Columns, columns_of, recording_of
+from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.formats import StreamingFormat, settle
 from neurovis_spec.runtime.inputs import STRETCH
 from neurovis_spec.runtime.kinds import Rows, Widths
 from neurovis_spec.runtime.memory import check_disk
-from neurovis_spec.runtime.record import (
-    Course,
-    InMemory,
-    after,
-    begun,
-    checked_steps,
-    go,
-    keep_state,
-    record_course,
-)
+from neurovis_spec.runtime.record import InMemory, after, begun, go, keep_state, record
 from neurovis_spec.runtime.recording import After, Recording, for_path
 from neurovis_spec.runtime.rows import RowWriter, Steps
 from neurovis_spec.runtime.state import State
@@ -55,24 +47,17 @@ def frame_of(network: Network, columns: Columns, state: State) -> Recording:
     return recording_of(network, columns, none, state.weights, after(network, state), state.backend)
 
 
-def record_to(
-    network: Network,
-    path: Path,
-    course: Course,
-    start: Recording | None = None,
-    progress: Progress | None = None,
-    checkpoint: Path | None = None,
-) -> str:
-    """Run a network and write what ``record_course`` returns to a file. Gives the name of the backend. Raises what it
-    and ``Recording.save`` raise, StoppedError after a signal, when the steps until then are in the file;
-    KeyboardInterrupt where there are none, and after a second signal, which ends everything at once."""
+def record_to(network: Network, path: Path, course: Course, progress: Progress | None = None) -> str:
+    """Run a network and write what ``record`` returns to a file. Gives the name of the backend. Raises what it and
+    ``Recording.save`` raise, StoppedError after a signal, when the steps until then are in the file; KeyboardInterrupt
+    where there are none, and after a second signal, which ends everything at once."""
     format_ = for_path(path)
     if not isinstance(format_, StreamingFormat):
-        made = record_course(network, course, start, progress, checkpoint)
+        made = record(network, course, progress)
         format_.save(made, path)
         return made.backend
-    course, state = begun(network, course, start, checkpoint)
-    steps = Steps(checked_steps(network, course.steps, course.every), course.every, state.k)
+    course, state = begun(network, course)
+    steps = Steps(course.length(network), course.every, state.k)
     columns = columns_of(network, course.keep, course.body)
     frame = frame_of(network, columns, state)
     settle(path, format_)
@@ -84,22 +69,17 @@ def record_to(
                 rows = _Handed(columns.widths(network), writer, lambda: after(network, state), asked)
                 go(network, state, course, rows, progress)
                 if asked and not rows.handed:
-                    _keep(state, course, checkpoint)
+                    keep_state(state, course)
                     raise Ended(asked.number)
                 rows.close()
             written = True
-            _keep(state, course, checkpoint)
+            keep_state(state, course)
     except KeyboardInterrupt:
         if not written:
             raise
     if asked:
         raise StoppedError(asked.number, path, state.k, rows.handed, steps)
     return state.backend
-
-
-def _keep(state: State, course: Course, checkpoint: Path | None) -> None:
-    if checkpoint is not None:
-        keep_state(state, course, checkpoint)
 
 
 class _Handed:

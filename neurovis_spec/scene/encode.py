@@ -1,6 +1,6 @@
-"""Encode: a network's activities and weights at a step become a Scene (Eqs. 2–5).
+"""Encode: a network's activities and weights at a step become colours and widths, and with a Plan a Scene (Eqs. 2–5).
 
-In: a network, its layout, a Snapshot, gains and settings. Out: a Scene, or what ``film`` starts from.
+In: a network, a Snapshot, gains, a Plan. Out: the Scene that a Film starts from.
 """
 
 from __future__ import annotations
@@ -13,19 +13,14 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene import encoding, texts
-from neurovis_spec.scene.caption import caption
-from neurovis_spec.scene.collapse import gathered
 from neurovis_spec.scene.fading import seconds_of
 from neurovis_spec.scene.gains import Gains
-from neurovis_spec.scene.gathered_layout import laid_out
 from neurovis_spec.scene.glyphs import marks_of
 from neurovis_spec.scene.lesions import FAINT
 from neurovis_spec.scene.model import Disc, Group, Scene, Shape, Spline, ended
-from neurovis_spec.scene.plan import Plan, plan
+from neurovis_spec.scene.plan import Plan
 from neurovis_spec.scene.themes import colours, readable
 
 if TYPE_CHECKING:
@@ -44,17 +39,6 @@ class Looks:
     widths: FloatArray
     glows: FloatArray
     bars: npt.NDArray[np.bool_]
-
-
-def encode(network: Network, layout: Layout, snapshot: Snapshot, gains: Gains, settings: RenderSettings) -> Scene:
-    """The picture of one step. Raises KeyError for an unknown theme or a neuron without a position."""
-    drawn = gathered(network, settings.collapse)
-    step = drawn.snapshot(snapshot)
-    planned = plan(drawn, laid_out(drawn, layout), gains, settings, np.abs(step.weights))
-    seen = looks(drawn.network, step, gains, planned.frame.widest, drawn.signals(snapshot))
-    words = tooltips(drawn.network, gains, step.activity[None], step.weights[None])
-    said = caption(network, snapshot.step, snapshot.activity)
-    return paint(planned, seen, seen.glows > 0, said, words, snapshot.step)
 
 
 def looks(

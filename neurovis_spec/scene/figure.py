@@ -1,16 +1,17 @@
 """The figure: several views of a run on one page, as a Film; of one step, a film of one frame.
 
-In: a network, its layout (where a view needs it), the views, the rows of a recording that are shown. Out: a Film. What
-shares the page shares its time: the last of several views over time has the axis, and in all of them a cursor stands at
-the step of the frame.
+In: a network, its layout (where a view needs it), a Look, the rows of a recording that are shown, gains. Out: a Film.
+What shares the page shares its time: the last of several views over time has the axis, and in all of them a cursor
+stands at the step of the frame.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
-from neurovis_spec.compiler.drawing.drawing_settings import Panel, RenderSettings
+from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene.body import PLOT, BodyPicture
@@ -20,10 +21,12 @@ from neurovis_spec.scene.film import film
 from neurovis_spec.scene.frame import DENSEST, DENSITIES, MARGIN, MOST, whole
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.heading import HEADER, caption_text, title_text
-from neurovis_spec.scene.model import Film, Group
+from neurovis_spec.scene.look import Look
+from neurovis_spec.scene.model import Film, Group, Theme
 from neurovis_spec.scene.parts import Page, Part, moved, stacked
 from neurovis_spec.scene.poses import Poses
 from neurovis_spec.scene.shots import Shots
+from neurovis_spec.scene.strips import Span
 from neurovis_spec.scene.themes import theme_of
 from neurovis_spec.scene.views import AXIS, Block, BlockSpace, Drawing, Maker, span_of
 
@@ -46,60 +49,70 @@ class _Sheet:
     density: float
 
 
-def figure(
-    network: Network,
-    layout: Layout | None,
-    panels: Sequence[Panel],
-    shots: Shots,
-    gains: Gains | None,
-    settings: RenderSettings,
-    fps: float,
-    glyphs: Gains | None = None,
-) -> Film:
-    """All views, one below the other, a frame for each of ``shots.frames``; ``gains`` are those of Eqs. 2–5, which
-    traces and weights do not need, ``glyphs`` those of the picture of the network where something in it is collapsed.
-    Raises RecordingError where the recording lacks what they show, KeyError for an unknown theme."""
-    drawn = any(panel.view == "network" for panel in panels)
-    maker = Maker(network, layout, shots, gains, drawn and settings.legend, settings.min_weight)
-    others = {number: maker.block(panel) for number, panel in enumerate(panels) if panel.view != "network"}
+class PageGains(NamedTuple):
+    """The gains of Eqs. 2–5 of a page: of the views that show each neuron, where one needs them; and of the picture of
+    the network, in which something may be collapsed."""
+
+    each: Gains | None
+    picture: Gains | None
+
+
+def figure(network: Network, layout: Layout | None, look: Look, shots: Shots, gains: PageGains) -> Film:
+    """The picture of some steps of a run, a frame for each of ``shots.frames``: its views one below the other, or the
+    network alone. Raises RecordingError where the recording lacks what they show, KeyError for an unknown theme."""
+    if not look.panels:
+        assert layout is not None
+        assert gains.picture is not None
+        return film(network, layout, shots.snapshots(network), gains.picture, look.settings, look.fps or 1.0)
+    settings = look.settings
+    explained = look.shows("network") and settings.legend
+    maker = Maker(network, layout, shots, gains.each, explained, settings.min_weight)
+    others = {number: maker.block(panel) for number, panel in enumerate(look.panels) if panel.view != "network"}
     title = _title(network, settings)
     head = HEADER + _TOP if title is not None else _TOP
-    picture: Film | None = None
-    if drawn:
-        seen = gains if glyphs is None else glyphs
+    picture, sheet, blocks = None, _sheet(settings), list(others.values())
+    if look.shows("network"):
         assert layout is not None
-        assert seen is not None
-        size = None
-        if settings.size is not None:
-            size = settings.size[0], _height_left(list(others.values()), head, settings.size)
-        own = replace(settings, size=size, title=False)
-        picture = film(network, layout, maker.snapshots(), seen, own, fps, PAGE if others else 0.0)
-        blocks: list[Block] = [others.get(number, Drawing(picture)) for number in range(len(panels))]
-        scene = picture.scene
-        height = None if settings.size is None else settings.size[1] / scene.density
-        sheet = _Sheet(scene.width, height, scene.density)
-    else:
-        blocks = list(others.values())
-        sheet = _sheet(settings)
-    theme = theme_of(settings)
-    share = 1.0 if sheet.height is None else _share(blocks, sheet.width, sheet.height - head - _FOOT)
+        assert gains.picture is not None
+        own, narrowest = _beside(settings, blocks, head), PAGE if others else 0.0
+        picture = film(network, layout, shots.snapshots(network), gains.picture, own, look.fps or 1.0, narrowest)
+        blocks = [others.get(number, Drawing(picture)) for number in range(len(look.panels))]
+        density = picture.scene.density
+        sheet = _Sheet(picture.scene.width, None if settings.size is None else settings.size[1] / density, density)
     span = span_of(blocks, shots, sheet.width, network.dt if network.dt_given else None)
-    parts: list[tuple[float, Part]] = []
-    top = head
+    theme, captions = theme_of(settings), _captions(network, shots)
+    parts, bottom = _placed(blocks, sheet, span, theme, head)
+    if title is not None:
+        texts = title_text(title, sheet.width, theme), caption_text(captions[0], sheet.width, theme)
+        parts.insert(0, (0.0, Part((Group(texts[:1], id="title"), Group(texts[1:], id=CAPTION)), HEADER)))
+    said = tuple(caption_text(words, sheet.width, theme).text for words in captions)
+    names = tuple(f"{network.title or network.name}, {words}" for words in captions)
+    sheet, parts = _fitted(sheet, parts, bottom, settings)
+    assert sheet.height is not None
+    page = Page(sheet.width, sheet.height, sheet.density, theme, names[0], look.fps or 1.0, CAPTION, said, names)
+    return stacked(page, parts, picture)
+
+
+def _beside(settings: RenderSettings, others: Sequence[Block], head: float) -> RenderSettings:
+    """The settings of the picture of the network on a page that has a title, and these views besides."""
+    size = None
+    if settings.size is not None:
+        size = settings.size[0], _height_left(others, head, settings.size)
+    return replace(settings, size=size, title=False)
+
+
+def _placed(
+    blocks: Sequence[Block], sheet: _Sheet, span: Span, theme: Theme, head: float
+) -> tuple[list[tuple[float, Part]], float]:
+    """The parts of all views, each with where it begins, and where the page ends."""
+    share = 1.0 if sheet.height is None else _share(blocks, sheet.width, sheet.height - head - _FOOT)
+    parts, top = list[tuple[float, Part]](), head
     for number, block in enumerate(blocks):
         axis = block.timed and not (number + 1 < len(blocks) and blocks[number + 1].timed)
         part = block.part(BlockSpace(sheet.width, span, share, axis, theme, f"p{number}:"))
         parts.append((top, part))
         top += part.height + _GAP
-    captions = _captions(network, shots)
-    if title is not None:
-        texts = title_text(title, sheet.width, theme), caption_text(captions[0], sheet.width, theme)
-        parts.insert(0, (0.0, Part((Group(texts[:1], id="title"), Group(texts[1:], id=CAPTION)), HEADER)))
-    said = tuple(caption_text(words, sheet.width, theme).text for words in captions)
-    sheet, parts = _fitted(sheet, parts, whole(top - _GAP + _FOOT), settings)
-    assert sheet.height is not None
-    name = f"{network.title or network.name}, {captions[0]}"
-    return stacked(Page(sheet.width, sheet.height, sheet.density, theme, name, fps, CAPTION, said), parts, picture)
+    return parts, whole(top - _GAP + _FOOT)
 
 
 def with_body(picture: Film, poses: Poses) -> Film:
@@ -108,8 +121,8 @@ def with_body(picture: Film, poses: Poses) -> Film:
     part = body.part(MARGIN, scene.width - MARGIN, PLOT, scene.theme, "body:")
     top = scene.height + _GAP
     height = whole(top + part.height + _FOOT)
-    captions = picture.caption, picture.captions
-    page = Page(scene.width, height, scene.density, scene.theme, scene.title, picture.fps, *captions)
+    words = picture.caption, picture.captions, picture.titles
+    page = Page(scene.width, height, scene.density, scene.theme, scene.title, picture.fps, *words)
     made = stacked(page, [(0.0, Part(scene.groups, scene.height)), (top, part)], picture)
     return replace(made, scene=replace(made.scene, notes=scene.notes))
 

@@ -1,7 +1,7 @@
 """Film: the steps of a run as a scene whose colours and widths change; and each frame as a scene of its own.
 
 In: a network, its layout, the snapshots of the frames, gains and settings. Out: a Film; ``still(film, f)``, the scene
-of one frame, the same picture as ``encode`` makes of that step.
+of one frame; ``scene_of_step``, that of one alone.
 """
 
 from __future__ import annotations
@@ -44,13 +44,21 @@ if TYPE_CHECKING:
     from neurovis_spec.runtime.recording import Snapshot
 
 
+def scene_of_step(
+    network: Network, layout: Layout, snapshot: Snapshot, gains: Gains, settings: RenderSettings
+) -> Scene:
+    """One step as discs, splines and texts: the only frame of its film. Raises KeyError for an unknown theme, and for a
+    neuron without a position."""
+    return still(film(network, layout, [snapshot], gains, settings), 0)
+
+
 def film(
     network: Network,
     layout: Layout,
     snapshots: Collection[Snapshot],
     gains: Gains,
     settings: RenderSettings,
-    fps: float,
+    fps: float = 1.0,
     narrowest: float = 0.0,
 ) -> Film:
     """One frame a snapshot, ``fps`` frames a second, without a stated size at least ``narrowest`` wide (page units).
@@ -74,10 +82,10 @@ def films(
     for snapshots in parts:
         if not len(snapshots):
             raise ValueError("a film has at least one frame")
-        peaks = np.zeros(len(drawn.network.connections))
+        peaks = np.full(len(drawn.network.connections), np.nan)
         for snapshot in snapshots if len(network.changing) else islice(snapshots, 1):
             peaks = np.fmax(peaks, np.abs(drawn.snapshot(snapshot).weights))
-        if planned is None or not np.array_equal(peaks, reached):
+        if planned is None or not np.array_equal(peaks, reached, equal_nan=True):
             planned, reached = plan(drawn, placed, gains, settings, peaks, narrowest), peaks
         yield filmed(drawn, planned, snapshots, gains, fps)
 
@@ -89,7 +97,7 @@ def filmed(drawn: Gathered, planned: Plan, snapshots: Collection[Snapshot], gain
     fill_values, line_values = np.empty((frames, neurons)), np.empty((frames, connections))
     widths, glows = np.empty((2, frames, connections))
     bars = np.empty((frames, connections), np.bool_)
-    captions, steps, low, high = list[str](), list[int](), None, None
+    captions, titles, steps, low, high = list[str](), list[str](), list[int](), None, None
     for frame, step in enumerate(snapshots):
         snapshot = drawn.snapshot(step)
         seen = looks(network, snapshot, gains, planned.frame.widest, drawn.signals(step))
@@ -99,6 +107,7 @@ def filmed(drawn: Gathered, planned: Plan, snapshots: Collection[Snapshot], gain
         words = caption(whole, step.step, step.activity)
         shape = planned.caption_shape(words)
         captions.append(shape.text if shape else words)
+        titles.append(f"{planned.title}, {words}")
         now = (snapshot.activity, snapshot.weights)
         low = now if low is None else (np.minimum(low[0], now[0]), np.minimum(low[1], now[1]))
         high = now if high is None else (np.maximum(high[0], now[0]), np.maximum(high[1], now[1]))
@@ -106,9 +115,9 @@ def filmed(drawn: Gathered, planned: Plan, snapshots: Collection[Snapshot], gain
     assert high is not None
     glowing: npt.NDArray[np.bool_] = glows.max(axis=0) > 0
     first = Looks(fill_values[0], line_values[0], widths[0], glows[0], bars[0])
-    titles = tooltips(network, gains, np.stack([low[0], high[0]]), np.stack([low[1], high[1]]))
+    tips = tooltips(network, gains, np.stack([low[0], high[0]]), np.stack([low[1], high[1]]))
     return Film(
-        scene=paint(planned, first, glowing, captions[0], titles, steps[0]),
+        scene=paint(planned, first, glowing, captions[0], tips, steps[0]),
         fps=fps,
         fills=tuple(f"n{index}" for index in range(len(network.neurons))),
         lines=tuple(f"c{index}" for index in range(len(network.connections))),
@@ -119,6 +128,7 @@ def filmed(drawn: Gathered, planned: Plan, snapshots: Collection[Snapshot], gain
         line_bars=bars & (planned.theme.ends == "signs"),
         caption=CAPTION,
         captions=tuple(captions),
+        titles=tuple(titles),
         faint={
             name: next(frame for frame, step in enumerate(steps) if step >= since)
             for name, since in lesions_by_id(planned).items()
@@ -181,7 +191,8 @@ def still(film: Film, frame: int) -> Scene:
         faint = group.id in film.faint and frame >= film.faint[group.id]
         return replace(group, shapes=tuple(shapes), opacity=film.faintness if faint else 1.0)
 
-    return replace(film.scene, groups=tuple(repaint(group) for group in film.scene.groups))
+    title = film.titles[frame] if film.titles else film.scene.title
+    return replace(film.scene, title=title, groups=tuple(repaint(group) for group in film.scene.groups))
 
 
 def part(film: Film, names: Collection[str]) -> Film:

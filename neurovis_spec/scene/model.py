@@ -257,7 +257,8 @@ class Film:
     may be in one of the three at most. A group ``redrawn`` (an id) is in none of them: its shapes at frame f are
     ``redrawn[id](f)``, and nothing that stays as it is stands in front of them. From frame ``faint[id]`` on, a group
     that stands there has the opacity ``faintness``. ``captions[f]`` is the text in group ``caption``. Colours are
-    linear in sRGB between the theme's anchors, of NaN that of texts; ``still(f)`` is frame f as a scene.
+    linear in sRGB between the theme's anchors, of NaN that of texts; ``still(f)`` is frame f as a scene, and
+    ``titles[f]`` its title, without which it is that of ``scene``.
     """
 
     scene: Scene
@@ -276,6 +277,7 @@ class Film:
     faint: Mapping[str, int] = field(default_factory=dict)
     faintness: float = 1.0
     redrawn: Mapping[str, Redrawn] = field(default_factory=dict)
+    titles: tuple[str, ...] = ()
 
     @property
     def frames(self) -> int:

@@ -55,7 +55,8 @@ def moved(part: Part, by: Point) -> Part:
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """What a film has besides its parts. ``fps`` is that of the film, ``captions`` one a frame."""
+    """What a film has besides its parts. ``fps`` is that of the film, ``captions`` and ``titles`` are one a frame;
+    ``title`` is that of the whole."""
 
     width: float
     height: float
@@ -65,6 +66,7 @@ class Page:
     fps: float
     caption: str
     captions: tuple[str, ...]
+    titles: tuple[str, ...]
 
 
 def stacked(page: Page, parts: Sequence[tuple[float, Part]], network: Film | None) -> Film:
@@ -90,6 +92,7 @@ def stacked(page: Page, parts: Sequence[tuple[float, Part]], network: Film | Non
         redrawn={name: shapes for one in changes for name, shapes in one.redrawn.items()},
         caption=page.caption,
         captions=page.captions,
+        titles=page.titles,
     )
 
 

@@ -14,7 +14,7 @@ from dataclasses import replace
 from neurovis_spec.body.kinds import BodyMissingError
 from neurovis_spec.compiler.drawing.drawing_settings import StatedGain
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.progress import Progress
+from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.scene.collapse import gathered
@@ -47,7 +47,7 @@ def _is_for_all(stated: Collection[StatedGain], count: int) -> bool:
     return len({member for one in stated for member in one.members or ()}) == count
 
 
-def probe(network: Network, progress: Progress | None = None, made: Recording | None = None) -> Gains:
+def probe(network: Network, made: Recording | None = None) -> Gains:
     """The gains of a network: what its spec states, else from the peaks of its default run. Where this is ``made``, as
     far as they need it or further, it is not run again."""
     steps, drawn = probe_steps(network), gathered(network, network.render.collapse)
@@ -56,10 +56,11 @@ def probe(network: Network, progress: Progress | None = None, made: Recording | 
     if made is None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # the run that the author asks for warns
+            course = Course(steps, backend="numpy")
             try:
-                made = record(network, steps, backend="numpy", progress=progress)
+                made = record(network, course)
             except BodyMissingError:  # its pictures can be drawn all the same
-                made = record(replace(network, body=None), steps, backend="numpy", progress=progress)
+                made = record(replace(network, body=None), course)
     return choose_gains(drawn.network, drawn.network.render, drawn.reached(made.part(slice(steps))))
 
 

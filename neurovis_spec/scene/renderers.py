@@ -1,13 +1,14 @@
 """Which renderer makes a file: found by the suffix, among what is installed.
 
-In: a suffix, and whether the picture moves. Out: the Renderer that declares it, or RendererError with what there is.
+In: a suffix, and whether the picture moves. Out: the Renderer that declares it, or RendererError with what there is; or
+the content of a file.
 """
 
 from __future__ import annotations
 
 from neurovis_spec import plugins
 from neurovis_spec.likeness import suggest
-from neurovis_spec.scene.model import Renderer, RendererCapabilities
+from neurovis_spec.scene.model import Renderer, RendererCapabilities, Scene, StreamingRenderer
 
 
 class RendererError(ValueError):
@@ -38,3 +39,15 @@ def renderer_for(suffix: str, *, moving: bool) -> Renderer:
     what = "films" if moving else "pictures"
     message = f"no renderer makes {what} of the kind '{suffix}'" if suffix else f"the file of {what} needs a suffix"
     raise RendererError(message, suggest(suffix, known, f"kinds of {what}"))
+
+
+def drawing(scene: Scene, suffix: str) -> bytes:
+    """A scene as the content of a file of this kind. Raises RendererError where nobody draws such files."""
+    return renderer_for(suffix, moving=False).draw(scene, suffix.lower())
+
+
+def streaming_renderer(suffix: str) -> StreamingRenderer:
+    """Who writes films of this kind while they are made. Raises RendererError where nobody does."""
+    renderer = renderer_for(suffix, moving=True)
+    assert isinstance(renderer, StreamingRenderer)
+    return renderer

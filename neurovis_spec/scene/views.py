@@ -16,10 +16,8 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.model import Layout
-from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.scene import body, encoding, strips
 from neurovis_spec.scene.encode import tooltips
-from neurovis_spec.scene.fading import snapshots_of
 from neurovis_spec.scene.frame import MARGIN
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.gains import Scale as Own
@@ -218,11 +216,6 @@ class Maker:
             case _:
                 return self._traces(panel)
 
-    def snapshots(self) -> Sequence[Snapshot]:
-        """Those of the frames."""
-        recording = self.shots.recording
-        return list(snapshots_of(self.network, recording, recording.step[self.shots.frames].tolist()))
-
     def _body(self) -> Block:
         posed = posed_of(self.shots.recording)
         if posed is None:
@@ -309,7 +302,7 @@ class Maker:
         everyone = range(len(network.neurons))
         sources = everyone if shown is None else np.unique(ends.sources[connections]).tolist()
         targets = everyone if shown is None else np.unique(ends.targets[connections]).tolist()
-        snapshots = self.snapshots()
+        snapshots = list(self.shots.snapshots(network))
         weights = np.stack([snapshot.weights[connections] for snapshot in snapshots])
         title = f"source (rows) × target (columns) · {len(connections):,} connections"
         if self.min_weight is not None:

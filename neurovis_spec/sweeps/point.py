@@ -20,10 +20,11 @@ from neurovis_spec.diagnostics import SpecError, printable
 from neurovis_spec.plugins import PluginError
 from neurovis_spec.runtime.backend import BackendError
 from neurovis_spec.runtime.columns import Columns, Keep, columns_of
+from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.inputs import STRETCH, InputError
 from neurovis_spec.runtime.kinds import Rows
 from neurovis_spec.runtime.measures import Measure, Meter, parsed, resolved
-from neurovis_spec.runtime.record import Course, go, with_body
+from neurovis_spec.runtime.record import go
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.sweeps.grid import SEED, Point
 
@@ -115,7 +116,7 @@ def _measured(job: Job, network: Network) -> tuple[float, ...]:
     state = initial_state(network)
     keep = Keep(states=tuple(dict.fromkeys(name for meter in meters for name in meter.measure.probe.names)))
     steps = network.steps if job.steps is None else job.steps
-    course = with_body(network, Course(steps, 1, job.inputs, job.backend, keep=keep))
+    course = Course(steps, inputs=job.inputs, backend=job.backend, keep=keep).embodied(network)
     rows = _Metered(network, state, meters, columns_of(network, keep, course.body))
     go(network, state, course, rows)
     return tuple(rows.last)

@@ -1,6 +1,6 @@
-"""Excerpt: what of a network a reader asks to see, as texts; with references resolved it is part of RenderSettings.
+"""The look of a picture: all that says what it is, in one value, from whoever asks for it down to the figure.
 
-In: a network, what the reader asks for. Out: RenderSettings that say so. Where the reader says nothing the spec's hold.
+In: what a reader asks for, where nothing the spec's own. Out: a Look, with every name in it resolved.
 """
 
 from __future__ import annotations
@@ -9,19 +9,64 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
+from neurovis_spec.compiler.drawing.drawing_settings import Panel, RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.references import Arrow, parse
+from neurovis_spec.language.words import TIMED
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.scene.renderers import RendererError
 from neurovis_spec.scene.shown import check_path
 
 
+@dataclass(frozen=True)
+class Look:
+    """What a picture is: how the network is drawn (``settings``: theme, size, what of it is seen, …), which views are
+    on the page, from top to bottom, none where it is the network alone, and of which steps it has frames."""
+
+    settings: RenderSettings
+    panels: tuple[Panel, ...] = ()
+    #: whether somebody asks for these views; else the body is among them only where a run has one that can be drawn
+    asked: bool = True
+    #: the step of the first frame; None: the last one of the run
+    first: int | None = None
+    #: how many steps from there on are seen, and of how many each one is a frame
+    count: int = 1
+    every: int = 1
+    #: frames a second of a picture that moves, None for a still
+    fps: float | None = None
+    #: the layout that it is drawn in: the spec's by default
+    engine: str | None = None
+    effort: str | None = None
+    #: what kind of file it is, in small letters
+    suffix: str = ".svg"
+    #: pixels of a user unit, by default the picture's own
+    density: float | None = None
+
+    @property
+    def moving(self) -> bool:
+        """Whether it is a film."""
+        return self.fps is not None
+
+    @property
+    def frames(self) -> int:
+        """How many frames it has."""
+        return -(-self.count // self.every)
+
+    @property
+    def timed(self) -> bool:
+        """Whether a view over time is in it."""
+        return any(panel.view in TIMED for panel in self.panels)
+
+    def shows(self, *views: str) -> bool:
+        """Whether one of these views is in it."""
+        return "network" in views if not self.panels else any(panel.view in views for panel in self.panels)
+
+
 @dataclass(frozen=True, slots=True)
 class Excerpt:
-    """``collapse``: groups and instances that are one glyph each; ``focus``: neurons to show with all that they are
-    connected to; ``path``: ``A -> B``, to show the shortest paths; ``min_weight``: connections with less are left out;
-    ``full``: all are drawn, however many there are."""
+    """What of a network a reader asks to see, as texts. ``collapse``: groups and instances that are one glyph each;
+    ``focus``: neurons to show with all that they are connected to; ``path``: ``A -> B``, to show the shortest paths;
+    ``min_weight``: connections with less are left out; ``full``: all are drawn, however many there are."""
 
     collapse: Sequence[str] = ()
     focus: str | None = None
