@@ -203,7 +203,7 @@ def of_peers(view: View, compiled: nv.CompiledNetwork) -> dict[str, object]:
     scene = json.loads(gzip.decompress(view.content))
     source = SimulatedSource(compiled.simulator())
     source.advance()
-    sizes = view.look(source.seen()).widths.tolist()
+    sizes = view.glance(source.seen()).widths.tolist()
     names: dict[str, int] = {}
     discs: list[object] = []
     lines: list[object] = []

@@ -37,6 +37,15 @@ Given = TypeVar("Given", bound=Mapping[str, object])
 Function = TypeVar("Function", bound=Callable[..., object])
 
 
+class CompileKeywords(TypedDict, total=False):
+    """How a spec is compiled."""
+
+    parameters: Mapping[str, float] | None
+    root: str | Path | None
+    limit: int | None
+    body: str | Path | bool
+
+
 class KeepKeywords(TypedDict, total=False):
     """What of a run is recorded."""
 
@@ -98,6 +107,7 @@ class FilmKeywords(PictureKeywords, total=False):
     frames: int | None
 
 
+COMPILE: Final[CompileKeywords] = {"parameters": None, "root": None, "limit": None, "body": True}
 KEEP: Final[KeepKeywords] = {"every": 1, "states": (), "neurons": (), "weights": "plastic"}
 RUN: Final[RunKeywords] = {
     "backend": None,

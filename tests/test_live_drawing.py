@@ -64,7 +64,7 @@ async def opened(folder: Path) -> AsyncIterator[Page]:
     view, source = view_of(compiled, compiled.gains), SimulatedSource(compiled.simulator())
     for _ in range(40):
         source.advance()
-    look = view.look(source.seen())
+    look = view.glance(source.seen())
     names = ("discs", "lines", "widths", "glows", "kinds")
     numbers = {name: getattr(look, name).tolist() for name in names} | {"caption": look.caption}
     scene = json.dumps({"scene": json.loads(gzip.decompress(view.content)), "look": numbers})

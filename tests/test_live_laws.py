@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from queue import SimpleQueue
 from threading import Event
 from typing import Any, cast
@@ -30,7 +31,7 @@ from neurovis_spec.live.commands import REQUESTS, Branch, Command, Pause, Play, 
 from neurovis_spec.live.commands import Event as ToEvent
 from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.hub import Client, Hub, Reception
-from neurovis_spec.live.live import Edits
+from neurovis_spec.live.live import Edited, Edits
 from neurovis_spec.live.run import Run, Shown
 from neurovis_spec.live.saving import told_by
 from neurovis_spec.live.show import Show
@@ -427,7 +428,7 @@ def test_what_a_source_raises_is_told_and_the_run_goes_on_as_it_was(
     if isinstance(answer, str):
         assert f"RuntimeError: {member} is out of order" in answer
     assert driven.ask(Step(1)) == ""
-    assert driven.shown[-1].look.step == 11
+    assert driven.shown[-1].glance.step == 11
     assert isinstance(driven.run.failure, RuntimeError)
     assert caplog.records
     driven.run.end()
@@ -516,17 +517,16 @@ def test_an_edit_that_cannot_be_shown_is_told_and_neither_the_run_nor_the_desk_c
     told: list[dict[str, object]] = []
     show = Show()
     desk = Desk(compiled, None, show.view, driven.run, lambda text: None)
-    edits = Edits(
-        show, lambda: other, lambda _: [], compiled, driven.run, lambda text: told.append(json.loads(text)), desk
-    )
+    edited = Edited(Path("x.yaml"), lambda: other)
+    edits = Edits(show, edited, driven.run, lambda text: told.append(json.loads(text)), desk)
     before = desk.placed
     edits._edited()  # a source that is no simulator cannot be carried over: whatever that raises
     assert told[-1]["errors"] is True
     assert "AssertionError" in str(told[-1]["text"])
     assert desk.placed is before
     assert driven.ask(Step(1)) == ""
-    assert driven.shown[-1].look.step == 6
-    assert len(driven.shown[-1].look.discs) == 5
+    assert driven.shown[-1].glance.step == 6
+    assert len(driven.shown[-1].glance.discs) == 5
     assert caplog.records
     driven.run.end()
 

@@ -83,10 +83,10 @@ def test_a_body_that_runs_is_drawn_as_it_was_recorded_also_of_the_past() -> None
         source.go(step) if step <= source.reach.last else source.advance()
         seen.append(shown(source, view))
     for one in seen:
-        assert one.look.pose.tolist() == recording.pose[one.look.step].astype(np.float32).tolist()
-    assert [one.look.step for one in seen[-3:]] == [17, 64, 3]
+        assert one.glance.pose.tolist() == recording.pose[one.glance.step].astype(np.float32).tolist()
+    assert [one.glance.step for one in seen[-3:]] == [17, 64, 3]
     messages = sent(*seen[:3], seen[-1])
-    assert list(poses(messages)) == [seen[at].look.pose.tolist() for at in (0, 1, 2, -1)]
+    assert list(poses(messages)) == [seen[at].glance.pose.tolist() for at in (0, 1, 2, -1)]
 
 
 def test_how_it_is_drawn_is_sent_once_before_its_first_pose() -> None:
@@ -141,7 +141,7 @@ def test_a_recording_is_drawn_by_the_poses_of_its_rows() -> None:
         source.go(step)
         with np.errstate(over="ignore"):
             wanted = walked[step].astype(np.float32)
-        assert shown(source, view).look.pose.tobytes() == wanted.tobytes()
+        assert shown(source, view).glance.pose.tobytes() == wanted.tobytes()
 
 
 def test_a_body_of_more_numbers_than_a_frame_holds_is_not_drawn() -> None:

@@ -78,7 +78,7 @@ class Driven:
             if seen and true(self.shown[-1]):
                 return self.shown[-1]
             time.sleep(0.005)
-        raise AssertionError(f"never: step {self.shown[-1].look.step}, {self.run.failure}")
+        raise AssertionError(f"never: step {self.shown[-1].glance.step}, {self.run.failure}")
 
 
 @pytest.fixture
@@ -136,17 +136,17 @@ def test_what_is_late_is_not_caught_up() -> None:
 
 
 def test_it_is_stepped_sought_and_begun_anew(driven: Driven) -> None:
-    assert driven.ask().look.step == 0
-    assert driven.ask(Step(1), Step(1)).look.step == 2
-    assert driven.ask(Step(-1)).look.step == 1
+    assert driven.ask().glance.step == 0
+    assert driven.ask(Step(1), Step(1)).glance.step == 2
+    assert driven.ask(Step(-1)).glance.step == 1
     assert driven.ask(Seek(100)).reach == Reach(0, 100)
-    assert driven.ask(Seek(7)).look.step == 7
+    assert driven.ask(Seek(7)).glance.step == 7
     assert driven.ask(Branch()).reach == Reach(0, 7)
-    assert driven.ask(Step(-20)).look.step == 0
-    assert driven.ask(Event(1)).look.step == 30
-    assert driven.ask(Event(1)).look.step == 55
-    assert driven.ask(Event(-1)).look.step == 30
-    assert driven.ask(Event(-1)).look.step == 30
+    assert driven.ask(Step(-20)).glance.step == 0
+    assert driven.ask(Event(1)).glance.step == 30
+    assert driven.ask(Event(1)).glance.step == 55
+    assert driven.ask(Event(-1)).glance.step == 30
+    assert driven.ask(Event(-1)).glance.step == 30
     assert driven.refused == ["there is no event before step 30"]
     assert driven.ask(Restart()).reach == Reach(0, 0)
 
@@ -154,9 +154,9 @@ def test_it_is_stepped_sought_and_begun_anew(driven: Driven) -> None:
 def test_it_plays_past_the_steps_of_the_spec_and_stands_still(driven: Driven) -> None:
     for command in (Speed(math.inf), Seek(41), Play()):
         driven.run.ask(command)
-    assert driven.until(lambda shown: shown.look.step > 200).status.playing
-    step = driven.ask(Pause()).look.step
-    assert driven.ask().look.step == step > 200
+    assert driven.until(lambda shown: shown.glance.step > 200).status.playing
+    step = driven.ask(Pause()).glance.step
+    assert driven.ask().glance.step == step > 200
 
 
 def test_a_turn_is_listed_and_one_that_cannot_be_is_told(driven: Driven) -> None:
@@ -164,7 +164,7 @@ def test_a_turn_is_listed_and_one_that_cannot_be_is_told(driven: Driven) -> None
     assert [entry.turn for entry in shown.status.turned] == [Set({"pull": 0.9}), Lesion("B")]
     assert shown.status.parameters == {"pull": 0.9}
     assert "pull" in driven.refused[0]
-    assert shown.look.kinds[-1] == FAINT
+    assert shown.glance.kinds[-1] == FAINT
 
 
 def test_a_recording_ends() -> None:
@@ -172,9 +172,9 @@ def test_a_recording_ends() -> None:
     made.run.ask(Speed(math.inf))
     made.run.ask(Play())
     shown = made.until(lambda shown: shown.status.ended)
-    assert shown.look.step == 49
+    assert shown.glance.step == 49
     assert not shown.status.playing
-    assert made.ask(Step(-9)).look.step == 40
+    assert made.ask(Step(-9)).glance.step == 40
     assert not made.ask(Set({"pull": 0.1})).status.capabilities.takes
     assert made.refused == ["a recording cannot be changed: run the spec"]
     made.run.end()
@@ -187,7 +187,7 @@ def test_a_recording_that_has_ended_plays_from_its_beginning() -> None:
     made.run.ask(Play())
     shown = made.until(lambda shown: shown.status.playing)
     assert not shown.status.ended
-    assert shown.look.step < 49
+    assert shown.glance.step < 49
     made.run.end()
 
 
@@ -203,7 +203,7 @@ def test_nothing_is_shown_to_nobody() -> None:
 def test_a_look_is_the_picture_of_its_step(driven: Driven) -> None:
     recording = COMPILED.run(steps=70)
     for step in (0, 1, 29, 30, 69):
-        look = driven.ask(Seek(step)).look
+        look = driven.ask(Seek(step)).glance
         wanted = looks(COMPILED.network, recording.snapshot(step), COMPILED.gains, VIEW.plan.frame.widest)
         assert np.abs(look.discs / LEVELS - wanted.discs).max() <= 0.5 / LEVELS
         assert np.abs(look.lines / LEVELS - wanted.lines).max() <= 0.5 / LEVELS
@@ -223,12 +223,12 @@ def test_it_is_drawn_otherwise_beside_the_run_which_goes_on(driven: Driven) -> N
     driven.run.ask(Draw(wanted))
     assert driven.ask().status.appearance == wanted, "it is what is wanted as soon as it is asked for"
     after = driven.until(lambda shown: shown.view.appearance == wanted)
-    assert after.look.step == before.look.step
+    assert after.glance.step == before.glance.step
     assert after.view.plan.theme.background != before.view.plan.theme.background
-    assert np.abs(after.look.discs[0] - before.look.discs[0] / 2) <= 1
-    widths = before.look.widths > FINENESS
+    assert np.abs(after.glance.discs[0] - before.glance.discs[0] / 2) <= 1
+    widths = before.glance.widths > FINENESS
     assert widths.any()
-    assert np.abs(after.look.widths[widths] - 2.0 * before.look.widths[widths]).max() <= 2
+    assert np.abs(after.glance.widths[widths] - 2.0 * before.glance.widths[widths]).max() <= 2
     words = gzip.decompress(after.view.content).decode()
     assert after.view.gains.activity_scales[0].gain == 0.5
     assert '"2"' in words, "the legend says how far a colour goes"
@@ -238,7 +238,7 @@ def test_it_is_drawn_otherwise_beside_the_run_which_goes_on(driven: Driven) -> N
     driven.run.ask(Draw(Appearance()))
     plain = driven.until(lambda shown: shown.view.appearance == Appearance())
     assert plain.view.content == VIEW.content
-    assert np.array_equal(plain.look.discs, before.look.discs)
+    assert np.array_equal(plain.glance.discs, before.glance.discs)
 
 
 def test_a_picture_that_cannot_be_drawn_is_refused_and_the_next_one_is_drawn() -> None:
@@ -270,6 +270,6 @@ def test_neurons_without_a_finite_activity_are_marked() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for _ in range(4):
-            marked.append((view.look(source.seen()).kinds[-2:] & UNDEFINED > 0).tolist())
+            marked.append((view.glance(source.seen()).kinds[-2:] & UNDEFINED > 0).tolist())
             source.advance()
     assert marked == [[False, False], [True, False], [True, True], [True, True]]

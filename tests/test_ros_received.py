@@ -155,7 +155,7 @@ def test_a_slow_display_stands_beside_a_complete_recorder(compiled: nv.CompiledN
 
     def show(shown: Shown) -> None:
         time.sleep(0.1)
-        slow.append(shown.look.step)
+        slow.append(shown.glance.step)
 
     run = Run(listening.source, view_of(compiled, compiled.gains_for(None)), show)
     listening.start()
@@ -242,25 +242,25 @@ def test_a_live_run_follows_pauses_and_goes_back(compiled: nv.CompiledNetwork, s
     run.start()
     try:
         come(source, range(50))
-        until(lambda: bool(shown) and shown[-1].look.step == 49)
+        until(lambda: bool(shown) and shown[-1].glance.step == 49)
         assert shown[-1].status.playing
         assert not shown[-1].status.ended
         count = len(shown)
         come(source, range(50, 80), 50)
-        until(lambda: shown[-1].look.step == 79)
+        until(lambda: shown[-1].glance.step == 79)
         assert len(shown) - count <= 30
         run.ask(Pause())
         run.ask(Seek(10))
-        until(lambda: shown[-1].look.step == 10)
+        until(lambda: shown[-1].glance.step == 10)
         come(source, range(80, 90), 80)
         run.ask(Step(1))
-        until(lambda: shown[-1].look.step == 11)
+        until(lambda: shown[-1].glance.step == 11)
         run.ask(Seek(10**6))
-        until(lambda: shown[-1].look.step == 89)
+        until(lambda: shown[-1].glance.step == 89)
         assert shown[-1].reach == Reach(0, 89)
         come(source, range(90, 95), 90)
         run.ask(Play())
-        until(lambda: shown[-1].look.step == 94)
+        until(lambda: shown[-1].glance.step == 94)
     finally:
         run.end()
     assert run.failure is None

@@ -18,8 +18,8 @@ from distributed import Client
 
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
-from neurovis_spec.sweeps.cluster import _ended_tasks_untold
 from neurovis_spec.sweeps.grid import SweepError
+from neurovis_spec.sweeps.workers import _ended_tasks_untold
 
 pytestmark = pytest.mark.cluster
 

@@ -413,9 +413,9 @@ def test_the_command_sums_up(folder: Path) -> None:
 
 
 def test_a_scheduler_that_is_not_there_is_told(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from neurovis_spec.sweeps import cluster
+    from neurovis_spec.sweeps import workers
 
-    monkeypatch.setattr(cluster, "_PATIENCE", 1)
+    monkeypatch.setattr(workers, "_PATIENCE", 1)
     result = call("sweep", "noisy.yaml", "--over", "gain=1", "--metric", "K1", "--scheduler", "tcp://127.0.0.1:9")
     assert (result.exit_code, result.stdout) == (1, "")
     assert "the scheduler at tcp://127.0.0.1:9 does not answer" in result.stderr

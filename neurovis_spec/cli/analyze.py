@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Final
 
 import click
 
@@ -12,6 +14,7 @@ from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.files import count, network_of, recording_of, tables, writing
 from neurovis_spec.cli.options import (
     FirstStep,
+    as_one,
     body_options,
     examples,
     finite,
@@ -24,6 +27,47 @@ from neurovis_spec.cli.options import (
 )
 from neurovis_spec.cli.progress import progress
 from neurovis_spec.cli.targets import check_files, check_folder, check_target, files_of
+
+
+@dataclass(frozen=True)
+class Measuring:
+    """What of a run is measured, as the command line says it."""
+
+    of: tuple[str, ...]
+    start: int | None
+    stop: int | None
+    threshold: float
+    bins: int
+    trials: bool
+    theme: str | None
+
+
+measuring_options: Final = as_one(
+    "measuring",
+    Measuring,
+    click.option(
+        "--of", metavar="REFS", multiple=True, help="The neurons to measure, such as K or 'C + K'; default: all."
+    ),
+    click.option("--from", "start", type=FirstStep(0, 2**53), metavar="STEP", help="The first step to measure."),
+    click.option("--to", "stop", type=click.IntRange(1, 2**53), metavar="STEP", help="The step to end before."),
+    click.option(
+        "--threshold",
+        type=click.FloatRange(min=0),
+        callback=finite,
+        default=0.05,
+        metavar="X",
+        help="A neuron is active while its absolute activity is above X; default: 0.05.",
+    ),
+    click.option(
+        "--bins", type=click.IntRange(2, 1000), default=20, metavar="N", help="Bins of mutual information; default: 20."
+    ),
+    click.option(
+        "--trials/--no-trials",
+        default=True,
+        help="Make the further runs that importance and sensitivity need (default), or leave these out.",
+    ),
+    theme_option,
+)
 
 
 @click.command(
@@ -45,26 +89,7 @@ from neurovis_spec.cli.targets import check_files, check_folder, check_target, f
 )
 @click.option("--recording", metavar="FILE", shell_complete=paths, help="Measure this; without it the network is run.")
 @run_option
-@click.option("--of", metavar="REFS", multiple=True, help="The neurons to measure, such as K or 'C + K'; default: all.")
-@click.option("--from", "start", type=FirstStep(0, 2**53), metavar="STEP", help="The first step to measure.")
-@click.option("--to", "stop", type=click.IntRange(1, 2**53), metavar="STEP", help="The step to end before.")
-@click.option(
-    "--threshold",
-    type=click.FloatRange(min=0),
-    callback=finite,
-    default=0.05,
-    metavar="X",
-    help="A neuron is active while its absolute activity is above X; default: 0.05.",
-)
-@click.option(
-    "--bins", type=click.IntRange(2, 1000), default=20, metavar="N", help="Bins of mutual information; default: 20."
-)
-@click.option(
-    "--trials/--no-trials",
-    default=True,
-    help="Make the further runs that importance and sensitivity need (default), or leave these out.",
-)
-@theme_option
+@measuring_options
 @set_option
 @input_option
 @body_options
@@ -73,13 +98,7 @@ def command(
     output: Path,
     recording: str | None,
     run: int | None,
-    of: tuple[str, ...],
-    start: int | None,
-    stop: int | None,
-    threshold: float,
-    bins: int,
-    trials: bool,
-    theme: str | None,
+    measuring: Measuring,
     settings: dict[str, float],
     inputs: dict[str, str],
 ) -> None:
@@ -90,6 +109,7 @@ def command(
     what the outputs lose and gain with each part. What cannot be measured is left out, and the page says why.
     """
     need_run(inputs, recording)
+    start, stop = measuring.start, measuring.stop
     if start is not None and stop is not None and stop <= start:
         raise click.UsageError(f"--to {stop} is not behind --from {start}: there is no step to measure")
     if find_spec("jinja2") is None:
@@ -105,7 +125,10 @@ def command(
     for name in file_names():
         check_files(output / name, network)
     record, arrays = recording_of(recording, run), tables(inputs, network.network)
-    options = ReportOptions(of or None, start, stop, threshold, bins, trials, theme, arrays)
+    asked = measuring
+    options = ReportOptions(
+        asked.of or None, start, stop, asked.threshold, asked.bins, asked.trials, asked.theme, arrays
+    )
     with progress("measuring") as bar, writing(output):
         files = analyze(network, output, record, options, bar)
     click.echo(f"{output}: {count(len(files), 'file')}; open {output / 'index.html'}")

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, TypedDict
+from typing import TYPE_CHECKING, Final
 
 import click
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from neurovis_spec.compiled import CompiledNetwork
     from neurovis_spec.compiler.network import Network
     from neurovis_spec.diagnostics import Diagnostic
+    from neurovis_spec.keywords import CompileKeywords
     from neurovis_spec.layout import Layout
     from neurovis_spec.runtime.recording import Recording
 
@@ -46,10 +47,10 @@ def compiler(spec: str, parameters: Mapping[str, float] | None = None) -> Callab
     """What compiles a SPEC so, also in another thread when the command has long begun. It raises SpecError."""
     from neurovis_spec import api
 
-    how = how_to_compile()
+    how = how_to_compile(parameters)
     if spec != "-":
-        return lambda: api.compile(spec, parameters=parameters, **how)
-    return lambda: api.compile_text(standard_input(), file=STDIN, folder=Path.cwd(), parameters=parameters, **how)
+        return lambda: api.compile(spec, **how)
+    return lambda: api.compile_text(standard_input(), file=STDIN, folder=Path.cwd(), **how)
 
 
 def compiler_in_place(spec: str, parameters: Mapping[str, float]) -> Callable[[str], CompiledNetwork]:
@@ -57,27 +58,20 @@ def compiler_in_place(spec: str, parameters: Mapping[str, float]) -> Callable[[s
     SpecError."""
     from neurovis_spec import api
 
-    how, folder = how_to_compile(), Path(spec).parent
-    return lambda text: api.compile_text(text, file=spec, folder=folder, parameters=parameters, **how)
+    how, folder = how_to_compile(parameters), Path(spec).parent
+    return lambda text: api.compile_text(text, file=spec, folder=folder, **how)
 
 
-class Compiling(TypedDict):
-    """What the command line says of how a spec is compiled, as ``api.compile`` takes it."""
-
-    root: Path | None
-    limit: int | None
-    body: bool | Path
-
-
-def how_to_compile() -> Compiling:
-    """The command's --root, --limit, --body and --no-body. Raises UsageError."""
+def how_to_compile(parameters: Mapping[str, float] | None = None) -> CompileKeywords:
+    """The command's --root, --limit, --body and --no-body, with these values of --set. Raises UsageError."""
     context = click.get_current_context(silent=True)
     given = {} if context is None else context.meta
     path, without = given.get("neurovis.body_file"), given.get("neurovis.bodiless")
     if path is not None and without:
         raise click.UsageError("--body names a body, and --no-body asks for none: give one of them")
     body = not without if path is None else path
-    return {"root": given.get("neurovis.root"), "limit": given.get("neurovis.limit"), "body": body}
+    root, limit = given.get("neurovis.root"), given.get("neurovis.limit")
+    return {"parameters": parameters, "root": root, "limit": limit, "body": body}
 
 
 def network_of(spec: str, parameters: Mapping[str, float] | None = None) -> CompiledNetwork:

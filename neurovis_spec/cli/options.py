@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
@@ -275,6 +276,31 @@ run_option = click.option(
     type=click.IntRange(min=1),
     metavar="N",
     help="Of a recording in which the network began anew, its N-th run; default: the last.",
+)
+
+
+@dataclass(frozen=True)
+class Running:
+    """What is run, as the command line says it."""
+
+    steps: int | None
+    settings: dict[str, float]
+    inputs: dict[str, str]
+    backend: str | None
+
+
+def running_options(text: str) -> Option:
+    """How long a network runs, with what and by what, as one argument ``running``; ``text`` explains ``--steps``."""
+    steps = click.option("--steps", type=click.IntRange(1, 2**53), metavar="N", help=text)
+    return as_one("running", Running, steps, set_option, input_option, backend_option)
+
+
+start_option = click.option(
+    "--from",
+    "start",
+    metavar="RECORDING",
+    shell_complete=paths,
+    help="Begin with the last weights and activities of this recording; states of models begin anew.",
 )
 
 

@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Literal, TypedDict
+from typing import TYPE_CHECKING, Final, Literal
 
 import click
 
 from neurovis_spec.cli.completion import paths
 from neurovis_spec.cli.files import count, network_of, recording_of, tables, writing
 from neurovis_spec.cli.options import (
-    backend_option,
+    Running,
+    as_one,
     body_options,
     compile_options,
     examples,
-    input_option,
     output_option,
-    set_option,
+    running_options,
+    start_option,
 )
 from neurovis_spec.cli.progress import progress
 from neurovis_spec.cli.targets import check_files, check_target, files_of
 
 if TYPE_CHECKING:
     from neurovis_spec.compiled import CompiledNetwork
+    from neurovis_spec.keywords import RunKeywords
     from neurovis_spec.runtime.recording import Recording
     from neurovis_spec.runtime.until import Until
 
@@ -31,17 +34,68 @@ if TYPE_CHECKING:
 _MOST_SHOWN = 20
 
 
-class Chosen(TypedDict):
-    """How the network runs, what of a step is recorded, and where a run goes on."""
+@dataclass(frozen=True)
+class Keeping:
+    """What of a run is recorded, from where it goes on and what ends it, as the command line says it."""
 
-    backend: str | None
     every: int
-    start: Recording | None
-    until: Until | None
+    start: str | None
     states: tuple[str, ...]
     neurons: tuple[str, ...]
     weights: Literal["plastic", "none"]
+    until: str | None
     checkpoint: Path | None
+
+    def keywords(self, network: CompiledNetwork, backend: str | None) -> RunKeywords:
+        """The same, as ``run`` takes it. Raises SpecError, RecordingError."""
+        return {
+            "backend": backend,
+            "every": self.every,
+            "start": recording_of(self.start),
+            "until": None if self.until is None else network.until(self.until),
+            "states": self.states,
+            "neurons": self.neurons,
+            "weights": self.weights,
+            "checkpoint": self.checkpoint,
+        }
+
+
+keeping_options: Final = as_one(
+    "keeping",
+    Keeping,
+    click.option(
+        "--every", type=click.IntRange(1, 2**53), default=1, metavar="K", help="Record every K-th step only; default 1."
+    ),
+    start_option,
+    click.option(
+        "--states",
+        metavar="REF",
+        multiple=True,
+        help="Record a state of models (K.v) or rules ('(K -> O).eligibility') as well. Repeatable.",
+    ),
+    click.option(
+        "--neurons", metavar="REFS", multiple=True, help="Record these neurons only, such as 'O + K'; default: all."
+    ),
+    click.option(
+        "--weights",
+        type=click.Choice(["plastic", "none"]),
+        default="plastic",
+        help="Record the weights that can change, the default, or none.",
+    ),
+    click.option(
+        "--until",
+        metavar="EXPR",
+        help="End at the first step after which this is true: an expression of neurons, outputs, parameters, k and t, "
+        "with rms, mean, min and max over the last N steps. Steps are the most there are.",
+    ),
+    click.option(
+        "--checkpoint",
+        type=click.Path(path_type=Path),
+        metavar="FILE",
+        shell_complete=paths,
+        help="Go on exactly from FILE, if it is there; write the run's state to it at the end, also after Ctrl-C.",
+    ),
+)
 
 
 @click.command(
@@ -55,68 +109,12 @@ class Chosen(TypedDict):
     )
 )
 @click.argument("spec", metavar="SPEC", shell_complete=paths)
-@click.option(
-    "--steps", type=click.IntRange(1, 2**53), metavar="N", help="Steps to run; default: the spec's time.steps."
-)
-@set_option
-@input_option
-@backend_option
-@click.option(
-    "--every", type=click.IntRange(1, 2**53), default=1, metavar="K", help="Record every K-th step only; default 1."
-)
-@click.option(
-    "--from",
-    "start",
-    metavar="RECORDING",
-    shell_complete=paths,
-    help="Begin with the last weights and activities of this recording; states of models begin anew.",
-)
-@click.option(
-    "--states",
-    metavar="REF",
-    multiple=True,
-    help="Record a state of models (K.v) or rules ('(K -> O).eligibility') as well. Repeatable.",
-)
-@click.option(
-    "--neurons", metavar="REFS", multiple=True, help="Record these neurons only, such as 'O + K'; default: all."
-)
-@click.option(
-    "--weights",
-    type=click.Choice(["plastic", "none"]),
-    default="plastic",
-    help="Record the weights that can change, the default, or none.",
-)
-@click.option(
-    "--until",
-    metavar="EXPR",
-    help="End at the first step after which this is true: an expression of neurons, outputs, parameters, k and t, with "
-    "rms, mean, min and max over the last N steps. Steps are the most there are.",
-)
-@click.option(
-    "--checkpoint",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    shell_complete=paths,
-    help="Go on exactly from FILE, if it is there; write the run's state to it at the end, also after Ctrl-C.",
-)
+@running_options("Steps to run; default: the spec's time.steps.")
+@keeping_options
 @output_option("Write the recording here (.npz, .csv, .mcap); without it a summary is printed.")
 @body_options
 @compile_options
-def command(
-    spec: str,
-    steps: int | None,
-    settings: dict[str, float],
-    inputs: dict[str, str],
-    backend: str | None,
-    every: int,
-    start: str | None,
-    until: str | None,
-    states: tuple[str, ...],
-    neurons: tuple[str, ...],
-    weights: Literal["plastic", "none"],
-    checkpoint: Path | None,
-    output: Path | None,
-) -> None:
+def command(spec: str, running: Running, keeping: Keeping, output: Path | None) -> None:
     """Run a network and write a recording.
 
     A recording holds the activity of every neuron and every weight that can change, at every step, or what of it
@@ -128,37 +126,36 @@ def command(
     With --checkpoint a run is made in parts: each goes on exactly where the last one ended, --steps counts the steps to
     be made now, and the parts together are bit for bit the run in one go, as they are made by one backend.
     """
-    read = files_of(inputs)
-    check_target(output, [("the spec itself", spec), ("the recording that the run goes on from", start), *read])
-    others = [("the spec itself", spec), ("the recording that the run goes on from", start), *read]
-    check_target(checkpoint, [*others, ("the recording", None if output is None else str(output))], "--checkpoint")
-    _check_format(output)
-    network = network_of(spec, settings)
-    check_files(output, network)
-    check_files(checkpoint, network, "--checkpoint")
-    arrays, before = tables(inputs, network.network), recording_of(start)
-    ends = None if until is None else network.until(until)
-    chosen: Chosen = {
-        "backend": backend,
-        "every": every,
-        "start": before,
-        "until": ends,
-        "states": states,
-        "neurons": neurons,
-        "weights": weights,
-        "checkpoint": checkpoint,
-    }
-    begun = perf_counter()
+    network = _network(spec, running, keeping, output)
+    steps, arrays = running.steps, tables(running.inputs, network.network)
+    options, begun = keeping.keywords(network, running.backend), perf_counter()
+    until = options["until"]
+    assert not isinstance(until, str)
     if output is not None:
         with writing(output), progress("running") as bar:
-            by = network.run_to(output, steps, arrays, progress=bar, **chosen)
-        _tell(ends)
-        click.echo(f"{output}: {_summary(network, steps, perf_counter() - begun, by, ends)}")
+            by = network.run_to(output, steps, arrays, **(options | {"progress": bar}))
+        _tell(until)
+        click.echo(f"{output}: {_summary(network, steps, perf_counter() - begun, by, until)}")
         return
     with progress("running") as bar:
-        recording = network.run(steps, arrays, progress=bar, last=ends is not None, **chosen)
-    _tell(ends)
-    _print(network, recording, _summary(network, steps, perf_counter() - begun, recording.backend, ends), states)
+        recording = network.run(steps, arrays, last=until is not None, **(options | {"progress": bar}))
+    _tell(until)
+    summary = _summary(network, steps, perf_counter() - begun, recording.backend, until)
+    _print(network, recording, summary, keeping.states)
+
+
+def _network(spec: str, running: Running, keeping: Keeping, output: Path | None) -> CompiledNetwork:
+    """The network that is run, once it is known that what is written replaces nothing that is read."""
+    read = [("the spec itself", spec), ("the recording that the run goes on from", keeping.start)]
+    read += files_of(running.inputs)
+    check_target(output, read)
+    others = [*read, ("the recording", None if output is None else str(output))]
+    check_target(keeping.checkpoint, others, "--checkpoint")
+    _check_format(output)
+    network = network_of(spec, running.settings)
+    check_files(output, network)
+    check_files(keeping.checkpoint, network, "--checkpoint")
+    return network
 
 
 def _tell(until: Until | None) -> None:

@@ -12,14 +12,13 @@ import click
 from neurovis_spec.cli.completion import axes, paths
 from neurovis_spec.cli.files import STDIN, count, how_to_compile, standard_input, tables, tell_warnings, writing
 from neurovis_spec.cli.options import (
-    backend_option,
+    Running,
     body_options,
     compile_options,
     examples,
-    input_option,
     output_option,
     ranges,
-    set_option,
+    running_options,
 )
 from neurovis_spec.cli.progress import progress
 from neurovis_spec.cli.targets import check_files, check_target, files_of
@@ -53,10 +52,7 @@ from neurovis_spec.cli.targets import check_files, check_target, files_of
     help="Measure each run: an expression of neurons, outputs, parameters, k and t after the last step, with rms, "
     "mean, min and max over the last N steps, or over all. Repeatable, a column each.",
 )
-@click.option("--steps", type=click.IntRange(1, 2**53), metavar="N", help="Steps of a run; default: time.steps.")
-@set_option
-@input_option
-@backend_option
+@running_options("Steps of a run; default: time.steps.")
 @click.option(
     "--jobs", type=click.IntRange(1, 4096), metavar="N", help="Run in N processes; default: one for each processor."
 )
@@ -68,10 +64,7 @@ def command(
     spec: str,
     over: dict[str, str],
     metrics: tuple[str, ...],
-    steps: int | None,
-    settings: dict[str, float],
-    inputs: dict[str, str],
-    backend: str | None,
+    running: Running,
     jobs: int | None,
     scheduler: str | None,
     output: Path | None,
@@ -82,25 +75,27 @@ def command(
     not run again: what was ended, by Ctrl-C or otherwise, goes on where it was when it is called again. It goes by the
     columns and the values of the grid: where the spec has changed, name another file.
     """
-    read = files_of(inputs)
+    read = files_of(running.inputs)
     check_target(output, [("the spec itself", spec), *read])
-    both = next((name for name in over if name in settings), None)
+    both = next((name for name in over if name in running.settings), None)
     if both is not None:
         raise click.UsageError(f"'{both}' is given by --over and by --set")
     if jobs is not None and scheduler is not None:
         raise click.UsageError("--jobs is of this machine, --scheduler of a cluster: give one of them")
-    from neurovis_spec.sweeps.sweep import Source, carried_out, planned
+    from neurovis_spec.runtime.course import Course
+    from neurovis_spec.sweeps.point import Source
+    from neurovis_spec.sweeps.sweep import carried_out, planned
     from neurovis_spec.sweeps.table import check_suffix
 
     if output is not None:
         check_suffix(output)
     source = Source(standard_input(), STDIN, Path.cwd()) if spec == "-" else spec
-    how = how_to_compile()
+    course, how = Course(running.steps, backend=running.backend), how_to_compile(running.settings)
     with progress("compiling"):
-        plan = planned(source, over, metrics, steps=steps, parameters=settings, backend=backend, **how)
+        plan = planned(source, over, metrics, course, how)
     tell_warnings(spec, plan.network.warnings)
     check_files(output, plan.network)
-    arrays = tables(inputs, plan.network.network)
+    arrays = tables(running.inputs, plan.network.network)
     begun, many = perf_counter(), jobs or min(_processors(), len(plan.points))
     with writing(output) if output is not None else nullcontext(), progress("sweeping") as bar:
         table = carried_out(plan, arrays, jobs=many, scheduler=scheduler, path=output, progress=bar)

@@ -169,7 +169,7 @@ class Hub:
         client, self._reader = self._waiting.popleft(), None
         wanted, client.wanted = client.wanted, None
         if client in self._clients and shown is not None and wanted is not None:
-            lines, traces = len(shown.look.lines), {}
+            lines, traces = len(shown.glance.lines), {}
             for item in wanted.items:
                 members = shown.view.members(item)
                 if members is not None:
@@ -214,7 +214,7 @@ class Hub:
             client.asked = bool(client.items)
         if client.asked:
             client.asked = False
-            yield values_message(shown.look.step, shown.view.values(shown.seen, client.items))
+            yield values_message(shown.glance.step, shown.view.values(shown.seen, client.items))
         if client.traces:
             traces, client.traces = client.traces, b""
             yield traces
@@ -227,7 +227,7 @@ class Hub:
         self._serial += 1
         if before is None or shown.view is not before.view:
             self._version = self._version % 0xFFFF + 1
-            self._changed_at = np.full(len(shown.look.kinds), self._serial, np.int64)
+            self._changed_at = np.full(len(shown.glance.kinds), self._serial, np.int64)
         else:
             self._changed_at[_changed(before, shown)] = self._serial
         if before is None or before.status != shown.status or not self._statuses:
@@ -256,14 +256,14 @@ class Hub:
             assert self._shown is not None
             changed = np.flatnonzero(self._changed_at > since)
             shown = self._shown
-            found = frame_message(shown.look, shown.reach, self._version, self._serial, changed)
+            found = frame_message(shown.glance, shown.reach, self._version, self._serial, changed)
             self._frames[since] = found
         return found
 
 
 def _changed(before: Shown, now: Shown) -> npt.NDArray[np.bool_]:
     """Which items (connections, then neurons) look otherwise, but for their colours."""
-    one, other = before.look, now.look
+    one, other = before.glance, now.glance
     changed: npt.NDArray[np.bool_] = one.kinds != other.kinds
     changed[: len(other.lines)] |= (one.widths != other.widths) | (one.glows != other.glows)
     return changed

@@ -10,6 +10,7 @@ import signal
 import socket
 import sys
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
 from typing import TypeAlias
@@ -49,23 +50,25 @@ def listen(host: str, port: int) -> socket.socket:
     return sock
 
 
+@dataclass(frozen=True)
+class Edited:
+    """The file of a spec that may be edited, and what compiles it anew."""
+
+    path: Path
+    compile: Callable[[], Compilation]
+
+    def files(self, compiled: Compilation) -> set[Path]:
+        """The files that an edit may change."""
+        return {self.path, *compiled.files}
+
+
 class Edits:
     """Shows a spec anew when one of its files was edited; if it is invalid, or cannot be shown at this step, reports
     that and keeps the old network."""
 
-    def __init__(
-        self,
-        show: Show,
-        compile: Callable[[], Compilation],
-        files: Callable[[Compilation], Iterable[Path]],
-        known: Compilation,
-        run: Run,
-        tell: Tell,
-        desk: Desk,
-    ) -> None:
-        self._show, self._compile, self._files, self._run, self._tell = show, compile, files, run, tell
-        self._desk = desk
-        self._watched = set(files(known))
+    def __init__(self, show: Show, edited: Edited, run: Run, tell: Tell, desk: Desk) -> None:
+        self._show, self._spec, self._run, self._tell, self._desk = show, edited, run, tell, desk
+        self._watched = edited.files(desk.placed.compiled)
 
     def watch(self) -> Watch:
         """What watches the files."""
@@ -73,7 +76,7 @@ class Edits:
 
     def _edited(self) -> Iterable[Path]:
         try:
-            compiled = self._compile()
+            compiled = self._spec.compile()
             layout = self._desk.renew(compiled)
         except Exception as error:  # a layout engine, ours or anybody's, may fail
             return self._refused(_words(error))
@@ -84,7 +87,7 @@ class Edits:
         if refused is not None:
             self._desk.unrenew()
             return self._refused(refused)
-        self._watched = set(self._files(compiled))
+        self._watched = self._spec.files(compiled)
         self._tell(findings_message(show_text(compiled.warnings, compiled.sources), errors=False))
         return self._watched
 

@@ -47,7 +47,7 @@ from neurovis_spec.live.run import Status
 from neurovis_spec.live.saving import MOST_SECONDS
 from neurovis_spec.live.source import Drawn, Reach, Turned
 from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set
-from neurovis_spec.live.view import Look
+from neurovis_spec.live.view import Glance
 from neurovis_spec.themes import THEMES
 
 #: The first byte of a binary message from the server.
@@ -90,21 +90,21 @@ def scene_message(content: bytes, version: int) -> bytes:
     return _SCENE_HEAD.pack(SCENE, version) + content
 
 
-def frame_message(look: Look, reach: Reach, version: int, serial: int, changed: npt.NDArray[np.int64]) -> bytes:
+def frame_message(glance: Glance, reach: Reach, version: int, serial: int, changed: npt.NDArray[np.int64]) -> bytes:
     """A frame: all colours, and of the ``changed`` items (connections, then neurons) widths, glows and kinds; and the
     pose of the body."""
-    lines = len(look.lines)
+    lines = len(glance.lines)
     of_lines = np.minimum(changed, max(lines - 1, 0))
     none = np.zeros(len(changed), np.uint16)
-    widths, glows = (values[of_lines] if lines else none for values in (look.widths, look.glows))
-    words = look.caption.encode("utf-8", "replace")[:4096]
-    pose = look.pose if len(look.pose) <= _POSED else look.pose[:0]
+    widths, glows = (values[of_lines] if lines else none for values in (glance.widths, glance.glows))
+    words = glance.caption.encode("utf-8", "replace")[:4096]
+    pose = glance.pose if len(glance.pose) <= _POSED else glance.pose[:0]
     counts = len(words), len(pose)
-    head = _HEAD.pack(FRAME, version, serial, len(changed), look.step, reach.first, reach.last, *counts)
-    colours = look.discs.tobytes() + look.lines.tobytes()
+    head = _HEAD.pack(FRAME, version, serial, len(changed), glance.step, reach.first, reach.last, *counts)
+    colours = glance.discs.tobytes() + glance.lines.tobytes()
     parts = [
         *(head, changed.astype("<u4").tobytes(), widths.astype("<u2").tobytes(), glows.astype("<u2").tobytes()),
-        *(look.kinds[changed].tobytes(), colours, words, pose.astype("<f4").tobytes()),
+        *(glance.kinds[changed].tobytes(), colours, words, pose.astype("<f4").tobytes()),
     ]
     return b"".join(parts)
 

@@ -33,7 +33,7 @@ from neurovis_spec.live.commands import (
 )
 from neurovis_spec.live.history import History
 from neurovis_spec.live.source import Capabilities, Drawn, Reach, Seen, Source, SourceError, Turned
-from neurovis_spec.live.view import Look, View
+from neurovis_spec.live.view import Glance, View
 
 _LOG: Final = logging.getLogger(__name__)
 P = ParamSpec("P")
@@ -62,7 +62,7 @@ class Shown:
 
     view: View
     seen: Seen
-    look: Look
+    glance: Glance
     reach: Reach
     status: Status
     history: History
@@ -370,4 +370,4 @@ class Run:
             appearance=self.appearance,
         )
         seen = source.seen()
-        return Shown(self._view, seen, self._view.look(seen), source.reach, status, source.history, source.body)
+        return Shown(self._view, seen, self._view.glance(seen), source.reach, status, source.history, source.body)

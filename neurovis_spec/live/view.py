@@ -1,7 +1,7 @@
 """The view: how a network is drawn live, the same picture as ``render`` makes of a step.
 
 In: a compiled network, its gains, a theme. Out: a View: its plan, all that stays as a page gets it, and for each step a
-Look: colours, widths and glows as small numbers, as fine as can be seen (Eqs. 2–5).
+Glance: colours, widths and glows as small numbers, as fine as can be seen (Eqs. 2–5).
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ SHARES, _SHARE = 31, 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Look:
+class Glance:
     """What a step looks like: colour values of discs (n,) and lines (m,); widths and glow widths (m,); and ``kinds``
     (m + n,): of each connection, then of each neuron, BAR where its line ends in a bar, FAINT where it is lesioned,
     of a line NEGATIVE where its weight is, and in the higher bits how large it is; of a neuron CLAMPED where it is, and
@@ -82,7 +82,7 @@ class View:
     #: what stays of a picture of the same network in which more changes, at least so wide (page units)
     planned: Callable[[Network, float], tuple[Gathered, Plan]]
 
-    def look(self, seen: Seen) -> Look:
+    def glance(self, seen: Seen) -> Glance:
         """What a step looks like."""
         whole, drawn = seen.snapshot, self.drawn
         snapshot = drawn.snapshot(whole)
@@ -93,7 +93,7 @@ class View:
         of_lines = bars * BAR + lines * FAINT + shown.bars * NEGATIVE + self._shares(snapshot.weights) * _SHARE
         clamped, undefined = self._all(seen.clamped), ~np.isfinite(snapshot.activity)
         of_neurons = neurons * FAINT + clamped * CLAMPED + undefined * UNDEFINED
-        return Look(
+        return Glance(
             step=snapshot.step,
             caption="" if words is None else words.text,
             discs=_levels(shown.discs),
@@ -194,7 +194,7 @@ def _planned(
 
 def _scene(planned: Plan, gains: Gains) -> Scene:
     """All that stays: the picture before anything happens. No line glows, nothing is faint, and tooltips say no values:
-    these come with each Look."""
+    these come with each Glance."""
     network = planned.network
     activity, weights = np.zeros(len(network.neurons)), network.connections.weights.whole()
     shown = looks(network, Snapshot(0, activity, weights, None), gains, planned.frame.widest)

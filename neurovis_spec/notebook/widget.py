@@ -158,7 +158,7 @@ class LiveWidget(anywidget.AnyWidget):
     def _follow_run(self) -> None:
         """Have the traits say what is shown."""
         shown = self._session.shown
-        self.set_trait("step", shown.look.step)
+        self.set_trait("step", shown.glance.step)
         self.set_trait("playing", shown.status.playing)
         for name, value in shown.status.parameters.items():
             if self._known.get(name, value) != value:

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from neurovis_spec import api
-from neurovis_spec.arrays import FloatArray
 from neurovis_spec.body import BodyError
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import SpecError, printable
+from neurovis_spec.keywords import CompileKeywords
 from neurovis_spec.plugins import PluginError
 from neurovis_spec.runtime.backend import BackendError
 from neurovis_spec.runtime.columns import Columns, Keep, columns_of
@@ -41,22 +41,24 @@ _CODES: Mapping[type[Exception], str] = {
 
 
 @dataclass(frozen=True)
-class Job:
-    """What all points of a sweep share: a spec as a text, called ``file``, whose own files lie in ``folder``; values
-    that are ``fixed``; the ``names`` of the grid; the ``metrics``; how to run."""
+class Source:
+    """A spec as a text, called ``file``; its own files lie in ``folder``."""
 
     text: str
     file: str
-    folder: str
+    folder: str | Path
+
+
+@dataclass(frozen=True)
+class Job:
+    """What all points of a sweep share: a spec, the ``names`` of the grid, the ``metrics``; how it is compiled, and the
+    course of each run."""
+
+    source: Source
     names: tuple[str, ...]
     metrics: tuple[str, ...]
-    fixed: Mapping[str, float] = field(default_factory=dict)
-    steps: int | None = None
-    inputs: Mapping[str, FloatArray] = field(default_factory=dict)
-    backend: str | None = None
-    root: str | None = None
-    limit: int | None = None
-    body: bool | Path = True
+    how: CompileKeywords
+    course: Course
 
 
 @dataclass(frozen=True)
@@ -71,16 +73,17 @@ def compiled(job: Job, point: Point | None) -> CompiledNetwork:
     """The network of a point; of the spec as it is without one. Raises SpecError."""
     given = dict(zip(job.names, point, strict=True)) if point is not None else {}
     seed = given.pop(SEED, None)
-    parameters = {**job.fixed, **{name: float(value) for name, value in given.items()}}
+    source, how = job.source, job.how
+    values = {**(how["parameters"] or {}), **{name: float(value) for name, value in given.items()}}
     return api.compile_text(
-        job.text,
-        file=job.file,
-        folder=job.folder,
-        parameters=parameters,
+        source.text,
+        file=source.file,
+        folder=source.folder,
+        parameters=values,
         seed=None if seed is None else int(seed),
-        root=job.root,
-        limit=job.limit,
-        body=job.body,
+        root=how["root"],
+        limit=how["limit"],
+        body=how["body"],
     )
 
 
@@ -88,7 +91,7 @@ def measures(job: Job, network: Network) -> tuple[Measure, ...]:
     """The metrics for the runs of a network. Raises SpecError."""
     found = tuple(resolved(parsed(text, LABEL), network, LABEL) for text in job.metrics)
     for measure in found:
-        measure.check_steps(network.steps if job.steps is None else job.steps)
+        measure.check_steps(job.course.length(network))
     return found
 
 
@@ -115,8 +118,7 @@ def _measured(job: Job, network: Network) -> tuple[float, ...]:
     meters = tuple(Meter(measure) for measure in measures(job, network))
     state = initial_state(network)
     keep = Keep(states=tuple(dict.fromkeys(name for meter in meters for name in meter.measure.probe.names)))
-    steps = network.steps if job.steps is None else job.steps
-    course = Course(steps, inputs=job.inputs, backend=job.backend, keep=keep).embodied(network)
+    course = replace(job.course, keep=keep).embodied(network)
     rows = _Metered(network, state, meters, columns_of(network, keep, course.body))
     go(network, state, course, rows)
     return tuple(rows.last)

@@ -7,11 +7,11 @@ file to which rows are added while the sweep runs.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeAlias
+from typing import Final, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,7 @@ from neurovis_spec import api, arguments
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.diagnostics import SpecError
 from neurovis_spec.interrupts import Ended
+from neurovis_spec.keywords import COMPILE, CompileKeywords, check, completed, keywords
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
 from neurovis_spec.language.yaml.reader import LARGEST
 from neurovis_spec.likeness import suggest
@@ -28,21 +29,17 @@ from neurovis_spec.progress import Progress
 from neurovis_spec.real_paths import real_path
 from neurovis_spec.runtime.backend import AUTO, BackendError, available, ready
 from neurovis_spec.runtime.backend import load as load_backend
+from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.embodied import embodied
 from neurovis_spec.runtime.inputs import check_names
 from neurovis_spec.runtime.measures import parsed
+from neurovis_spec.runtime.record import AS_IT_IS
 from neurovis_spec.sweeps.grid import SEED, Axis, Number, Point, SweepError, axes, points
-from neurovis_spec.sweeps.journal import Journal
-from neurovis_spec.sweeps.point import LABEL, Job, Result, compiled, measures
-from neurovis_spec.sweeps.table import ERROR, Row, Table
-from neurovis_spec.sweeps.workers import here, in_processes
+from neurovis_spec.sweeps.point import LABEL, Job, Source, compiled, measures
+from neurovis_spec.sweeps.table import ERROR, Journal, Row, Table
+from neurovis_spec.sweeps.workers import Runner, runner_of
 from neurovis_spec.whole import whole_text
 
-#: Runs points: their places and results, as they come.
-Runner: TypeAlias = Callable[[Job, Sequence[Point]], Generator[tuple[int, Result], None, None]]
-
-#: The most steps of a run.
-_MOST_STEPS = 1 << 53
 _NAMED = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*=(?!=)(.*)", re.DOTALL)
 
 
@@ -50,13 +47,31 @@ class SweepStoppedError(Ended):
     """A signal has ended a sweep; the rows until then are in the file."""
 
 
-@dataclass(frozen=True)
-class Source:
-    """A spec as a text, called ``file``; its own files lie in ``folder``."""
+class SweepKeywords(CompileKeywords, total=False):
+    """What a sweep is, besides its grid and its metrics."""
 
-    text: str
-    file: str
-    folder: Path
+    steps: int | None
+    inputs: Mapping[str, npt.ArrayLike] | None
+    backend: str | None
+    jobs: int
+    scheduler: str | None
+    path: str | Path | None
+    progress: Progress | None
+
+
+SWEEP: Final[SweepKeywords] = {
+    "steps": None,
+    "inputs": None,
+    "parameters": None,
+    "backend": None,
+    "jobs": 1,
+    "scheduler": None,
+    "path": None,
+    "root": None,
+    "limit": None,
+    "body": True,
+    "progress": None,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,22 +84,12 @@ class CheckedSweep:
     network: CompiledNetwork
 
 
+@keywords(SweepKeywords, SWEEP)
 def sweep(
     source: str | Path | Mapping[str, object],
     over: Mapping[str, str | Iterable[Number]],
     metrics: str | Iterable[str] | Mapping[str, str],
-    *,
-    steps: int | None = None,
-    inputs: Mapping[str, npt.ArrayLike] | None = None,
-    parameters: Mapping[str, float] | None = None,
-    backend: str | None = None,
-    jobs: int = 1,
-    scheduler: str | None = None,
-    path: str | Path | None = None,
-    root: str | Path | None = None,
-    limit: int | None = None,
-    body: str | Path | bool = True,
-    progress: Progress | None = None,
+    **options: Unpack[SweepKeywords],
 ) -> Table:
     """Run a spec at every point of a grid, and measure each run.
 
@@ -97,44 +102,34 @@ def sweep(
     the body cannot be opened, and SpecError where the spec or
     a metric is invalid at both ends of the grid and without it; what is wrong with a single point is in its row.
     """
-    for name, text in (("backend", backend), ("scheduler", scheduler)):
-        if text is not None:
-            arguments.text(name, text)
-    for name, place in (("root", root), ("path", path)):
+    given = completed("sweep", options, SWEEP)
+    check(backend=given["backend"], scheduler=given["scheduler"])
+    for name, place in (("root", given["root"]), ("path", given["path"])):
         if place is not None:
             arguments.path(name, place)
+    steps, inputs, progress = given["steps"], given["inputs"], given["progress"]
     if steps is not None:
-        steps = arguments.integer("steps", steps, least=1, most=_MOST_STEPS)
-    arguments.mapping("inputs", inputs)
-    arguments.function("progress", progress)
-    jobs = arguments.integer("jobs", jobs, least=1)
-    plan = planned(
-        source,
-        over,
-        metrics,
-        steps=steps,
-        parameters=parameters,
-        backend=backend,
-        root=root,
-        limit=limit,
-        body=arguments.body(body),
-    )
-    return carried_out(plan, inputs, jobs=jobs, scheduler=scheduler, path=path, progress=progress)
+        steps = arguments.integer("steps", steps, least=1, most=arguments.MOST_STEPS)
+    check(inputs=inputs, progress=progress)
+    jobs = arguments.integer("jobs", given["jobs"], least=1)
+    how: CompileKeywords = {
+        "parameters": given["parameters"],
+        "root": given["root"],
+        "limit": given["limit"],
+        "body": given["body"],
+    }
+    plan = planned(source, over, metrics, Course(steps, backend=given["backend"]), how)
+    return carried_out(plan, inputs, jobs=jobs, scheduler=given["scheduler"], path=given["path"], progress=progress)
 
 
 def planned(
     source: str | Path | Mapping[str, object] | Source,
     over: Mapping[str, str | Iterable[Number]],
     metrics: str | Iterable[str] | Mapping[str, str],
-    *,
-    steps: int | None = None,
-    parameters: Mapping[str, float] | None = None,
-    backend: str | None = None,
-    root: str | Path | None = None,
-    limit: int | None = None,
-    body: bool | Path = True,
+    course: Course = AS_IT_IS,
+    how: CompileKeywords = COMPILE,
 ) -> CheckedSweep:
-    """A sweep before anything is run. Raises what ``sweep`` raises."""
+    """A sweep before anything is run: of each point this ``course``, compiled so. Raises what ``sweep`` raises."""
     grid = axes(over)
     spec = source if isinstance(source, Source) else _read(source)
     named = named_metrics(metrics)
@@ -142,22 +137,23 @@ def planned(
         parsed(one, LABEL)
     columns = (*(one.name for one in grid), *named, ERROR)
     _check_columns(columns)
-    job = Job(
-        spec.text,
-        spec.file,
-        str(real_path(spec.folder)),
-        tuple(one.name for one in grid),
-        tuple(named.values()),
-        {name: arguments.number(name, value) for name, value in arguments.mapping("parameters", parameters).items()},
-        steps,
-        {},
-        None if backend == AUTO else backend,
-        None if root is None else str(real_path(root)),
-        limit,
-        body if isinstance(body, bool) else real_path(body),
-    )
-    every = tuple(points(grid))
+    names, every = tuple(one.name for one in grid), tuple(points(grid))
+    if course.backend == AUTO:
+        course = replace(course, backend=None)
+    job = Job(replace(spec, folder=real_path(spec.folder)), names, tuple(named.values()), _anywhere(how), course)
     return CheckedSweep(job, columns, every, _checked(job, grid, every))
+
+
+def _anywhere(how: CompileKeywords) -> CompileKeywords:
+    """How to compile, the same from whatever folder."""
+    given = arguments.mapping("parameters", how["parameters"])
+    root, body = how["root"], arguments.body(how["body"])
+    return {
+        "parameters": {name: arguments.number(name, value) for name, value in given.items()},
+        "root": None if root is None else str(real_path(root)),
+        "limit": how["limit"],
+        "body": body if isinstance(body, bool) else real_path(body),
+    }
 
 
 def carried_out(
@@ -172,8 +168,9 @@ def carried_out(
     """The table of a sweep. Raises what ``sweep`` raises."""
     check_names(plan.network.network, inputs or {})
     arrays = {name: np.asarray(value, dtype=np.float64) for name, value in (inputs or {}).items()}
-    job = replace(plan.job if scheduler is None else _by_itself(plan), inputs=arrays)
-    width, run = len(plan.job.names), _runner(jobs, scheduler)
+    job = plan.job if scheduler is None else _by_itself(plan)
+    job = replace(job, course=replace(job.course, inputs=arrays))
+    width, run = len(plan.job.names), runner_of(jobs, scheduler)
     if path is None:
         rows: dict[Row, Row] = {}
         _run(plan, job, run, rows, lambda row: rows.__setitem__(row[:width], row), progress)
@@ -203,12 +200,14 @@ def _by_itself(plan: CheckedSweep) -> Job:
             "a body is not sent to a cluster", "sweep in processes of this machine, or without it (--no-body)"
         )
     text = whole_text(made.spec, replace(made.request, parameters={}, seed=None), made.sources)
-    if text == plan.job.text:
-        return plan.job
+    job = plan.job
+    if text == job.source.text:
+        return job
     if len(text.encode()) > LARGEST:
         size = f"{len(text) >> 20} MiB, of {LARGEST >> 20} at most"
         raise SweepError(f"with the data that it reads the spec is too large to be sent to a cluster: {size}")
-    return replace(plan.job, text=text, folder=".", root=None)
+    source = replace(job.source, text=text, folder=".")
+    return replace(job, source=source, how={**job.how, "root": None})
 
 
 def named_metrics(metrics: str | Iterable[str] | Mapping[str, str]) -> dict[str, str]:
@@ -270,11 +269,12 @@ def _checked(job: Job, grid: Sequence[Axis], every: Sequence[Point]) -> Compiled
         if one.name != SEED and one.name not in known:
             hint = suggest(one.name, (*known, SEED), "there are")
             raise SweepError(f"there is no parameter '{one.name}'", hint)
-    if job.backend is not None:
-        load_backend(job.backend)
-        found = available(job.backend)
+    backend = job.course.backend
+    if isinstance(backend, str):
+        load_backend(backend)
+        found = available(backend)
         if not found.available:
-            raise BackendError(f"the backend '{job.backend}' is not available here: {found.note}")
+            raise BackendError(f"the backend '{backend}' is not available here: {found.note}")
     wrong: list[SpecError] = []
     for network in networks:
         try:
@@ -284,16 +284,6 @@ def _checked(job: Job, grid: Sequence[Axis], every: Sequence[Point]) -> Compiled
     if len(wrong) == len(networks):
         raise wrong[0]
     return networks[0]
-
-
-def _runner(jobs: int, scheduler: str | None) -> Runner:
-    if scheduler is not None:
-        from neurovis_spec.sweeps.cluster import on_cluster
-
-        return lambda job, some: on_cluster(job, some, scheduler)
-    if jobs < 1:
-        raise SweepError(f"a sweep runs in one process at least, not in {jobs}")
-    return here if jobs == 1 else lambda job, some: in_processes(job, some, jobs)
 
 
 def _run(
@@ -314,7 +304,7 @@ def _run(
     if not missing:
         return
     embodied(plan.network.network)
-    if job.backend is None:  # what has to be compiled is, before any process asks for it
+    if job.course.backend is None:  # what has to be compiled is, before any process asks for it
         ready(plan.network.network)
     with closing(run(job, missing)) as results:
         for place, result in results:

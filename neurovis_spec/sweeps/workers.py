@@ -1,16 +1,19 @@
-"""Points in processes of this machine.
+"""Where the points of a sweep run: here, in processes of this machine, or on a cluster (the extra ``cluster``).
 
 In: a Job and its points. Out: results as they come, each with the place of its point. Processes are spawned, so that
 none shares a state with this one; each is given a point at a time, so that it is known what a process did that has been
-ended from outside: the point is tried once more, and then it is a failed one.
+ended from outside: the point is tried once more, and then it is a failed one. On a cluster, through dask.distributed,
+what a worker has not finished when it is lost runs on another; a point that ends worker after worker is a failed one.
 """
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import sys
 import threading
+from asyncio import CancelledError
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -18,6 +21,7 @@ from multiprocessing import get_context, parent_process, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import TypeAlias
+from uuid import uuid4
 
 from neurovis_spec.interrupts import ENDING
 from neurovis_spec.sweeps.grid import Point, SweepError
@@ -29,6 +33,20 @@ Run: TypeAlias = Callable[[Job, Point], Result]
 _TRIES = 2
 #: how many processes in a row may end before they ask for a point
 _STILLBORN = 3
+#: seconds within which the scheduler answers
+_PATIENCE = 20
+
+#: Runs points: their places and results, as they come.
+Runner: TypeAlias = Callable[[Job, Sequence[Point]], Generator[tuple[int, Result], None, None]]
+
+
+def runner_of(jobs: int, scheduler: str | None) -> Runner:
+    """What runs points in so many processes, or on the cluster of a scheduler. Raises SweepError."""
+    if scheduler is not None:
+        return lambda job, some: on_cluster(job, some, scheduler)
+    if jobs < 1:
+        raise SweepError(f"a sweep runs in one process at least, not in {jobs}")
+    return here if jobs == 1 else lambda job, some: in_processes(job, some, jobs)
 
 
 def here(job: Job, points: Sequence[Point]) -> Generator[tuple[int, Result], None, None]:
@@ -149,3 +167,61 @@ def _follow() -> None:
     if parent is not None:
         wait([parent.sentinel])
         os._exit(1)
+
+
+def on_cluster(job: Job, points: Sequence[Point], address: str) -> Generator[tuple[int, Result], None, None]:
+    """Points on the workers of a scheduler. Raises SweepError where it does not answer, or workers lack NeuroVis."""
+    try:
+        from distributed import Client, Future, KilledWorker, as_completed
+    except ImportError:
+        hint = "pip install 'neurovis-spec[cluster]'"
+        raise SweepError("a sweep on a cluster needs dask.distributed, which is not installed", hint) from None
+    try:
+        client = Client(address, timeout=_PATIENCE, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        message = f"the scheduler at {address} does not answer: {error or type(error).__name__}"
+        raise SweepError(message, "an address is like tcp://10.0.0.1:8786") from None
+    name = f"neurovis-{uuid4().hex}"
+    futures: dict[Future, int] = {}
+    with _ended_tasks_untold():
+        try:
+            # the job is a task of its own: what is merely scattered is gone with the worker that has it
+            shared = client.submit(_same, job, key=f"{name}-job")
+            for place, point in enumerate(points):
+                futures[client.submit(run_point, shared, point, key=f"{name}-{place}")] = place
+            for future in as_completed(list(futures), loop=client.loop):
+                try:
+                    result = future.result()
+                except KilledWorker:
+                    result = failed(job, "worker-died", "one worker after the other ended while it ran this point")
+                yield futures.pop(future), result
+                future.release()
+        except Exception as error:  # of whatever kind: run_point raises nothing, so it is one of the cluster's
+            message = f"the cluster gave up: {' '.join(str(error).split()) or type(error).__name__}"
+            raise SweepError(
+                message, "the rows until then are kept; do all of its workers have this version?"
+            ) from None
+        finally:
+            if futures:
+                client.cancel(list(futures))
+            client.close(timeout=5)
+
+
+def _same(job: Job) -> Job:
+    return job
+
+
+@contextmanager
+def _ended_tasks_untold() -> Iterator[None]:
+    """Where the scheduler is lost, dask's client logs a traceback for each task of its own that it ends, before the
+    points fail and say why. These are dropped meanwhile, and nothing else that it logs."""
+    logger = logging.getLogger("distributed.client")
+    logger.addFilter(_is_no_ended_task)
+    try:
+        yield
+    finally:
+        logger.removeFilter(_is_no_ended_task)
+
+
+def _is_no_ended_task(record: logging.LogRecord) -> bool:
+    return not (record.exc_info and isinstance(record.exc_info[1], CancelledError))
