@@ -15,7 +15,7 @@ from typing import TypeAlias
 from neurovis_spec.compiler.compile import Request
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.data.edge_list import EdgeTable
-from neurovis_spec.language.data.files import read_edges, read_table
+from neurovis_spec.language.data.files import NamedFile, read_edges, read_table
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.language.unknown import UNKNOWN
@@ -92,15 +92,15 @@ class _Reader:
             return [self.value(item, folder, path) for item in node.items]
         return node.value
 
-    def _named(self, node: SourceMapping) -> tuple[Scalar, Located[str] | None]:
+    def _named(self, node: SourceMapping, folder: Path) -> NamedFile:
         self.inlined = True
         file, key = node.get("file"), node.get("key")
         assert isinstance(file, Scalar)
-        return file, Located(str(key.value), key) if isinstance(key, Scalar) else None
+        located = Located(str(key.value), key) if isinstance(key, Scalar) else None
+        return NamedFile(str(file.value), self._root, folder, file.span, located)
 
     def _table(self, node: SourceMapping, folder: Path) -> Plain:
-        file, key = self._named(node)
-        table = read_table(str(file.value), self._root, folder, file.span, self._findings, key)
+        table = read_table(self._named(node, folder), self._findings)
         if table is UNKNOWN:
             return None
         return [
@@ -109,8 +109,7 @@ class _Reader:
         ]
 
     def _edges(self, node: SourceMapping, folder: Path) -> Plain:
-        file, key = self._named(node)
-        edges = read_edges(str(file.value), self._root, folder, file.span, self._findings, key)
+        edges = read_edges(self._named(node, folder), self._findings)
         return None if edges is UNKNOWN else list(_rows(edges))
 
 

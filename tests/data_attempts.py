@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span
-from neurovis_spec.language.data.files import Table, read_table
+from neurovis_spec.language.data.files import NamedFile, Table, read_table
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.yaml.source import Scalar
@@ -30,7 +30,7 @@ def attempt(
     (folder / name).write_bytes(data.encode() if isinstance(data, str) else data)
     findings = Findings()
     located = None if key is None else Located(key, Scalar(key, THERE))
-    return read_table(name, folder, folder, HERE, findings, located), findings.sorted()
+    return read_table(NamedFile(name, folder, folder, HERE, located), findings), findings.sorted()
 
 
 def table(folder: Path, name: str, data: str | bytes, key: str | None = None) -> Table:

@@ -9,9 +9,8 @@ import pytest
 from data_attempts import npz
 from small_specs import compiled, network_of, wires
 
-from neurovis_spec.diagnostics import Findings, Span
-from neurovis_spec.language.data.files import Room, Table, read_table
-from neurovis_spec.language.located import Located
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.data.files import NamedFile, Room, Table, read_table
 from neurovis_spec.language.unknown import Unknown
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
 
@@ -72,20 +71,9 @@ def test_inputs(folder: Path, name: str) -> None:
 def test_a_file_is_read_once_for_each_key(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     read: list[tuple[str, str | None]] = []
 
-    def counting(
-        path: str,
-        root: Path,
-        base: Path,
-        span: Span,
-        findings: Findings,
-        key: Located[str] | None,
-        *,
-        keyed: bool,
-        gaps: bool,
-        room: Room,
-    ) -> Table | Unknown:
-        read.append((path, None if key is None else key.value))
-        return read_table(path, root, base, span, findings, key, keyed=keyed, gaps=gaps, room=room)
+    def counting(file: NamedFile, findings: Findings, *, keyed: bool, gaps: bool, room: Room) -> Table | Unknown:
+        read.append((file.path, None if file.key is None else file.key.value))
+        return read_table(file, findings, keyed=keyed, gaps=gaps, room=room)
 
     monkeypatch.setattr("neurovis_spec.compiler.values.data_files.read_table", counting)
     bodies = ["{matrix: {file: w.npz, key: weights}}", "{matrix: {file: w.npz, key: turned}, rows: to}"]

@@ -19,7 +19,7 @@ from neurovis_spec.diagnostics import Diagnostic, Findings
 from neurovis_spec.language.data.cells import number_of, numbers_of
 from neurovis_spec.language.data.csv_table import parse_numbers
 from neurovis_spec.language.data.edge_list import EdgeTable, parse_edges
-from neurovis_spec.language.data.files import read_edges, read_table
+from neurovis_spec.language.data.files import NamedFile, read_edges, read_table
 from neurovis_spec.language.data.npy import parse_npy
 from neurovis_spec.language.data.table import CellError
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
@@ -264,7 +264,7 @@ def test_nothing_but_its_own_error_leaves_a_parser(noise: bytes, at: int, patch:
 def edges(folder: Path, data: str) -> tuple[EdgeTable | Unknown, tuple[Diagnostic, ...]]:
     (folder / "e.csv").write_text(data, encoding="utf-8", newline="")
     findings = Findings()
-    return read_edges("e.csv", folder, folder, HERE, findings), findings.sorted()
+    return read_edges(NamedFile("e.csv", folder, folder, HERE), findings), findings.sorted()
 
 
 def test_edges_by_the_names_of_the_columns(tmp_path: Path) -> None:
@@ -321,7 +321,7 @@ def told(name: str, data: str, folder: Path) -> list[str]:
     """What is said of a table, in order, without the name of the file."""
     (folder / name).write_text(data)
     findings = Findings()
-    assert read_table(name, folder, folder, HERE, findings) is UNKNOWN
+    assert read_table(NamedFile(name, folder, folder, HERE), findings) is UNKNOWN
     return [finding.message.partition(": ")[2] for finding in findings.sorted()]
 
 
@@ -389,7 +389,7 @@ def test_all_faults_of_an_mtx_are_told_by_line(tmp_path: Path) -> None:
 
 def refused(path: str, root: Path, base: Path) -> Diagnostic:
     findings = Findings()
-    assert read_table(path, root, base, HERE, findings) is UNKNOWN
+    assert read_table(NamedFile(path, root, base, HERE), findings) is UNKNOWN
     (finding,) = findings.sorted()
     return finding
 
@@ -398,7 +398,7 @@ def test_paths_are_relative_to_the_file_that_names_them(tmp_path: Path) -> None:
     (tmp_path / "library").mkdir()
     (tmp_path / "a.csv").write_text("1\n")
     findings = Findings()
-    got = read_table("../a.csv", tmp_path, tmp_path / "library", HERE, findings)
+    got = read_table(NamedFile("../a.csv", tmp_path, tmp_path / "library", HERE), findings)
     assert got is not UNKNOWN
     assert refused("a.csv", tmp_path, tmp_path / "library").code == "file-missing"
 
@@ -427,7 +427,7 @@ def test_no_path_leaves_the_root(tmp_path: Path) -> None:
     ):
         assert refused(path, root, root).code == "path-outside", path
     assert table(root, "inner.csv", "7\n").values[0, 0] == 7
-    assert read_table("fine.csv", root, root, HERE, Findings()) is not UNKNOWN
+    assert read_table(NamedFile("fine.csv", root, root, HERE), Findings()) is not UNKNOWN
 
 
 def test_what_is_no_regular_file_is_never_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,7 +24,7 @@ from neurovis_spec.language.data import csv_table as data_files_csv
 from neurovis_spec.language.data import edge_list
 from neurovis_spec.language.data.csv_table import parse_numbers
 from neurovis_spec.language.data.edge_list import parse_edges
-from neurovis_spec.language.data.files import CellError, locate, read_edges, read_table
+from neurovis_spec.language.data.files import CellError, NamedFile, locate, read_edges, read_table
 from neurovis_spec.language.unknown import UNKNOWN
 
 CELLS = ["1", "-2.5", "3e-7", "", " 7", "\t8 ", "\u00a09", "0", ".5", "1.", " "]
@@ -144,7 +144,7 @@ def test_a_cell_may_be_long(tmp_path: Path) -> None:
 def test_a_first_row_of_many_cells_is_no_header_of_edges(tmp_path: Path) -> None:
     (tmp_path / "e.csv").write_text("from," * 1_000_000)
     findings = Findings()
-    assert read_edges("e.csv", tmp_path, tmp_path, HERE, findings) is UNKNOWN
+    assert read_edges(NamedFile("e.csv", tmp_path, tmp_path, HERE), findings) is UNKNOWN
     (finding,) = findings.sorted()
     assert "row 1 has 1,000,001 cells" in finding.message
     assert finding.hint is not None
@@ -169,7 +169,7 @@ def test_who_reads_a_table_may_refuse_its_size(tmp_path: Path, name: str, data: 
         raise CellError("wrong-size", f"{count} cells are too many")
 
     findings = Findings()
-    assert read_table(name, tmp_path, tmp_path, HERE, findings, room=room) is UNKNOWN
+    assert read_table(NamedFile(name, tmp_path, tmp_path, HERE), findings, room=room) is UNKNOWN
     assert asked == [cells]
     assert [(finding.code, finding.span) for finding in findings.sorted()] == [("wrong-size", HERE)]
 
@@ -221,7 +221,7 @@ def test_edges_beyond_the_limit_are_refused_before_they_are_made(tmp_path: Path)
 def test_a_path_has_a_largest_length(tmp_path: Path) -> None:
     for text in ("a/" * 50_000 + "data.csv", "a" * 4093 + ".csv"):
         findings = Findings()
-        assert locate(text, tmp_path, tmp_path, HERE, findings) is UNKNOWN
+        assert locate(NamedFile(text, tmp_path, tmp_path, HERE), findings) is UNKNOWN
         (finding,) = findings.sorted()
         assert finding.code == "file-missing"
         assert f"a path of {len(text):,} characters" in finding.message

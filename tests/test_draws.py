@@ -148,9 +148,9 @@ def test_moments(seed: int) -> None:
 def test_drawn_scales() -> None:
     stream = Stream(3, "weight", "A")
     z, u = stream.normal(1, 2, 0, 0), stream.uniform(1, 2, 0, 0)
-    assert stream.drawn("normal", 10.0, 0.5, 1, 2, 0, 0) == 10 + 0.5 * z
-    assert stream.drawn("uniform", -1.0, 3.0, 1, 2, 0, 0) == -1 + 4 * u
-    assert stream.drawn("uniform", np.zeros(3), 1.0, 1, 2, 0, 0).tolist() == [u] * 3
+    assert stream.drawn("normal", 10.0, 0.5, (1, 2, 0, 0)) == 10 + 0.5 * z
+    assert stream.drawn("uniform", -1.0, 3.0, (1, 2, 0, 0)) == -1 + 4 * u
+    assert stream.drawn("uniform", np.zeros(3), 1.0, (1, 2, 0, 0)).tolist() == [u] * 3
 
 
 @given(st.integers(1, 2**53))

@@ -186,14 +186,14 @@ instances: {left: {module: leg, count: 2}}
     for number in (1, 2):
         group = network.neurons.groups[2 * number - 2]
         assert group.name == f"left{number}.S"
-        bias = Stream(5, "bias", f"left{number}.S").drawn("normal", 0.0, 1.0, i, 0, 0, 0)
-        initial = Stream(5, "initial", f"left{number}.S").drawn("uniform", 0.0, 1.0, i, 0, 0, 0)
+        bias = Stream(5, "bias", f"left{number}.S").drawn("normal", 0.0, 1.0, (i, 0, 0, 0))
+        initial = Stream(5, "initial", f"left{number}.S").drawn("uniform", 0.0, 1.0, (i, 0, 0, 0))
         mine = slice(group.start, group.start + 4)
         assert network.neurons.bias[mine].tolist() == bias.tolist()
         assert network.neurons.initial[mine].tolist() == initial.tolist()
         begin = 8 * (number - 1)
-        first = Stream(5, "weight", f"left{number}/S -> K").drawn("normal", 1.0, 2.0, i, 0, 0, 0)
-        second = Stream(5, "weight", f"left{number}/S -> K (2)").drawn("uniform", 0.0, 1.0, i, 0, 0, 0)
+        first = Stream(5, "weight", f"left{number}/S -> K").drawn("normal", 1.0, 2.0, (i, 0, 0, 0))
+        second = Stream(5, "weight", f"left{number}/S -> K (2)").drawn("uniform", 0.0, 1.0, (i, 0, 0, 0))
         assert network.connections.weights[begin : begin + 8].tolist() == [*first.tolist(), *second.tolist()]
     assert [noise.name for noise in network.noises] == ["left1.S", "left2.S"]
 

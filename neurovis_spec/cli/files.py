@@ -158,7 +158,7 @@ def tables(named: Mapping[str, str], network: Network) -> dict[str, FloatArray]:
     if not named:
         return {}
     from neurovis_spec.diagnostics import Findings, Span
-    from neurovis_spec.language.data.files import read_table
+    from neurovis_spec.language.data.files import NamedFile, read_table
     from neurovis_spec.language.unknown import UNKNOWN
     from neurovis_spec.runtime.inputs import check_names
 
@@ -168,7 +168,7 @@ def tables(named: Mapping[str, str], network: Network) -> dict[str, FloatArray]:
     for name, text in named.items():
         place = Span(text, 1, 1, 1, 1)
         path = real_path(text)
-        table = read_table(path.name, path.parent, path.parent, place, findings, inside=True, kinds=_INPUTS)
+        table = read_table(NamedFile(path.name, path.parent, path.parent, place), findings, inside=True, kinds=_INPUTS)
         if table is UNKNOWN:
             continue
         if table.numbered:

@@ -21,11 +21,11 @@ from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.names.references import key_of, known_inputs
 from neurovis_spec.compiler.names.scope import Surroundings
 from neurovis_spec.compiler.network import Output
-from neurovis_spec.compiler.values.constants import ALWAYS, Constants, is_constant, parse_formula
+from neurovis_spec.compiler.values.constants import ALWAYS, Constants, Sight, is_constant, parse_formula
 from neurovis_spec.compiler.values.constants import Scope as Together
 from neurovis_spec.diagnostics import Findings, Home, Span, shorten
 from neurovis_spec.language.body import BodyModel
-from neurovis_spec.language.data.files import LARGEST, read_data
+from neurovis_spec.language.data.files import LARGEST, NamedFile, read_data
 from neurovis_spec.language.expressions.tree import Name, names, walk
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.model import names_of
@@ -102,8 +102,7 @@ def _found(kind: str, given: Located[str], place: Place, findings: Findings) -> 
         loaded = load_kind(kind)
         if not loaded.takes_file:
             return None, True
-        where = (given.value, place.root, place.base, given.span, findings)
-        if read_data(*where) is UNKNOWN:
+        if read_data(NamedFile(given.value, place.root, place.base, given.span), findings) is UNKNOWN:
             return None, False
         path = real_path(place.base / given.value)
         return path, _all_sound(loaded.files(path), given, real_path(place.root), findings)
@@ -265,7 +264,7 @@ def _command(actuator: str, formula: Formula, around: Surroundings, constants: C
     made = {output.name: output for output in around.outputs}
     outputs = names_of(around.spec, "outputs", {**dict.fromkeys(around.spec.outputs, UNKNOWN), **made})
     known = _Bases(Together((outputs, constants.names, ALWAYS)))
-    tree = parse_formula(formula, known, findings, what="outputs and parameters", subscripts=True, home=_HOME)
+    tree = parse_formula(formula, Sight(known, "outputs and parameters", home=_HOME), findings, subscripts=True)
     if tree is UNKNOWN:
         return UNKNOWN
     constants.read |= names(tree)

@@ -36,7 +36,7 @@ from neurovis_spec.compiler.neurons.noise import make_noises
 from neurovis_spec.compiler.neurons.populate import Population, populate, without_neurons
 from neurovis_spec.compiler.ros_settings import RosSettings
 from neurovis_spec.compiler.run_checks import with_checks
-from neurovis_spec.compiler.values.constants import Constants, parse_formula
+from neurovis_spec.compiler.values.constants import Constants, Sight, parse_formula
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.parameters import make_parameters
 from neurovis_spec.diagnostics import Findings
@@ -286,7 +286,7 @@ def _step_length(spec: Spec, constants: Constants) -> bool:
     if spec.time is None or spec.time.dt is None:
         return spec.time is None or "dt" not in spec.time.unknown
     known = "'dt' comes before the parameters, which may use it; known here"
-    if parse_formula(spec.time.dt, CONSTANTS, constants.findings, what=known) is UNKNOWN:
+    if parse_formula(spec.time.dt, Sight(CONSTANTS, known), constants.findings) is UNKNOWN:
         return False
     dt = constants.scalar(spec.time.dt)
     if dt is UNKNOWN:

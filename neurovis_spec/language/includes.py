@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Final, NamedTuple, TypeAlias
 
 from neurovis_spec.diagnostics import Findings, shorten
-from neurovis_spec.language.data.files import locate
+from neurovis_spec.language.data.files import NamedFile, locate
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.shape import read_included
 from neurovis_spec.language.spec import IncludedModel, Spec
@@ -74,7 +74,7 @@ class _Reader:
 
     def _one(self, path: Located[str], file: str, folder: Path, way: tuple[Path, ...]) -> bool:
         """Read one file; whether it could be read."""
-        place = locate(path.value, self.root, folder, path.span, self.findings)
+        place = locate(NamedFile(path.value, self.root, folder, path.span), self.findings)
         if place is UNKNOWN:
             return False
         if place in way:

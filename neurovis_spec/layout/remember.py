@@ -10,7 +10,7 @@ from pathlib import Path
 
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Findings, Span, shorten
-from neurovis_spec.language.data.files import locate
+from neurovis_spec.language.data.files import NamedFile, locate
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
@@ -24,7 +24,7 @@ def read_memory(path: Located[str], folder: Path, root: Path, network: Network, 
 
     Codes: those of data files, those of layout files, ``layout-file-missing`` and ``forgotten-neuron`` (warnings).
     """
-    place = locate(path.value, root, folder, path.span, findings)
+    place = locate(NamedFile(path.value, root, folder, path.span), findings)
     if place is UNKNOWN:
         return None
     data = read_bytes(place, LARGEST)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from neurovis_spec import plugins
 from neurovis_spec.diagnostics import Findings, Span
-from neurovis_spec.language.data.files import locate
+from neurovis_spec.language.data.files import NamedFile, locate
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.yaml.reader import read_file
 from neurovis_spec.lsp.document import Document
@@ -66,7 +66,7 @@ def _file(document: Document, item: Item) -> Location | None:
 
 
 def _located(document: Document, item: Item) -> Path | Unknown:
-    return locate(item.text, document.root, document.folder, item.span, Findings())
+    return locate(NamedFile(item.text, document.root, document.folder, item.span), Findings())
 
 
 def _shipped(name: Name) -> Location | None:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Final, TypeAlias
 
 from neurovis_spec.diagnostics import Findings
-from neurovis_spec.language.data.files import locate
+from neurovis_spec.language.data.files import NamedFile, locate
 from neurovis_spec.language.includes import MOST
 from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
@@ -101,7 +101,7 @@ class Files:
         waiting = deque((path.parent, item) for item in page.includes)
         while waiting and len(found) < MOST:
             folder, item = waiting.popleft()
-            place = locate(item.text, root, folder, item.span, Findings())
+            place = locate(NamedFile(item.text, root, folder, item.span), Findings())
             other = None if place is UNKNOWN or place in found or place == path else self.page(place)
             if place is not UNKNOWN and other is not None:
                 found[place] = other

@@ -14,7 +14,7 @@ from typing import Final
 from lsprotocol import types
 
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span
-from neurovis_spec.language.data.files import locate
+from neurovis_spec.language.data.files import NamedFile, locate
 from neurovis_spec.lsp.completion import Completion
 from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.hover import Hover
@@ -87,7 +87,7 @@ def _inclusion(document: Document, path: Path) -> Span:
     """Where a document includes a file; the first of its includes if that is done by another file."""
     own = document.page.includes
     for item in own:
-        if locate(item.text, document.root, document.path.parent, item.span, Findings()) == path:
+        if locate(NamedFile(item.text, document.root, document.path.parent, item.span), Findings()) == path:
             return item.span
     return own[0].span if own else Span(document.file, 1, 1, 1, 1)
 

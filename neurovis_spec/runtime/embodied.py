@@ -147,7 +147,7 @@ def seed_of(network: Network, episode: int, drawn: int = 0) -> int:
     """What the body is reset with at the beginning of an episode: it depends on the seed of the spec, the number of the
     episode, and how many steps the runs had that this one continues (``State.drawn``), alone."""
     stream = Stream(network.seed, "body", "reset")
-    return int(stream.drawn("uniform", 0.0, _SEEDS, episode, 0, drawn, 0))
+    return int(stream.drawn("uniform", 0.0, _SEEDS, (episode, 0, drawn, 0)))
 
 
 def embodied(network: Network) -> Embodied | None:

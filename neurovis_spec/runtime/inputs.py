@@ -181,7 +181,7 @@ class InputReader:
         step = step + self._drawn_before
 
         def draw(node: Draw, first: float | FloatArray, second: float | FloatArray) -> FloatArray:
-            return stream.drawn(node.kind, first, second, i, 0, step, node.index)
+            return stream.drawn(node.kind, first, second, (i, 0, step, node.index))
 
         return evaluate_array(tree, known, draw, by=self._by)
 

@@ -77,24 +77,30 @@ NOTHING_OUTSIDE = Outside((), "")
 PARAMETERS = Home((), ("parameters",))
 
 
+class Sight(NamedTuple):
+    """What a formula sees: the ``known`` names, which are ``what`` in the words of a finding. And what it does not see,
+    and why: names that come ``later``, behind it, and those that are ``outside``; ``home`` is where its names are
+    declared."""
+
+    known: Collection[str]
+    what: str = "known here"
+    later: Collection[str] = ()
+    outside: Outside = NOTHING_OUTSIDE
+    home: Home = PARAMETERS
+
+
 def parse_formula(
     formula: Formula,
-    known: Collection[str],
+    sight: Sight,
     findings: Findings,
     *,
     random: bool = False,
     functions: Mapping[str, int] | None = None,
-    what: str = "known here",
-    later: Collection[str] = (),
     subscripts: bool = False,
-    outside: Outside = NOTHING_OUTSIDE,
-    home: Home = PARAMETERS,
 ) -> Tree | Unknown:
-    """The tree of a formula whose names are all known; else findings at the invalid characters.
-
-    ``later`` are names that are declared behind the formula, ``outside`` those that it does not see; ``subscripts``
-    allows names such as ``legs[3]``; ``home`` is where its names are declared.
-    """
+    """The tree of a formula whose names are all known; else findings at the invalid characters. ``subscripts`` allows
+    names such as ``legs[3]``."""
+    known = sight.known
     if formula.value is UNKNOWN:
         return UNKNOWN
     if not isinstance(formula.value, str):
@@ -115,14 +121,14 @@ def parse_formula(
         used = [(node.name, node.start, node.end) for node in unknown]
     for name, start, end in used:
         few = () if findings.many else known
-        message, hint = _unknown(name, few, functions or {}, what)
-        if name in later:
+        message, hint = _unknown(name, few, functions or {}, sight.what)
+        if name in sight.later:
             message, hint = f"'{name}' comes later", "a parameter sees those that are declared before it"
-        elif name in outside.names:
-            hint = outside.hint.format(name)
+        elif name in sight.outside.names:
+            hint = sight.outside.hint.format(name)
         elif name in UNITS and (factor := _FACTOR.search(formula.value, 0, start)):
             hint = unit_hint(factor[1].strip(), name)
-        lost = Undeclared(name, home)
+        lost = Undeclared(name, sight.home)
         findings.error("unknown-name", formula.node.at(start, end), message, hint, undeclared=lost)
     return UNKNOWN
 
@@ -256,16 +262,8 @@ class Constants:
         """The tree of a formula over the parameters and what it sees, for a caller that evaluates it; else findings.
         ``later`` are parameters that it does not see."""
         known = Scope((role.sees, self.names, ALWAYS))
-        tree = parse_formula(
-            formula,
-            known,
-            self.findings,
-            random=role.draws,
-            what=what,
-            later=later,
-            outside=self.outside,
-            home=self.home,
-        )
+        sight = Sight(known, what, later, self.outside, self.home)
+        tree = parse_formula(formula, sight, self.findings, random=role.draws)
         if tree is UNKNOWN:
             return UNKNOWN
         used = names(tree)
@@ -406,7 +404,7 @@ class _Drawing:
         if self.wrong is None and wrong.any():
             self.wrong = node, float(np.nanmin(width))
         at = self.randomness
-        drawn = at.stream.drawn(node.kind, first, second, at.i, at.j, 0, node.index)
+        drawn = at.stream.drawn(node.kind, first, second, (at.i, at.j, 0, node.index))
         return np.where(wrong, np.nan, drawn) if wrong.any() else drawn
 
 

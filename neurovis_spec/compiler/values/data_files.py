@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 
 from neurovis_spec.compiler.limits import amount
 from neurovis_spec.diagnostics import Findings
-from neurovis_spec.language.data.files import CellError, Room, Table, read_edges, read_table
+from neurovis_spec.language.data.files import CellError, NamedFile, Room, Table, read_edges, read_table
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.values import FileReference
@@ -78,8 +78,7 @@ class Files:
                 raise CellError("wrong-size", f"it has {amount(cells)} cells; {shape[0]} × {shape[1]} are wanted")
 
         def read(room: Room) -> Table | Unknown:
-            where = (path.value, self.root, self.base, path.span)
-            return read_table(*where, self.findings, key, keyed=keyed, gaps=not full, room=room)
+            return read_table(self._named(reference), self.findings, keyed=keyed, gaps=not full, room=room)
 
         file = (path.value, None if key is None else key.value, keyed, full)
         table = self._tables.get(file, shape, room, read)
@@ -91,6 +90,9 @@ class Files:
             self.findings.error("file-format", path.span, message)
             return UNKNOWN
         return table
+
+    def _named(self, reference: FileReference) -> NamedFile:
+        return NamedFile(reference.path.value, self.root, self.base, reference.path.span, reference.key)
 
     def table_at(self, path: Located[str]) -> Table | Unknown:
         """The table of an input: of any size, beside whose path no key can stand."""
@@ -107,6 +109,6 @@ class Files:
                 raise CellError("too-many", message, "raise the limit with --limit")
 
         def read(room: Room) -> EdgeTable | Unknown:
-            return read_edges(path.value, self.root, self.base, path.span, self.findings, key, room=room)
+            return read_edges(self._named(reference), self.findings, room=room)
 
         return self._edges.get((path.value, None if key is None else key.value), most, room, read)

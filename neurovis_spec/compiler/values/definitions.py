@@ -18,6 +18,7 @@ from neurovis_spec.compiler.program import ACTIVATION, MODEL, RULE, Definition, 
 from neurovis_spec.compiler.values.constants import (
     ALWAYS,
     Outside,
+    Sight,
     Value,
     check_finite,
     is_constant,
@@ -176,10 +177,8 @@ class _Checker:
     ) -> Tree:
         """The tree of a formula over what is declared so far, or what is ``known``; 0 in the place of one that is
         invalid, as nothing is computed with it any more."""
-        known = self.known if known is None else known
-        tree = parse_formula(
-            formula, known, self.findings, functions=functions, what=what, outside=self.outside, home=self.home
-        )
+        sight = Sight(self.known if known is None else known, what, outside=self.outside, home=self.home)
+        tree = parse_formula(formula, sight, self.findings, functions=functions)
         if tree is not UNKNOWN and not functions and is_constant(tree):
             check_finite(evaluate_array(tree, self.constants), formula, self.findings)
         return Number(0.0) if tree is UNKNOWN else tree
@@ -212,7 +211,8 @@ class _Checker:
 
     def _finite(self, formula: Formula, values: Names[Value]) -> Tree | Unknown:
         what = "known in this default"
-        tree = parse_formula(formula, values, self.findings, what=what, outside=self.outside, home=self.home)
+        sight = Sight(values, what, outside=self.outside, home=self.home)
+        tree = parse_formula(formula, sight, self.findings)
         value = value_of(tree, values)
         return UNKNOWN if value is not UNKNOWN and not check_finite(value, formula, self.findings) else tree
 

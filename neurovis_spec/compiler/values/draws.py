@@ -153,19 +153,17 @@ class Stream:
         kind: Literal["normal", "uniform"],
         first: Value,
         second: Value,
-        i: Index,
-        j: Index,
-        step: Index,
-        draw: Index,
+        counter: tuple[Index, Index, Index, Index],
     ) -> FloatArray:
-        """``normal(first, second)``: mean and deviation; or ``uniform(first, second)``: from low to below high.
+        """``normal(first, second)``: mean and deviation; or ``uniform(first, second)``: from low to below high. The
+        counter is (i, j, step, draw).
 
         NaN where a deviation is negative: no distribution has one.
         """
         if kind == "normal":
-            drawn = np.asarray(first + second * self.normal(i, j, step, draw))
+            drawn = np.asarray(first + second * self.normal(*counter))
             return np.where(np.less(second, 0), np.nan, drawn) if np.less(second, 0).any() else drawn
-        return np.asarray(first + (second - first) * self.uniform(i, j, step, draw))
+        return np.asarray(first + (second - first) * self.uniform(*counter))
 
     def random_targets(self, row: int, n: int, probability: float) -> IntArray:
         """The targets 0 … n−1 that row ``row`` connects to, each with this probability, ascending.

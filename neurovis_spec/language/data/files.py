@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import islice
 from pathlib import Path, PureWindowsPath
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.data.table import EMPTY_CELL, MOST_FAULTS, CellError, Faults, Room, Table, full, in_cell
@@ -24,7 +24,7 @@ from neurovis_spec.real_paths import real_path
 if TYPE_CHECKING:
     from neurovis_spec.language.data.edge_list import EdgeTable
 
-__all__ = ["DATA_FILES", "CellError", "Room", "Table", "locate", "read_data", "read_edges", "read_table"]
+__all__ = ["DATA_FILES", "CellError", "NamedFile", "Room", "Table", "locate", "read_data", "read_edges", "read_table"]
 
 LARGEST: Final = 256 << 20  # bytes; ten million connections in double precision are 80 MB
 #: characters of a path: what common systems take
@@ -36,11 +36,23 @@ _SHOWN: Final = 1 << 20
 _FROM: Final = "paths are relative to the file that names them"
 
 
-def locate(path_text: str, root: Path, base: Path, span: Span, findings: Findings) -> Path | Unknown:
-    """The file that an author means by a path: relative to ``base``, inside ``root`` also behind symbolic links.
+class NamedFile(NamedTuple):
+    """A file as an author names it: by a path relative to ``base``, inside ``root`` also behind symbolic links; where
+    that stands, and with which ``key`` of an array in it."""
+
+    path: str
+    root: Path
+    base: Path
+    span: Span
+    key: Located[str] | None = None
+
+
+def locate(file: NamedFile, findings: Findings) -> Path | Unknown:
+    """The file that an author means.
 
     Codes: ``path-outside``, ``file-missing``. Whether there is such a file is not asked here.
     """
+    path_text, root, base, span, _ = file
     shown = _short(path_text)
     if not path_text or "\0" in path_text:
         findings.error("file-missing", span, "this is no path of a file")
@@ -65,26 +77,22 @@ def locate(path_text: str, root: Path, base: Path, span: Span, findings: Finding
     return path
 
 
-def read_data(path_text: str, root: Path, base: Path, span: Span, findings: Findings) -> bytes | Unknown:
+def read_data(file: NamedFile, findings: Findings) -> bytes | Unknown:
     """The bytes of a file that an author named; None, and a finding, where it must not or cannot be read."""
-    path = locate(path_text, root, base, span, findings)
+    path = locate(file, findings)
     if path is UNKNOWN:
         return UNKNOWN
     data = read_bytes(path, LARGEST)
     if isinstance(data, FileFault):
         hint = (_neighbours(path) or _FROM) if data.code == "file-missing" else None
-        findings.error(data.code, span, f"the file '{_short(path_text)}' {data.reason}", hint)
+        findings.error(data.code, file.span, f"the file '{_short(file.path)}' {data.reason}", hint)
         return UNKNOWN
     return data
 
 
 def read_table(
-    path_text: str,
-    root: Path,
-    base: Path,
-    span: Span,
+    file: NamedFile,
     findings: Findings,
-    key: Located[str] | None = None,
     *,
     keyed: bool = True,
     gaps: bool = True,
@@ -95,21 +103,21 @@ def read_table(
     """A table of numbers from a file of one of these ``kinds``; an array of one dimension is a column.
 
     A ``.csv`` may begin with a row of texts, the header; its empty cells are absent, and so is what an ``.mtx`` and a
-    sparse ``.npz`` leave out. ``key`` names an array of an ``.npz``; ``keyed`` says whether the author can give one at
-    this place, ``gaps`` whether cells may be empty there. ``inside``: none may, and findings stand at the cells of a
-    ``.csv``, not where it is named. ``room`` may refuse a table for its size before it is made. Codes: those of
-    ``read_data`` and ``room``, and ``file-format``, ``invalid-utf8``, ``not-finite``, ``cell-empty``, ``missing-key``,
-    ``unknown-array``, ``useless-key``.
+    sparse ``.npz`` leave out. The key of the file names an array of an ``.npz``; ``keyed`` says whether the author can
+    give one at this place, ``gaps`` whether cells may be empty there. ``inside``: none may, and findings stand at the
+    cells of a ``.csv``, not where it is named. ``room`` may refuse a table for its size before it is made. Codes: those
+    of ``read_data`` and ``room``, and ``file-format``, ``invalid-utf8``, ``not-finite``, ``cell-empty``,
+    ``missing-key``, ``unknown-array``, ``useless-key``.
     """
-    suffix = Path(path_text).suffix.lower()
+    key, suffix = file.key, Path(file.path).suffix.lower()
     if suffix not in kinds:
-        message = f"'{_short(path_text)}' is no kind of file that holds numbers"
-        findings.error("file-format", span, message, "known: " + ", ".join(kinds))
+        message = f"'{_short(file.path)}' is no kind of file that holds numbers"
+        findings.error("file-format", file.span, message, "known: " + ", ".join(kinds))
         return UNKNOWN
     if key is not None and suffix != ".npz":
         _refuse_key(key, findings)
         return UNKNOWN
-    data = read_data(path_text, root, base, span, findings)
+    data = read_data(file, findings)
     if data is UNKNOWN:
         return UNKNOWN
     try:
@@ -120,9 +128,9 @@ def read_table(
     except CellError as error:
         if error.code == "missing-key" and not keyed:
             error = CellError("file-format", str(error), "keep the one that is meant in a file of its own")
-        place = key.span if key is not None and error.code == "unknown-array" else span
+        place = key.span if key is not None and error.code == "unknown-array" else file.span
         shown = data if inside and suffix == ".csv" else None
-        _refuse(error, path_text, place, findings, gaps=gaps and not inside, shown=shown)
+        _refuse(error, file.path, place, findings, gaps=gaps and not inside, shown=shown)
         return UNKNOWN
 
 
@@ -153,29 +161,20 @@ def _parsed(suffix: str, data: bytes, key: str | None, room: Room | None) -> Tab
     return parse_npz(data, key, room)
 
 
-def read_edges(
-    path_text: str,
-    root: Path,
-    base: Path,
-    span: Span,
-    findings: Findings,
-    key: Located[str] | None = None,
-    *,
-    room: Room | None = None,
-) -> EdgeTable | Unknown:
+def read_edges(file: NamedFile, findings: Findings, *, room: Room | None = None) -> EdgeTable | Unknown:
     """A list of edges from a ``.csv`` file whose header names the columns from, to, weight and perhaps delay.
 
-    An empty weight is 1, an empty delay −1; a ``key`` is refused; ``room`` may refuse so many edges before they are
+    An empty weight is 1, an empty delay −1; a key is refused; ``room`` may refuse so many edges before they are
     made. Where rows are invalid, these are reported, and the table has a ``fault``. Codes: those of ``read_data`` and
     of ``room``, and ``file-format``, ``invalid-utf8``, ``not-finite``, ``useless-key``.
     """
-    if Path(path_text).suffix.lower() != ".csv":
-        findings.error("file-format", span, f"edges are read from a .csv file, not from '{_short(path_text)}'")
+    if Path(file.path).suffix.lower() != ".csv":
+        findings.error("file-format", file.span, f"edges are read from a .csv file, not from '{_short(file.path)}'")
         return UNKNOWN
-    if key is not None:
-        _refuse_key(key, findings)
+    if file.key is not None:
+        _refuse_key(file.key, findings)
         return UNKNOWN
-    data = read_data(path_text, root, base, span, findings)
+    data = read_data(file, findings)
     if data is UNKNOWN:
         return UNKNOWN
     from neurovis_spec.language.data.edge_list import parse_edges
@@ -183,10 +182,10 @@ def read_edges(
     try:
         table = parse_edges(data, room)
     except CellError as error:
-        _refuse(error, path_text, span, findings)
+        _refuse(error, file.path, file.span, findings)
         return UNKNOWN
     if table.fault is not None:
-        _refuse(table.fault, path_text, span, findings)
+        _refuse(table.fault, file.path, file.span, findings)
     return table
 
 
