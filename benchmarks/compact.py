@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 import neurovis_spec as nv
+from neurovis_spec.arrays import Column
 
 _GROUP = "neurovis: 1\nname: large\nneurons:\n  N: {{count: {}, activation: tanh, bias: 0.1}}\nconnections:\n"
 #: by case how many neurons and what is connected how
@@ -60,6 +61,9 @@ def _arrays(value: object, seen: set[int]) -> Iterator[np.ndarray]:
             yield from _arrays(value.base, seen)
         else:
             yield value
+    elif isinstance(value, Column):
+        for name in Column.__slots__:
+            yield from _arrays(getattr(value, name), seen)
     elif isinstance(value, Mapping):
         for item in value.values():
             yield from _arrays(item, seen)
