@@ -84,7 +84,7 @@ def load(path: str | Path, *, run: int | None = None) -> Recording:
 
 def schema(*, included: bool = False) -> dict[str, object]:
     """The JSON Schema (2020-12) of the language, for editors: of a spec, or of a file that specs include."""
-    from neurovis_spec.language.schema import json_schema
+    from neurovis_spec.language.spec import json_schema
 
     return json_schema(included)
 

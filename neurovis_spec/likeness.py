@@ -1,25 +1,73 @@
-"""Likeness: which of known names are much like another, and what an author who got one wrong is told.
+"""Likeness: which of known names are much like another, which characters look alike, and what an author is told.
 
 In: a name, known names. Out: those like it, best first; the one that it can only be meant for; a help line. Few names
 are compared in full. Of the others a bound says that they are not like it: no name is more alike than the letters that
 both have, and of many names, which are prepared once, those that both have in the same order (the longest common
-subsequence, found for all names at once: Hyyrö 2004).
+subsequence, found for all names at once: Hyyrö 2004). Characters that look like others, or like nothing, are taken for
+what they are to be: ``in_ascii``.
 """
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from bisect import bisect_left, insort
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 from neurovis_spec.diagnostics import listed
-from neurovis_spec.lookalikes import in_ascii
 
-if TYPE_CHECKING:  # few names need no arrays
+if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
+
+
+_CYRILLIC: Final = ("АВЕКМНОРСТУХаеорсухіјѕһԁԛԝЅІЈҮ", "ABEKMHOPCTYXaeopcyxijshdqwSIJY")
+_GREEK: Final = ("ΑΒΕΖΗΙΚΜΝΟΡΤΥΧοϲ", "ABEZHIKMNOPTYXoc")
+_SIGNS: Final[Mapping[str, str]] = {
+    "→": "->", "⟶": "->", "➔": "->", "➜": "->", "⇒": "->", "–": "-", "—": "-", "‐": "-", "‑": "-", "‒": "-", "−": "-",
+    "“": '"', "”": '"', "„": '"', "‘": "'", "’": "'",
+}  # fmt: skip
+_DOUBLES: Final = {**dict(zip(*_CYRILLIC, strict=True)), **dict(zip(*_GREEK, strict=True)), **_SIGNS}
+#: Characters that are not seen, or seen as a blank.
+_UNSEEN: Final = frozenset({"Zs", "Cf", "Cc", "Zl", "Zp"})
+_NOT_ASCII: Final = re.compile(r"[^\x00-\x7f]")
+
+
+def unseen(character: str) -> bool:
+    """Whether a character is none of ASCII and is not seen, or seen as a blank."""
+    return not character.isascii() and unicodedata.category(character) in _UNSEEN
+
+
+def double(character: str) -> str | None:
+    """What a character looks like in ASCII; nothing where it is not seen, None where it looks like itself alone.
+
+    >>> double(chr(0x410)), double(chr(0x200B)), double(chr(0xA0)), double(chr(0xE9))
+    ('A', '', ' ', None)
+    """
+    if unseen(character):
+        return " " if unicodedata.category(character) == "Zs" else ""
+    known = _DOUBLES.get(character) or unicodedata.normalize("NFKC", character)
+    return known if known.isascii() else None
+
+
+def in_ascii(text: str) -> str:
+    """A text as its author sees it, in ASCII, as far as there are such characters.
+
+    >>> in_ascii("le" + chr(0x200B) + "ft" + chr(0xA0)), in_ascii("café")
+    ('left', 'café')
+    """
+    if text.isascii():
+        return text
+    return _NOT_ASCII.sub(lambda match: match[0] if (seen := double(match[0])) is None else seen, text).strip()
+
+
+def strange(text: str) -> tuple[str, ...]:
+    """The characters of a text that are no ASCII, each once."""
+    return () if text.isascii() else tuple(dict.fromkeys(_NOT_ASCII.findall(text)))
+
 
 #: What a first letter that is right is worth, as it is seldom mistyped; how alike names are at least that have the same
 #: letters (letters changed over are the commonest slip), of which one begins the other, or that differ in their number.

@@ -16,7 +16,7 @@ from data_attempts import HERE, THERE, attempt, fault, npy, npz, table, zipped
 from hypothesis import given
 from hypothesis import strategies as st
 
-from neurovis_spec.language.data.npz import MOST_MEMBERS, parse_npz
+from neurovis_spec.language.data.npy import MOST_MEMBERS, parse_npz
 from neurovis_spec.language.data.table import CellError
 from neurovis_spec.language.unknown import UNKNOWN
 

@@ -22,7 +22,7 @@ from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.differences import difference
 from neurovis_spec.language.format.canonical import FormattingError, format_read, format_text
-from neurovis_spec.language.format.connection_keys import normal
+from neurovis_spec.language.format.printer import normal
 from neurovis_spec.language.yaml.reader import read_text
 from neurovis_spec.language.yaml.source import Mapping, Node, Scalar
 

@@ -15,7 +15,7 @@ from pydantic import Field
 from neurovis_spec.cli.topics import text_of
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Diagnostic, Findings
-from neurovis_spec.language import places, schema, shape
+from neurovis_spec.language import places, shape, spec
 from neurovis_spec.language.grammar import ENDS, NOISE, Needs, NotWith, declaring
 from neurovis_spec.language.located import Formula, FormulaField, Located
 from neurovis_spec.language.model import Named
@@ -51,7 +51,7 @@ class Wider(Spec):
 
 
 CACHES = (places._places, formula_at, keys.keys, topics)
-USERS: tuple[ModuleType, ...] = (places, schema, shape, keys)
+USERS: tuple[ModuleType, ...] = (places, shape, spec, keys)
 
 
 @pytest.fixture(autouse=True)
@@ -90,7 +90,7 @@ def test_what_it_excludes_and_needs_is_reported_once() -> None:
 
 
 def test_the_schema_knows_it() -> None:
-    validator = Draft202012Validator(schema.json_schema())
+    validator = Draft202012Validator(spec.json_schema())
 
     def is_valid(group: str) -> bool:
         return validator.is_valid(yaml.safe_load(f"{HEAD}neurons: {{K: {group}}}"))
@@ -98,7 +98,7 @@ def test_the_schema_knows_it() -> None:
     groups = ("{count: 2, mood: k}", "{count: 2, mood: [1]}", "{count: 2, mod: 1}", "{mood: 1}")
     assert [is_valid(group) for group in groups] == [True, False, False, False]
     assert not is_valid("{count: 2, mood: 1, bias: 1}")
-    definitions = cast(dict[str, dict[str, dict[str, dict[str, object]]]], schema.json_schema()["$defs"])
+    definitions = cast(dict[str, dict[str, dict[str, dict[str, object]]]], spec.json_schema()["$defs"])
     assert definitions["Group"]["properties"]["mood"]["description"] == "How the neurons feel (default 0)."
 
 

@@ -99,7 +99,7 @@ def test_validating_asks_no_engine_where_the_spec_names_none() -> None:
 def test_validating_imports_no_more_than_the_spec_needs() -> None:
     """This spec has no events, no comment that allows, one table as ``.csv`` and no mistake."""
     modules = loaded(command("validate", "specs/cpg_rbf.yaml"))
-    kinds = {f"neurovis_spec.language.data.{kind}" for kind in ("edge_list", "mtx", "npy", "npz")}
+    kinds = {f"neurovis_spec.language.data.{kind}" for kind in ("edge_list", "mtx", "npy")}
     assert not modules & (
         kinds | {"neurovis_spec.compiler.events.events", "neurovis_spec.language.allow", "difflib", "json"}
     )

@@ -15,7 +15,7 @@ from neurovis_spec.compiler.neurons import groups
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.expressions import undefined
 from neurovis_spec.language.unknown import Names
-from neurovis_spec.language.yaml import brackets, crowded
+from neurovis_spec.language.yaml import brackets, refusals
 from neurovis_spec.language.yaml.reader import read_text
 from neurovis_spec.scene.cut import Cut
 
@@ -100,7 +100,7 @@ def test_what_else_is_drawn_may_be_long(text: str, tmp_path_factory: pytest.Temp
 )
 def test_a_mapping_has_so_many_entries(text: str, place: tuple[int, int], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(brackets, "MOST_ENTRIES", 20)
-    monkeypatch.setattr("neurovis_spec.language.yaml.reader.crowded", lambda text: crowded.crowded(text, 20))
+    monkeypatch.setattr("neurovis_spec.language.yaml.reader.crowded", lambda text: refusals.crowded(text, 20))
     findings = Findings()
     assert read_text(text, "x", findings) is None
     (item,) = findings.sorted()
@@ -116,7 +116,7 @@ def test_entries_of_several_mappings_are_not_counted_together(monkeypatch: pytes
         "m:\n" + "".join(f"  - [A{i}, B: 1]\n" for i in range(30)),
         "t: |\n" + "".join(f"  a{i}: 1\n" for i in range(20)) + "u: 1\n",
     ):
-        assert crowded.crowded(text, 20) is None
+        assert refusals.crowded(text, 20) is None
 
 
 @pytest.mark.parametrize(
@@ -138,7 +138,7 @@ def test_entries_of_several_mappings_are_not_counted_together(monkeypatch: pytes
 def test_too_many_are_refused_before_memory_is_taken(
     lines: list[str], column: int, message: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("neurovis_spec.language.yaml.reader.crowded", lambda text: crowded.crowded(text, 20_000))
+    monkeypatch.setattr("neurovis_spec.language.yaml.reader.crowded", lambda text: refusals.crowded(text, 20_000))
     text = HEAD + "".join(f"{line}\n" for line in lines)
     findings = Findings()
     tracemalloc.start()

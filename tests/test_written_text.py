@@ -6,7 +6,7 @@ import pytest
 
 import neurovis_spec as nv
 from neurovis_spec.diagnostics import SpecError
-from neurovis_spec.language.yaml.written_text import Written
+from neurovis_spec.language.yaml.texts import Written
 
 WAYS = {
     "folded": "bias: >\n      1 +\n      2 * foo\n",

@@ -172,7 +172,7 @@ def tables(named: Mapping[str, str], network: Network) -> dict[str, FloatArray]:
         if table is UNKNOWN:
             continue
         if table.numbered:
-            from neurovis_spec.language.data.header import AS_TEXTS, NUMBERED
+            from neurovis_spec.language.data.csv_table import AS_TEXTS, NUMBERED
 
             findings.warning("numbered-columns", place, NUMBERED, AS_TEXTS)
         arrays[name] = table.values

@@ -1,16 +1,17 @@
-"""The sections ``layout`` and ``render``: how a network is laid out and drawn; the shape as written.
+"""The sections ``layout`` and ``render``, with its theme: how a network is laid out and drawn; the shape as written.
 
 In: nodes. Out: frozen models whose leaves know their places.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, ClassVar, Final, NamedTuple
 
 from pydantic import Field, ValidationInfo
 
-from neurovis_spec.diagnostics import Span
+from neurovis_spec.diagnostics import Span, shorten
 from neurovis_spec.language import grammar
 from neurovis_spec.language.grammar import (
     ENDS,
@@ -46,8 +47,7 @@ from neurovis_spec.language.located import (
     valid,
     words,
 )
-from neurovis_spec.language.model import Keyed, Model
-from neurovis_spec.language.theme import ThemeField
+from neurovis_spec.language.model import Keyed, Model, Short
 from neurovis_spec.language.values import (
     Pair,
     PointField,
@@ -60,6 +60,57 @@ from neurovis_spec.language.values import (
 )
 from neurovis_spec.language.words import VIEWS, WHOLE, Direction
 from neurovis_spec.language.yaml.source import AnyList, Mapping, Node, Scalar, Sequence
+
+_COLOUR = re.compile(r"#[0-9A-Fa-f]{6}")
+THEMES: Final = {
+    "default": "vermilion over grey to blue, on light",
+    "dark": "the same on dark",
+    "print": "for paper, readable without colour",
+    "paper": "red, grey and green, as in the NeuroVis paper",
+}
+
+
+def _colour(node: Node, info: ValidationInfo) -> Located[str]:
+    """``#rrggbb``."""
+    text = as_text(node, info)
+    if not _COLOUR.fullmatch(text.value):
+        message = f"'{shorten(text.value)}' is not a colour"
+        findings_of(info).error("bad-colour", node.span, message, "write six hexadecimal digits, '#d55e00', in quotes")
+        give_up()
+    return Located(text.value.lower(), text.node)
+
+
+ColourField = Annotated[Located[str], Leaf(_colour, Plain({"type": "string", "pattern": f"^{_COLOUR.pattern}$"}))]
+
+
+class ThemeModel(Model):
+    """A theme of one's own: another one with other colours."""
+
+    PLACE: ClassVar[str] = "'render: theme'"
+    UNSAID: ClassVar[str] = "leave the key out, or write a colour in quotes, '#d55e00': # begins a comment"
+
+    base: Annotated[Located[str], words(*THEMES, abouts=THEMES)] | None = Field(
+        None, description="The theme whose colours hold where no other is given: default, dark, print or paper."
+    )
+    negative: ColourField | None = Field(None, description="The colour of −1, in quotes: '#d55e00'.")
+    zero: ColourField | None = Field(None, description="The colour of 0.")
+    positive: ColourField | None = Field(None, description="The colour of 1.")
+    glow: ColourField | None = Field(None, description="Around connections whose weight changes.")
+    background: ColourField | None = Field(None, description="Behind all.")
+    ink: ColourField | None = Field(None, description="Titles, and labels beside discs.")
+    muted: ColourField | None = Field(None, description="Other texts, and the lines of the legend.")
+    box_fill: ColourField | None = Field(None, description="Within boxes.")
+    box_line: ColourField | None = Field(None, description="Around boxes.")
+    ring: ColourField | None = Field(None, description="Around discs.")
+    light: ColourField | None = Field(None, description="Texts on dark discs.")
+    dark: ColourField | None = Field(None, description="Texts on light discs.")
+    ends: Annotated[Located[str], words("signs", "arrows")] | None = Field(
+        None,
+        description="Lines end as the sign of their weight says, or all in arrowheads: signs, arrows (default signs).",
+    )
+
+
+ThemeField = Annotated[ThemeModel, Short("base", "the name of a theme, or a mapping of its colours")]
 
 
 def _references(node: Node, info: ValidationInfo) -> tuple[Reference, ...]:

@@ -26,8 +26,7 @@ from neurovis_spec.language.grammar import FORMULA, REFERENCE, TEXT, TEXTS, Eith
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.yaml.scalars import INTEGER_HIGH, INTEGER_LOW
 from neurovis_spec.language.yaml.source import AnyList, Node, Scalar, describe, one_or_more
-from neurovis_spec.likeness import did_you_mean, meant, nearest, suggest
-from neurovis_spec.lookalikes import in_ascii
+from neurovis_spec.likeness import did_you_mean, in_ascii, meant, nearest, suggest
 
 T = TypeVar("T")
 M = TypeVar("M")

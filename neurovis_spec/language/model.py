@@ -47,7 +47,7 @@ from neurovis_spec.language.located import (
 )
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Scalar, Sequence
-from neurovis_spec.lookalikes import in_ascii
+from neurovis_spec.likeness import in_ascii
 
 V = TypeVar("V")
 

@@ -1,7 +1,8 @@
-"""The Spec: the pydantic models of the language, section by section; the shape as written, the source of the schema.
+"""The Spec: the pydantic models of the language, section by section; the shape as written, and the JSON Schema from it.
 
 In: nodes (``shape.read_spec`` feeds them). Out: frozen models whose leaves know their places. No reference is resolved
-and no expression is parsed here. The descriptions are what an editor shows, and what the reference page prints.
+and no expression is parsed here. The descriptions are what an editor shows, and what the reference page prints. The
+schema (2020-12) is plain data.
 """
 
 from __future__ import annotations
@@ -10,13 +11,15 @@ from collections.abc import Mapping as AnyMapping
 from typing import Annotated, ClassVar
 
 from pydantic import Field
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+from pydantic_core import core_schema
 
 from neurovis_spec.language.body import BodyModel
 from neurovis_spec.language.drawing import LayoutModel, RenderModel
 from neurovis_spec.language.grammar import declaring
 from neurovis_spec.language.library import LANGUAGE_VERSION, VERSION, Library, version_field
 from neurovis_spec.language.located import NAME, IntegerField, Leaf, Located, TextsField, as_identifier
-from neurovis_spec.language.model import Named
+from neurovis_spec.language.model import Model, Named
 from neurovis_spec.language.modules import INCLUDED, InstancesField, ModulesField
 from neurovis_spec.language.ros import RosModel
 from neurovis_spec.language.sections import ConnectionsField, EventsField, GroupsField, InputsField, Time
@@ -102,3 +105,28 @@ def is_library(data: Mapping) -> bool:
     """Whether this holds modules or definitions alone: then it is no spec, but may be a file that specs include."""
     there = {entry.name for entry in data.entries}
     return bool(there & set(INCLUDED)) and not there & {"neurons", "instances", "connections"}
+
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+class _Written(GenerateJsonSchema):
+    """The schema of what is written: a key that may be left out is not null, which is a finding."""
+
+    def nullable_schema(self, schema: core_schema.NullableSchema) -> JsonSchemaValue:
+        """What may be written, without the null that stands for nothing."""
+        return self.generate_inner(schema["schema"])
+
+    def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
+        """The same without null as its default."""
+        inner = super().default_schema(schema)
+        return inner if inner.get("default", ...) is not None else {k: v for k, v in inner.items() if k != "default"}
+
+
+def json_schema(included: bool = False) -> dict[str, object]:
+    """The schema of a whole spec, or of a file that specs include. Keys that no model knows are refused in it as they
+    are by the compiler."""
+    model: type[Model] = IncludedModel if included else Spec
+    schema = model.model_json_schema(by_alias=True, schema_generator=_Written)
+    title = "NeuroVis file to be included, version 1" if included else "NeuroVis spec, version 1"
+    return {"$schema": DIALECT, **schema, "title": title}

@@ -15,7 +15,7 @@ from typing import Final
 from neurovis_spec.diagnostics import Diagnostic, Findings, Mark, Span, shorten
 from neurovis_spec.language.yaml import faults
 from neurovis_spec.language.yaml.characters import Lines, character_name
-from neurovis_spec.lookalikes import double, strange, unseen
+from neurovis_spec.likeness import double, strange, unseen
 
 #: Findings about names, beside those about unknown ones.
 _NAMES: Final = frozenset({"bad-name", "bad-connection", "bad-range", "edge-outside", "unexpected-character"})

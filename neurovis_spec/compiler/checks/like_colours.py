@@ -8,7 +8,7 @@ from __future__ import annotations
 from itertools import combinations
 
 from neurovis_spec.diagnostics import Findings
-from neurovis_spec.language.theme import ThemeModel
+from neurovis_spec.language.drawing import ThemeModel
 
 #: Colours whose ΔE00 is less are hardly told apart in thin lines; our themes keep 20.
 _LEAST = 10.0

@@ -19,7 +19,7 @@ from neurovis_spec.compiler.names.references import Section, key_span
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.diagnostics import Findings
-from neurovis_spec.language.data.header import AS_TEXTS, NUMBERED
+from neurovis_spec.language.data.csv_table import AS_TEXTS, NUMBERED
 from neurovis_spec.language.unknown import UNKNOWN
 
 

@@ -19,10 +19,9 @@ from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.neurons.populate import Population
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, Span, shorten
-from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, RenderModel
+from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, RenderModel, ThemeModel
 from neurovis_spec.language.located import Formula, Located, said
 from neurovis_spec.language.references import Sum, parse
-from neurovis_spec.language.theme import ThemeModel
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
 from neurovis_spec.language.values import Reference
 from neurovis_spec.language.words import Direction

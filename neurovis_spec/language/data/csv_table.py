@@ -1,11 +1,13 @@
 """Tables of numbers from the bytes of a ``.csv`` file.
 
 In: bytes. Out: Table. A fault is a CellError that names row and column, and holds those behind it. Cells are turned
-into numbers many at a time; they are checked one by one only among the few where something is wrong.
+into numbers many at a time; they are checked one by one only among the few where something is wrong. A first row that
+numbers its columns, as pandas writes them, is no data (``numbers_columns``).
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import Final
 
@@ -27,7 +29,6 @@ from neurovis_spec.language.data.cells import (
     rows_of,
     separated,
 )
-from neurovis_spec.language.data.header import numbers_columns
 from neurovis_spec.language.data.table import CellError, Faults, Room, Table, check_cells
 
 #: cells of a row among which one that is invalid is searched
@@ -133,3 +134,31 @@ def cell_at(data: bytes, file: str, at: tuple[int, int]) -> Span:
     cell = line[begin:end]
     begin += (len(cell) - len(cell.lstrip())) % (len(cell) + 1)
     return Span(file, row, begin + 1, row, max(begin + 1, begin + len(cell.strip())) + 1)
+
+
+#: what is said of such a file where its rows are steps, and what to do
+NUMBERED = "the first row, 0, 1, …, seems to number the columns; it is read as step 0"
+AS_TEXTS = "remove it, or give the columns names; in pandas, that is the argument header of to_csv"
+_POINT = re.compile(rb"[.eE]")
+#: rows without which nothing can be said: the first one and two others
+_LEAST = 3
+
+
+def numbers_columns(data: bytes, values: NDArray[np.float64]) -> bool:
+    """Whether the first row numbers the columns.
+
+    >>> values = np.array([[0, 1], [0.5, 0.25], [0.625, 0.125]])
+    >>> [numbers_columns(first + b"\\n0.5,0.25\\n0.625,0.125", values) for first in (b"0,1", b"0.0,1.0")]
+    [True, False]
+    """
+    rows, columns = values.shape
+    if columns < 2 or rows < _LEAST or not np.array_equal(values[0], np.arange(columns)):
+        return False
+    first, _, rest = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n").partition(b"\n")
+    cells = [cell.strip(b' \t"') for cell in first.removeprefix(b"\xef\xbb\xbf").split(b",")]
+    if cells != [b"%d" % column for column in range(columns)]:
+        return False
+    if not all(_POINT.search(cell) for cell in rest.rstrip(b"\n").replace(b"\n", b",").split(b",")):
+        return False
+    low, high = values[1:].min(axis=0), values[1:].max(axis=0)
+    return bool((np.maximum(low - values[0], values[0] - high) > high - low).any())

@@ -156,7 +156,7 @@ def _parsed(suffix: str, data: bytes, key: str | None, room: Room | None) -> Tab
         from neurovis_spec.language.data.mtx import parse_mtx
 
         return parse_mtx(data, room)
-    from neurovis_spec.language.data.npz import parse_npz
+    from neurovis_spec.language.data.npy import parse_npz
 
     return parse_npz(data, key, room)
 

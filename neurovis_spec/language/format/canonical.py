@@ -8,8 +8,7 @@ twice changes nothing more, and the values are the same before and after (names 
 from __future__ import annotations
 
 from neurovis_spec.diagnostics import Findings
-from neurovis_spec.language.format.connection_keys import normal
-from neurovis_spec.language.format.printer import print_document
+from neurovis_spec.language.format.printer import normal, print_document
 from neurovis_spec.language.yaml.reader import read_text
 from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar
 

@@ -4,21 +4,19 @@ In: the root, whose values know where they stand, and the text, with LF line end
 written, quotes and all. Blocks are indented by two blanks, lists below their key as well; line breaks inside brackets
 stay where the author has them, and what follows one is indented by two, or stands below the first item where that
 follows its bracket on the same line. A comment on a line of its own belongs to the block in whose column, or behind it,
-it begins.
+it begins. References to connections have single blanks: ``K1+K3->O`` becomes ``K1 + K3 -> O``.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Final, NamedTuple, TypeAlias
 
-from neurovis_spec.language.format.align import aligned
-from neurovis_spec.language.format.blocks import Block, Lines, read_block, read_lines
-from neurovis_spec.language.format.connection_keys import names_connections, normal, normal_all
 from neurovis_spec.language.format.gaps import NONE, Comment, Gap, joined, read_gap
-from neurovis_spec.language.format.lines import LineWriter
-from neurovis_spec.language.places import Path
+from neurovis_spec.language.format.lines import Block, Lines, LineWriter, aligned, read_block, read_lines
+from neurovis_spec.language.places import Path, role_of
+from neurovis_spec.language.references import Arrow, parse
 from neurovis_spec.language.yaml.characters import Lines as Places
 from neurovis_spec.language.yaml.source import AnyList, Mapping, Node, Packed, Scalar
 
@@ -399,3 +397,31 @@ def _bare(key: _Written | None) -> str:
 
 def _row(cells: list[str]) -> str:
     return "[" + ", ".join(cells) + "]"
+
+
+_NAMES: Final = re.compile(r"[A-Za-z0-9_.]+")
+
+
+def names_connections(path: Path, is_key: bool) -> bool:
+    """Whether the text at a path, a key or a value, may name connections."""
+    role = role_of(path, is_key)
+    return role is not None and role.use == "ends"
+
+
+def normal(key: str) -> str:
+    """A connection's name, quoted or not, with single blanks; anything else as it is.
+
+    >>> normal("K1+K3..K5->O"), normal('"A->B"'), normal("a ->")
+    ('K1 + K3..K5 -> O', '"A -> B"', 'a ->')
+    """
+    quote = key[:1] if key[:1] in ("'", '"') else ""
+    bare = key[1:-1] if quote else key
+    found = parse(bare)
+    ends = (*found.sources.parts, *found.targets.parts) if isinstance(found, Arrow) else ()
+    return quote + found.normal + quote if ends and all(_NAMES.fullmatch(part.text) for part in ends) else key
+
+
+def normal_all(keys: Sequence[str]) -> list[str]:
+    """The same for all keys of a mapping; none is changed where two would become the same."""
+    changed = [normal(key) for key in keys]
+    return changed if len({key.strip("'\"") for key in changed}) == len(keys) else list(keys)

@@ -11,10 +11,9 @@ from typing import Final
 
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.yaml import faults
-from neurovis_spec.language.yaml.crowded import MOST_ENTRIES
 from neurovis_spec.language.yaml.faults import Words
 from neurovis_spec.language.yaml.packed import PACK_FROM, Packer, balance
-from neurovis_spec.language.yaml.refusals import DEEPEST, ReadingStoppedError
+from neurovis_spec.language.yaml.refusals import DEEPEST, MOST_ENTRIES, ReadingStoppedError
 from neurovis_spec.language.yaml.scalars import NumberRangeError, resolve
 from neurovis_spec.language.yaml.scanner import (
     ENDS_TEXT,
@@ -28,7 +27,7 @@ from neurovis_spec.language.yaml.scanner import (
     UnsoundError,
 )
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Scalar, ScalarValue, Sequence
-from neurovis_spec.language.yaml.written_text import Written
+from neurovis_spec.language.yaml.texts import Written
 
 _FLOW_TEXT: Final = Unquoted(
     re.compile(FIRST + r"-(?![\s,\[\]{}]|\Z))", re.ASCII),

@@ -36,7 +36,7 @@ from neurovis_spec.language.yaml.scanner import (
     UnsoundError,
 )
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Scalar, Sequence
-from neurovis_spec.lookalikes import unseen
+from neurovis_spec.likeness import unseen
 
 _END: Final = r"(?=[ \t\r\n]|\Z)"
 _TEXT: Final = Unquoted(

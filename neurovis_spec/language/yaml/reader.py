@@ -14,10 +14,9 @@ from typing import Final
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.gc_paused import uncollected
 from neurovis_spec.language.yaml.characters import FORBIDDEN, REPLACEMENT, Lines, character_name
-from neurovis_spec.language.yaml.crowded import crowded
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
 from neurovis_spec.language.yaml.parser import Parser
-from neurovis_spec.language.yaml.refusals import ONE_GROUP, TABLE, TOO_LONG, TOO_MANY
+from neurovis_spec.language.yaml.refusals import ONE_GROUP, TABLE, TOO_LONG, TOO_MANY, crowded
 from neurovis_spec.language.yaml.source import Mapping, Node, Scalar, SourceDocument, describe
 
 LARGEST: Final = 64 << 20  # bytes

@@ -16,7 +16,7 @@ from neurovis_spec.language.yaml.faults import Words
 from neurovis_spec.language.yaml.refusals import Refusals
 from neurovis_spec.language.yaml.scalars import NumberRangeError, resolve
 from neurovis_spec.language.yaml.source import Scalar
-from neurovis_spec.language.yaml.written_text import Written
+from neurovis_spec.language.yaml.texts import Written
 
 #: A longer key has to be announced by a question mark.
 LONGEST_KEY: Final = 1024

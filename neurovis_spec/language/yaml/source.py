@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple, TypeAlias
 
 from neurovis_spec.diagnostics import Span
-from neurovis_spec.language.yaml.written_text import Written
+from neurovis_spec.language.yaml.texts import Written
 
 ScalarValue: TypeAlias = bool | int | float | str | None
 
