@@ -205,7 +205,7 @@ def tanh_in_c(network: Network) -> Run:
 
     def made(steps: int) -> None:
         w, a, following = network.connections.weights[order].copy(), np.zeros(n), np.zeros(n)
-        learns = bool(network.plasticity)
+        learns = bool(network.projections)
         rows, kept = ROOM[: steps * n], ROOM[steps * n :]
         numbers = (ctypes.c_int64(steps), ctypes.c_int64(n), ctypes.c_int64(learns))
         arrays = (first, source, w, np.zeros(m), network.neurons.bias, a, following, rows, kept)
@@ -258,21 +258,21 @@ def cpg_in_c(network: Network) -> Run:
 
 def hexapod_in_c(network: Network) -> Run:
     run, n, m = loaded(HEXAPOD_BY_HAND), len(network.neurons), len(network.connections)
-    blocks, links = network.blocks, network.connections
-    group = np.cumsum([0, *(len(b.members) for b in blocks)]).astype(np.int32)
-    neuron = np.concatenate([b.members for b in blocks]).astype(np.int32)
-    edges = [b.incoming[np.argsort(b.slots, kind="stable")] for b in blocks]
-    counts = np.concatenate([np.bincount(b.slots, minlength=len(b.members)) for b in blocks])
+    populations, links = network.populations, network.connections
+    group = np.cumsum([0, *(len(b.members) for b in populations)]).astype(np.int32)
+    neuron = np.concatenate([b.members for b in populations]).astype(np.int32)
+    edges = [b.drive.incoming[np.argsort(b.drive.slots, kind="stable")] for b in populations]
+    counts = np.concatenate([np.bincount(b.drive.slots, minlength=len(b.members)) for b in populations])
     first, edge = np.cumsum([0, *counts]).astype(np.int32), np.concatenate(edges).astype(np.int32)
     delay = links.delays.whole().astype(np.int32)
     start = np.cumsum([0, *delay[:-1]]).astype(np.int32)
     one, two, v = np.zeros(n), np.zeros(n), np.zeros(n)
-    for number, b in enumerate(blocks):
+    for number, b in enumerate(populations):
         own = [*b.model.parameters.values(), *b.activation.parameters.values()]
         for array, values in zip((one, two), own, strict=False):
             array[group[number] : group[number + 1]] = values
     v[group[6] : group[7]] = two[group[6] : group[7]]
-    (rules,) = network.plasticity
+    (rules,) = network.projections
     learned, reflex = rules.members.astype(np.int32), rules.signals["reflex"].astype(np.int32)
     rate = rules.rule.parameters["rate"]
     source, fed = links.sources.whole().astype(np.int32), network.neurons.input.astype(np.int32)
@@ -372,7 +372,7 @@ def brian(network: Network, steps: int) -> float:
         links = network.connections
         sources, targets, weights = links.sources.whole(), links.targets.whole(), links.weights.whole()
         np.savez(path, sources=sources, targets=targets, weights=weights, bias=network.neurons.bias)
-        command = [python, str(HERE / "brian_peer.py"), str(path), str(steps), str(int(bool(network.plasticity)))]
+        command = [python, str(HERE / "brian_peer.py"), str(path), str(steps), str(int(bool(network.projections)))]
         done = [subprocess.run(command, capture_output=True, text=True, check=False) for _ in range(2)]
     if any(one.returncode for one in done):
         return float("nan")

@@ -19,7 +19,9 @@ def describe(network: Network, engine: tuple[str, str]) -> dict[str, object]:
     owners = [group for group in network.neurons.groups for _ in range(group.count)]
     names, connections = network.neurons.names, network.connections
     sensed = set() if network.body is None else {one.input for one in network.body.sensed}
-    rules = [None if rule < 0 else network.plasticity[rule].rule.definition.name for rule in connections.rules.tolist()]
+    rules = [
+        None if rule < 0 else network.projections[rule].rule.definition.name for rule in connections.rules.tolist()
+    ]
     return {
         "name": network.name,
         "dt": network.dt,

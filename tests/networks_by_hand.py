@@ -1,7 +1,7 @@
 """Small networks for tests, lowered here by hand: no compiler is needed, and none can be at fault.
 
-In: neurons and links, one by one. Out: a Network whose blocks and program follow the contract (delay-0 connections in
-topological order, then Send, then Learn).
+In: neurons and links, one by one. Out: a Network whose populations and program follow the contract (delay-0
+connections in topological order, then Send, then Learn).
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ from neurovis_spec.compiler.program import (
     ACTIVATION,
     MODEL,
     RULE,
-    Block,
     Definition,
     Gather,
     Learn,
     Operation,
     Owner,
-    Plasticity,
+    Population,
+    Port,
+    Projection,
     Quantity,
     ReadInputs,
     Send,
@@ -140,9 +141,9 @@ def build(
     structural: Sequence[str] = (),
 ) -> Network:
     """Lower neurons and links to a Network."""
-    blocks = lowered(units, links)
+    populations = lowered(units, links)
     levels: list[Operation] = [ReadInputs()]
-    for number in range(len(blocks)):
+    for number in range(len(populations)):
         levels += [Gather(number), Update(number)]
     return Network(
         name="by_hand",
@@ -159,8 +160,8 @@ def build(
         connections=connections(links),
         inputs=tuple(inputs),
         outputs=tuple(outputs),
-        blocks=blocks,
-        plasticity=tuple(learning(number, use, links) for number, use in enumerate(uses)),
+        populations=populations,
+        projections=tuple(learning(number, use, links) for number, use in enumerate(uses)),
         program=(*levels, Send(), *(Learn(number) for number in range(len(uses)))),
         layout=LayoutSettings(),
         render=RenderSettings(),
@@ -212,8 +213,8 @@ def level_of(index: int, links: Sequence[Link]) -> int:
     return 1 + max(level_of(source, links) for source in before) if before else 0
 
 
-def lowered(units: Sequence[Unit], links: Sequence[Link]) -> tuple[Block, ...]:
-    """Blocks of equal level, combination, activation and model, level by level."""
+def lowered(units: Sequence[Unit], links: Sequence[Link]) -> tuple[Population, ...]:
+    """Populations of equal level, combination, activation and model, level by level."""
     alike: dict[tuple[int, str, str, str], list[int]] = {}
     for index, unit in enumerate(units):
         key = (level_of(index, links), unit.combine, unit.activation.name, unit.model.name)
@@ -221,10 +222,11 @@ def lowered(units: Sequence[Unit], links: Sequence[Link]) -> tuple[Block, ...]:
     return tuple(block(number, key[0], alike[key], units, links) for number, key in enumerate(sorted(alike)))
 
 
-def block(number: int, level: int, members: list[int], units: Sequence[Unit], links: Sequence[Link]) -> Block:
+def block(number: int, level: int, members: list[int], units: Sequence[Unit], links: Sequence[Link]) -> Population:
     first = units[members[0]]
     incoming = [number for number, link in enumerate(links) if link.target in members]
-    return Block(
+    slots = np.array([members.index(links[c].target) for c in incoming], dtype=np.int64)
+    return Population(
         level=level,
         members=np.array(members, dtype=np.int64),
         model=Use(
@@ -237,38 +239,36 @@ def block(number: int, level: int, members: list[int], units: Sequence[Unit], li
             first.activation,
             {name: floats([units[i].shape[name] for i in members]) for name in first.shape},
         ),
-        combine=first.combine,
-        incoming=np.array(incoming, dtype=np.int64),
-        slots=np.array([members.index(links[c].target) for c in incoming], dtype=np.int64),
+        ports=(Port("drive", first.combine, np.array(incoming, dtype=np.int64), slots),),
     )
 
 
-def learning(number: int, use: Learns, links: Sequence[Link]) -> Plasticity:
+def learning(number: int, use: Learns, links: Sequence[Link]) -> Projection:
     members = [index for index, link in enumerate(links) if link.learns == number]
     parameters = {name: np.full(len(members), value) for name, value in use.parameters.items()}
-    return Plasticity(
+    return Projection(
         members=np.array(members, dtype=np.int64),
-        rule=Use(Owner("rule", number), use.rule, parameters),
+        uses=(Use(Owner("rule", number), use.rule, parameters),),
         signals={name: np.full(len(members), index, dtype=np.int64) for name, index in use.signals.items()},
     )
 
 
 def rewired(network: Network, weights: Sequence[float], sources: Sequence[int], targets: Sequence[int]) -> Network:
-    """A network of one block, all of its neurons alike, with these connections of delay 1 in place of its own."""
+    """A network of one population, all of its neurons alike, with these connections of delay 1 in place of its own."""
     links = connections([Link(0, 0, weight) for weight in weights])
     slots = np.array(targets, dtype=np.int64)
     links = replace(links, sources=integers(np.array(sources, dtype=np.int64)), targets=integers(slots))
-    (one,) = network.blocks
-    one = replace(one, incoming=np.arange(len(links)), slots=slots)
-    return replace(network, connections=links, blocks=(one,))
+    (one,) = network.populations
+    one = replace(one, ports=(replace(one.drive, incoming=np.arange(len(links)), slots=slots),))
+    return replace(network, connections=links, populations=(one,))
 
 
 def all_learning(network: Network, by: Definition) -> Network:
     """A network whose connections are fixed, and now all learn by a rule without parameters and signals."""
     count = len(network.connections)
     links = replace(network.connections, rules=integers(np.zeros(count, dtype=np.int64)))
-    plasticity = (Plasticity(np.arange(count), Use(Owner("rule", 0), by, {}), {}),)
-    return replace(network, connections=links, plasticity=plasticity, program=(*network.program, Learn(0)))
+    projections = (Projection(np.arange(count), (Use(Owner("rule", 0), by, {}),), {}),)
+    return replace(network, connections=links, projections=projections, program=(*network.program, Learn(0)))
 
 
 def cpg_rbf(learns: bool = True) -> Network:

@@ -350,7 +350,7 @@ def test_signals_of_rules() -> None:
     )
 
     def signal(target: str) -> list[int]:
-        (rule,) = network_of(text % target).plasticity
+        (rule,) = network_of(text % target).projections
         assert rule.rule.parameters["rate"].tolist() == [1, 2]
         found: list[int] = rule.signals["target"].tolist()
         return found
@@ -391,7 +391,7 @@ def rates(rate: str, pattern: str = "all_to_all") -> list[float]:
     """The rates of the connections from three neurons to two, in order."""
     text = "neurons: {A: {count: 3, bias: 1}, B: {count: 2, bias: 1}}\n"
     body = f"{{pattern: {pattern}, plasticity: {{hebbian: {{rate: {rate}}}}}}}"
-    (rule,) = network_of(f"{text}connections: {{A -> B: {body}}}").plasticity
+    (rule,) = network_of(f"{text}connections: {{A -> B: {body}}}").projections
     return list(rule.rule.parameters["rate"])
 
 

@@ -346,9 +346,9 @@ def test_every_array_of_a_network_is_frozen() -> None:
     network = nv.compile_text(HEAD + BASE).network
     arrays = [getattr(network.connections, name) for name in ("sources", "targets", "weights", "delays", "centres")]
     arrays += [network.neurons.bias, network.neurons.initial, network.neurons.input, network.neurons.position]
-    for block in network.blocks:
-        arrays += [block.members, block.incoming, block.slots]
-    for entry in network.plasticity:
+    for population in network.populations:
+        arrays += [population.members, population.drive.incoming, population.drive.slots]
+    for entry in network.projections:
         arrays += [entry.members, *entry.signals.values()]
     arrays += [array for _, use in network.uses for array in use.parameters.values()]
     assert all(isinstance(array, np.ndarray) and not array.flags.writeable for array in arrays)

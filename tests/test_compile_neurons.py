@@ -90,21 +90,21 @@ def test_values_of_a_group() -> None:
 
 def test_parameters_of_an_activation_may_differ_from_neuron_to_neuron() -> None:
     network = network_of("neurons: {K: {count: 3, activation: {gaussian: {sigma: i + 1}}}, L: {activation: gaussian}}")
-    (block,) = network.blocks
-    assert block.activation.parameters["sigma"].tolist() == [1, 2, 3, 1]
+    (population,) = network.populations
+    assert population.activation.parameters["sigma"].tolist() == [1, 2, 3, 1]
 
 
 def test_blocks_join_neurons_that_are_updated_alike() -> None:
     text = (
         "neurons: {A: {activation: tanh}, B: {}, C: {activation: tanh}}\nconnections: {A -> C: {delay: 0}, B -> A: 1}"
     )
-    blocks = network_of(text).blocks
-    assert [(b.level, b.activation.definition.name, b.members.tolist()) for b in blocks] == [
+    populations = network_of(text).populations
+    assert [(b.level, b.activation.definition.name, b.members.tolist()) for b in populations] == [
         (0, "tanh", [0]),
         (0, "identity", [1]),
         (1, "tanh", [2]),
     ]
-    assert [b.incoming.tolist() for b in blocks] == [[1], [], [0]]
+    assert [b.drive.incoming.tolist() for b in populations] == [[1], [], [0]]
 
 
 # ---- references ---------------------------------------------------------------------------------------------------

@@ -22,7 +22,7 @@ from scenes import file_of, scene_of
 
 import neurovis_spec as nv
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.compiler.program import ACTIVATION, MODEL, Block, Definition, Plasticity
+from neurovis_spec.compiler.program import ACTIVATION, MODEL, Definition, Population, Projection
 from neurovis_spec.scene import Scene
 
 HERE = Path(__file__).parent
@@ -52,6 +52,10 @@ def plain(value: object) -> Plain:
     raise TypeError(f"no golden form for {type(value).__name__}")
 
 
+#: What the fields of operations are called in the golden files.
+CALLED = {"population": "block", "projection": "plasticity"}
+
+
 def record(kind: str, **fields: object) -> dict[str, Plain]:
     """A record by the names that it had in the first golden files."""
     return {"kind": kind, **{name: plain(value) for name, value in fields.items()}}
@@ -75,22 +79,22 @@ def definition_of(made: Definition) -> dict[str, Plain]:
     return record("Rule", **named, signals=made.signals, **inner, **steps)
 
 
-def block_of(block: Block) -> dict[str, Plain]:
+def block_of(population: Population) -> dict[str, Plain]:
     return record(
         "Block",
-        level=block.level,
-        members=block.members,
-        combine=block.combine,
-        activation=definition_of(block.activation.definition),
-        activation_parameters=block.activation.parameters,
-        model=definition_of(block.model.definition),
-        model_parameters=block.model.parameters,
-        incoming=block.incoming,
-        slots=block.slots,
+        level=population.level,
+        members=population.members,
+        combine=population.drive.combine,
+        activation=definition_of(population.activation.definition),
+        activation_parameters=population.activation.parameters,
+        model=definition_of(population.model.definition),
+        model_parameters=population.model.parameters,
+        incoming=population.drive.incoming,
+        slots=population.drive.slots,
     )
 
 
-def plasticity_of(one: Plasticity) -> dict[str, Plain]:
+def plasticity_of(one: Projection) -> dict[str, Plain]:
     rule, parameters = definition_of(one.rule.definition), one.rule.parameters
     return record("Plasticity", rule=rule, members=one.members, parameters=parameters, signals=one.signals)
 
@@ -103,9 +107,12 @@ def network_of(compiled: CompiledNetwork) -> Plain:
         "bounds": plain(np.stack([network.connections.low.whole(), network.connections.high.whole()], axis=1)),
         "centres": plain(network.connections.centres.whole()),
         "initial": plain(network.neurons.initial),
-        "blocks": [block_of(one) for one in network.blocks],
-        "plasticity": [plasticity_of(one) for one in network.plasticity],
-        "program": plain(network.program),
+        "blocks": [block_of(one) for one in network.populations],
+        "plasticity": [plasticity_of(one) for one in network.projections],
+        "program": [
+            record(type(one).__name__, **{CALLED[field.name]: getattr(one, field.name) for field in fields(one)})
+            for one in network.program
+        ],
     }
 
 

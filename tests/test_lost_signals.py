@@ -113,7 +113,7 @@ def test_a_rule_reads_something_exactly_where_something_arrives(
         now = simulation.state()
         gone = now.conditions.structure.gone
         sums = np.zeros(len(before))
-        for entry in network.network.plasticity:
+        for entry in network.network.projections:
             sums[entry.members] = next(iter(now.cells[entry.rule.owner].values()))
         for index in np.flatnonzero(~gone & (delays > 0)).tolist():
             # mended at this step: the state of before it has not lost yet what is under way

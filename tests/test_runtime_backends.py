@@ -438,7 +438,7 @@ def test_entries_that_learn_by_one_rule_are_computed_together(backend: str) -> N
         "A1 -> B2: {weight: 0.2, plasticity: {delta: {target: T1}}, bounds: [0, 0.3]}",
     ]
     network = compile_text(head + "connections:\n" + "".join(f"  {entry}\n" for entry in entries))
-    assert [rule.members.tolist() for rule in network.network.plasticity] == [[0, 2, 4], [3]]
+    assert [rule.members.tolist() for rule in network.network.projections] == [[0, 2, 4], [3]]
     titles = network.network.connections.learns
     assert titles[2] == "delta(rate=0.2, target=T2)"
     assert titles[1] is None
@@ -447,6 +447,6 @@ def test_entries_that_learn_by_one_rule_are_computed_together(backend: str) -> N
     rule = "{parameters: {rate: 0.01}, signals: [target], weight: {each_step: weight + rate*pre*(target - post)}}"
     rules = "".join(f"  delta{i}: {rule}\n" for i in (0, 2, 4))
     alone = compile_text(f"{head}rules:\n{rules}connections:\n{apart}")
-    assert len(alone.network.plasticity) == 4
+    assert len(alone.network.projections) == 4
     expected, found = alone.run(20, backend=backend), network.run(20, backend=backend)
     np.testing.assert_array_equal(found.weights, expected.weights)

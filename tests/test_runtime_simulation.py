@@ -446,7 +446,8 @@ def test_recordings_of_another_network_are_refused() -> None:
         record(build([]), Course(1, start=record(network, Course(2))))
     with pytest.raises(RecordingError, match="no step to go on from"):
         record(network, Course(1, start=record(network, Course(0))))
-    fewer = replace(network, connections=build([], [Link(0, 0)]).connections, plasticity=(), blocks=(), program=())
+    links = build([], [Link(0, 0)]).connections
+    fewer = replace(network, connections=links, projections=(), populations=(), program=())
     with pytest.raises(RecordingError, match="has no connection 'K1 -> O'"):
         record(fewer, Course(1, start=record(network, Course(2))))
 

@@ -18,7 +18,7 @@ from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.digest import TREES, Content, Record, content, digest
 from neurovis_spec.compiler.names.state_references import singles
 from neurovis_spec.compiler.network import Connections, Group, Input, Network, Neurons, Noise, Output
-from neurovis_spec.compiler.program import Block, Definition, Plasticity, Quantity
+from neurovis_spec.compiler.program import Definition, Population, Projection, Quantity
 
 #: What of each type is content. What follows parameters shows by the parameters; ``starts`` and states of outputs are
 #: put behind the rest, where there are some.
@@ -58,8 +58,8 @@ def content_hash(network: Network) -> str:
         network.connections,
         arranged,
         sorted(network.outputs, key=lambda output: output.name),
-        [_block(one) for one in network.blocks],
-        [_plasticity(one, moved) for one in network.plasticity],
+        [_block(one) for one in network.populations],
+        [_plasticity(one, moved) for one in network.projections],
         network.noises,
         *((output.name, *singles(output.states)) for output in network.outputs if output.states),
         *([("starts", neurons.starts)] if neurons.starts else []),
@@ -79,21 +79,21 @@ def _arranged(inputs: Sequence[Input]) -> tuple[list[Input], IntArray]:
     return result, places
 
 
-def _block(block: Block) -> Record:
+def _block(population: Population) -> Record:
     fields: dict[str, object] = {
-        "level": block.level,
-        "members": block.members,
-        "combine": block.combine,
-        "activation": _activation(block.activation.definition),
-        "activation_parameters": block.activation.parameters,
-        "model": _model(block.model.definition),
-        "model_parameters": block.model.parameters,
-        "incoming": block.incoming,
+        "level": population.level,
+        "members": population.members,
+        "combine": population.drive.combine,
+        "activation": _activation(population.activation.definition),
+        "activation_parameters": population.activation.parameters,
+        "model": _model(population.model.definition),
+        "model_parameters": population.model.parameters,
+        "incoming": population.drive.incoming,
     }
     return Record("Block", fields)
 
 
-def _plasticity(one: Plasticity, moved: IntArray) -> Record:
+def _plasticity(one: Projection, moved: IntArray) -> Record:
     """``moved``: where each place of all activities and inputs is here."""
     signals = {name: moved[indices] for name, indices in one.signals.items()}
     rule, parameters = _rule(one.rule.definition), one.rule.parameters

@@ -22,9 +22,9 @@ from neurovis_spec.compiler.checks.warnings import warn
 from neurovis_spec.compiler.connections.connect import Connected, connect, join
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.drawing.sections import layout_settings, render_settings
-from neurovis_spec.compiler.events.bound import make_settable, own_weights
+from neurovis_spec.compiler.events.bound import found_in, make_settable, own_weights
 from neurovis_spec.compiler.limits import MOST_SIGNALS, Limits, amount
-from neurovis_spec.compiler.lower import Cycle, levels, make_blocks, make_plasticity, make_program
+from neurovis_spec.compiler.lower import Cycle, levels, make_populations, make_program, make_projections
 from neurovis_spec.compiler.names.expand import Expander, constants_of
 from neurovis_spec.compiler.names.finder import Finder, finder_of
 from neurovis_spec.compiler.names.modules import library_of
@@ -33,7 +33,7 @@ from neurovis_spec.compiler.names.references import other_parameter
 from neurovis_spec.compiler.names.scope import Scope, Surroundings
 from neurovis_spec.compiler.network import Input, Instance, Network, Output
 from neurovis_spec.compiler.neurons.noise import make_noises
-from neurovis_spec.compiler.neurons.populate import Population, populate, without_neurons
+from neurovis_spec.compiler.neurons.populate import Census, populate, without_neurons
 from neurovis_spec.compiler.ros_settings import RosSettings
 from neurovis_spec.compiler.run_checks import with_checks
 from neurovis_spec.compiler.values.constants import Constants, Sight, parse_formula
@@ -82,33 +82,33 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
     expander = Expander(library, request.root, findings, constants.dt, files={**request.files}, limits=request.limits)
     expansion = expander.expand(spec, constants, request.base)
     scopes, inputs = expansion.scopes, expansion.inputs
-    population = populate(scopes, request.limits, seed)
+    census = populate(scopes, request.limits, seed)
     _check_unused(expander, request.limits, seed)
-    if not len(population.neurons):
-        _report_no_neurons(spec, population, findings)
-        population = without_neurons(population)
-    layout = layout_settings(spec.layout, scopes, population, findings)
-    made = connect(scopes, population, request.limits, seed)
+    if not len(census.neurons):
+        _report_no_neurons(spec, census, findings)
+        census = without_neurons(census)
+    layout = layout_settings(spec.layout, scopes, census, findings)
+    made = connect(scopes, census, request.limits, seed)
     bundles = made.bundles
-    finder = finder_of(population, made, findings)
+    finder = finder_of(census, made, findings)
     render = render_settings(spec.render, finder, constants)
     outputs = make_outputs(spec, finder)
     if spec.render is not None and spec.render.figure:
         from neurovis_spec.compiler.drawing.figure import figure_of
 
-        render = replace(render, figure=figure_of(spec, population, outputs, finder))
+        render = replace(render, figure=figure_of(spec, census, outputs, finder))
     ros = _ros(spec, inputs, outputs, scopes[0], constants)
     body = _body(spec, request, inputs, outputs, scopes[0], constants, dt_known=dt_known)
-    noises = make_noises(population, sum(entry.size for entry in inputs))
+    noises = make_noises(census, sum(entry.size for entry in inputs))
     expansion.depend()
-    level = _levels(made, population, findings)
+    level = _levels(made, census, findings)
     if level is None or not made.complete or findings.errors > before or not _under_way(bundles, findings):
         _read_events(spec, finder, constants)
         return None
-    plasticity, rules = make_plasticity(bundles)
+    projections, rules = make_projections(bundles)
     connections = join(bundles, rules)
-    blocks = make_blocks(population, connections.sources.whole(), connections.targets.whole(), level)
-    program = make_program(blocks, plasticity)
+    populations = make_populations(census, connections.sources.whole(), connections.targets.whole(), level)
+    program = make_program(populations, projections)
     slots = tuple(constants.slots)
     network = Network(
         name=name,
@@ -121,28 +121,28 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         seed=seed,
         parameters=dict(constants.parameters),
         structural=frozenset(constants.structural),
-        neurons=population.neurons,
+        neurons=census.neurons,
         connections=connections,
         inputs=inputs,
         outputs=outputs,
-        blocks=blocks,
-        plasticity=plasticity,
+        populations=populations,
+        projections=projections,
         program=program,
         layout=layout,
         render=render,
         hash="",  # of all the rest
         noises=noises,
-        instances=_instances(scopes, population),
+        instances=_instances(scopes, census),
         numbering=own_weights(slots, bundles, connections.weights.whole()),
         ros=ros,
         body=body,
     )
-    settable = make_settable(network, slots, population, bundles)
+    settable = make_settable(network, slots, found_in(network, census, bundles))
     network = replace(network, hash=content_hash(network), settable=settable)
     eventful = _eventful(spec, network, finder, constants)
     if eventful is not None and not findings.failed:  # the shape may have been invalid
         files = tuple(file.model for file in request.includes.files)
-        warn(Compiled(spec, scopes, library, expander.used, eventful, bundles, population, files), findings)
+        warn(Compiled(spec, scopes, library, expander.used, eventful, bundles, census, files), findings)
     return None if eventful is None else with_checks(eventful)
 
 
@@ -200,18 +200,18 @@ def _check_unused(expander: Expander, limits: Limits, seed: int) -> None:
         constants = constants_of(module, expander.dt, expander.findings)
         make_parameters(module.model, constants, {})
         scopes = expander.expand(module.model, constants, module.folder, name).scopes
-        population = populate(scopes, limits, seed)
-        made = connect(scopes, population, limits, seed)
-        make_noises(population, 0)
-        layout_settings(None, scopes, population, expander.findings)
-        neurons -= len(population.neurons)
+        census = populate(scopes, limits, seed)
+        made = connect(scopes, census, limits, seed)
+        make_noises(census, 0)
+        layout_settings(None, scopes, census, expander.findings)
+        neurons -= len(census.neurons)
         connections -= sum(len(bundle.sources) for bundle in made.bundles)
 
 
-def _instances(scopes: tuple[Scope, ...], population: Population) -> tuple[Instance, ...]:
+def _instances(scopes: tuple[Scope, ...], census: Census) -> tuple[Instance, ...]:
     return tuple(
         Instance(scope.path, scope.module, members.start, len(members), scope.declared, scope.number)
-        for scope, members in zip(scopes, (directory.members for directory in population.directories), strict=True)
+        for scope, members in zip(scopes, (directory.members for directory in census.directories), strict=True)
         if scope.module is not None
     )
 
@@ -239,9 +239,9 @@ def _read_events(spec: Spec, finder: Finder, constants: Constants) -> tuple[Even
     return EventReader(finder, constants).read(spec.events)
 
 
-def _report_no_neurons(spec: Spec, population: Population, findings: Findings) -> None:
+def _report_no_neurons(spec: Spec, census: Census, findings: Findings) -> None:
     """Without neurons nothing else can be checked; if that is because groups are invalid, it is said already."""
-    if any(directory.invalid or directory.invalid.is_open for directory in population.directories):
+    if any(directory.invalid or directory.invalid.is_open for directory in census.directories):
         return
     node = spec.source.entry("neurons")
     span = opening(spec.source) if node is None else node.key.span
@@ -253,14 +253,14 @@ def _report_no_neurons(spec: Spec, population: Population, findings: Findings) -
     findings.error("no-neurons", span, message, hint, key="neurons")  # also where the name is missing there
 
 
-def _levels(made: Connected, population: Population, findings: Findings) -> IntArray | None:
+def _levels(made: Connected, census: Census, findings: Findings) -> IntArray | None:
     """The level of each neuron; None where neurons wait for each other, which is reported: a cycle of connections that
     are in order is one whatever becomes of the others."""
     delays = np.concatenate([bundle.delays for bundle in made.bundles] or [np.zeros(0, dtype=np.int64)])
-    level = levels(len(population.neurons), made.sources, made.targets, delays)
+    level = levels(len(census.neurons), made.sources, made.targets, delays)
     if not isinstance(level, Cycle):
         return level
-    path = [population.neurons.names[neuron] for neuron in level.neurons]
+    path = [census.neurons.names[neuron] for neuron in level.neurons]
     shown = path if len(path) <= 12 else [*path[:6], "…", *path[-5:]]
     message = f"these neurons wait for each other within one step: {' -> '.join(shown)}"
     ends = np.cumsum([len(bundle.sources) for bundle in made.bundles])

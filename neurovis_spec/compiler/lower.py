@@ -1,8 +1,8 @@
-"""Lowering: from neurons and connections to blocks and the update program.
+"""Lowering: from neurons and connections to populations and the update program.
 
-In: the Population, the connections. Out: levels of neurons along delay-0 connections (one more than the highest of
-those that reach it within the step) or a Cycle; Blocks (neurons that are updated together), Plasticities (connections
-that learn by one rule) and the program, an ordered list of operations.
+In: the Census, the connections. Out: levels of neurons along delay-0 connections (one more than the highest of
+those that reach it within the step) or a Cycle; Populations (neurons that are updated together), Projections
+(connections that learn by one rule) and the program, an ordered list of operations.
 """
 
 from __future__ import annotations
@@ -16,14 +16,15 @@ import numpy as np
 from neurovis_spec.arrays import IntArray, frozen
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.connections.plasticity import Learning
-from neurovis_spec.compiler.neurons.populate import Population
+from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.program import (
-    Block,
     Gather,
     Learn,
     Operation,
     Owner,
-    Plasticity,
+    Population,
+    Port,
+    Projection,
     ReadInputs,
     Send,
     Update,
@@ -84,9 +85,9 @@ def _cycle(prompt: list[int], sources: IntArray, targets: IntArray, waiting: lis
     return Cycle(forward, into[ring[0]])
 
 
-def make_blocks(population: Population, sources: IntArray, targets: IntArray, levels: IntArray) -> tuple[Block, ...]:
+def make_populations(census: Census, sources: IntArray, targets: IntArray, levels: IntArray) -> tuple[Population, ...]:
     """Neurons of the same level, activation, model and combination, in the order of the levels."""
-    groups = population.groups
+    groups = census.groups
     alike: dict[tuple[str, ...], int] = {}
     own = [
         alike.setdefault((*(used.definition.name for used in one.kind), one.group.combine), len(alike))
@@ -103,44 +104,34 @@ def make_blocks(population: Population, sources: IntArray, targets: IntArray, le
         [(one.group.start, used) for one, used in zip(groups, column, strict=True)]
         for column in zip(*(one.kind for one in groups), strict=True)
     ]
-    blocks = []
+    populations = []
     for number, (some, incoming) in enumerate(zip(members, _split(home[targets], len(members)), strict=True)):
         first = groups[group[some[0]]]
         activation, model = (_use(number, some, group[some], settled) for settled in chosen)
-        block = Block(
-            level=int(levels[some[0]]),
-            members=some,
-            model=model,
-            activation=activation,
-            combine=first.group.combine,
-            incoming=incoming,
-            slots=slot[targets[incoming]],
-        )
-        for array in (block.members, block.incoming, block.slots):
-            frozen(array)
-        blocks.append(block)
-    return tuple(blocks)
+        drive = Port("drive", first.group.combine, frozen(incoming), frozen(slot[targets[incoming]]))
+        populations.append(Population(int(levels[some[0]]), frozen(some), activation, model, (drive,)))
+    return tuple(populations)
 
 
 def _numbered(levels: IntArray, alike: IntArray, kinds: int) -> IntArray:
-    """The number of each neuron's block, by levels, then by first neurons; ``alike`` has what else they have in
+    """The number of each neuron's population, by levels, then by first neurons; ``alike`` has what else they have in
     common, one of so many kinds."""
-    _, first, block = np.unique(levels * kinds + alike, return_index=True, return_inverse=True)
+    _, first, population = np.unique(levels * kinds + alike, return_index=True, return_inverse=True)
     number = np.empty_like(first)
     number[np.lexsort((first, levels[first]))] = np.arange(len(first))
-    return np.asarray(number[block], dtype=np.int64)
+    return np.asarray(number[population], dtype=np.int64)
 
 
-def _split(blocks: IntArray, number: int) -> list[IntArray]:
-    """The places of each block, ascending."""
-    order = np.argsort(blocks, kind="stable")
-    ends = np.searchsorted(blocks[order], np.arange(number + 1)).tolist()
+def _split(populations: IntArray, number: int) -> list[IntArray]:
+    """The places of each population, ascending."""
+    order = np.argsort(populations, kind="stable")
+    ends = np.searchsorted(populations[order], np.arange(number + 1)).tolist()
     return [order[start:end].astype(np.int64) for start, end in pairwise(ends)]
 
 
 def _use(number: int, members: IntArray, own: IntArray, settled: Sequence[tuple[int, Settled]]) -> Use:
-    """A definition in use at a block; ``own`` are the groups of its members, and ``settled`` of all groups where they
-    start and what they say of it."""
+    """A definition in use at a population; ``own`` are the groups of its members, and ``settled`` of all groups where
+    they start and what they say of it."""
     definition = settled[own[0]][1].definition
     owner = Owner(definition.kind.name, number)
     if not definition.parameters:
@@ -157,8 +148,8 @@ def _use(number: int, members: IntArray, own: IntArray, settled: Sequence[tuple[
     return Use(owner, definition, parameters)
 
 
-def make_plasticity(bundles: tuple[Bundle, ...]) -> tuple[tuple[Plasticity, ...], list[int]]:
-    """One Plasticity a rule, whichever entries learn by it, and for each entry the number of its Plasticity or −1: what
+def make_projections(bundles: tuple[Bundle, ...]) -> tuple[tuple[Projection, ...], list[int]]:
+    """One Projection a rule, whichever entries learn by it, and for each entry the number of its Projection or −1: what
     is learned by the same rule is computed together."""
     numbers: dict[str, int] = {}
     parts: list[list[tuple[Learning, IntArray]]] = []
@@ -177,7 +168,7 @@ def make_plasticity(bundles: tuple[Bundle, ...]) -> tuple[tuple[Plasticity, ...]
     return tuple(_together(number, part) for number, part in enumerate(parts)), rules
 
 
-def _together(number: int, parts: list[tuple[Learning, IntArray]]) -> Plasticity:
+def _together(number: int, parts: list[tuple[Learning, IntArray]]) -> Projection:
     """The connections of several entries that learn by one rule."""
     first = parts[0][0]
     members = np.concatenate([members for _, members in parts])
@@ -185,14 +176,14 @@ def _together(number: int, parts: list[tuple[Learning, IntArray]]) -> Plasticity
     signals = {name: np.concatenate([one.signals[name] for one, _ in parts]) for name in first.signals}
     for array in (members, *parameters.values(), *signals.values()):
         frozen(array)
-    return Plasticity(members, Use(Owner(first.rule.kind.name, number), first.rule, parameters), signals)
+    return Projection(members, (Use(Owner(first.rule.kind.name, number), first.rule, parameters),), signals)
 
 
-def make_program(blocks: tuple[Block, ...], plasticity: tuple[Plasticity, ...]) -> tuple[Operation, ...]:
+def make_program(populations: tuple[Population, ...], projections: tuple[Projection, ...]) -> tuple[Operation, ...]:
     """What a step does, in order (§5): inputs, neurons along delay 0, signals that leave, rules."""
     program: list[Operation] = [ReadInputs()]
-    for number in range(len(blocks)):
+    for number in range(len(populations)):
         program += [Gather(number), Update(number)]
     program.append(Send())
-    program += [Learn(number) for number in range(len(plasticity))]
+    program += [Learn(number) for number in range(len(projections))]
     return tuple(program)

@@ -21,7 +21,7 @@ from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, Rend
 from neurovis_spec.compiler.events.changes import Change
 from neurovis_spec.compiler.events.settable import Binding, ParameterFormula, Part, Settable
 from neurovis_spec.compiler.names.state_references import StateOf
-from neurovis_spec.compiler.program import Block, Operation, Plasticity, Use
+from neurovis_spec.compiler.program import Holder, Operation, Population, Projection, Use
 from neurovis_spec.compiler.ros_settings import RosSettings
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.language.words import Combine, NeuronRole
@@ -108,7 +108,7 @@ class Connections:
     centres: FloatColumn
     #: steps
     delays: IntColumn
-    #: index into ``Network.plasticity``, −1 where fixed
+    #: index into ``Network.projections``, −1 where fixed
     rules: IntColumn
     #: index into ``entries``
     entry: IntColumn
@@ -205,8 +205,8 @@ class Network:
     connections: Connections
     inputs: tuple[Input, ...]
     outputs: tuple[Output, ...]
-    blocks: tuple[Block, ...]
-    plasticity: tuple[Plasticity, ...]
+    populations: tuple[Population, ...]
+    projections: tuple[Projection, ...]
     program: tuple[Operation, ...]
     layout: LayoutSettings
     render: RenderSettings
@@ -226,12 +226,12 @@ class Network:
     body: BodySettings | None = None
 
     @property
-    def holders(self) -> tuple[Block | Plasticity, ...]:
+    def holders(self) -> tuple[Holder, ...]:
         """Whatever has definitions in use, in the order in which their states are kept."""
-        return *self.blocks, *self.plasticity
+        return *self.populations, *self.projections
 
     @property
-    def uses(self) -> Iterator[tuple[Block | Plasticity, Use]]:
+    def uses(self) -> Iterator[tuple[Holder, Use]]:
         """All definitions in use, each with whoever has it."""
         return ((holder, use) for holder in self.holders for use in holder.uses)
 
@@ -303,7 +303,7 @@ class Network:
     def _parallel_key(self, index: int) -> tuple[int, str, float, int]:
         connections = self.connections
         rule = int(connections.rules[index])
-        name = self.plasticity[rule].rule.definition.name if rule >= 0 else ""
+        name = self.projections[rule].rule.definition.name if rule >= 0 else ""
         weights: FloatColumn | FloatArray = connections.weights if self.numbering is None else self.numbering
         return (int(connections.delays[index]), name, float(weights[index]), index)
 

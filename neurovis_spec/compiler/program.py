@@ -1,7 +1,7 @@
 """The update program: what a step does, and by which definitions.
 
-In: nothing; these are values of a Network. A Definition is a set of typed expressions, of one Kind; blocks and
-plasticities say for which neurons and connections which are in use; operations are what a step does, in order.
+In: nothing; these are values of a Network. A Definition is a set of typed expressions, of one Kind; populations and
+projections say for which neurons and connections which are in use; operations are what a step does, in order.
 """
 
 from __future__ import annotations
@@ -126,8 +126,8 @@ def is_activation(node: Tree) -> bool:
 
 
 class Owner(NamedTuple):
-    """Whose states and parameters: those of the definition of a kind that is in use at the ``number``-th block or
-    plasticity."""
+    """Whose states and parameters: those of the definition of a kind that is in use at the ``number``-th population or
+    projection."""
 
     kind: str
     number: int
@@ -156,75 +156,92 @@ class Use:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Block:
-    """Neurons that are updated together: the same activation, model, combination and level.
+class Port:
+    """An input of neurons: what arrives there is combined to one number. ``incoming`` are the connections that lead
+    there, in the order of the connections, and ``slots`` says which member (its position) each of them goes to."""
 
-    ``members`` are neuron indices, ascending. ``incoming`` are the connections into them, in the order of the
-    connections, and ``slots`` says which member (position in ``members``) each of them goes to.
-    """
-
-    level: int
-    members: IntArray
-    model: Use
-    activation: Use
+    name: str
     combine: Combine
     incoming: IntArray
     slots: IntArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Population:
+    """Neurons that are updated together: the same activation, model, combination and level. ``members`` are neuron
+    indices, ascending."""
+
+    level: int
+    members: IntArray
+    activation: Use
+    model: Use
+    ports: tuple[Port, ...]
 
     @property
     def uses(self) -> tuple[Use, ...]:
         """The definitions that its neurons are of."""
         return self.activation, self.model
 
+    @property
+    def drive(self) -> Port:
+        """The port that all neurons have."""
+        return self.ports[0]
+
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Plasticity:
-    """Connections that learn by one rule. ``signals`` gives, for each signal of the rule, one index a
+class Projection:
+    """Connections of the same definitions: today of one rule. ``signals`` gives, for each signal of these, one index a
     connection into the activities of all neurons followed by the vector of all inputs."""
 
     members: IntArray
-    rule: Use
+    uses: tuple[Use, ...]
     signals: Mapping[str, IntArray]
 
     @property
-    def uses(self) -> tuple[Use, ...]:
-        """The definitions that its connections are of."""
-        return (self.rule,)
+    def rule(self) -> Use:
+        """The rule by which the weights change."""
+        return self.uses[0]
+
+
+Holder: TypeAlias = Population | Projection
 
 
 # The update program: operations in the order of §5. Each sees what those before it have made in the same step.
 
 
 @dataclass(frozen=True, slots=True)
-class ReadInputs:
+class Operation:
+    """Something that a step does; each backend says how, type by type."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReadInputs(Operation):
     """s[t]: expressions, tables and what the caller supplied, into the vector of all inputs."""
 
 
 @dataclass(frozen=True, slots=True)
-class Gather:
-    """u[t] of a block: what arrives, combined, + bias + input. Delay 0 reads activities of this step, the rest the
+class Gather(Operation):
+    """u[t] of a population: what arrives, combined, + bias + input. Delay 0 reads activities of this step, the rest the
     signals under way."""
 
-    block: int
+    population: int
 
 
 @dataclass(frozen=True, slots=True)
-class Update:
-    """The states and the activity of a block, from its drive; at step 0 neurons with ``initial`` take it instead."""
+class Update(Operation):
+    """The states and the activity of a population, from its drive; at step 0 neurons with ``initial`` take it
+    instead."""
 
-    block: int
+    population: int
 
 
 @dataclass(frozen=True, slots=True)
-class Send:
+class Send(Operation):
     """w[t]·a[t] of every delayed connection leaves its source; a[t] is remembered for ``pre``."""
 
 
 @dataclass(frozen=True, slots=True)
-class Learn:
-    """The rule of a plasticity, step and (where it has them) episode: w[t+1] and its states, from old values."""
+class Learn(Operation):
+    """The rule of a projection, step and (where it has them) episode: w[t+1] and its states, from old values."""
 
-    plasticity: int
-
-
-Operation: TypeAlias = ReadInputs | Gather | Update | Send | Learn
+    projection: int

@@ -22,11 +22,11 @@ from neurovis_spec.compiler.events.settable import HIGH, LOW
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import (
     UNDEFINED_F,
-    Block,
     Check,
     Definition,
     Key,
-    Plasticity,
+    Population,
+    Projection,
     Quantity,
     Use,
 )
@@ -57,18 +57,18 @@ from neurovis_spec.language.expressions.undefined import (
 def with_checks(network: Network) -> Network:
     """The network with the checks that it needs."""
     checks = _Checks(network)
-    blocks = tuple(map(checks.of_block, network.blocks))
-    rules = tuple(map(checks.of_rule, network.plasticity))
-    if all(new is old for new, old in zip((*blocks, *rules), network.holders, strict=True)):
+    populations = tuple(map(checks.of_population, network.populations))
+    projections = tuple(map(checks.of_projection, network.projections))
+    if all(new is old for new, old in zip((*populations, *projections), network.holders, strict=True)):
         return network
-    return replace(network, blocks=blocks, plasticity=rules)
+    return replace(network, populations=populations, projections=projections)
 
 
 def without_checks(network: Network) -> Network:
     """The network without them, for one that nobody watches."""
-    blocks = tuple(replace(block, model=_unchecked(block.model)) for block in network.blocks)
-    rules = tuple(replace(one, rule=_unchecked(one.rule)) for one in network.plasticity)
-    return replace(network, blocks=blocks, plasticity=rules)
+    populations = tuple(replace(population, model=_unchecked(population.model)) for population in network.populations)
+    projections = tuple(replace(one, uses=tuple(map(_unchecked, one.uses))) for one in network.projections)
+    return replace(network, populations=populations, projections=projections)
 
 
 def _unchecked(use: Use) -> Use:
@@ -92,32 +92,35 @@ class _Checks:
         """Whether an array can be set in a run."""
         return array in self.network.settable.variables
 
-    def of_block(self, block: Block) -> Block:
-        """The block with the checks of its model and activation."""
-        activation = block.activation.definition
-        states, calls = self.of_use(block.model, functions=activation.functions)
+    def of_population(self, population: Population) -> Population:
+        """The population with the checks of its model and activation."""
+        activation = population.activation.definition
+        states, calls = self.of_use(population.model, functions=activation.functions)
         if calls and activation.given.each_step is not None:
             inside = hazards(activation.given.each_step, max(call.hidden for call in calls)).found
-            inside = list(_open(inside, self.known(block.activation)))
+            inside = list(_open(inside, self.known(population.activation)))
             if inside:
                 undefined = Quantity(UNDEFINED_F, either(hazard.formula for hazard in inside))
                 activation = replace(activation, gives=(*activation.gives, undefined))
                 found = [Hazard(inside[0].what, Call(UNDEFINED_F, c.call.arguments), c.where) for c in calls]
                 states += _check(f"activation '{activation.name}'", _sized(found), [], {})
         if not states:
-            return block
-        model = _with_states(block.model, states)
-        return replace(block, model=model, activation=replace(block.activation, definition=activation))
+            return population
+        model = _with_states(population.model, states)
+        return replace(population, model=model, activation=replace(population.activation, definition=activation))
 
-    def of_rule(self, plasticity: Plasticity) -> Plasticity:
-        """The plasticity with the checks of its rule."""
-        connections, members = self.network.connections, plasticity.members
+    def of_projection(self, projection: Projection) -> Projection:
+        """The projection with the checks of its definitions."""
+        connections, members = self.network.connections, projection.members
         bounded = any(
             self.is_set(array) or bool(np.isfinite(values[members]).any())
             for array, values in ((LOW, connections.low), (HIGH, connections.high))
         )
-        states, _ = self.of_use(plasticity.rule, Hidden.INFINITY if bounded else Hidden.NOTHING)
-        return replace(plasticity, rule=_with_states(plasticity.rule, states)) if states else plasticity
+        degree = Hidden.INFINITY if bounded else Hidden.NOTHING
+        states = [self.of_use(use, degree)[0] for use in projection.uses]
+        if not any(states):
+            return projection
+        return replace(projection, uses=tuple(map(_with_states, projection.uses, states)))
 
     def of_use(
         self, use: Use, hidden: Hidden = Hidden.NOTHING, functions: Mapping[str, Tree] = MappingProxyType({})

@@ -275,7 +275,7 @@ def lacking(network: Network, capabilities: Capabilities) -> tuple[str, ...]:
             not capabilities.delays and bool((network.connections.delays.kept > 1).any()),
             "no delays of more than a step",
         ),
-        (not capabilities.plasticity and bool(network.plasticity), "no plasticity"),
+        (not capabilities.plasticity and bool(network.projections), "no plasticity"),
         (not capabilities.noise and bool(network.noises), "no noise"),
         (not capabilities.episodes and network.episode is not None, "no episodes"),
         (

@@ -1,6 +1,6 @@
-"""What arrives at the neurons of a block, as C: sums of terms, each in the order of its connections.
+"""What arrives at the neurons of a population, as C: sums of terms, each in the order of its connections.
 
-In: a Network, one of its blocks. Out: lines of C. The sums of a full matrix, and those of neurons with many
+In: a Network, one of its populations. Out: lines of C. The sums of a full matrix, and those of neurons with many
 connections, go on beside each other, since an addition need not wait for the one before in another sum.
 """
 
@@ -15,22 +15,22 @@ import numpy as np
 from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.events.settable import CENTRES
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Block
+from neurovis_spec.compiler.program import Population
 from neurovis_spec.language.expressions.emit_c import Value
 from neurovis_spec.runtime.c_code import Code, Form, Place
 from neurovis_spec.runtime.signals import SignalLayout
 
 #: connections of a neuron that are written out one after the other
 _FEW = 16
-#: neurons of a dense block whose sums are kept beside each other
+#: neurons of a dense population whose sums are kept beside each other
 _BESIDE = 4096
-#: neurons of any other block whose sums go on beside each other: an addition need not wait for the one before
+#: neurons of any other population whose sums go on beside each other: an addition need not wait for the one before
 _LANES = 8
 
 
 @dataclass(frozen=True, slots=True)
 class _Lanes:
-    """How the sums of some neurons go on beside each other. ``neurons``: places in the block, those of like many
+    """How the sums of some neurons go on beside each other. ``neurons``: places in the population, those of like many
     connections beside each other, eight to a group. First come the connections that all of a group have (those of
     group g from ``begins[g]`` on, the first of each neuron, then the second of each, …), then the others, neuron by
     neuron (those of the i-th from ``rests[i]`` on)."""
@@ -64,8 +64,8 @@ def _in_lanes(ends: IntArray) -> tuple[_Lanes, IntArray]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Incoming:
-    """The connections that arrive at the neurons of a block, whatever is made of them: neuron by neuron, each neuron's
-    in their order, those of the i-th neuron up to ``ends[i + 1]``."""
+    """The connections that arrive at the neurons of a population, whatever is made of them: neuron by neuron, each
+    neuron's in their order, those of the i-th neuron up to ``ends[i + 1]``."""
 
     connections: IntArray
     ends: IntArray
@@ -79,15 +79,18 @@ class Incoming:
     lanes: tuple[_Lanes, IntArray] | None
 
 
-def incoming_of(network: Network, block: Block) -> Incoming:
-    """What arrives at a block: worked out once, read by each form of a step."""
-    connections, count = network.connections, len(block.members)
-    delays, rules = connections.delays[block.incoming], connections.rules[block.incoming]
-    order = np.argsort(block.slots, kind="stable")
-    own, ends = block.incoming[order], np.searchsorted(block.slots[order], np.arange(count + 1)).astype(np.int64)
+def incoming_of(network: Network, population: Population) -> Incoming:
+    """What arrives at a population: worked out once, read by each form of a step."""
+    connections, count = network.connections, len(population.members)
+    delays, rules = connections.delays[population.drive.incoming], connections.rules[population.drive.incoming]
+    order = np.argsort(population.drive.slots, kind="stable")
+    own, ends = (
+        population.drive.incoming[order],
+        np.searchsorted(population.drive.slots[order], np.arange(count + 1)).astype(np.int64),
+    )
     degrees = np.diff(ends)
     degree = int(degrees[0]) if (degrees == degrees[0]).all() else -1
-    full = block.combine == "sum" and degree > 1 and 1 < count <= _BESIDE and len(_different(delays)) == 1
+    full = population.drive.combine == "sum" and degree > 1 and 1 < count <= _BESIDE and len(_different(delays)) == 1
     if full:
         rows, sources = own.reshape(count, degree), connections.sources[own].reshape(count, degree)
         regular = rows[0, 0] + np.arange(degree) * count + np.arange(count).reshape(-1, 1)
@@ -106,13 +109,13 @@ def _different(delays: IntArray) -> list[int]:
 
 
 class Arrivals:
-    """What arrives at the neurons of a block: their connections, in the order in which they are read: neuron by neuron,
-    or as ``lanes`` says. What arrives at one neuron is put together in the order of its connections."""
+    """What arrives at the neurons of a population: their connections, in the order in which they are read: neuron by
+    neuron, or as ``lanes`` says. What arrives at one neuron is put together in the order of its connections."""
 
     def __init__(
-        self, network: Network, block: Block, incoming: Incoming, code: Code, form: Form, layout: SignalLayout
+        self, network: Network, population: Population, incoming: Incoming, code: Code, form: Form, layout: SignalLayout
     ) -> None:
-        self.network, self.block, self.code, self.form = network, block, code, form
+        self.network, self.population, self.code, self.form = network, population, code, form
         #: where the weights begin among those packed
         self.begin = 0
         self.can_be_fused, self.ends, self.degree = incoming.can_be_fused, incoming.ends, incoming.degree
@@ -135,9 +138,9 @@ class Arrivals:
 
     @contextmanager
     def beside(self, lanes: _Lanes) -> Iterator[tuple[Place, str]]:
-        """The body of a loop over all neurons of the block: the place of one, and what arrives at it."""
+        """The body of a loop over all neurons of the population: the place of one, and what arrives at it."""
         code, count = self.code, len(lanes.neurons)
-        start: Value = 1.0 if self.block.combine == "product" else 0.0
+        start: Value = 1.0 if self.population.drive.combine == "product" else 0.0
         begins, rests = code.tables.name(lanes.begins), code.tables.name(lanes.rests)
         with code.block(code.loop("g", len(lanes.begins) - 1)):
             totals = [code.variable("u", start) for _ in range(_LANES)]
@@ -159,7 +162,7 @@ class Arrivals:
 
     def matrix(self) -> str:
         """The sums of a full matrix; the name of their array."""
-        code, count = self.code, len(self.block.members)
+        code, count = self.code, len(self.population.members)
         name = code.name("u")
         code.line(f"{code.real} {name}[{count}];")
         code.line(code.loop("p", count))
@@ -183,7 +186,7 @@ class Arrivals:
 
     def combined(self, place: Place) -> Value:
         """All that arrives at one neuron as one number."""
-        combine = self.block.combine
+        combine = self.population.drive.combine
         start: Value = 1.0 if combine == "product" else 0.0
         if not len(self.connections):
             return start
@@ -196,7 +199,7 @@ class Arrivals:
 
     def _written(self, start: Value, edges: list[Place], columns: list[slice]) -> Value:
         """One term after the other."""
-        if not self.form.gone and self.block.combine == "sum":
+        if not self.form.gone and self.population.drive.combine == "sum":
             terms = [self.term(edge, column) for edge, column in zip(edges, columns, strict=True)]
             return " + ".join([self.code.text(start), *terms])
         total = self.code.variable("u", start)
@@ -210,7 +213,7 @@ class Arrivals:
             code.line(f"if (!gone[{code.at(self.connections[column], edge)}]) {{")
             code.indent += 1
         term = self.term(edge, column)
-        match self.block.combine:
+        match self.population.drive.combine:
             case "sum":
                 code.line(f"{total} += {term};")
             case "product":
@@ -229,7 +232,7 @@ class Arrivals:
         return f"({text})" if text.startswith("-") else text
 
     def _finished(self, total: str) -> Value:
-        return f"sqrt{self.code.emitter.suffix}({total})" if self.block.combine == "distance" else total
+        return f"sqrt{self.code.emitter.suffix}({total})" if self.population.drive.combine == "distance" else total
 
     def term(self, edge: Place, column: slice) -> str:
         """w[t−d]·a[t−d] of a connection."""

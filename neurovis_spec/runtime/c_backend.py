@@ -164,9 +164,9 @@ def _write(network: Network) -> Written:
     small = len(network.neurons) + len(network.connections) <= SMALL
     bodies: list[str] = []
     taken = _taken(network)
-    watched = bool(network.plasticity) and not small
+    watched = bool(network.projections) and not small
     # a network that is written out is in registers, and nothing is gained
-    incoming = [incoming_of(network, block) for block in network.blocks]
+    incoming = [incoming_of(network, population) for population in network.populations]
     whole = StepCode(network, Code(emitter, tables, network.dt, {}), Form(), incoming)
     fused = not small and bool(whole.fuses.any())
     of_step = ", int64_t k, const double *restrict s"
@@ -216,7 +216,7 @@ def _taken(network: Network) -> dict[str, str]:
 def _look(network: Network) -> tuple[str, str]:
     """Whether anything that neurons, and that connections carry is not finite."""
     tests = {"neuron": [f"nv_odd(p->activity, {len(network.neurons)})"], "connection": list[str]()}
-    if network.plasticity:
+    if network.projections:
         tests["connection"].append(f"nv_odd(p->weights, {len(network.connections)})")
     number = 0
     for holder, use in network.uses:

@@ -307,7 +307,7 @@ class Exported:
         small = len(network.neurons) + len(network.connections) <= SMALL
         left = self._left_out()
         form = Form(small, self.first, self.holding, *(name in left for name in ("gone", "still", "lost")))
-        StepCode(network, code, form, [incoming_of(network, block) for block in network.blocks]).write()
+        StepCode(network, code, form, [incoming_of(network, population) for population in network.populations]).write()
         before: list[str] = []
         for name in sorted(left.keys() & words_of(code.lines)):  # what never learns asks for none that is still
             kind, phases = left[name]

@@ -124,15 +124,15 @@ def _calls_a_step(made: Definition) -> int:
 def _cost(made: Exported) -> str:
     network = made.network
     functions = 0
-    for block in network.blocks:
-        each = _calls_a_step(block.model.definition)
-        if block.model.definition.reads_activation:
-            each += _calls_a_step(block.activation.definition)
-        functions += each * len(block.members)
+    for population in network.populations:
+        each = _calls_a_step(population.model.definition)
+        if population.model.definition.reads_activation:
+            each += _calls_a_step(population.activation.definition)
+        functions += each * len(population.members)
     learning = 0
-    for plasticity in network.plasticity:
-        learning += len(plasticity.members)
-        functions += _calls_a_step(plasticity.rule.definition) * len(plasticity.members)
+    for projection in network.projections:
+        learning += len(projection.members)
+        functions += _calls_a_step(projection.rule.definition) * len(projection.members)
     functions += _calls(entry.expression for entry in network.inputs)
     drawn = sum(len(noise.members) for noise in network.noises)
     lines = [

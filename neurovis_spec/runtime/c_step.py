@@ -3,20 +3,31 @@
 In: a Network. Out: the lines of a function's body, over the arrays of a State by the names ``activity``, ``weights``,
 ``signals``, ``history``, ``cells…``, ``traces…``, the numbers that can be set as ``x``, the vector of the step as
 ``s`` and the step ``k``. Sums go in the order of the connections. A small network is written out neuron by neuron;
-of a larger one, each block is a loop.
+of a larger one, each population is a loop.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from functools import partial, singledispatch
 
 import numpy as np
 
 from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.events.settable import BIAS, HIGH, LOW
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Block, Definition, Gather, Learn, Plasticity, ReadInputs, Send, Update, Use
+from neurovis_spec.compiler.program import (
+    Definition,
+    Gather,
+    Learn,
+    Operation,
+    Population,
+    Projection,
+    ReadInputs,
+    Send,
+    Update,
+    Use,
+)
 from neurovis_spec.language.expressions.emit_c import Made, Value
 from neurovis_spec.language.expressions.tree import Tree, names
 from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming
@@ -31,25 +42,24 @@ _RULES = 4
 
 
 class StepCode:
-    """Writes the body of a step; ``incoming`` is what arrives at each block, which all forms of a step share."""
+    """Writes the body of a step; ``incoming`` is what arrives at each population, which all forms of a step share."""
 
     def __init__(self, network: Network, code: Code, form: Form, incoming: Sequence[Incoming]) -> None:
         self.network, self.code, self.form = network, code, form
         self.layout: SignalLayout = signal_layout(network)
         self.depth = history_depth(network)
         self.arrivals = [
-            Arrivals(network, block, own, code, form, self.layout)
-            for block, own in zip(network.blocks, incoming, strict=True)
+            Arrivals(network, population, own, code, form, self.layout)
+            for population, own in zip(network.populations, incoming, strict=True)
         ]
         #: connections that are fused, (m,)
         self.fuses = np.zeros(len(network.connections), dtype=np.bool_)
         #: how many weights are packed
         self.count = 0
-        #: plasticities whose connections send while they learn, in one pass over their weights: those of one delay
+        #: projections whose connections send while they learn, in one pass over their weights: those of one delay
+        learn = (one.projection for one in network.program if isinstance(one, Learn) and not form.written_out)
         self.sent_with = frozenset(
-            number
-            for number, plasticity in enumerate(network.plasticity)
-            if not form.written_out and _alike(network.connections.delays[plasticity.members]) > 0
+            number for number in learn if _alike(network.connections.delays[network.projections[number].members]) > 0
         )
         for arrivals in self.arrivals:
             if arrivals.can_be_fused:
@@ -58,7 +68,7 @@ class StepCode:
                 self.count += len(arrivals.packed)
 
     def pack(self) -> None:
-        """The weights of fused blocks in the order in which they are read, where they do not lie so."""
+        """The weights of fused populations in the order in which they are read, where they do not lie so."""
         code = self.code
         for arrivals in self.arrivals:
             if len(arrivals.packed):
@@ -66,47 +76,39 @@ class StepCode:
                 code.line(f"    packed[{arrivals.begin} + e] = weights[{code.at(arrivals.packed, 'e')}];")
 
     def write(self) -> None:
-        """All operations in order. What a block gathers is computed neuron by neuron, together with its update."""
+        """All operations in order."""
         if self.form.watched:
             self.code.line(f"{self.code.real} odd = {self.code.text(0.0)};")
         for operation in self.network.program:
-            match operation:
-                case ReadInputs() | Gather():
-                    pass
-                case Update(block=number):
-                    self.block(number)
-                case Send():
-                    self.send()
-                case Learn(plasticity=number):
-                    self.learn(number)
+            write(operation, self)
 
     # ---- neurons -----------------------------------------------------------------------------------------------
 
-    def block(self, number: int) -> None:
-        """The neurons of a block."""
-        block, code = self.network.blocks[number], self.code
+    def population(self, number: int) -> None:
+        """The neurons of a population."""
+        population, code = self.network.populations[number], self.code
         arrivals = self.arrivals[number]
         if self.form.written_out:
-            for place in range(len(block.members)):
+            for place in range(len(population.members)):
                 with code.block(""):
                     self.neuron(number, place, arrivals)
-        elif arrivals.dense and self.reads_drive(block):
+        elif arrivals.dense and self.reads_drive(population):
             with code.block(""):
                 sums = arrivals.matrix()
-                with code.block(code.loop("p", len(block.members))):
+                with code.block(code.loop("p", len(population.members))):
                     self.neuron(number, "p", arrivals, f"{sums}[p]")
-        elif arrivals.lanes is not None and self.reads_drive(block):
+        elif arrivals.lanes is not None and self.reads_drive(population):
             with arrivals.beside(arrivals.lanes) as (where, total):
                 self.neuron(number, where, arrivals, total)
         else:
-            with code.block(code.loop("p", len(block.members))):
+            with code.block(code.loop("p", len(population.members))):
                 self.neuron(number, "p", arrivals)
 
     def neuron(self, number: int, place: Place, arrivals: Arrivals, total: str = "") -> None:
         """One neuron's step."""
-        block, code = self.network.blocks[number], self.code
-        neuron = code.at(block.members, place)
-        initial = self.network.neurons.initial[block.members]
+        population, code = self.network.populations[number], self.code
+        neuron = code.at(population.members, place)
+        initial = self.network.neurons.initial[population.members]
         given = ~np.isnan(initial)
         taken = self.form.first and (given[place] if isinstance(place, int) else given.any())
         if taken:
@@ -116,7 +118,7 @@ class StepCode:
             code.line(f"    activity[{neuron}] = {value};")
             code.line("} else {")
             code.indent += 1
-        drive = self.drive(block, place, arrivals, total) if self.reads_drive(block) else 0.0
+        drive = self.drive(population, place, arrivals, total) if self.reads_drive(population) else 0.0
         self.advance(number, place, neuron, drive)
         if taken:
             code.indent -= 1
@@ -125,21 +127,21 @@ class StepCode:
             code.line(f"if (held[{neuron}])")
             code.line(f"    activity[{neuron}] = holding[{neuron}];")
 
-    def reads_drive(self, block: Block) -> bool:
-        """Whether the model of a block takes what arrives."""
-        return "drive" in block.model.definition.read
+    def reads_drive(self, population: Population) -> bool:
+        """Whether the model of a population takes what arrives."""
+        return "drive" in population.model.definition.read
 
-    def drive(self, block: Block, place: Place, arrivals: Arrivals, total: str) -> Value:
+    def drive(self, population: Population, place: Place, arrivals: Arrivals, total: str) -> Value:
         """u[t]: what arrives, combined, + bias + input + noise."""
         code, network = self.code, self.network
         drive: Value = total or arrivals.combined(place)
-        bias = code.settable(BIAS, network.neurons.bias, block.members, place)
+        bias = code.settable(BIAS, network.neurons.bias, population.members, place)
         if isinstance(drive, float) and isinstance(bias, float):
             drive += bias
-        elif isinstance(drive, float) or block.combine == "product" or bias != 0.0:
+        elif isinstance(drive, float) or population.drive.combine == "product" or bias != 0.0:
             # a sum that begins with 0 is never −0, so adding 0 changes nothing; a product may be
             drive = f"{code.text(drive)} + {code.text(bias)}"
-        for fed in (network.neurons.input[block.members], network.noise_index[block.members]):
+        for fed in (network.neurons.input[population.members], network.noise_index[population.members]):
             drive = self._fed(drive, fed, place)
         return code.let("u", drive)
 
@@ -158,19 +160,19 @@ class StepCode:
 
     def advance(self, number: int, place: Place, neuron: Place, drive: Value) -> None:
         """The states of a neuron from old ones and the drive, its activity from the new ones; the episode's end."""
-        code, block = self.code, self.network.blocks[number]
+        code, population = self.code, self.network.populations[number]
 
         def activation(x: Value, formula: Tree) -> Value:
-            parameters = code.parameters(block.activation, place)
+            parameters = code.parameters(population.activation, place)
             known = parameters | ({"x": code.let("x", x)} if "x" in names(formula) else {})
             return code.let("y", code.value(formula, known))
 
         functions = {
-            name: partial(activation, formula=tree) for name, tree in block.activation.definition.functions.items()
+            name: partial(activation, formula=tree) for name, tree in population.activation.definition.functions.items()
         }
-        seen = code.parameters(block.model, place) | {"drive": drive}
-        stored = self.states(block.model, place)
-        new, given = self.change(block.model.definition, seen, stored, functions)
+        seen = code.parameters(population.model, place) | {"drive": drive}
+        stored = self.states(population.model, place)
+        new, given = self.change(population.model.definition, seen, stored, functions)
         self.store([(stored[name], value) for name, value in new.items()])
         self.store([(f"activity[{neuron}]", given["activity"])])
 
@@ -251,7 +253,7 @@ class StepCode:
         code = self.code
         which = ~self.fuses if self.form.fused else np.ones(len(self.fuses), dtype=np.bool_)
         for number in self.sent_with:
-            which[self.network.plasticity[number].members] = False
+            which[self.network.projections[number].members] = False
         self.leave(which)
         if self.depth:
             n = len(self.network.neurons)
@@ -283,8 +285,8 @@ class StepCode:
     # ---- connections -------------------------------------------------------------------------------------------
 
     def learn(self, number: int) -> None:
-        """The rule of a plasticity."""
-        code, count = self.code, len(self.network.plasticity[number].members)
+        """The rule of a projection."""
+        code, count = self.code, len(self.network.projections[number].members)
         if self.form.written_out:
             for place in range(count):
                 with code.block(""):
@@ -307,7 +309,7 @@ class StepCode:
         what is stored adds 0, or NaN where it is not finite."""
         code, leaving = self.code, []
         if number in self.sent_with:
-            leaving = [self.leaving(self.network.plasticity[number].members, place) for place in places]
+            leaving = [self.leaving(self.network.projections[number].members, place) for place in places]
             leaving = [(slot, code.let("s", signal)) for slot, signal in leaving]
         if self.form.still:
             self.store(leaving)
@@ -332,8 +334,8 @@ class StepCode:
     def connection(self, number: int, place: Place) -> list[tuple[str, Value]]:
         """The weight and the states of one connection, at a step and, where it has one, at an episode's end: where
         each is stored, and what."""
-        code, plasticity = self.code, self.network.plasticity[number]
-        connection = code.at(plasticity.members, place)
+        code, projection = self.code, self.network.projections[number]
+        connection = code.at(projection.members, place)
         if self.form.still:
             if isinstance(place, int):
                 code.line(f"if (!still[{connection}]) {{")
@@ -341,18 +343,18 @@ class StepCode:
             else:
                 code.line(f"if (still[{connection}])")
                 code.line("    continue;")
-        seen = code.parameters(plasticity.rule, place) | self.seen(plasticity, place)
-        stored = {**self.states(plasticity.rule, place), "weight": f"weights[{connection}]"}
+        seen = code.parameters(projection.rule, place) | self.seen(projection, place)
+        stored = {**self.states(projection.rule, place), "weight": f"weights[{connection}]"}
 
         def bounded(name: str, value: Value) -> Value:
-            return self.bounded(plasticity, place, value) if name == "weight" else value
+            return self.bounded(projection, place, value) if name == "weight" else value
 
-        new, _ = self.change(plasticity.rule.definition, seen, stored, bounded=bounded)
+        new, _ = self.change(projection.rule.definition, seen, stored, bounded=bounded)
         return [(stored[name], value) for name, value in new.items()]
 
-    def bounded(self, plasticity: Plasticity, place: Place, weight: Value) -> Value:
+    def bounded(self, projection: Projection, place: Place, weight: Value) -> Value:
         """A new weight within its bounds."""
-        code, connections, members = self.code, self.network.connections, plasticity.members
+        code, connections, members = self.code, self.network.connections, projection.members
         for function, array, values in (
             ("nv_max", LOW, connections.low.whole()),
             ("nv_min", HIGH, connections.high.whole()),
@@ -363,32 +365,32 @@ class StepCode:
                 weight = f"{function}({code.text(weight)}, {bound})"
         return code.let("n", weight)
 
-    def seen(self, plasticity: Plasticity, place: Place) -> dict[str, Value]:
+    def seen(self, projection: Projection, place: Place) -> dict[str, Value]:
         """What a rule may read besides its own: pre, sent, post, the signals."""
-        code, connections, members = self.code, self.network.connections, plasticity.members
+        code, connections, members = self.code, self.network.connections, projection.members
         sources, targets = connections.sources[members], connections.targets[members]
-        source, read = code.at(sources, place), plasticity.rule.definition.read
+        source, read = code.at(sources, place), projection.rule.definition.read
         seen: dict[str, Value] = {
             "sent": f"activity[{source}]",
             "post": f"activity[{code.at(targets, place)}]",
             "pre": f"activity[{source}]",
         }
         if self.depth and "pre" in read:
-            seen["pre"] = self.remembered(plasticity, source, place)
-        for name, indices in plasticity.signals.items():
+            seen["pre"] = self.remembered(projection, source, place)
+        for name, indices in projection.signals.items():
             seen[name] = self.signal(indices, place)
         return {name: value for name, value in seen.items() if name in read}
 
-    def remembered(self, plasticity: Plasticity, source: Place, place: Place) -> Value:
+    def remembered(self, projection: Projection, source: Place, place: Place) -> Value:
         """a_j[t−d], 0 where what was sent then is lost."""
-        code, delays = self.code, self.network.connections.delays[plasticity.members]
+        code, delays = self.code, self.network.connections.delays[projection.members]
         own = delays if not isinstance(place, int) else delays[place : place + 1]
         if not own.any():
             return f"activity[{source}]"
         past = self.past(delays, own, source, place)
         if not self.form.lost:
             return past
-        lost = f"lost[{code.at(plasticity.members, place)}]"
+        lost = f"lost[{code.at(projection.members, place)}]"
         return code.let("a", f"k - ({code.at(delays, place)}) < {lost} ? {code.text(0.0)} : {past}")
 
     def past(self, delays: IntArray, own: IntArray, source: Place, place: Place) -> str:
@@ -426,3 +428,30 @@ def read_through(let: tuple[tuple[str, Tree], ...], readers: list[Tree | None]) 
         if name in wanted:
             wanted |= names(tree)
     return wanted
+
+
+@singledispatch
+def write(operation: Operation, step: StepCode) -> None:
+    """The lines of an operation of the program. Raises TypeError for one that is not registered."""
+    raise TypeError(f"there is no C for {type(operation).__name__}")
+
+
+@write.register(ReadInputs)
+@write.register(Gather)
+def _together(operation: ReadInputs | Gather, step: StepCode) -> None:
+    """Nothing: ``s`` holds the inputs, and what a population gathers is computed neuron by neuron, with its update."""
+
+
+@write.register
+def _update(operation: Update, step: StepCode) -> None:
+    step.population(operation.population)
+
+
+@write.register
+def _send(operation: Send, step: StepCode) -> None:
+    step.send()
+
+
+@write.register
+def _learn(operation: Learn, step: StepCode) -> None:
+    step.learn(operation.projection)

@@ -16,7 +16,7 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.body import Skeleton
 from neurovis_spec.compiler.names.state_references import StateOf, singles
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Block, Owner, Plasticity
+from neurovis_spec.compiler.program import Owner, Population, Projection
 from neurovis_spec.runtime.kinds import Rows, Widths
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.recording import After, Recording
@@ -135,7 +135,7 @@ def probe_of(network: Network, states: Iterable[StateOf]) -> Probe:
 
 def _probe(network: Network, wanted: list[tuple[str, str, int]]) -> Probe:
     places: dict[tuple[Owner, str], tuple[list[int], list[int]]] = {}
-    located: dict[str, tuple[Sequence[Block | Plasticity], IntArray, IntArray]] = {}
+    located: dict[str, tuple[Sequence[Population | Projection], IntArray, IntArray]] = {}
     for column, (state, what, index) in enumerate(wanted):
         if what not in located:
             located[what] = _located(network, what)
@@ -158,10 +158,10 @@ def _probe(network: Network, wanted: list[tuple[str, str, int]]) -> Probe:
     return Probe(tuple(names), parts)
 
 
-def _located(network: Network, what: str) -> tuple[Sequence[Block | Plasticity], IntArray, IntArray]:
-    """The blocks, for each neuron its own, and its place there; or the plasticities, for each connection; −1 without
-    one."""
-    holders: Sequence[Block | Plasticity] = network.plasticity if what == "connection" else network.blocks
+def _located(network: Network, what: str) -> tuple[Sequence[Population | Projection], IntArray, IntArray]:
+    """The populations, for each neuron its own, and its place there; or the projections, for each connection; −1
+    without one."""
+    holders: Sequence[Population | Projection] = network.projections if what == "connection" else network.populations
     count = len(network.connections if what == "connection" else network.neurons)
     numbers, positions = np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=np.int64)
     for number, holder in enumerate(holders):

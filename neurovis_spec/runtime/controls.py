@@ -114,15 +114,15 @@ class Controls:
         self.restructure(state)
 
     def hold(self, now: Conditions) -> None:
-        """Work out what is held in each block."""
+        """Work out what is held in each population."""
         holding = (now.held.order >= 0) | now.lesioned_neurons
         if not holding.any():
             now.holds = None
             return
         values = np.where(now.lesioned_neurons, 0.0, now.held.value)
         holds: list[tuple[IntArray, FloatArray] | None] = []
-        for block in self.network.blocks:
-            own = block.members[holding[block.members]]
+        for population in self.network.populations:
+            own = population.members[holding[population.members]]
             holds.append((own, values[own]) if len(own) else None)
         now.holds = tuple(holds)
 

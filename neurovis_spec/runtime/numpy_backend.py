@@ -11,11 +11,10 @@ from dataclasses import replace
 
 from neurovis_spec.arrays import FloatArray, subscript
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Block, Gather, Learn, ReadInputs, Send, Update
+from neurovis_spec.compiler.program import Population
 from neurovis_spec.runtime.backend import Availability, Capabilities
-from neurovis_spec.runtime.numpy_blocks import emit_gather, emit_send, emit_update
 from neurovis_spec.runtime.numpy_code import Code
-from neurovis_spec.runtime.numpy_learn import emit_history, emit_learn
+from neurovis_spec.runtime.numpy_operations import Step, emit
 from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.state import Mask, State, Structure
@@ -33,7 +32,7 @@ class NumpyStepper:
         self.network = network
         self._structure: Structure | None = None
         self._changing = subscript(network.changing)
-        operations = len(network.blocks) + len(network.plasticity)
+        operations = len(network.populations) + len(network.projections)
         size = len(network.neurons) + len(network.connections) + _OPERATION * operations
         self.at_once = max(1, _AT_ONCE // (size + 1))
 
@@ -85,27 +84,23 @@ class NumpyBackend:
 
 def step_code(network: Network, structure: Structure) -> Code:
     """The code of one step, operation by operation, without what the structure leaves out."""
-    code, layout, depth = Code(network.dt, network.settable.variables), signal_layout(network), history_depth(network)
     if structure.gone.any():
-        network = replace(network, blocks=tuple(_without(block, structure.gone) for block in network.blocks))
-    drives: dict[int, str] = {}
+        populations = tuple(_without(population, structure.gone) for population in network.populations)
+        network = replace(network, populations=populations)
+    code = Code(network.dt, network.settable.variables)
+    step = Step(code, network, structure, signal_layout(network), history_depth(network), {})
     for operation in network.program:
-        match operation:
-            case ReadInputs():
-                pass  # done by the caller: ``s`` holds them
-            case Gather(block=number):
-                drives[number] = emit_gather(code, network, layout, operation)
-            case Update(block=number):
-                emit_update(code, network, operation, drives[number])
-            case Send():
-                emit_send(code, network, layout)
-                emit_history(code, depth)
-            case Learn(plasticity=number):
-                emit_learn(code, network, number, depth, structure)
+        emit(operation, step)
     return code
 
 
-def _without(block: Block, gone: Mask) -> Block:
-    """A block without some connections."""
-    keep = ~gone[block.incoming]
-    return block if keep.all() else replace(block, incoming=block.incoming[keep], slots=block.slots[keep])
+def _without(population: Population, gone: Mask) -> Population:
+    """A population without some connections."""
+    keep = [~gone[port.incoming] for port in population.ports]
+    if all(some.all() for some in keep):
+        return population
+    ports = (
+        replace(port, incoming=port.incoming[some], slots=port.slots[some])
+        for port, some in zip(population.ports, keep, strict=True)
+    )
+    return replace(population, ports=tuple(ports))

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Plasticity
+from neurovis_spec.compiler.program import Projection
 
 
 def history_depth(network: Network) -> int:
@@ -29,5 +29,5 @@ def remembering(network: Network) -> npt.NDArray[np.bool_]:
     return reading & (network.connections.delays.whole() > 0)
 
 
-def _readers_of_pre(network: Network) -> list[Plasticity]:
-    return [entry for entry in network.plasticity if "pre" in entry.rule.definition.read]
+def _readers_of_pre(network: Network) -> list[Projection]:
+    return [entry for entry in network.projections if any("pre" in use.definition.read for use in entry.uses)]

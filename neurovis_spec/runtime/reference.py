@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from functools import singledispatch
 from types import MappingProxyType
 from typing import NamedTuple
 
 from neurovis_spec.arrays import FloatArray, FloatColumn
 from neurovis_spec.compiler.events.settable import BIAS, CENTRES, HIGH, LOW
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Block, Gather, Key, Learn, ReadInputs, Send, Update, Use
+from neurovis_spec.compiler.program import Gather, Key, Learn, Operation, Population, ReadInputs, Send, Update, Use
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.functions import PLAIN
 from neurovis_spec.language.expressions.tree import Tree
@@ -50,40 +51,31 @@ class ReferenceBackend:
 
 
 class ReferenceStepper:
-    """One network; ``step`` executes its program once."""
+    """One network; ``step`` executes its program once, each operation as it is registered with ``perform``."""
 
     def __init__(self, network: Network) -> None:
         self.network, self.functions = network, PLAIN
         self.offsets = signal_layout(network).offsets
+        #: u[t] of the members of each population, as they were gathered last
+        self.drives: dict[int, list[float]] = {}
 
     def step(self, state: State, inputs: FloatArray, /) -> None:
         """Execute the operations of the program in order."""
-        drives: dict[int, list[float]] = {}
         for operation in self.network.program:
-            match operation:
-                case ReadInputs():
-                    pass  # done by the caller: ``inputs`` holds them
-                case Gather(block=number):
-                    drives[number] = self.gather(self.network.blocks[number], state, inputs)
-                case Update(block=number):
-                    self.update(number, drives[number], state)
-                case Send():
-                    self.send(state)
-                case Learn(plasticity=number):
-                    self.learn(number, state, inputs)
+            perform(operation, self, state, inputs)
         state.k += 1
 
-    def gather(self, block: Block, state: State, inputs: FloatArray) -> list[float]:
+    def gather(self, population: Population, state: State, inputs: FloatArray) -> list[float]:
         """u[t] of each member: what arrives, combined, + bias + input + noise (§5.2)."""
         connections, neurons = self.network.connections, self.network.neurons
-        arriving: list[list[tuple[float, float]]] = [[] for _ in block.members]
-        for connection, slot in zip(block.incoming.tolist(), block.slots.tolist(), strict=True):
+        arriving: list[list[tuple[float, float]]] = [[] for _ in population.members]
+        for connection, slot in zip(population.drive.incoming.tolist(), population.drive.slots.tolist(), strict=True):
             if not state.conditions.structure.gone[connection]:
                 signal = self.arriving(connection, state)
                 arriving[slot].append((signal, self.number(CENTRES, connections.centres, connection, state)))
         drives = []
-        for neuron, signals in zip(block.members.tolist(), arriving, strict=True):
-            drive = combined(block.combine, signals) + self.number(BIAS, neurons.bias, neuron, state)
+        for neuron, signals in zip(population.members.tolist(), arriving, strict=True):
+            drive = combined(population.drive.combine, signals) + self.number(BIAS, neurons.bias, neuron, state)
             if neurons.input[neuron] >= 0:
                 drive += float(inputs[neurons.input[neuron]])
             if self.network.noise_index[neuron] >= 0:
@@ -115,9 +107,9 @@ class ReferenceStepper:
         return float(state.signals[self.offsets[connection] + state.k % delay])
 
     def update(self, number: int, drives: list[float], state: State) -> None:
-        """The states of a block from old states and the drive, then the activities from the new ones."""
-        block, neurons = self.network.blocks[number], self.network.neurons
-        for position, neuron in enumerate(block.members.tolist()):
+        """The states of a population from old states and the drive, then the activities from the new ones."""
+        population, neurons = self.network.populations[number], self.network.neurons
+        for position, neuron in enumerate(population.members.tolist()):
             initial = float(neurons.initial[neuron])
             if state.k == 0 and not state.continued and not math.isnan(initial):
                 state.activity[neuron] = initial
@@ -129,14 +121,14 @@ class ReferenceStepper:
 
     def advance(self, number: int, position: int, drive: float, state: State) -> float:
         """One neuron's step: its states are replaced, its activity is returned."""
-        block = self.network.blocks[number]
-        shape = self.known(block.activation, position, state)
+        population = self.network.populations[number]
+        shape = self.known(population.activation, position, state)
         functions = {
             name: lambda x, value=value: evaluate(value, shape | {"x": x})
-            for name, value in block.activation.definition.functions.items()
+            for name, value in population.activation.definition.functions.items()
         }
-        seen = self.known(block.model, position, state) | {"drive": drive}
-        return self.change(block.model, position, seen, state, {}, functions)["activity"]
+        seen = self.known(population.model, position, state) | {"drive": drive}
+        return self.change(population.model, position, seen, state, {}, functions)["activity"]
 
     def change(
         self,
@@ -175,21 +167,21 @@ class ReferenceStepper:
 
     def learn(self, number: int, state: State, inputs: FloatArray) -> None:
         """w[t+1] and the states of a rule from old values; at an episode's end, once more from what these gave."""
-        plasticity = self.network.plasticity[number]
-        for position, connection in enumerate(plasticity.members.tolist()):
+        projection = self.network.projections[number]
+        for position, connection in enumerate(projection.members.tolist()):
             if not state.conditions.structure.still[connection]:
                 self.learn_one(number, position, connection, state, inputs)
 
     def learn_one(self, number: int, position: int, connection: int, state: State, inputs: FloatArray) -> None:
         """The weight and the states of one connection."""
-        plasticity, connections = self.network.plasticity[number], self.network.connections
+        projection, connections = self.network.projections[number], self.network.connections
         low = self.number(LOW, connections.low, connection, state)
         high = self.number(HIGH, connections.high, connection, state)
-        seen = self.known(plasticity.rule, position, state) | self.seen(connection, state)
+        seen = self.known(projection.rule, position, state) | self.seen(connection, state)
         both = (*state.activity.tolist(), *inputs.tolist())
-        seen |= {signal: both[indices[position]] for signal, indices in plasticity.signals.items()}
+        seen |= {signal: both[indices[position]] for signal, indices in projection.signals.items()}
         weight = Bounded(float(state.weights[connection]), low, high)
-        made = self.change(plasticity.rule, position, seen, state, {"weight": weight})
+        made = self.change(projection.rule, position, seen, state, {"weight": weight})
         state.weights[connection] = made["weight"]
 
     def seen(self, connection: int, state: State) -> dict[str, float]:
@@ -252,3 +244,34 @@ def changed(
         name: min(max(value, bounds[name].low), bounds[name].high) for name, value in new.items() if name in bounds
     }
     return {**old, **new, **within}
+
+
+@singledispatch
+def perform(operation: Operation, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
+    """Carry out an operation of the program. Raises TypeError for one that is not registered."""
+    raise TypeError(f"the reference does not know how to {type(operation).__name__}")
+
+
+@perform.register
+def _read(operation: ReadInputs, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
+    """Nothing: ``inputs`` holds what the caller has read."""
+
+
+@perform.register
+def _gather(operation: Gather, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
+    by.drives[operation.population] = by.gather(by.network.populations[operation.population], state, inputs)
+
+
+@perform.register
+def _update(operation: Update, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
+    by.update(operation.population, by.drives[operation.population], state)
+
+
+@perform.register
+def _send(operation: Send, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
+    by.send(state)
+
+
+@perform.register
+def _learn(operation: Learn, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
+    by.learn(operation.projection, state, inputs)

@@ -2,7 +2,8 @@
 
 In: a Network. Out: a SignalLayout. The signal that connection c sends at step t lies in slot
 ``offsets[c] + t mod d``: it is read there when it arrives, at t + d, and then overwritten by the one sent at t + d.
-Connections of the same delay into the same block lie next to each other, so that a backend reads them as one slice.
+Connections of the same delay into the same population lie next to each other, so that a backend reads them as one
+slice.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ class DelayClass:
     delay: int
     start: int
     connections: IntArray
-    #: block of the target of each
-    blocks: IntArray
+    #: population of the target of each
+    populations: IntArray
 
     @property
     def stop(self) -> int:
@@ -41,20 +42,20 @@ class SignalLayout:
 
 
 def signal_layout(network: Network) -> SignalLayout:
-    """Lay the slots out by delay, then by block of the target, then in the order of the connections."""
+    """Lay the slots out by delay, then by population of the target, then in the order of the connections."""
     connections = network.connections
     block_of = np.zeros(len(network.neurons), dtype=np.int64)
-    for number, block in enumerate(network.blocks):
-        block_of[block.members] = number
-    blocks = block_of[connections.targets.whole()]
+    for number, population in enumerate(network.populations):
+        block_of[population.members] = number
+    populations = block_of[connections.targets.whole()]
     offsets = np.full(len(connections), -1, dtype=np.int64)
     classes: list[DelayClass] = []
     size = 0
     # the counts take no more memory than the slots of one connection with the longest delay
     for delay in (np.flatnonzero(np.bincount(connections.delays.whole())[1:]) + 1).tolist():
         members = np.flatnonzero(connections.delays.whole() == delay)
-        members = members[np.argsort(blocks[members], kind="stable")]
+        members = members[np.argsort(populations[members], kind="stable")]
         offsets[members] = size + delay * np.arange(len(members))
-        classes.append(DelayClass(delay, size, members, blocks[members]))
+        classes.append(DelayClass(delay, size, members, populations[members]))
         size += delay * len(members)
     return SignalLayout(offsets, size, tuple(classes))

@@ -64,8 +64,8 @@ class Structure:
 class Conditions:
     """What holds for the step to come: ``parameters`` and ``chosen`` (one a slot: its value, and whether it was set),
     ``variables`` as in ``Settable``, what is ``held``, ``lesioned_neurons`` (n,), ``lesioned_connections`` (m,) by
-    name, ``paused`` (m,) connections whose rules are stopped. ``holds`` says for each block which neurons are held at
-    what, None where none is; it is None as a whole where nothing is held."""
+    name, ``paused`` (m,) connections whose rules are stopped. ``holds`` says for each population which neurons are held
+    at what, None where none is; it is None as a whole where nothing is held."""
 
     parameters: FloatArray
     chosen: Mask

@@ -111,7 +111,7 @@ class Watch:
 def carried_by(network: Network, state: State) -> list[FloatArray]:
     """What a state carries to the next step and may not be finite, in pieces. Where activities and weights are, the
     signals that leave, products of both, are as well."""
-    learned = [state.weights] if network.plasticity else []
+    learned = [state.weights] if network.projections else []
     arrays = [state.activity, *learned, *chain.from_iterable(own.values() for own in state.cells.values())]
     return [piece for values in arrays for piece in _pieces(values)]
 

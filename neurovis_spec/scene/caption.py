@@ -33,7 +33,7 @@ def _decimals(dt: float) -> int:
 
 def _error(network: Network, activity: FloatArray) -> str | None:
     """target − post where exactly one rule has a signal ``target``; the root mean square where they are several."""
-    aims = [plasticity for plasticity in network.plasticity if "target" in plasticity.signals]
+    aims = [projection for projection in network.projections if "target" in projection.signals]
     if len(aims) != 1:
         return None
     sources, targets = aims[0].signals["target"], network.connections.targets[aims[0].members]

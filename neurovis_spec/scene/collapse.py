@@ -19,7 +19,7 @@ from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, Mirr
 from neurovis_spec.compiler.events.changes import Change
 from neurovis_spec.compiler.events.settable import Settable
 from neurovis_spec.compiler.network import Connections, Group, Instance, Network, Neurons
-from neurovis_spec.compiler.program import Plasticity
+from neurovis_spec.compiler.program import Projection
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.lesions import lesions_of
 from neurovis_spec.scene.reached import Reached, reached, reached_by
@@ -206,9 +206,9 @@ class _Gatherer:
             inputs=(),
             outputs=(),
             noises=(),
-            blocks=(),
+            populations=(),
             program=(),
-            plasticity=self._plasticity(),
+            projections=self._plasticity(),
             layout=self._layout(),
             render=self._render(),
             instances=self._instances(),
@@ -326,11 +326,11 @@ class _Gatherer:
             (*old.labels, *(None for _ in entries[len(old.labels) :])),
         )
 
-    def _plasticity(self) -> tuple[Plasticity, ...]:
+    def _plasticity(self) -> tuple[Projection, ...]:
         """Rules whose signals and targets are neurons that are drawn: these are taught, and have an error."""
         count, result = len(self.whole.neurons), []
         targets = self.whole.connections.targets.whole()
-        for one in self.whole.plasticity:
+        for one in self.whole.projections:
             ends = [targets[one.members], *one.signals.values()]
             drawn = all(
                 (index < count).all() and not any(unit in self.glyphs for unit in self.unit[index].tolist())
@@ -342,7 +342,7 @@ class _Gatherer:
             members, first = np.unique(bundle, return_index=True)
             signals = {name: self.unit[index[first]] for name, index in one.signals.items()}
             parameters = {name: values[first] for name, values in one.rule.parameters.items()}
-            result.append(Plasticity(members, replace(one.rule, parameters=parameters), signals))
+            result.append(Projection(members, (replace(one.rule, parameters=parameters),), signals))
         return tuple(result)
 
     def _layout(self) -> LayoutSettings:

@@ -1,4 +1,4 @@
-"""Who teaches whom: the signals of plasticity rules, as quiet dotted lines.
+"""Who teaches whom: the signals of projection rules, as quiet dotted lines.
 
 In: a network's rules and where its neurons are. Out: a dotted spline from each neuron that is a signal of a rule to
 the neuron whose connections learn by it. Signals that come from inputs alone have no neuron to start from.
@@ -36,12 +36,12 @@ class Teacher:
 def teachers_of(network: Network) -> list[Teacher]:
     """Every pair once, in the order of the rules; none from a neuron to itself."""
     found: dict[tuple[int, int], Teacher] = {}
-    for plasticity in network.plasticity:
-        for signal, sources in plasticity.signals.items():
-            for source, target in zip(sources.tolist(), network.connections.targets[plasticity.members], strict=True):
+    for projection in network.projections:
+        for signal, sources in projection.signals.items():
+            for source, target in zip(sources.tolist(), network.connections.targets[projection.members], strict=True):
                 if source < len(network.neurons) and source != target:
                     pair = (int(source), int(target))
-                    found.setdefault(pair, Teacher(*pair, signal, plasticity.rule.definition.name))
+                    found.setdefault(pair, Teacher(*pair, signal, projection.rule.definition.name))
     return list(found.values())
 
 

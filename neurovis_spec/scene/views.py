@@ -267,8 +267,8 @@ class Maker:
             return Note("there is no neuron to show")
         recording.check_whole("a raster cannot be drawn from")
         stateful = np.zeros(len(network.neurons), np.bool_)
-        for block in network.blocks:
-            stateful[block.members] = bool(block.model.definition.state)
+        for population in network.populations:
+            stateful[population.members] = bool(population.model.definition.state)
         group_of = {index: group.name for group in network.neurons.groups for index in group.indices}
         groups = [group_of[index] for index in neurons.tolist()]
         bands = bands_of(groups), bands_of([group.partition(".")[0] for group in groups])

@@ -17,7 +17,7 @@ from neurovis_spec.compiler.names.references import Section
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.groups import Chosen
-from neurovis_spec.compiler.neurons.populate import Population
+from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.library import Library as Definitions
 from neurovis_spec.language.located import Located
@@ -48,7 +48,7 @@ class Compiled:
     used: Collection[str]
     network: Network
     bundles: tuple[Bundle, ...]
-    population: Population
+    census: Census
     included: tuple[Definitions, ...]
 
     @cached_property
@@ -74,7 +74,7 @@ class Compiled:
     @property
     def models(self) -> Iterator[tuple[Chosen, GroupModel]]:
         """Every group of every scope: what its neurons are, and how it is written."""
-        return ((one.kind, one.model) for one in self.population.groups)
+        return ((one.kind, one.model) for one in self.census.groups)
 
     @property
     def libraries(self) -> tuple[Definitions, ...]:

@@ -166,7 +166,7 @@ def _check_unused(compiled: Compiled, findings: Findings) -> None:
     used = {
         ACTIVATION.section: {group.activation for group in network.neurons.groups},
         MODEL.section: {group.model for group in network.neurons.groups},
-        RULE.section: {one.rule.definition.name for one in network.plasticity},
+        RULE.section: {one.rule.definition.name for one in network.projections},
     }
     modules = [library.source.get("modules") for library in compiled.libraries]
     named = {text for node in modules if node is not None for text in _texts(node)}

@@ -80,7 +80,7 @@ def _is_one(name: str, compiled: Compiled, place: int) -> bool:
     """Whether a reference of a scope names a neuron itself, no group or instance that is counted."""
     head, dot, rest = name.partition(".")
     if not dot:
-        return name in compiled.population.directories[place].neurons
+        return name in compiled.census.directories[place].neurons
     scope = compiled.scopes[place]
     inside = known(scope.children.get(head, ()), ())
     counted = head in scope.section.instances and scope.section.instances[head].count is not None

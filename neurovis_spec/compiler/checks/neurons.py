@@ -21,7 +21,7 @@ from neurovis_spec.compiler.events.settable import BIAS
 from neurovis_spec.compiler.names.references import key_span
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.initial_states import starts_of
-from neurovis_spec.compiler.program import Block, Definition
+from neurovis_spec.compiler.program import Definition, Population
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
@@ -107,22 +107,22 @@ def _idle(network: Network) -> Mask:
     quiet: Mask = (neurons.input < 0) & (neurons.bias == 0) & np.isnan(neurons.initial)
     for noise in network.noises:
         quiet[noise.members] = False
-    for block in network.blocks:
-        if block.combine == "distance":  # |c| away from a signal of 0
-            quiet[connections.targets[block.incoming]] = False
+    for population in network.populations:
+        if population.drive.combine == "distance":  # |c| away from a signal of 0
+            quiet[connections.targets[population.drive.incoming]] = False
     if not len(connections):
         quiet &= _needed(network)
     if not quiet.any():
         return quiet
-    for block in network.blocks:
-        quiet[block.members] &= _stays_at_zero(block, network)
+    for population in network.populations:
+        quiet[population.members] &= _stays_at_zero(population, network)
     for binding in network.set_by_events:  # what an event makes of a neuron is not checked
         if binding.array == BIAS:
             quiet[binding.places] = False
     owners = {binding.array.owner for binding in network.set_by_events}
-    for block in network.blocks:
-        if any(use.owner in owners for use in block.uses):
-            quiet[block.members] = False
+    for population in network.populations:
+        if any(use.owner in owners for use in population.uses):
+            quiet[population.members] = False
     idle = _unreached(quiet, connections.sources.whole(), connections.targets.whole())
     return _first(idle, connections.sources.whole(), connections.targets.whole()) if idle.any() else idle
 
@@ -133,8 +133,8 @@ def _needed(network: Network) -> Mask:
     needed = np.zeros(n, dtype=np.bool_)
     for output in network.outputs:
         needed[output.neurons] = True
-    for plasticity in network.plasticity:
-        for signal in plasticity.signals.values():
+    for projection in network.projections:
+        for signal in projection.signals.values():
             needed[signal[signal < n]] = True
     return needed
 
@@ -214,15 +214,15 @@ def _first(idle: Mask, sources: Indices, targets: Indices) -> Mask:
     return result
 
 
-def _stays_at_zero(block: Block, network: Network) -> Mask:
-    """Whether the neurons of a block, never driven, surely keep their states and an activity of 0: then all that their
-    formulas read stays what it is at the first step."""
-    count, model = len(block.members), block.model.definition
-    if block.combine == "product" or not model.read.isdisjoint(("k", "t")):
+def _stays_at_zero(population: Population, network: Network) -> Mask:
+    """Whether the neurons of a population, never driven, surely keep their states and an activity of 0: then all that
+    their formulas read stays what it is at the first step."""
+    count, model = len(population.members), population.model.definition
+    if population.drive.combine == "product" or not model.read.isdisjoint(("k", "t")):
         return np.zeros(count, dtype=np.bool_)
     result = np.ones(count, dtype=np.bool_)
-    values: dict[str, Value] = {**CONSTANTS, "dt": network.dt, **block.model.parameters, "drive": 0.0}
-    states = starts_of(block.model, block.members, network.dt, network.neurons.starts)
+    values: dict[str, Value] = {**CONSTANTS, "dt": network.dt, **population.model.parameters, "drive": 0.0}
+    states = starts_of(population.model, population.members, network.dt, network.neurons.starts)
     values |= states
     for name, tree in model.let:
         values[name] = evaluate_array(tree, values)
@@ -230,17 +230,17 @@ def _stays_at_zero(block: Block, network: Network) -> Mask:
         for change in (state.each_step, state.each_episode):
             if change is not None:
                 result &= np.broadcast_to(evaluate_array(change, values) == states[state.name], (count,))
-    result &= np.broadcast_to(_activity(block, values) == 0, (count,))
+    result &= np.broadcast_to(_activity(population, values) == 0, (count,))
     return result
 
 
-def _activity(block: Block, values: dict[str, Value]) -> Value:
+def _activity(population: Population, values: dict[str, Value]) -> Value:
     """The model's activity; f is the neurons' activation."""
-    given = {**values, **block.activation.parameters}
+    given = {**values, **population.activation.parameters}
     functions = {
         name: lambda x, tree=tree: evaluate_array(tree, {**given, "x": x})
-        for name, tree in block.activation.definition.functions.items()
+        for name, tree in population.activation.definition.functions.items()
     }
-    activity = block.model.definition.given.each_step
+    activity = population.model.definition.given.each_step
     assert activity is not None
     return evaluate_array(activity, values, functions=functions)

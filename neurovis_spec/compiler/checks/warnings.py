@@ -70,7 +70,7 @@ def _events(compiled: Compiled, findings: Findings) -> None:
         from neurovis_spec.compiler.checks.event_warnings import check_events
 
         steps = None if spec.time is None or spec.time.steps is None else network.steps
-        directory, constants = compiled.population.directory, compiled.scopes[0].constants
+        directory, constants = compiled.census.directory, compiled.scopes[0].constants
         check_events(spec.events, directory, constants, steps, findings)
 
 
@@ -79,8 +79,8 @@ def _inputs(compiled: Compiled, findings: Findings) -> None:
     network = compiled.network
     n = len(network.neurons)
     read = set(network.neurons.input.tolist())
-    for plasticity in network.plasticity:
-        for signal in plasticity.signals.values():
+    for projection in network.projections:
+        for signal in projection.signals.values():
             read.update(place - n for place in set(signal.tolist()))
     for section, scopes in compiled.sections:
         handed = {outer.value for instance in section.instances.values() for outer in instance.inputs.values()}

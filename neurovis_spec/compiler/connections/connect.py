@@ -1,6 +1,6 @@
 """Connections: from the entries of a spec to structures of arrays.
 
-In: the ``connections`` section, the Population, Constants, Definitions. Out: Connections in the order written (a
+In: the ``connections`` section, the Census, Constants, Definitions. Out: Connections in the order written (a
 matrix or pattern row by row), and for each plastic entry what it learns by.
 """
 
@@ -17,7 +17,7 @@ from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.compiler.names.references import Directory, arrow_of, resolve_sum
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import Connections
-from neurovis_spec.compiler.neurons.populate import Population
+from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.sections import written
@@ -44,13 +44,13 @@ class Connected(NamedTuple):
 _NONE = np.zeros(0, dtype=np.int64)
 
 
-def connect(scopes: tuple[Scope, ...], population: Population, limits: Limits, seed: int) -> Connected:
+def connect(scopes: tuple[Scope, ...], census: Census, limits: Limits, seed: int) -> Connected:
     """The entries of all scopes, a scope's own before those of the instances within it. What is invalid in one instance
     of a module is so in all: it is said once. Of an invalid entry all that does not depend on that is checked."""
     result: list[Bundle] = []
     total = 0
     failed: set[str | None] = set()
-    for scope, directory in zip(scopes, population.directories, strict=True):
+    for scope, directory in zip(scopes, census.directories, strict=True):
         if scope.module is not None and scope.module in failed:
             continue
         section, findings = scope.section, scope.constants.findings
@@ -65,7 +65,7 @@ def connect(scopes: tuple[Scope, ...], population: Population, limits: Limits, s
                 name = f"{name} ({number[name]})"
             if body.contradictory:  # which key is meant is not known: nothing is held against the sizes of the ends
                 sources = targets = UNKNOWN
-            around = EntryContext(scope, directory, population, limits, seed, limits.connections - total)
+            around = EntryContext(scope, directory, census, limits, seed, limits.connections - total)
             bundle = EntryBuilder(around, key, body, name, sources, targets).build()
             if bundle is UNKNOWN or findings.errors > before:
                 failed.add(scope.module)

@@ -22,7 +22,7 @@ from neurovis_spec.compiler.limits import LONGEST_DELAY, Limits, amount
 from neurovis_spec.compiler.names.references import Directory
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.neurons.labels import check_length
-from neurovis_spec.compiler.neurons.populate import Population
+from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.values.constants import Constants, Randomness, Value
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.compiler.values.matrices import Grid, grid_of
@@ -80,7 +80,7 @@ class EntryContext(NamedTuple):
 
     scope: Scope
     directory: Directory
-    population: Population
+    census: Census
     limits: Limits
     seed: int
     room: int
@@ -232,7 +232,7 @@ class EntryBuilder:
             return UNKNOWN
         loops: bool | None = True if len(self.sources) == len(self.targets) == 1 else None
         loops = loops if self.body.self is None else self.body.self.value
-        position = self.around.population.neurons.position
+        position = self.around.census.neurons.position
         return Ends(self.sources, self.targets, loops, position[self.sources], position[self.targets])
 
     def _pattern(self) -> _Shape | Unknown:
@@ -240,7 +240,7 @@ class EntryBuilder:
         ends = UNKNOWN if self._misplaced() else self._ends()
         pairs = pairs_of(self.body.pattern, ends, self.constants, self._stream("edges"), self._fits)
         if ends is not UNKNOWN and self.body.pattern.name.value == "nearest":
-            self.around.population.go_by_position(np.concatenate((ends.sources, ends.targets)))
+            self.around.census.go_by_position(np.concatenate((ends.sources, ends.targets)))
         return UNKNOWN if pairs is UNKNOWN else _Shape(*pairs)
 
     def _all(self) -> _Shape | Unknown:
@@ -275,7 +275,7 @@ class EntryBuilder:
         """The places of an end's neurons by the names that they have in the scope."""
         if neurons is UNKNOWN:
             return End(UNKNOWN, self.around.directory)
-        called, own = self.around.population.neurons.names, len(self.around.scope.called(""))
+        called, own = self.around.census.neurons.names, len(self.around.scope.called(""))
         places = {called[neuron][own:]: place for place, neuron in enumerate(neurons.tolist())}
         return End(places, self.around.directory)
 
@@ -294,7 +294,7 @@ class EntryBuilder:
         if tree is UNKNOWN:
             return UNKNOWN
         if "distance" in names(tree):
-            position = self.around.population.neurons.position
+            position = self.around.census.neurons.position
             ends = position[self.sources[shape.i]], position[self.targets[shape.j]]
             if self._misplaced() or not all(np.isfinite(end).all() for end in ends):
                 if not self._misplaced():
@@ -309,7 +309,7 @@ class EntryBuilder:
             value = self.constants.value(formula, extra, randomness)
         if "distance" in extra:
             pairs = self.sources[shape.i], self.targets[shape.j]
-            distance = Distance(self.around.population.moving, *pairs)
+            distance = Distance(self.around.census.moving, *pairs)
             if distance.slots:
                 parts = [Part(self.constants.bound(tree, {**extra, "distance": distance}, randomness))]
         self.constants.follow(parts)
@@ -319,7 +319,7 @@ class EntryBuilder:
 
     def _misplaced(self) -> bool:
         """Whether what the spec says of a position of these neurons is invalid."""
-        misplaced = self.around.population.misplaced
+        misplaced = self.around.census.misplaced
         return any(end is not UNKNOWN and bool(misplaced[end].any()) for end in (self.sources, self.targets))
 
     def _weights(self, shape: _Shape | Unknown) -> FloatArray | Unknown:
@@ -366,7 +366,7 @@ class EntryBuilder:
 
     def _measures_distance(self) -> bool:
         """Whether any of the targets combines by distance, or may, where what it says of that is invalid."""
-        return self.targets is UNKNOWN or bool(self.around.population.by_distance[self.targets].any())
+        return self.targets is UNKNOWN or bool(self.around.census.by_distance[self.targets].any())
 
     def _bounds(self, weights: FloatArray | Unknown) -> tuple[float, float] | Unknown:
         bounds = self.body.bounds
@@ -406,7 +406,7 @@ class EntryBuilder:
             UNKNOWN if self.targets is UNKNOWN else len(self.targets),
             self.around.scope,
             self.around.directory,
-            len(self.around.population.neurons),
+            len(self.around.census.neurons),
         )
 
 

@@ -1,6 +1,6 @@
 """The ``figure`` of the section ``render``: which views a picture is made of, their references resolved.
 
-In: the section as written, the Population, the outputs, who finds what references name. Out: Panels, or findings with
+In: the section as written, the Census, the outputs, who finds what references name. Out: Panels, or findings with
 the nearest known names.
 """
 
@@ -14,7 +14,7 @@ from neurovis_spec.compiler.names.finder import Finder
 from neurovis_spec.compiler.names.references import Directory, resolve_part
 from neurovis_spec.compiler.names.state_references import StateOf
 from neurovis_spec.compiler.network import Output
-from neurovis_spec.compiler.neurons.populate import Population
+from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.diagnostics import Span, shorten
 from neurovis_spec.language.drawing import PanelModel
 from neurovis_spec.language.located import Located
@@ -25,20 +25,20 @@ from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
 
 def figure_of(
     spec: Spec,
-    population: Population,
+    census: Census,
     outputs: tuple[Output, ...],
     finder: Finder,
 ) -> tuple[Panel, ...]:
     """The views in the order written; those that are invalid are left out, and reported."""
     models = () if spec.render is None else spec.render.figure
-    reader = _Reader(population, {output.name: output for output in outputs}, frozenset(spec.outputs), finder)
+    reader = _Reader(census, {output.name: output for output in outputs}, frozenset(spec.outputs), finder)
     panels = [reader.panel(model) for model in models]
     return tuple(panel for panel in panels if panel is not UNKNOWN)
 
 
 @dataclass(frozen=True)
 class _Reader:
-    population: Population
+    census: Census
     outputs: dict[str, Output]
     #: the names of all outputs, also of those that are invalid
     declared: frozenset[str]
@@ -47,7 +47,7 @@ class _Reader:
     @property
     def directory(self) -> Directory:
         """The names of groups and neurons."""
-        return self.population.directory
+        return self.census.directory
 
     def panel(self, model: PanelModel) -> Panel | Unknown:
         """A view with what it shows; UNKNOWN where something of it is invalid."""
@@ -108,13 +108,13 @@ class _Reader:
             if inside:
                 return tuple(index for one in inside for index in one.members)
             if self._fed(name):
-                groups = self.population.neurons.groups
+                groups = self.census.neurons.groups
                 return tuple(index for group in groups if group.input == name for index in group.indices)
         return known(resolve_part(part, text, directory, self.finder.findings), ())
 
     def _fed(self, name: str) -> bool:
         """Whether it is an input that neurons take in."""
-        return any(group.input == name for group in self.population.neurons.groups)
+        return any(group.input == name for group in self.census.neurons.groups)
 
     def _refuse(self, name: str, span: Span, what: str, hint: str) -> None:
         message = f"{what}, and '{shorten(name)}' is none"

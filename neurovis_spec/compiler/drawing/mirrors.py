@@ -14,7 +14,7 @@ from neurovis_spec.compiler.drawing.pins import Pins
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.names.references import Directory, resolve, resolve_end
 from neurovis_spec.compiler.names.scope import Scope
-from neurovis_spec.compiler.neurons.populate import Population
+from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.diagnostics import Findings, shorten
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
@@ -25,19 +25,19 @@ from neurovis_spec.language.words import Direction
 _SLACK = 1e-9
 
 
-def mirrors_of(scopes: tuple[Scope, ...], population: Population, findings: Findings) -> tuple[Mirror, ...]:
+def mirrors_of(scopes: tuple[Scope, ...], census: Census, findings: Findings) -> tuple[Mirror, ...]:
     """All mirrors. A neuron with two mirror images in one frame is a finding; in an instance it may have one, and in
     what is around the instance another."""
     paths = [scope.path for scope in scopes]
     result: list[Mirror] = []
     taken: set[tuple[str, int]] = set()
-    for scope, directory in zip(scopes, population.directories, strict=True):
+    for scope, directory in zip(scopes, census.directories, strict=True):
         layout = scope.section.layout
         for reference in () if layout is None else layout.mirror:
-            mirror = _mirror(scope, reference, directory, population.neurons.names, paths, findings)
+            mirror = _mirror(scope, reference, directory, census.neurons.names, paths, findings)
             if mirror is UNKNOWN:
                 continue
-            names = population.neurons.names
+            names = census.neurons.names
             sides = [(_frame(names[a], names[b]), m) for a, b in mirror.pairs for m in (a, b)]
             twice = next((m for frame, m in sides if (frame, m) in taken), None)
             itself = next((a for a, b in mirror.pairs if a == b), None)
@@ -124,10 +124,10 @@ def _of_instances(
     return Mirror(scope.path, tuple(pairs), tuple(instances))
 
 
-def lines_of(scopes: tuple[Scope, ...], population: Population, findings: Findings) -> tuple[tuple[int, ...], ...]:
+def lines_of(scopes: tuple[Scope, ...], census: Census, findings: Findings) -> tuple[tuple[int, ...], ...]:
     """The neurons of each list of ``align``."""
     result: list[tuple[int, ...]] = []
-    for scope, directory in zip(scopes, population.directories, strict=True):
+    for scope, directory in zip(scopes, census.directories, strict=True):
         layout = scope.section.layout
         for reference in () if layout is None else layout.align:
             members = resolve(reference.parts, directory, findings)

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple, TypeAlias
 
 from neurovis_spec.compiler.names.references import Directory, check_keys, key_of, resolve_end
 from neurovis_spec.compiler.names.scope import Scope
-from neurovis_spec.compiler.neurons.populate import Population
+from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel
 from neurovis_spec.language.located import Located
@@ -62,9 +62,9 @@ class _Said(NamedTuple):
     origins: dict[int, _Pin]
 
 
-def pins_of(scopes: tuple[Scope, ...], population: Population, findings: Findings) -> Pins:
+def pins_of(scopes: tuple[Scope, ...], census: Census, findings: Findings) -> Pins:
     """All pins. Those closer than 0.6 to each other are a finding."""
-    said = [_said(*one, findings) for one in zip(scopes, population.directories, strict=True)]
+    said = [_said(*one, findings) for one in zip(scopes, census.directories, strict=True)]
     own: dict[int, _Pin] = dict(said[0].neurons)
     taken = set(own)  # what an outer scope says wins
     # for each scope the instance whose origin its pins are relative to, and the way there from that origin
@@ -77,14 +77,14 @@ def pins_of(scopes: tuple[Scope, ...], population: Population, findings: Finding
             if neuron not in taken:
                 groups.setdefault(base, {})[neuron] = pin.moved(shift)
             taken.add(neuron)
-    _check_placing(said, population, taken, findings)
+    _check_placing(said, census, taken, findings)
     origins = said[0].origins
     for base, pins in sorted(groups.items()):
         if base in origins:
             own.update({neuron: pin.at(origins[base]) for neuron, pin in pins.items()})
         else:
-            _check_apart(pins, population.neurons.names, len(scopes[base].called("")), findings)
-    _check_apart(own, population.neurons.names, 0, findings)
+            _check_apart(pins, census.neurons.names, len(scopes[base].called("")), findings)
+    _check_apart(own, census.neurons.names, 0, findings)
     return Pins(
         {neuron: (pin.x, pin.y) for neuron, pin in own.items()},
         tuple(
@@ -96,11 +96,11 @@ def pins_of(scopes: tuple[Scope, ...], population: Population, findings: Finding
     )
 
 
-def _check_placing(said: list[_Said], population: Population, taken: set[int], findings: Findings) -> None:
+def _check_placing(said: list[_Said], census: Census, taken: set[int], findings: Findings) -> None:
     """A module that pins an instance within it needs pins in that one: they are what is placed."""
     for scope in said[1:]:
         for index, pin in scope.origins.items():
-            if taken.isdisjoint(population.directories[index].members):
+            if taken.isdisjoint(census.directories[index].members):
                 message = f"'{pin.key.value}' has no pins of its own that this could place"
                 hint = "give its module 'layout: {positions: …}', or leave this pin out"
                 findings.error("bad-pin", pin.key.span, message, hint)

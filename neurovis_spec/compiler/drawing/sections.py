@@ -16,7 +16,7 @@ from neurovis_spec.compiler.drawing.pins import DIAMETER, FARTHEST, pins_of
 from neurovis_spec.compiler.names.finder import Finder
 from neurovis_spec.compiler.names.references import Directory, check_keys, key_of, resolve, resolve_end
 from neurovis_spec.compiler.names.scope import Scope
-from neurovis_spec.compiler.neurons.populate import Population
+from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, RenderModel, ThemeModel
@@ -35,14 +35,14 @@ _NOTHING = LayoutModel.model_validate(SourceMapping((), Span("", 1, 1, 1, 1)), c
 
 
 def layout_settings(
-    model: LayoutModel | None, scopes: tuple[Scope, ...], population: Population, findings: Findings
+    model: LayoutModel | None, scopes: tuple[Scope, ...], census: Census, findings: Findings
 ) -> LayoutSettings:
     """The ``layout`` section, and those of modules. Which engines there are is known where they are called; here only
     words are checked."""
-    pins = pins_of(scopes, population, findings)
+    pins = pins_of(scopes, census, findings)
     arrange: list[tuple[tuple[int, ...], str]] = []
     boxes: list[tuple[str, tuple[int, ...]]] = []
-    for scope, directory in zip(scopes, population.directories, strict=True):
+    for scope, directory in zip(scopes, census.directories, strict=True):
         if scope.section.layout is not None:
             arrange += _arranged(scope.section.layout, directory, findings)
             boxes += _boxed(scope, scope.section.layout, directory, findings)
@@ -52,10 +52,10 @@ def layout_settings(
     direction: Direction = said(model.direction, "down")
     if model.engine is not None:
         _check_engine(model.engine, findings)
-    mirrors = mirrors_of(scopes, population, findings)
-    lines = lines_of(scopes, population, findings)
-    plan = _plans(scopes, population, boxes, mirrors, lines, direction, findings)
-    check_pins(mirrors, lines, pins, direction, population.neurons.names, findings)
+    mirrors = mirrors_of(scopes, census, findings)
+    lines = lines_of(scopes, census, findings)
+    plan = _plans(scopes, census, boxes, mirrors, lines, direction, findings)
+    check_pins(mirrors, lines, pins, direction, census.neurons.names, findings)
     spacing = model.spacing
     neuron = _spacing(None if spacing is None else spacing.neuron, 1.0, scopes[0].constants)
     rank = _spacing(None if spacing is None else spacing.rank, 2.0, scopes[0].constants)
@@ -78,7 +78,7 @@ def layout_settings(
 
 def _plans(
     scopes: tuple[Scope, ...],
-    population: Population,
+    census: Census,
     boxes: Iterable[tuple[str, tuple[int, ...]]],
     mirrors: tuple[Mirror, ...],
     lines: tuple[tuple[int, ...], ...],
@@ -87,12 +87,12 @@ def _plans(
 ) -> tuple[Cell, ...]:
     """The plans of the page and of instances, whose boxes are known by the titles that they have there."""
     titled: dict[str, tuple[int, ...]] = {}
-    grouped = [(group.box, tuple(group.indices)) for group in population.neurons.groups if group.box is not None]
+    grouped = [(group.box, tuple(group.indices)) for group in census.neurons.groups if group.box is not None]
     for title, members in [*boxes, *grouped]:
         titled[title] = (*titled.get(title, ()), *members)
     cells: list[Cell] = []
-    names = population.neurons.names
-    for scope, directory in zip(scopes, population.directories, strict=True):
+    names = census.neurons.names
+    for scope, directory in zip(scopes, census.directories, strict=True):
         rows = () if scope.section.layout is None else scope.section.layout.plan
         start = scope.called("")
         own = {title.removeprefix(start): found for title, found in titled.items() if title.startswith(start)}

@@ -6,7 +6,7 @@ Settable.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -31,12 +31,12 @@ from neurovis_spec.compiler.events.settable import (
     table_of,
 )
 from neurovis_spec.compiler.network import Network, Noise
-from neurovis_spec.compiler.neurons.populate import Population
+from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.program import Key, Owner
 from neurovis_spec.language.expressions.tree import Number
 
 
-class _Found(NamedTuple):
+class Found(NamedTuple):
     """A formula for some numbers of an array."""
 
     array: Key
@@ -44,14 +44,18 @@ class _Found(NamedTuple):
     part: Part
 
 
-def make_settable(
-    network: Network, slots: tuple[Slot, ...], population: Population, bundles: tuple[Bundle, ...]
-) -> Settable:
+def found_in(network: Network, census: Census, bundles: tuple[Bundle, ...]) -> Iterator[Found]:
+    """What follows parameters in all of a network."""
+    yield from _of_neurons(census, network)
+    yield from _of_connections(bundles, network)
+    yield from _of_inputs(network)
+
+
+def make_settable(network: Network, slots: tuple[Slot, ...], found: Iterable[Found]) -> Settable:
     """The bindings of a network, those of the same formula as one, and the arrays that they write to."""
     arrays = _arrays(network)
-    found = [*_of_neurons(population, network), *_of_connections(bundles, network), *_of_inputs(network)]
     merged = list(_merged([one for one in found if len(one.places)]))  # a cell may be of no connection
-    by_array: dict[Key, list[_Found]] = {}
+    by_array: dict[Key, list[Found]] = {}
     for one in merged:
         by_array.setdefault(one.array, []).append(one)
     variables: dict[Key, Variable] = {}
@@ -86,7 +90,7 @@ def _arrays(network: Network) -> Mapping[Key, FloatArray]:
     return arrays
 
 
-def _binding(one: _Found, variable: Variable | None, size: int) -> Binding:
+def _binding(one: Found, variable: Variable | None, size: int) -> Binding:
     """Some numbers of an array of this size that follow a formula; of the weights where it is no variable."""
     indices, part = one.places, one.part
     if variable is not None:
@@ -120,28 +124,28 @@ def own_weights(slots: tuple[Slot, ...], bundles: tuple[Bundle, ...], weights: F
     return frozen(result)
 
 
-def _of_neurons(population: Population, network: Network) -> Iterator[_Found]:
-    n = len(population.neurons)
+def _of_neurons(census: Census, network: Network) -> Iterator[Found]:
+    n = len(census.neurons)
     home, position = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
-    for number, block in enumerate(network.blocks):
-        home[block.members] = number
-        position[block.members] = np.arange(len(block.members))
-    for group, part in ((one.group, part) for one in population.groups for part in one.parts):
+    for number, population in enumerate(network.populations):
+        home[population.members] = number
+        position[population.members] = np.arange(len(population.members))
+    for group, part in ((one.group, part) for one in census.groups for part in one.parts):
         members = group.start + part.within(group.count)
         if part.field == BIAS.name:
-            yield _Found(BIAS, members, part)
-        elif part.name:  # of a definition; neurons of a group may belong to several blocks
+            yield Found(BIAS, members, part)
+        elif part.name:  # of a definition; neurons of a group may belong to several populations
             blocked = np.unique(home[members])
             for number in blocked.tolist():
                 inside = np.flatnonzero(home[members] == number)
                 own = part if len(blocked) == 1 else part.some(inside)
-                yield _Found(Key(Owner(part.field, number), part.name), position[members[inside]], own)
+                yield Found(Key(Owner(part.field, number), part.name), position[members[inside]], own)
 
 
-def _of_connections(bundles: tuple[Bundle, ...], network: Network) -> Iterator[_Found]:
+def _of_connections(bundles: tuple[Bundle, ...], network: Network) -> Iterator[Found]:
     connections = network.connections
     position = np.zeros(len(connections), dtype=np.int64)
-    for rule in network.plasticity:
+    for rule in network.projections:
         position[rule.members] = np.arange(len(rule.members))
     start = 0
     for bundle in bundles:
@@ -152,26 +156,26 @@ def _of_connections(bundles: tuple[Bundle, ...], network: Network) -> Iterator[_
                 continue
             if part.name:  # of a definition
                 owner = Owner(part.field, int(connections.rules[start]))
-                yield _Found(Key(owner, part.name), position[members], part)
+                yield Found(Key(owner, part.name), position[members], part)
             else:
-                yield _Found(Key(None, part.field), members, part)
+                yield Found(Key(None, part.field), members, part)
         start += count
 
 
-def _of_inputs(network: Network) -> Iterator[_Found]:
+def _of_inputs(network: Network) -> Iterator[Found]:
     for number, entry in enumerate(network.inputs):
         for part in entry.parts:
             assert entry.table is not None
-            yield _Found(table_of(number), part.within(entry.table.size), part)
+            yield Found(table_of(number), part.within(entry.table.size), part)
 
 
 def _is_one_number(formula: Dependent) -> bool:
     return isinstance(formula, ParameterFormula) and formula.plain
 
 
-def _merged(found: list[_Found]) -> Iterator[_Found]:
+def _merged(found: list[Found]) -> Iterator[Found]:
     """Numbers of an array that follow the same formula, which gives one number, as one."""
-    groups: dict[Hashable, list[_Found]] = {}
+    groups: dict[Hashable, list[Found]] = {}
     for place, one in enumerate(found):
         formula = one.part.formula
         key: Hashable = (one.array, place)

@@ -1,6 +1,6 @@
 """Who finds what references name in a spec: neurons, connections, states of models and rules.
 
-In: the Population, the connections that are made. Out: arrays of indices and StateOf, or findings with the nearest
+In: the Census, the connections that are made. Out: arrays of indices and StateOf, or findings with the nearest
 names. References that are written alike share one array.
 """
 
@@ -22,7 +22,7 @@ from neurovis_spec.compiler.names.state_references import (
     connections_state,
     model_state,
 )
-from neurovis_spec.compiler.neurons.populate import Population
+from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.program import Definition
 from neurovis_spec.diagnostics import Findings, shorten
 from neurovis_spec.language.located import Located
@@ -122,7 +122,7 @@ class Finder:
         return one
 
 
-def finder_of(population: Population, made: Connected, findings: Findings) -> Finder:
+def finder_of(census: Census, made: Connected, findings: Findings) -> Finder:
     """The Finder of the neurons, connections and states of a spec."""
     rules, start = [], 0
     for bundle in made.bundles:
@@ -134,14 +134,14 @@ def finder_of(population: Population, made: Connected, findings: Findings) -> Fi
     names = tuple(bundle.name for bundle in made.bundles)
     empty = tuple(bundle.empty for bundle in made.bundles if bundle.empty is not None)
     wiring = Wiring(made.sources, made.targets, names, tuple(rules), made.complete, empty)
-    return Finder(population.directory, _models(population), wiring, findings)
+    return Finder(census.directory, _models(census), wiring, findings)
 
 
-def _models(population: Population) -> tuple[Holder, ...]:
+def _models(census: Census) -> tuple[Holder, ...]:
     """The states of the models of groups, by models; nothing is known of a group whose model is invalid."""
     members: dict[str, list[range]] = {}
     models: dict[str, Definition] = {}
-    for one in population.groups:
+    for one in census.groups:
         written, model = one.model, one.kind.model.definition
         if (not written.sound and "model" in written.unknown) or (
             written.model is not None and written.model.name.value != model.name

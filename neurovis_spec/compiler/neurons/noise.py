@@ -12,7 +12,7 @@ import numpy as np
 from neurovis_spec.arrays import frozen
 from neurovis_spec.compiler.events.settable import ParameterFormula, places_of
 from neurovis_spec.compiler.network import Noise
-from neurovis_spec.compiler.neurons.populate import Population
+from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.values.constants import Constants, Value, width_of
 from neurovis_spec.language.expressions.evaluate import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
@@ -25,11 +25,11 @@ from neurovis_spec.language.unknown import UNKNOWN
 _NOISE = formula_at(GroupModel, "noise")
 
 
-def make_noises(population: Population, inputs: int) -> tuple[Noise, ...]:
+def make_noises(census: Census, inputs: int) -> tuple[Noise, ...]:
     """The noise of every group that has some; ``inputs`` is the length of the vector of all inputs."""
     result: list[Noise] = []
     start = inputs
-    for one in population.groups:
+    for one in census.groups:
         formula, tree, group, constants = one.model.noise, one.noise, one.group, one.constants
         if formula is None or tree is UNKNOWN:
             continue

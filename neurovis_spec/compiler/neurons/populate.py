@@ -1,6 +1,6 @@
 """Neurons: from the groups of a spec to structures of arrays.
 
-In: Scopes. Out: a Population: Neurons, a Directory of names for each scope, and for each group what its activation and
+In: Scopes. Out: a Census: Neurons, a Directory of names for each scope, and for each group what its activation and
 its model are (``groups`` makes each).
 """
 
@@ -33,7 +33,7 @@ _NO_LETTERS = re.compile(r"[^A-Za-z0-9_]+")
 
 
 @dataclass(frozen=True)
-class Population:
+class Census:
     """All neurons, the groups that they are made of, and how everything is called in each scope (``directories`` are in
     the order of the scopes, the network's own first)."""
 
@@ -87,7 +87,7 @@ class _Settled(NamedTuple):
     invalid: Names[Group]
 
 
-def populate(scopes: tuple[Scope, ...], limits: Limits, seed: int) -> Population:
+def populate(scopes: tuple[Scope, ...], limits: Limits, seed: int) -> Census:
     """Make every neuron, scope by scope. A group that is invalid is made as far as its names are known, so that what
     refers to it can be checked."""
     settled: list[_Settled] = []
@@ -101,11 +101,11 @@ def populate(scopes: tuple[Scope, ...], limits: Limits, seed: int) -> Population
     return _join(settled)
 
 
-def without_neurons(population: Population) -> Population:
-    """A population without neurons whose tables of names are open: no name is reported as unknown, since the lack of
+def without_neurons(census: Census) -> Census:
+    """A census without neurons whose tables of names are open: no name is reported as unknown, since the lack of
     neurons was reported already."""
-    first, *others = population.directories
-    return replace(population, directories=(replace(first, invalid=first.invalid.opened()), *others))
+    first, *others = census.directories
+    return replace(census, directories=(replace(first, invalid=first.invalid.opened()), *others))
 
 
 def _settle(scope: Scope, start: int, limits: Limits, seed: int, kinds: Kinds) -> _Settled:
@@ -187,7 +187,7 @@ def _instances(scope: Scope, owners: Mapping[str, str]) -> None:
                 break
 
 
-def _join(settled: list[_Settled]) -> Population:
+def _join(settled: list[_Settled]) -> Census:
     built = [item for one in settled for item in one.built]
     names: list[str] = []
     for one in settled:
@@ -204,7 +204,7 @@ def _join(settled: list[_Settled]) -> Population:
         position=frozen(np.concatenate([_placed(item) for item in built] or [np.zeros((0, 2))])),
         starts=_starts(built, len(names)),
     )
-    return Population(neurons, tuple(built), _directories(settled, len(names)))
+    return Census(neurons, tuple(built), _directories(settled, len(names)))
 
 
 def _starts(built: list[Built], total: int) -> dict[str, FloatArray]:
