@@ -16,41 +16,16 @@ from neurovis_spec.compiler.network import Network
 
 def describe(network: Network, engine: tuple[str, str]) -> dict[str, object]:
     """The object of ``inspect``: keys and shapes as the contract states them."""
-    owners = [group for group in network.neurons.groups for _ in range(group.count)]
-    names, connections = network.neurons.names, network.connections
+    names = network.neurons.names
     sensed = set() if network.body is None else {one.input for one in network.body.sensed}
-    rules = [
-        None if rule < 0 else network.projections[rule].rule.definition.name for rule in connections.rules.tolist()
-    ]
     return {
         "name": network.name,
         "dt": network.dt,
         "steps": network.steps,
         "seed": network.seed,
         "parameters": dict(network.parameters),
-        "neurons": [
-            {
-                "name": name,
-                "group": group.name,
-                "module": group.module,
-                "activation": group.activation,
-                "model": group.model,
-                "combine": group.combine,
-                "bias": bias,
-            }
-            for name, group, bias in zip(names, owners, network.neurons.bias.tolist(), strict=True)
-        ],
-        "connections": [
-            {"from": names[source], "to": names[target], "weight": weight, "delay": delay, "rule": rule}
-            for source, target, weight, delay, rule in zip(
-                connections.sources.tolist(),
-                connections.targets.tolist(),
-                connections.weights.tolist(),
-                connections.delays.tolist(),
-                rules,
-                strict=True,
-            )
-        ],
+        "neurons": _neurons(network),
+        "connections": _connections(network),
         "inputs": [
             {
                 "name": entry.name,
@@ -68,6 +43,40 @@ def describe(network: Network, engine: tuple[str, str]) -> dict[str, object]:
         "hash": network.hash,
         **({} if network.body is None else {"body": _body(network)}),
     }
+
+
+def _neurons(network: Network) -> list[dict[str, object]]:
+    owners = [group for group in network.neurons.groups for _ in range(group.count)]
+    return [
+        {
+            "name": name,
+            "group": group.name,
+            "module": group.module,
+            "activation": group.activation,
+            "model": group.model,
+            "combine": group.combine,
+            "bias": bias,
+        }
+        for name, group, bias in zip(network.neurons.names, owners, network.neurons.bias.tolist(), strict=True)
+    ]
+
+
+def _connections(network: Network) -> list[dict[str, object]]:
+    names, connections = network.neurons.names, network.connections
+    rules = [
+        None if rule < 0 else network.projections[rule].rule.definition.name for rule in connections.rules.tolist()
+    ]
+    return [
+        {"from": names[source], "to": names[target], "weight": weight, "delay": delay, "rule": rule}
+        for source, target, weight, delay, rule in zip(
+            connections.sources.tolist(),
+            connections.targets.tolist(),
+            connections.weights.tolist(),
+            connections.delays.tolist(),
+            rules,
+            strict=True,
+        )
+    ]
 
 
 class Wired(NamedTuple):

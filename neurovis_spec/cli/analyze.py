@@ -11,7 +11,17 @@ import click
 
 from neurovis_spec.cli.completion import paths
 from neurovis_spec.cli.failure import fault
-from neurovis_spec.cli.files import count, network_of, recording_of, tables, writing
+from neurovis_spec.cli.files import (
+    check_files,
+    check_folder,
+    check_target,
+    count,
+    files_of,
+    network_of,
+    recording_of,
+    tables,
+    writing,
+)
 from neurovis_spec.cli.options import (
     FirstStep,
     as_one,
@@ -26,7 +36,6 @@ from neurovis_spec.cli.options import (
     theme_option,
 )
 from neurovis_spec.cli.progress import progress
-from neurovis_spec.cli.targets import check_files, check_folder, check_target, files_of
 
 
 @dataclass(frozen=True)

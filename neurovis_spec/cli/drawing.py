@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final, TypedDict
 import click
 
 from neurovis_spec.cli.completion import one_of, paths
-from neurovis_spec.cli.files import network_of, recording_of, show, tables
+from neurovis_spec.cli.files import check_files, check_target, files_of, network_of, recording_of, show, tables
 from neurovis_spec.cli.options import (
     as_one,
     body_options,
@@ -27,7 +27,6 @@ from neurovis_spec.cli.options import (
     spec_argument,
     theme_option,
 )
-from neurovis_spec.cli.targets import check_files, check_target, files_of
 
 if TYPE_CHECKING:
     from neurovis_spec.arrays import FloatArray

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from neurovis_spec.cli.files import count, earlier_layout, network_of, show, writing
+from neurovis_spec.cli.files import check_files, check_target, count, earlier_layout, network_of, show, writing
 from neurovis_spec.cli.options import effort_option, engine_option, examples, output_option, set_option, spec_argument
 from neurovis_spec.cli.progress import progress
-from neurovis_spec.cli.targets import check_files, check_target
 
 if TYPE_CHECKING:
     from neurovis_spec.compiled import NetworkLayout

@@ -11,9 +11,8 @@ from pathlib import Path, PurePosixPath
 import click
 
 from neurovis_spec.cli.failure import fault
-from neurovis_spec.cli.files import writing
+from neurovis_spec.cli.files import check_target, writing
 from neurovis_spec.cli.options import examples, listed
-from neurovis_spec.cli.targets import check_target
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}")
 _NAME_LINE = re.compile(r"^name:[^\n]*$", re.MULTILINE)

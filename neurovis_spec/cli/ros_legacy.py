@@ -12,10 +12,9 @@ import click
 
 from neurovis_spec.cli.completion import paths
 from neurovis_spec.cli.failure import fault
+from neurovis_spec.cli.files import check_target
 from neurovis_spec.cli.options import examples
-from neurovis_spec.cli.ros_options import Meeting, meeting_options, tell
-from neurovis_spec.cli.ros_shown import Desk, shown_options
-from neurovis_spec.cli.targets import check_target
+from neurovis_spec.cli.ros_options import Desk, Meeting, meeting_options, shown_options, tell
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.interrupts import heeded
 
@@ -42,7 +41,6 @@ def command(output: str | None, namespace: str, network: str, desk: Desk, meetin
     """
     from neurovis_spec.ros.legacy import LegacyListener
     from neurovis_spec.ros.summary import Summary
-    from neurovis_spec.runtime.files import replacing
 
     if output is None:
         desk = desk or desk.in_the_browser()
@@ -78,8 +76,7 @@ def command(output: str | None, namespace: str, network: str, desk: Desk, meetin
             raise fault(f"no network was described under {namespace}", "its controller publishes neuronName")
         compiled = listener.compiled() if listening is None else listening.compiled
         if output is not None:
-            with replacing(output) as file:
-                file.write(listener.legacy.spec(network).encode())
+            _write(listener.legacy.spec(network), output)
         seen, skipped = (0, 0) if listening is None else listening.shown
         files = () if listening is None else listening.paths
         summary = Summary(
@@ -88,3 +85,10 @@ def command(output: str | None, namespace: str, network: str, desk: Desk, meetin
             files=(*files, *(() if output is None else (output,))), topics=listener.counts,
         )  # fmt: skip
     meeting.show(summary)
+
+
+def _write(text: str, path: str) -> None:
+    from neurovis_spec.runtime.files import replacing
+
+    with replacing(path) as file:
+        file.write(text.encode())

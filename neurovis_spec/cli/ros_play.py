@@ -14,8 +14,7 @@ import click
 from neurovis_spec.cli.completion import paths
 from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.options import examples, finite
-from neurovis_spec.cli.ros_options import Meeting, meeting_options, tell
-from neurovis_spec.cli.ros_shown import Desk, shown_options
+from neurovis_spec.cli.ros_options import Desk, Meeting, meeting_options, shown_options, tell
 from neurovis_spec.interrupts import heeded
 
 if TYPE_CHECKING:

@@ -10,8 +10,7 @@ import click
 from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.files import network_of
 from neurovis_spec.cli.options import backend_option, examples, finite, set_option, spec_argument
-from neurovis_spec.cli.ros_options import Meeting, NodeCommand, meeting_options, tell
-from neurovis_spec.cli.ros_shown import Desk, shown_options
+from neurovis_spec.cli.ros_options import Desk, Meeting, NodeCommand, meeting_options, shown_options, tell
 from neurovis_spec.interrupts import heeded
 
 

@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING, Final, Literal
 import click
 
 from neurovis_spec.cli.completion import paths
-from neurovis_spec.cli.files import count, network_of, recording_of, tables, writing
+from neurovis_spec.cli.files import (
+    check_files,
+    check_target,
+    count,
+    files_of,
+    network_of,
+    recording_of,
+    tables,
+    writing,
+)
 from neurovis_spec.cli.options import (
     Running,
     as_one,
@@ -22,7 +31,6 @@ from neurovis_spec.cli.options import (
     start_option,
 )
 from neurovis_spec.cli.progress import progress
-from neurovis_spec.cli.targets import check_files, check_target, files_of
 
 if TYPE_CHECKING:
     from neurovis_spec.compiled import CompiledNetwork

@@ -10,7 +10,18 @@ from time import perf_counter
 import click
 
 from neurovis_spec.cli.completion import axes, paths
-from neurovis_spec.cli.files import STDIN, count, how_to_compile, standard_input, tables, tell_warnings, writing
+from neurovis_spec.cli.files import (
+    STDIN,
+    check_files,
+    check_target,
+    count,
+    files_of,
+    how_to_compile,
+    standard_input,
+    tables,
+    tell_warnings,
+    writing,
+)
 from neurovis_spec.cli.options import (
     Running,
     body_options,
@@ -21,7 +32,6 @@ from neurovis_spec.cli.options import (
     running_options,
 )
 from neurovis_spec.cli.progress import progress
-from neurovis_spec.cli.targets import check_files, check_target, files_of
 
 
 @click.command(
