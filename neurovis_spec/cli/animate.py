@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -10,6 +11,9 @@ from neurovis_spec.cli.drawing import Drawing, drawing_options, show_warnings
 from neurovis_spec.cli.files import writing
 from neurovis_spec.cli.options import FirstStep, examples, finite, output_option
 from neurovis_spec.cli.progress import progress
+
+if TYPE_CHECKING:
+    from neurovis_spec.keywords import FilmKeywords
 
 
 @click.command(
@@ -56,7 +60,8 @@ def command(
     if every is not None and frames is not None:
         raise click.UsageError("--every and --frames say the same in two ways: give one of them")
     network, look = drawing.made_for(output)
+    options: FilmKeywords = {**look, "steps": steps, "start": start, "fps": fps, "every": every, "frames": frames}
     with progress("drawing") as bar, writing(output):
-        network.animate(output, steps=steps, start=start, fps=fps, every=every, frames=frames, progress=bar, **look)
+        network.animate(output, **(options | {"progress": bar}))
     show_warnings(network, look)
     click.echo(str(output))

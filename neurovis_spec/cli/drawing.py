@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, TypedDict
+from typing import TYPE_CHECKING, Final
 
 import click
 
@@ -29,24 +29,8 @@ from neurovis_spec.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from neurovis_spec.arrays import FloatArray
     from neurovis_spec.compiled import CompiledNetwork
-    from neurovis_spec.runtime.recording import Recording
-
-
-class Look(TypedDict):
-    """What ``CompiledNetwork.render`` and ``animate`` both take."""
-
-    recording: Recording | None
-    inputs: dict[str, FloatArray] | None
-    theme: str | None
-    engine: str | None
-    view: tuple[str, ...] | None
-    collapse: tuple[str, ...]
-    focus: str | None
-    paths: str | None
-    min_weight: float | None
-    full: bool
+    from neurovis_spec.keywords import PictureKeywords
 
 
 @dataclass(frozen=True)
@@ -67,7 +51,7 @@ class Drawing:
     full: bool
     settings: dict[str, float]
 
-    def made_for(self, output: Path) -> tuple[CompiledNetwork, Look]:
+    def made_for(self, output: Path) -> tuple[CompiledNetwork, PictureKeywords]:
         """The network, and how it is drawn into a file. Raises UsageError where it would replace what is read."""
         need_run(self.inputs, self.recording)
         read = [("the recording that is drawn", self.recording), *files_of(self.inputs)]
@@ -88,7 +72,7 @@ class Drawing:
         }
 
 
-def show_warnings(network: CompiledNetwork, look: Look, effort: str | None = None) -> None:
+def show_warnings(network: CompiledNetwork, look: PictureKeywords, effort: str | None = None) -> None:
     """Write the warnings about the layout, where one was drawn, to standard error."""
     if network.needs_layout(look["view"]):
         show(network.drawn(look["engine"], effort).warnings, network.sources)

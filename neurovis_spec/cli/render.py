@@ -14,6 +14,7 @@ from neurovis_spec.cli.progress import on_terminal, progress
 
 if TYPE_CHECKING:
     from neurovis_spec.compiled import CompiledNetwork
+    from neurovis_spec.keywords import StillKeywords
 
 
 def _why(network: CompiledNetwork, step: int | None, steps: int) -> str:
@@ -61,7 +62,8 @@ def command(
     if steps and on_terminal():
         why = "" if look["view"] or network.network.render.figure else _why(network, step, steps)
         click.echo(f"running {count(steps, 'step')}{why}", err=True)
+    options: StillKeywords = {**look, "step": step, "effort": effort, "window": window, "dpi": dpi}
     with progress("drawing") as bar, writing(output):
-        network.render(output, step=step, effort=effort, window=window, dpi=dpi, progress=bar, **look)
+        network.render(output, **(options | {"progress": bar}))
     show_warnings(network, look, effort)
     click.echo(str(output))
