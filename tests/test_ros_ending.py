@@ -13,7 +13,7 @@ from ros_alone import Alone
 import neurovis_spec as nv
 from neurovis_spec.interrupts import heeded, raise_at_signals
 from neurovis_spec.ros.middleware import Arrival
-from neurovis_spec.ros.run import Course, NodeRun
+from neurovis_spec.ros.run import NodeRun, Schedule
 
 SPEC = """
 neurovis: 1
@@ -36,7 +36,7 @@ def alone(at_safe: Callable[[], None]) -> Alone:
 
 
 def run(node: Alone, told: list[str], asked: Callable[[], bool] = lambda: False) -> None:
-    NodeRun(nv.compile_text(SPEC), node, Course(1000, steps=3, backend="reference"), told.append).run(asked)
+    NodeRun(nv.compile_text(SPEC), node, Schedule(1000, steps=3, backend="reference"), told.append).run(asked)
 
 
 def is_safe(node: Alone) -> bool:
@@ -94,7 +94,7 @@ def test_what_comes_after_the_end_is_not_counted() -> None:
     node = Alone("/neurovis/pair")
     text = SPEC.replace("neurons: {A: {bias: 1}", "inputs: {aim: {}}\nneurons: {A: {input: aim}")
     text = text.replace("ros: {", "ros: {subscribe: {aim: {topic: /aim}}, ")
-    made = NodeRun(nv.compile_text(text), node, Course(1000, steps=3, backend="reference"), print)
+    made = NodeRun(nv.compile_text(text), node, Schedule(1000, steps=3, backend="reference"), print)
     message = Arrival(struct.pack("<d", 1.5), 0, None, "std_msgs/Float64")
     node.arrived["/aim"](message)
     made.run(lambda: False)

@@ -26,9 +26,8 @@ from neurovis_spec.ros.fields import encode
 from neurovis_spec.ros.inputs import Inputs
 from neurovis_spec.ros.middleware import Arrival, MiddlewareError, choose
 from neurovis_spec.ros.pace import NO_CLOCK, Pace, clock_begins
-from neurovis_spec.ros.play import Course as Playing
-from neurovis_spec.ros.play import Player
-from neurovis_spec.ros.run import Course, NodeRun
+from neurovis_spec.ros.play import Playback, Player
+from neurovis_spec.ros.run import NodeRun, Schedule
 from neurovis_spec.ros.summary import Teller
 
 FLOAT, JOINTS = "std_msgs/Float64", "sensor_msgs/JointState"
@@ -95,9 +94,9 @@ def test_a_run_and_a_player_tell_of_a_clock_that_nobody_sends(monkeypatch: pytes
     monkeypatch.setattr(node, "now", lambda: 0)
     asked = iter([False, False, False, True, True, True])
     network = nv.compile_text("neurovis: 1\nname: a\nneurons: {A: {}}\n")
-    NodeRun(network, node, Course(100, backend="reference"), told.append).run(lambda: next(asked))
+    NodeRun(network, node, Schedule(100, backend="reference"), told.append).run(lambda: next(asked))
     assert told == [NO_CLOCK]
-    player = Player(Bag(()), node, Playing(sim_time=True), told.append)
+    player = Player(Bag(()), node, Playback(sim_time=True), told.append)
     asked = iter([False, False, False, True, True, True])
     player.run(lambda: next(asked))
     assert told == [NO_CLOCK] * 2
@@ -196,7 +195,7 @@ def test_a_run_tells_of_an_input_that_falls_silent() -> None:
     node, told = Alone("/neurovis/a"), list[str]()
     text = "neurovis: 1\nname: a\ninputs: {aim: {}}\nneurons: {A: {input: aim}}\n"
     text += "ros: {subscribe: {aim: {topic: /aim, timeout: 0.001}}}\n"
-    run = NodeRun(nv.compile_text(text), node, Course(100, steps=3, backend="reference"), told.append)
+    run = NodeRun(nv.compile_text(text), node, Schedule(100, steps=3, backend="reference"), told.append)
     node.arrived["/aim"](arrival(1.5))
     run.run(lambda: False)
     assert told == ["the input 'aim' has fallen silent: no message on /aim for 0.001 s"]

@@ -49,7 +49,7 @@ def command(file: str, speed: float, loop: bool, network: str | None, desk: Desk
     where the other one is there. Ctrl-C ends it.
     """
     from neurovis_spec.ros.bags import read_bag
-    from neurovis_spec.ros.play import Course, Player
+    from neurovis_spec.ros.play import Playback, Player
     from neurovis_spec.ros.summary import Summary
 
     desk.check(played=file)
@@ -61,11 +61,11 @@ def command(file: str, speed: float, loop: bool, network: str | None, desk: Desk
     if not bag.topics:
         raise fault(f"{file}: it holds no topics")
     compiled, base = _network(bag, file, network) if desk else (None, None)
-    course = Course(speed, loop, meeting.wait, meeting.seconds, meeting.sim_time)
+    playback = Playback(speed, loop, meeting.wait, meeting.seconds, meeting.sim_time)
     sys.setswitchinterval(0.0005)
     with meeting.node("neurovis_play", anonymous=True) as node, ExitStack() as stack, heeded() as asked:
         listening = None if compiled is None else stack.enter_context(desk.open(compiled, node, base))
-        player = Player(bag, node, course, tell, None if listening is None else listening.put)
+        player = Player(bag, node, playback, tell, None if listening is None else listening.put)
         tell(f"ready: {file}, ROS {node.ros}, {len(bag.topics)} topics")
         player.wait(lambda: bool(asked))
         begun = time.monotonic()

@@ -52,17 +52,17 @@ def command(
     """
     desk.check()
     compiled = network_of(spec, settings)
-    from neurovis_spec.ros.run import Course, NodeRun
+    from neurovis_spec.ros.run import NodeRun, Schedule
     from neurovis_spec.runtime.backend import ready
 
     network = compiled.network
     made = ready(network, backend)
-    course = Course(rate or network.ros.rate, steps, meeting.seconds, meeting.wait, made)
+    schedule = Schedule(rate or network.ros.rate, steps, meeting.seconds, meeting.wait, made)
     sys.setswitchinterval(0.0005)  # steps are due, and threads must not wait for each other as long as Python lets them
     with meeting.node(network.name, network.ros.namespace) as node, heeded() as asked:
         with desk.open(compiled, node, backend=made.name) if desk else nullcontext() as listening:
-            run = NodeRun(compiled, node, course, tell, listening)
-            tell(f"ready: {node.name}, ROS {node.ros}, {course.rate:g} steps a second")
+            run = NodeRun(compiled, node, schedule, tell, listening)
+            tell(f"ready: {node.name}, ROS {node.ros}, {schedule.rate:g} steps a second")
             run.wait(lambda: bool(asked))
             run.run(lambda: bool(asked))
         summary = run.summary()

@@ -24,7 +24,7 @@ Sent = Callable[[str, Arrival], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class Playback:
     """How it is played: so many times as fast, again and again, beginning when each topic has a subscriber, at the
     latest after ``wait`` seconds, for so many ``seconds`` at most."""
 
@@ -72,10 +72,10 @@ class _Way:
 class Player:
     """Plays a recording; ``sent`` is given what is sent. Raises MiddlewareError where a type's package is missing."""
 
-    def __init__(self, bag: Bag, node: Node, course: Course, tell: Tell, sent: Sent | None = None) -> None:
-        self._bag, self._node, self._course, self._sent = bag, node, course, sent
+    def __init__(self, bag: Bag, node: Node, playback: Playback, tell: Tell, sent: Sent | None = None) -> None:
+        self._bag, self._node, self._playback, self._sent = bag, node, playback, sent
         self._teller = Teller(tell)
-        self._clock: Clock = SimulatedClock(node.now) if course.sim_time else SteadyClock()
+        self._clock: Clock = SimulatedClock(node.now) if playback.sim_time else SteadyClock()
         self._ways: dict[tuple[str, str], _Way] = {}
         for topic in bag.topics:
             if (topic.name, topic.type) not in self._ways:
@@ -100,8 +100,8 @@ class Player:
         return {topic: way.counts for (topic, _), way in self._ways.items()}
 
     def wait(self, stopped: Callable[[], bool]) -> None:
-        """Wait for subscribers, as long as the course says."""
-        end = time.monotonic() + self._course.wait
+        """Wait for subscribers, as long as the playback says."""
+        end = time.monotonic() + self._playback.wait
         awaited = [way.publisher for way in self._ways.values() if not way.latched]
         while time.monotonic() < end and not stopped():
             if all(publisher.subscribers for publisher in awaited):
@@ -109,8 +109,8 @@ class Player:
             time.sleep(0.01)
 
     def run(self, asked: Callable[[], bool]) -> None:
-        """Play it, until ``asked`` says to end, or the course does. Raises RecordingError."""
-        begun, seconds = time.monotonic(), self._course.seconds
+        """Play it, until ``asked`` says to end, or the playback does. Raises RecordingError."""
+        begun, seconds = time.monotonic(), self._playback.seconds
 
         def stopped() -> bool:
             return asked() or self._node.ended or (seconds is not None and time.monotonic() - begun >= seconds)
@@ -124,7 +124,7 @@ class Player:
                 sent = True
                 if self._sent is not None:
                     self._sent(way.publisher.topic, Arrival(data, time.time_ns(), None, way.publisher.type))
-            again = self._course.loop and sent
+            again = self._playback.loop and sent
         self._teller.rest()
 
     def _due(self, stopped: Callable[[], bool]) -> Iterator[tuple[_Way, bytes]]:
@@ -134,7 +134,7 @@ class Player:
         for message in self._bag.messages():
             if first is None:
                 first, start = message.log_time, self._clock.now()
-            due = start + (message.log_time - first) / 1e9 / self._course.speed
+            due = start + (message.log_time - first) / 1e9 / self._playback.speed
             while not stopped() and (now := self._clock.now()) < due:
                 self._clock.nap(due - now)
             if stopped():

@@ -37,7 +37,7 @@ from neurovis_spec.runtime.wire import ArrayForm, WireError, text_message
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class Schedule:
     """How a run goes: ``rate`` steps a second, at most ``steps`` of them or so many ``seconds``, on a ``backend``;
     it begins when its topics have subscribers, at the latest after ``wait`` seconds."""
 
@@ -101,16 +101,16 @@ class NodeRun:
         self,
         compiled: CompiledNetwork,
         node: Node,
-        course: Course,
+        schedule: Schedule,
         tell: Tell,
         listening: Listening | None = None,
     ) -> None:
-        self._compiled, self.network, self.node, self._course = compiled, compiled.network, node, course
+        self._compiled, self.network, self.node, self._schedule = compiled, compiled.network, node, schedule
         self._tell, self._teller, self._listening = tell, Teller(tell), listening
         self._lock, self._end = Lock(), Event()
-        self._simulation = simulation(self.network, course.backend)
+        self._simulation = simulation(self.network, schedule.backend)
         self._clock: Clock = SimulatedClock(node.now) if node.simulated else SteadyClock()
-        self._pace = Pace(self._clock, course.rate)
+        self._pace = Pace(self._clock, schedule.rate)
         self._begun, self._over = time.monotonic(), math.inf
         self.why: str | None = None
         try:
@@ -143,7 +143,7 @@ class NodeRun:
     def _publish(self) -> None:
         node, network = self.node, self.network
         settings = network.ros
-        quality = Quality(settings.reliability, settings.durability, settings.depth_at(self._course.rate))
+        quality = Quality(settings.reliability, settings.durability, settings.depth_at(self._schedule.rate))
         base = base_of(self._compiled)
         self._activity = self._array(f"{base}/{ACTIVITY}", len(network.neurons), quality)
         changing = len(network.changing)
@@ -186,29 +186,29 @@ class NodeRun:
     # ---- the run -----------------------------------------------------------------------------------------------
 
     def wait(self, stopped: Callable[[], bool]) -> None:
-        """Wait for subscribers, as long as the course says."""
+        """Wait for subscribers, as long as the schedule says."""
         arrays = [self._activity, *([self._weights] if self._weights else [])]
         publishers = [*(one.publisher for one in arrays), *(one.publisher for one in self._outputs)]
-        deadline = time.monotonic() + self._course.wait
+        deadline = time.monotonic() + self._schedule.wait
         while time.monotonic() < deadline and not stopped() and not self.node.ended:
             if all(publisher.subscribers for publisher in publishers):
                 return
             time.sleep(0.01)
 
     def run(self, asked: Callable[[], bool]) -> None:
-        """Make the steps, until ``asked`` says to end, or the course does; at the end the outputs are safe."""
-        course, step = self._course, 0
+        """Make the steps, until ``asked`` says to end, or the schedule does; at the end the outputs are safe."""
+        schedule, step = self._schedule, 0
         self._begun = begun = time.monotonic()
 
         def stopped() -> bool:
-            over = course.seconds is not None and time.monotonic() - begun >= course.seconds
+            over = schedule.seconds is not None and time.monotonic() - begun >= schedule.seconds
             return over or asked() or self.node.ended
 
         watch = Thread(target=self._watch, name="ros diagnostics", daemon=True)
         watch.start()
         try:
             going = self._pace.begin(stopped, lambda: self._tell(NO_CLOCK))
-            while going and (course.steps is None or step < course.steps) and self._pace.wait(step, stopped):
+            while going and (schedule.steps is None or step < schedule.steps) and self._pace.wait(step, stopped):
                 going = self._step(step)
                 step += 1
         finally:
@@ -265,7 +265,7 @@ class NodeRun:
                 self.node.follow(self._steering.parameters)
                 self._teller.look()
                 self._tell_of_inputs()
-                self._diagnostics.say(self.summary(), [one.input for one in self._inputs.silent], self._course.rate)
+                self._diagnostics.say(self.summary(), [one.input for one in self._inputs.silent], self._schedule.rate)
             except Exception as error:
                 self._tell(f"diagnostics: {error}")
 
