@@ -309,10 +309,7 @@ class CompiledNetwork(Compilation):
 
     def _repr_svg_(self) -> str:
         """The network at the last step of its default run, for a notebook."""
-        from neurovis_spec.scene.look import Look
-
-        look = Look(self.network.render)
-        return pipeline.svg(pipeline.filmed(self, look, pipeline.run_of(self, look, None)), look.settings)
+        return pipeline.svg(self)
 
     def export(
         self, folder: str | Path, to: str = "c", *, start: Recording | None = None, real: str = "double"

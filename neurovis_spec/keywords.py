@@ -22,7 +22,6 @@ from neurovis_spec.callers import callers_level
 from neurovis_spec.compilation import Compilation
 from neurovis_spec.compiler.drawing.drawing_settings import Panel
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.pipeline import CSS
 from neurovis_spec.progress import Progress
 
 if TYPE_CHECKING:
@@ -208,6 +207,7 @@ def course_of(
 def still_of(of: Compilation, path: Path, given: StillKeywords) -> Look:
     """A picture of one step in a file of this kind. Raises RendererError, KeyError for an unknown reference."""
     from neurovis_spec.runtime.inputs import InputError
+    from neurovis_spec.scene.files import CSS
     from neurovis_spec.scene.renderers import renderer_for
 
     _check_picture(given)

@@ -18,21 +18,17 @@ validated without all that runs and draws.
 
 from __future__ import annotations
 
-import math
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.callers import callers_level
 from neurovis_spec.compilation import Compilation
 from neurovis_spec.compiler.compile import Request, compile_spec
-from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
+from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span
 from neurovis_spec.gc_paused import uncollected
@@ -47,26 +43,18 @@ if TYPE_CHECKING:
     from neurovis_spec.layout.model import Layout, LayoutProblem
     from neurovis_spec.runtime.course import Course
     from neurovis_spec.runtime.recording import Recording, Snapshot
-    from neurovis_spec.scene import Film, Scene
+    from neurovis_spec.scene import Film
     from neurovis_spec.scene.figure import PageGains
+    from neurovis_spec.scene.files import Filmed
     from neurovis_spec.scene.gains import Gains
     from neurovis_spec.scene.look import Look
-    from neurovis_spec.scene.model import Renderer
 
     #: A run: one that was recorded, or one that is to be made.
     Run: TypeAlias = Recording | Course
-    #: A picture, in whatever settings.
-    Filmed: TypeAlias = Callable[[RenderSettings], Film]
 
 
 #: Frames of a film that are held at once, and how many numbers they are about.
 _FEWEST_AT_ONCE, _MOST_AT_ONCE, _NUMBERS_AT_ONCE = 16, 512, 4_000_000
-#: The largest SVG, in bytes, with as many connections as there are.
-_LARGEST_SVG = 5_000_000
-#: How wide a picture is in a notebook at most, in pixels: JupyterLab cuts off what is wider than its column.
-_CELL = 900.0
-#: Pixels of an inch where a user unit is one pixel, and the most that are drawn of a picture.
-CSS, _MOST_PIXELS = 96.0, 1 << 28
 
 
 class Outcome(NamedTuple):
@@ -180,18 +168,18 @@ def run_of(of: Compilation, look: Look, inputs: Mapping[str, npt.ArrayLike] | No
 
 def draw(of: Compilation, look: Look, run: Run, path: Path, progress: Progress | None = None) -> None:
     """A picture of a run as a file. Warns of what it leaves out. Raises RendererError, and what ``filmed`` raises."""
+    from neurovis_spec.scene.files import content_of, noting
     from neurovis_spec.scene.renderers import renderer_for, streaming_renderer
 
     renderer = renderer_for(look.suffix, moving=look.moving)
     if look.moving and look.suffix in renderer.capabilities.streams:
         films = films_of(of, look, run, progress)
         with replacing(path, "part") as file:
-            streaming_renderer(look.suffix).stream(_noting(films), look.frames, look.suffix, file, progress)
+            streaming_renderer(look.suffix).stream(noting(films), look.frames, look.suffix, file, progress)
         return
-    made = filmed(of, look, run, progress)
+    film = filmed(of, look, run, progress)
     with replacing(path) as file:
-        draws = partial(drawn, look=look, renderer=renderer, progress=progress)
-        file.write(bounded(lambda settings: draws(made(settings)), look.settings, look.suffix))
+        file.write(content_of(film, look, renderer, progress))
 
 
 def filmed(of: Compilation, look: Look, run: Run, progress: Progress | None = None) -> Filmed:
@@ -289,72 +277,21 @@ def gains_by(of: Compilation, look: Look, run: Run, made: Recording | None = Non
     return probe(of.network, still)
 
 
-def drawn(film: Film, look: Look, renderer: Renderer, progress: Progress | None = None) -> tuple[Scene, bytes]:
-    """A film, or its only frame, as the content of a file; and the scene that it begins with. Raises RendererError for
-    a picture that is too large."""
-    from neurovis_spec.scene.film import still
-    from neurovis_spec.scene.renderers import RendererError
+def svg(of: Compilation) -> str:
+    """The network at the last step of its default run, for a notebook."""
+    from neurovis_spec.scene.files import notebook_svg
+    from neurovis_spec.scene.look import Look
 
-    if look.moving:
-        return film.scene, renderer.animate(film, look.suffix, progress)
-    scene = still(film, 0)
-    if look.density is not None:
-        scene = replace(scene, density=look.density)
-        wide, high = scene.pixels
-        if wide * high > _MOST_PIXELS:
-            most = int(CSS * math.sqrt(_MOST_PIXELS / (scene.width * scene.height)))
-            raise RendererError(f"a picture of {wide:,} × {high:,} pixels is too large", f"take at most {most} an inch")
-    return scene, renderer.draw(scene, look.suffix)
-
-
-def svg(film: Filmed, settings: RenderSettings) -> str:
-    """A picture for a notebook: a pixel a unit, but no wider than a cell, and no larger than a file."""
-    from neurovis_spec.scene.film import still
-    from neurovis_spec.scene.renderers import drawing
-
-    def draws(settings: RenderSettings) -> tuple[Scene, bytes]:
-        scene = still(film(settings), 0)
-        return scene, drawing(replace(scene, density=min(1.0, _CELL / scene.width)), ".svg")
-
-    return bounded(draws, settings, ".svg").decode()
+    look = Look(of.network.render)
+    return notebook_svg(filmed(of, look, run_of(of, look, None)), look.settings)
 
 
 def svg_at_rest(of: Compilation, layout: Layout) -> str:
     """The network in a layout before anything happens, for a notebook."""
     from neurovis_spec.runtime.recording import Snapshot
+    from neurovis_spec.scene.files import notebook_svg
     from neurovis_spec.scene.film import film
 
     network = of.network
     snapshot = Snapshot(0, np.zeros(len(network.neurons)), network.connections.weights.whole(), None)
-    return svg(lambda settings: film(network, layout, [snapshot], of.gains, settings), network.render)
-
-
-def bounded(draws: Callable[[RenderSettings], tuple[Scene, bytes]], settings: RenderSettings, suffix: str) -> bytes:
-    """The file of a picture, an SVG with so many connections as make it no larger than 5 MB, unless all are asked for,
-    or it is larger without any; and a warning for each note in it."""
-    scene, content = draws(settings)
-    if suffix == ".svg" and not settings.full and len(content) > _LARGEST_SVG:
-        lines = sum("connection" in group.data for group in scene.groups)
-        bare = len(draws(replace(settings, most=0))[1]) if lines else len(content)
-        for _ in range(3 if bare <= _LARGEST_SVG else 0):  # strong lines may take more room than weak ones
-            if len(content) <= _LARGEST_SVG or not lines:
-                break
-            lines = max(0, int(0.98 * lines * (_LARGEST_SVG - bare) / max(len(content) - bare, 1)))
-            scene, content = draws(replace(settings, most=lines))
-    _note(scene)
-    return content
-
-
-def _noting(films: Iterator[Film]) -> Iterator[Film]:
-    """The parts of a film; of the first one the notes are warned of."""
-    for place, film in enumerate(films):
-        if place == 0:
-            _note(film.scene)
-        yield film
-
-
-def _note(scene: Scene) -> None:
-    from neurovis_spec.scene.shown import LeftOut
-
-    for note in scene.notes:
-        warnings.warn(note, LeftOut, stacklevel=callers_level())
+    return notebook_svg(lambda settings: film(network, layout, [snapshot], of.gains, settings), network.render)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -216,3 +217,34 @@ def test_numbers_of_any_make_are_taken() -> None:
     run: Callable[..., Recording] = made.run
     assert made.parameters["g"] == 2
     assert len(run(np.int64(3), every=np.int32(2))) == 2
+
+
+RUN = ("backend", "every", "start", "until", "progress", "states", "neurons", "weights", "checkpoint")
+PICTURE = ("recording", "inputs", "theme", "engine", "view", "progress", "collapse", "focus", "paths", "min_weight")
+
+
+@pytest.mark.parametrize(
+    ("function", "named"),
+    [
+        (nv.CompiledNetwork.run, {"steps": None, "inputs": None, **dict.fromkeys(RUN), "last": False, "body": True}),
+        (nv.CompiledNetwork.run_to, {"steps": None, "inputs": None, **dict.fromkeys(RUN), "body": True}),
+        (nv.CompiledNetwork.simulator, {"backend": None, "start": None, "record": False, "body": True, "every": 1}),
+        (nv.CompiledNetwork.render, {**dict.fromkeys(PICTURE), "full": False, "step": None, "dpi": None}),
+        (nv.CompiledNetwork.animate, {**dict.fromkeys(PICTURE), "start": 0, "fps": None, "every": None}),
+        (nv.sweep, {"steps": None, "jobs": 1, "scheduler": None, "path": None, "body": True, "parameters": None}),
+    ],
+)
+def test_a_function_names_its_keywords_and_refuses_others(
+    function: Callable[..., object], named: Mapping[str, object]
+) -> None:
+    """Also those that it shares with others, which stand in one place: for ``help`` and for completion."""
+    shown = inspect.signature(function).parameters
+    other = {"every": 1, "states": (), "neurons": (), "weights": "plastic", "collapse": ()}
+    film = {**other, "every": None}
+    for name, default in named.items():
+        wanted = default if default is not None else (film if "frames" in shown else other).get(name)
+        assert shown[name].default == wanted, name
+    assert not any(one.kind is one.VAR_KEYWORD for one in shown.values())
+    needed = ["x"] * sum(one.default is one.empty for one in shown.values() if one.kind is not one.KEYWORD_ONLY)
+    with pytest.raises(TypeError, match=rf"{function.__name__}\(\) got an unexpected keyword argument 'evry'"):
+        function(*needed, evry=3)

@@ -462,7 +462,7 @@ def test_of_a_long_film_no_connection_is_left_out_for_the_room_that_the_body_tak
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     target = tmp_path / "x.svg"
-    monkeypatch.setattr("neurovis_spec.pipeline._LARGEST_SVG", 60_000)
+    monkeypatch.setattr("neurovis_spec.scene.files._LARGEST_SVG", 60_000)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         WALKER.animate(target, recording=walked())

@@ -192,7 +192,7 @@ def test_what_cannot_be_shown_is_said_before_anything_runs(
 
 @pytest.mark.filterwarnings("ignore:left out")
 def test_a_large_svg_leaves_out_the_weakest_and_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("neurovis_spec.pictures._LARGEST_SVG", 60_000)
+    monkeypatch.setattr("neurovis_spec.scene.files._LARGEST_SVG", 60_000)
     path, network = tmp_path / "x.svg", connectome(20, 150, 2, more=LARGE)
     with pytest.warns(
         LeftOut,
