@@ -11,7 +11,7 @@ from neurovis_spec.version import __version__
 
 if TYPE_CHECKING:
     from neurovis_spec.api import compile, compile_text, load
-    from neurovis_spec.body.model import BodyError
+    from neurovis_spec.body import BodyError
     from neurovis_spec.compiled import CompiledNetwork
     from neurovis_spec.diagnostics import Diagnostic, SpecError
     from neurovis_spec.layout.model import LayoutRefusalError
@@ -48,7 +48,7 @@ __all__ = [
 
 _HOMES = {
     "BackendError": "neurovis_spec.runtime.backend",
-    "BodyError": "neurovis_spec.body.model",
+    "BodyError": "neurovis_spec.body",
     "CompiledNetwork": "neurovis_spec.compiled",
     "Diagnostic": "neurovis_spec.diagnostics",
     "ExportError": "neurovis_spec.runtime.c_settable",

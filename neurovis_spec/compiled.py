@@ -165,7 +165,7 @@ class CompiledNetwork(Compilation):
     def measure(self, text: str, recording: Recording) -> FloatArray:
         """What a measure (``rms(O - T, last=129)``) is after each step of a recording of every step, (steps,): NaN
         while it has no value. Raises SpecError, RecordingError."""
-        from neurovis_spec.runtime.gauge import over
+        from neurovis_spec.runtime.measures import over
         from neurovis_spec.runtime.recording import Recording
 
         arguments.instance("recording", recording, Recording, "a recording")

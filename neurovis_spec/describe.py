@@ -9,8 +9,7 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import NamedTuple
 
-from neurovis_spec.body.kinds import open_body
-from neurovis_spec.body.model import BodyError, Port
+from neurovis_spec.body import BodyError, Port, open_body
 from neurovis_spec.compiler.network import Network
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.body.model import Link, Skeleton, Solid
+from neurovis_spec.body import Link, Skeleton, Solid
 from neurovis_spec.runtime.recording import Recording
 
 LEGS = tuple((f"{side}{pair}", 0.12 * (2 - pair), 1 if side == "l" else -1) for side in "lr" for pair in (1, 2, 3))

@@ -13,7 +13,7 @@ import pytest
 import neurovis_spec as nv
 from neurovis_spec import analysis
 from neurovis_spec.runtime.errors import RecordingError
-from neurovis_spec.runtime.period import period_of
+from neurovis_spec.runtime.pairwise import period_of
 from neurovis_spec.runtime.recording import Recording
 
 Array = npt.NDArray[np.float64]

@@ -14,8 +14,7 @@ import pytest
 from gymnasium import spaces
 
 import neurovis_spec as nv
-from neurovis_spec.body import Body, BodyError
-from neurovis_spec.body.kinds import BodyMissingError, open_body
+from neurovis_spec.body import Body, BodyError, BodyMissingError, open_body
 
 MODEL = """\
 <mujoco><worldbody><body name="rod"><joint type="slide"/><geom type="capsule" fromto="0 0 0 0 0 1" size="0.1"/></body>

@@ -12,8 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from neurovis_bodies import mujoco as kind
 
-from neurovis_spec.body import Body, BodyError
-from neurovis_spec.body.kinds import BodyMissingError, load_kind, open_body
+from neurovis_spec.body import Body, BodyError, BodyMissingError, load_kind, open_body
 
 LEG = """\
 <mujoco>

@@ -21,7 +21,7 @@ from toy_bodies import carted, registered
 
 import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.body.model import Link, Skeleton, Solid
+from neurovis_spec.body import Link, Skeleton, Solid
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiler.drawing.drawing_settings import Panel
 from neurovis_spec.runtime.recording import Recording

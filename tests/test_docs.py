@@ -16,8 +16,7 @@ from neurovis_spec.cli.topics import contents, text_of
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.language.patterns import PATTERNS, Pattern
 from neurovis_spec.manual.builtins import builtins
-from neurovis_spec.manual.keys import Key, keys
-from neurovis_spec.manual.samples import example, examples
+from neurovis_spec.manual.keys import Key, example, examples, keys
 from neurovis_spec.manual.topics import find, near, topics
 from neurovis_spec.manual.words import functions, names
 

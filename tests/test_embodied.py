@@ -12,17 +12,16 @@ import pytest
 from toy_bodies import SPEC, Cart, carted, registered
 
 import neurovis_spec as nv
-from neurovis_spec.body import BodyError
-from neurovis_spec.body.kinds import open_body
+from neurovis_spec.body import BodyError, open_body
 from neurovis_spec.compiler.body_settings import Moved
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.parser import parse
 from neurovis_spec.runtime.backend import available
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.embodied import Embodied, seed_of
-from neurovis_spec.runtime.kinds import Rows
 from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.recording import Recording
+from neurovis_spec.runtime.rows import Rows
 from neurovis_spec.runtime.simulation import Simulation
 
 

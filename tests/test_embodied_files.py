@@ -14,8 +14,7 @@ import pytest
 from toy_bodies import SKELETON, SPEC, carted, registered
 
 import neurovis_spec as nv
-from neurovis_spec.body import BodyError, Link, Skeleton, Solid
-from neurovis_spec.body.skeletons import skeleton_of, text_of
+from neurovis_spec.body import BodyError, Link, Skeleton, Solid, skeleton_of, text_of
 from neurovis_spec.runtime.errors import RecordingError, UnknownNameError
 from neurovis_spec.runtime.recording import Recording
 

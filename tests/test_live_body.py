@@ -18,7 +18,7 @@ from test_live_browser import STEP, pause
 from test_live_everyone import violations
 
 import neurovis_spec as nv
-from neurovis_spec.body.model import Solid
+from neurovis_spec.body import Solid
 from neurovis_spec.live.access import Access
 from neurovis_spec.live.commands import REQUESTS
 from neurovis_spec.live.hub import Hub

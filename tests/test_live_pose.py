@@ -16,8 +16,7 @@ from bodies_by_hand import hexapod, posed
 from toy_bodies import SKELETON, carted, registered
 
 import neurovis_spec as nv
-from neurovis_spec.body.model import Link, Skeleton
-from neurovis_spec.body.skeletons import skeleton_of
+from neurovis_spec.body import Link, Skeleton, skeleton_of
 from neurovis_spec.live.declared import declared
 from neurovis_spec.live.hub import Client, Hub
 from neurovis_spec.live.protocol import FRAME, SCENE, body_message

@@ -23,8 +23,7 @@ from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.runtime import mcap_records as records
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.recording import Recording
-from neurovis_spec.runtime.ros_messages import label_of, step_of
-from neurovis_spec.runtime.wire import text_of
+from neurovis_spec.runtime.wire import label_of, step_of, text_of
 
 SPECS = Path(__file__).parents[1] / "specs"
 SPEC = """\

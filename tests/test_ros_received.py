@@ -30,8 +30,7 @@ from neurovis_spec.ros.middleware import Arrival
 from neurovis_spec.ros.received import ReceivedSource
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.recording import Recording
-from neurovis_spec.runtime.ros_messages import label_of
-from neurovis_spec.runtime.wire import ENCODINGS, ArrayForm, text_message
+from neurovis_spec.runtime.wire import ENCODINGS, ArrayForm, label_of, text_message
 
 SPEC = """
 neurovis: 1

@@ -16,7 +16,7 @@ from neurovis_spec.ros.accept import ARRAY, arrays
 from neurovis_spec.ros.bags import read_bag
 from neurovis_spec.ros.convert import Converter
 from neurovis_spec.ros.definitions import definition
-from neurovis_spec.runtime.ros_messages import label_of
+from neurovis_spec.runtime.wire import label_of
 
 pytestmark = pytest.mark.ros
 

@@ -18,8 +18,7 @@ from neurovis_spec.ros.convert import Converter
 from neurovis_spec.ros.definitions import definition
 from neurovis_spec.ros.files import Files
 from neurovis_spec.ros.logs import Stored, topic_of
-from neurovis_spec.runtime.ros_messages import label_of
-from neurovis_spec.runtime.wire import ArrayForm, text_message
+from neurovis_spec.runtime.wire import ArrayForm, label_of, text_message
 
 pytestmark = pytest.mark.ros
 

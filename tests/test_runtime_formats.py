@@ -22,7 +22,8 @@ from neurovis_spec.runtime import files, formats
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.record import record
-from neurovis_spec.runtime.recording import After, Recording, after_rows, ended
+from neurovis_spec.runtime.recording import Recording, after_rows, ended
+from neurovis_spec.runtime.rows import After
 
 ARRAYS = ("activity", "weights", "weights_static", "plastic", "sources", "targets", "delays", "step", "ranks",
           "weights_after", "lesioned_neurons", "lesioned_connections")  # fmt: skip

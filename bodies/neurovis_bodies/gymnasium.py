@@ -20,8 +20,7 @@ import numpy as np
 from gymnasium import spaces
 
 from neurovis_bodies.steps import substeps_of
-from neurovis_spec.body import Body, BodyError, FloatArray, Port, Skeleton
-from neurovis_spec.body.kinds import BodyMissingError
+from neurovis_spec.body import Body, BodyError, BodyMissingError, FloatArray, Port, Skeleton
 
 #: characters of an id
 _LONGEST: Final = 200

@@ -13,8 +13,7 @@ from neurovis_spec.cli.tables import table
 from neurovis_spec.language.grammar import Role
 from neurovis_spec.language.patterns import PATTERNS, Pattern
 from neurovis_spec.manual.builtins import Builtin, builtins
-from neurovis_spec.manual.keys import Key, keys, keys_of
-from neurovis_spec.manual.samples import example
+from neurovis_spec.manual.keys import Key, example, keys, keys_of
 from neurovis_spec.manual.topics import Topic
 from neurovis_spec.manual.words import Word, functions, names
 

@@ -13,8 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from neurovis_spec.body.kinds import BodyMissingError, load_kind, open_body
-from neurovis_spec.body.model import Body, BodyError, Port
+from neurovis_spec.body import Body, BodyError, BodyMissingError, Port, load_kind, open_body
 from neurovis_spec.compiler.body_settings import BodySettings, Moved, Sensed
 from neurovis_spec.compiler.events.settable import places_of
 from neurovis_spec.compiler.limits import plural

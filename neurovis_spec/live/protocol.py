@@ -17,7 +17,7 @@ from typing import Final, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.body.skeletons import text_of
+from neurovis_spec.body import text_of
 from neurovis_spec.compiler.drawing.pins import FARTHEST
 from neurovis_spec.layout.model import Point
 from neurovis_spec.live.clock import SPEEDS

@@ -20,7 +20,8 @@ from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.fitting import fitted
 from neurovis_spec.runtime.record import after
-from neurovis_spec.runtime.recording import After, Recording
+from neurovis_spec.runtime.recording import Recording
+from neurovis_spec.runtime.rows import After
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.scene.fading import snapshots_of
 

@@ -19,8 +19,8 @@ from neurovis_spec.live.as_turned import as_turned
 from neurovis_spec.live.source import NOTHING, Drawn, Mask, Seen, Source, Turned
 from neurovis_spec.live.view import View
 from neurovis_spec.runtime.columns import Numbers, columns_of, recording_of
-from neurovis_spec.runtime.kinds import Rows
-from neurovis_spec.runtime.recording import After, Recording
+from neurovis_spec.runtime.recording import Recording
+from neurovis_spec.runtime.rows import After, Rows
 from neurovis_spec.scene import Film
 from neurovis_spec.scene.figure import PAGE, with_body
 from neurovis_spec.scene.film import filmed, still

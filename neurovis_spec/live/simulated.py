@@ -39,7 +39,8 @@ from neurovis_spec.live.turns import (
     turn,
 )
 from neurovis_spec.runtime.columns import columns_of
-from neurovis_spec.runtime.recording import After, Snapshot
+from neurovis_spec.runtime.recording import Snapshot
+from neurovis_spec.runtime.rows import After
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
 from neurovis_spec.runtime.state import State
 from neurovis_spec.scene.fading import Fading

@@ -19,7 +19,8 @@ from neurovis_spec.body import Skeleton
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.history import History
 from neurovis_spec.live.turns import Turn
-from neurovis_spec.runtime.recording import After, Snapshot
+from neurovis_spec.runtime.recording import Snapshot
+from neurovis_spec.runtime.rows import After
 from neurovis_spec.scene.poses import start_of
 
 Mask: TypeAlias = npt.NDArray[np.bool_]

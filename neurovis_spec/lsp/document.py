@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Literal
 
 from neurovis_spec import plugins
-from neurovis_spec.body.model import Port
+from neurovis_spec.body import Port
 from neurovis_spec.compiler.body import Clock, find_body
 from neurovis_spec.compiler.body import Place as BodyPlace
 from neurovis_spec.compiler.limits import plural

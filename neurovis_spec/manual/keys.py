@@ -1,7 +1,7 @@
 """The keys of the language, from its models: path, kind of value, default, what it means.
 
 In: the pydantic models, their descriptions and shapes. Out: Keys in the order of the models, those that this
-version does not read yet among them.
+version does not read yet among them; of a key, an example, a part of a spec from ``examples.yaml`` beside this module.
 """
 
 from __future__ import annotations
@@ -10,11 +10,13 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
+from importlib.resources import files
 from types import NoneType
 from typing import get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
+from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.grammar import ListOf, Map, Plain, Role, Row
 from neurovis_spec.language.model import Model
 from neurovis_spec.language.modules import InstanceModel
@@ -22,6 +24,8 @@ from neurovis_spec.language.places import fields_of, fitting, role_at
 from neurovis_spec.language.sections import ConnectionModel, GroupModel, InputModel
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.language.values import ParameterModel
+from neurovis_spec.language.yaml.reader import read_text
+from neurovis_spec.language.yaml.source import Mapping, Scalar
 
 _DEFAULT = re.compile(r" \(default ([^()]*)\)")
 #: Where a mapping of the author's names stands between a section and its keys, as in ``neurons.GROUP.count``.
@@ -135,3 +139,29 @@ def _word(fits: object) -> str:
     if get_origin(fits) is tuple:
         return "mapping or list" if get_origin(get_args(fits)[0]) is tuple else "list"
     return "" if fits is NoneType else "mapping"
+
+
+@cache
+def examples() -> dict[str, str]:
+    """Path of a key to a part of a spec, in the order of the file."""
+    text = files("neurovis_spec.manual").joinpath("examples.yaml").read_text(encoding="utf-8")
+    findings = Findings()
+    document = read_text(text, "examples.yaml", findings)
+    findings.check()
+    assert document is not None
+    assert isinstance(document.root, Mapping)
+    return {
+        entry.name: str(entry.value.value).rstrip()
+        for entry in document.root.entries
+        if isinstance(entry.value, Scalar)
+    }
+
+
+def example(path: str) -> str | None:
+    """The example of a key, else that of its section; none where there is nothing to show."""
+    while path:
+        found = examples().get(path)
+        if found is not None:
+            return found
+        path = path.rpartition(".")[0]
+    return None

@@ -18,8 +18,7 @@ from neurovis_spec.language.ros_types import plain
 from neurovis_spec.ros.middleware import Arrival
 from neurovis_spec.ros.publishers import OnePublisher
 from neurovis_spec.ros.summary import REASONS, Counts, Reason, Teller
-from neurovis_spec.runtime.ros_messages import label_of
-from neurovis_spec.runtime.wire import Encoding, WireError, array_of, stamp_of, text_of
+from neurovis_spec.runtime.wire import Encoding, WireError, array_of, label_of, stamp_of, text_of
 
 ARRAY: Final = "std_msgs/Float64MultiArray"
 STRING: Final = "std_msgs/String"

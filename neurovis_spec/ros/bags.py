@@ -28,7 +28,7 @@ from neurovis_spec.ros.logs import ABOUT, BAG_MAGIC, Stored, Topic
 from neurovis_spec.ros.middleware import Ros
 from neurovis_spec.runtime import mcap_records as records
 from neurovis_spec.runtime.errors import RecordingError
-from neurovis_spec.runtime.rotated import following
+from neurovis_spec.runtime.mcap_file import following
 from neurovis_spec.runtime.wire import Encoding
 
 _SQLITE: Final = b"SQLite format 3\0"

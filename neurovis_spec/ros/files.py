@@ -22,8 +22,8 @@ import yaml
 from neurovis_spec.ros.definitions import written
 from neurovis_spec.ros.logs import BagLog, Log, McapLog, Stored, Topic
 from neurovis_spec.ros.middleware import Ros
+from neurovis_spec.runtime.mcap_file import numbered
 from neurovis_spec.runtime.parts import short
-from neurovis_spec.runtime.rotated import place
 
 _FORMATS: Final[Mapping[str, tuple[type[McapLog | BagLog], Ros | None]]] = {
     ".mcap": (McapLog, None),
@@ -78,13 +78,15 @@ def in_the_way(path: Path, force: bool) -> list[Path]:
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
     if not path.suffix and path.exists() and not path.is_dir():
         raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
-    old = [place(path, 0)] if path.suffix else [path / METADATA]
+    old = [numbered(path, 0)] if path.suffix else [path / METADATA]
     number = 0
-    while place(path, number).exists():
-        old.append(place(path, number))
+    while numbered(path, number).exists():
+        old.append(numbered(path, number))
         number += 1
-    if path.suffix and place(path, 1).exists() and not place(path, 0).exists():  # the first may have been moved away
-        old.append(place(path, 1))
+    if (
+        path.suffix and numbered(path, 1).exists() and not numbered(path, 0).exists()
+    ):  # the first may have been moved away
+        old.append(numbered(path, 1))
     there = [one for one in dict.fromkeys(old) if one.exists()]
     if there and not force:
         raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(there[0]))
@@ -153,7 +155,7 @@ class Files:
 
     def _begin(self, message: Stored) -> None:
         format_, _ = _FORMATS[self.path.suffix.lower()]
-        path = place(self.path, self._number)
+        path = numbered(self.path, self._number)
         held = _Held(path)
         first = [Stored(topic, 0, message.log_time, message.publish_time, data) for topic, data in self.first]
         about = {**self.about, "recording": self._id, "part": str(self._number)}

@@ -30,8 +30,7 @@ from neurovis_spec.ros.announced import compiled_from
 from neurovis_spec.ros.listening import ACTIVITY, WEIGHTS, Listening
 from neurovis_spec.ros.middleware import Arrival, Node, Quality, Tell
 from neurovis_spec.ros.summary import REASONS, Counts, Reason, Teller
-from neurovis_spec.runtime.ros_messages import label_of
-from neurovis_spec.runtime.wire import ArrayForm, Encoding, WireError, array_of, text_of
+from neurovis_spec.runtime.wire import ArrayForm, Encoding, WireError, array_of, label_of, text_of
 
 Kind: TypeAlias = Literal["neuronName", "neuronPos", "connections", "connectionsLayers", "activity", "weightsAll"]
 KINDS: Final[tuple[Kind, ...]] = get_args(Kind)

@@ -21,7 +21,8 @@ from neurovis_spec.live.clock import FRAMES
 from neurovis_spec.live.history import Ring
 from neurovis_spec.live.source import NOTHING, Capabilities, Mask, Reach, Seen, SourceError, Turned
 from neurovis_spec.live.turns import Turn, same_value
-from neurovis_spec.runtime.recording import After, Snapshot
+from neurovis_spec.runtime.recording import Snapshot
+from neurovis_spec.runtime.rows import After
 from neurovis_spec.scene.fading import Fading
 
 #: bytes of the steps that are kept

@@ -33,9 +33,9 @@ class BagFormat:
         from neurovis_spec.ros.play import spec_of
         from neurovis_spec.runtime.arrived import Arrived
         from neurovis_spec.runtime.errors import RecordingError
-        from neurovis_spec.runtime.kinds import KINDS
         from neurovis_spec.runtime.npz_file import recording_errors
         from neurovis_spec.runtime.recording import after_rows, ended
+        from neurovis_spec.runtime.rows import KINDS
         from neurovis_spec.runtime.wire import WireError
 
         bag = read_bag(path)

@@ -31,9 +31,8 @@ from neurovis_spec.ros.pace import NO_CLOCK, Clock, Pace, SimulatedClock, Steady
 from neurovis_spec.ros.steering import RunSteering
 from neurovis_spec.ros.summary import Counts, Summary, Teller
 from neurovis_spec.runtime.backend import Ready
-from neurovis_spec.runtime.ros_messages import label_of
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
-from neurovis_spec.runtime.wire import ArrayForm, WireError, text_message
+from neurovis_spec.runtime.wire import ArrayForm, WireError, label_of, text_message
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,10 +16,9 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.runtime.errors import RecordingError
-from neurovis_spec.runtime.kinds import KINDS, Rows
 from neurovis_spec.runtime.recording import Recording
-from neurovis_spec.runtime.ros_messages import label_of, step_of
-from neurovis_spec.runtime.wire import Encoding
+from neurovis_spec.runtime.rows import KINDS, Rows
+from neurovis_spec.runtime.wire import Encoding, label_of, step_of
 
 #: runs that are listed
 _LISTED = 5

@@ -17,10 +17,10 @@ from neurovis_spec.body import Skeleton
 from neurovis_spec.compiler.names.state_references import StateOf, singles
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Owner, Population, Projection
-from neurovis_spec.runtime.kinds import Rows, Widths
 from neurovis_spec.runtime.names import Names, names_of
-from neurovis_spec.runtime.recording import After, Recording
+from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.references import find_neurons, find_states
+from neurovis_spec.runtime.rows import After, Rows, Widths
 from neurovis_spec.runtime.state import State
 
 

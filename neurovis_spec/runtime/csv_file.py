@@ -27,11 +27,9 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.language.references import Sum, parse, state_of
 from neurovis_spec.real_paths import reason_of
 from neurovis_spec.runtime.errors import RecordingError
-from neurovis_spec.runtime.files import regular_size, replacing
-from neurovis_spec.runtime.kinds import Rows
-from neurovis_spec.runtime.recording import After, Recording, after_rows
-from neurovis_spec.runtime.rows import RowWriter, Steps
-from neurovis_spec.runtime.unfinished import Part, move, part_of
+from neurovis_spec.runtime.files import Part, move, part_of, regular_size, replacing
+from neurovis_spec.runtime.recording import Recording, after_rows
+from neurovis_spec.runtime.rows import After, Rows, RowWriter, Steps
 
 #: before the names of sensors, which may be anything
 _SENSOR = "sensor "

@@ -15,8 +15,7 @@ from math import isfinite
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
-from neurovis_spec.body import Body, BodyError, Port
-from neurovis_spec.body.kinds import open_body
+from neurovis_spec.body import Body, BodyError, Port, open_body
 from neurovis_spec.compiler.body_settings import BodySettings, Moved
 from neurovis_spec.compiler.names.state_references import StateOf, singles
 from neurovis_spec.compiler.network import Network

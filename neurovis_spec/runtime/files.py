@@ -1,8 +1,8 @@
-"""Files written as a whole or not at all.
+"""Files written as a whole or not at all; and the part into which a recording is written during its run.
 
-In: a path. Out: an open file beside it, which takes its place when all is written. So a reader never sees half a
-file, and an interrupted run leaves what was there before. A character device (``/dev/null``, a terminal) has no place
-to take: it gets all at the end.
+In: a path. Out: an open file beside it, which takes its place when all is written. So a reader never sees half a file,
+and an interrupted run leaves what was there before. A character device (``/dev/null``, a terminal) has no place to
+take: it gets all at the end. A part takes rows as they come, and is kept if the run fails, so that no step is lost.
 """
 
 from __future__ import annotations
@@ -13,13 +13,16 @@ import os
 import shutil
 import stat
 import tempfile
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from io import FileIO
 from pathlib import Path
 from typing import BinaryIO, Final
 
 from neurovis_spec.real_paths import CIRCLE, is_circular, real_path
-from neurovis_spec.runtime.parts import Kind, clear, open_beside
+from neurovis_spec.runtime.parts import Kind, clear, open_beside, shown
 
 #: What the system says where there is no room: on the disk, for this user, in a file.
 FULL: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
@@ -93,3 +96,69 @@ def regular_size(path: str | os.PathLike[str]) -> int:
     if not stat.S_ISREG(found.st_mode):
         raise OSError("not a regular file")
     return found.st_size
+
+
+@dataclass
+class Part:
+    """A file that is written to without a buffer. ``held`` is the last step that can be read from it, None for none."""
+
+    file: FileIO
+    #: None where the recording goes to a device
+    path: Path | None
+    target: Path
+    held: int | None = None
+
+    def take_place(self) -> None:
+        """Move the part to the path of the recording; both have the same format. Raises OSError."""
+        if self.path is None:
+            copy_to_device(self.file, self.target)
+            return
+        os.fsync(self.file.fileno())
+        self.path.replace(self.target)
+        self.path = None
+
+
+@contextmanager
+def part_of(path: Path) -> Iterator[Part]:
+    """A part for a recording. It is removed when the block ends; after an exception it stays if it holds a step, and a
+    warning says so. Raises OSError."""
+    target = written_to(path)
+    with named(path):
+        if not target.is_char_device():
+            yield from _open(path, target)
+            return
+        with tempfile.TemporaryFile(buffering=0) as unnamed, FileIO(os.dup(unnamed.fileno()), "r+") as file:
+            yield Part(file, None, target)
+
+
+def _open(path: Path, target: Path) -> Iterator[Part]:
+    beside, file = open_beside(target, "part")
+    part = Part(file, beside, target)
+    try:
+        yield part
+    except BaseException:
+        if part.path is not None and part.held is None:
+            part.path.unlink(missing_ok=True)
+        elif part.path is not None:
+            words = f"{path}: what was recorded, up to step {part.held}, is in {shown(beside, path)}"
+            warnings.warn(words + ("" if target.exists() else ", and is read in its place"), stacklevel=2)
+        raise
+    else:
+        if part.path is not None:
+            part.path.unlink(missing_ok=True)
+    finally:
+        with suppress(OSError):
+            file.close()
+
+
+def move(file: FileIO, part: Path, path: Path) -> None:
+    """Move a part, which has the same format as the recording, to the path of the recording. Raises OSError."""
+    target = written_to(path)
+    if target.is_char_device():
+        with target.open("wb") as device:
+            file.seek(0)
+            shutil.copyfileobj(file, device)
+        part.unlink()
+        return
+    os.fsync(file.fileno())
+    part.replace(target)

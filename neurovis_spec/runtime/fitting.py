@@ -14,7 +14,8 @@ from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.columns import Columns, Keep, Numbers, Probe, columns_of, recording_of
 from neurovis_spec.runtime.errors import RecordingError
-from neurovis_spec.runtime.recording import After, Recording
+from neurovis_spec.runtime.recording import Recording
+from neurovis_spec.runtime.rows import After
 
 
 def fitted(recording: Recording, network: Network) -> Recording:

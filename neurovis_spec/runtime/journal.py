@@ -22,9 +22,7 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.runtime.errors import RecordingError
-from neurovis_spec.runtime.kinds import KINDS, Rows, Widths
-from neurovis_spec.runtime.recording import After
-from neurovis_spec.runtime.rows import Steps
+from neurovis_spec.runtime.rows import KINDS, After, Rows, Steps, Widths
 
 MAGIC: Final = b"neurovis run 2\n"
 #: bytes of the frame, every how many steps, the first step, checksum; of a chunk: a mark, rows, bytes of

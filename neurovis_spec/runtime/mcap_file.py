@@ -2,7 +2,8 @@
 
 In: a Recording and a path, or a path. Out: a file that can be read at any moment while it is written, or a Recording.
 Topics are ``NAMESPACE/NETWORK/activity``, ``/weights`` (of the changing connections), ``/states``, ``/sensors`` and
-``/pose`` of a body, and ``/spec``. What does not grow with the steps is an attachment, as an archive like a ``.npz``.
+``/pose`` of a body, and ``/spec``. What does not grow with the steps is an attachment, as an archive like a ``.npz``. A
+recording may go on from file to file: ``NAME.mcap``, ``NAME-1.mcap``, ….
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import io
 import json
 import os
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from io import FileIO
@@ -24,16 +25,12 @@ import numpy as np
 from neurovis_spec.runtime import mcap_records as records
 from neurovis_spec.runtime.arrived import Arrived
 from neurovis_spec.runtime.errors import RecordingError
-from neurovis_spec.runtime.files import regular_size
-from neurovis_spec.runtime.kinds import KINDS, Rows
+from neurovis_spec.runtime.files import Part, move, part_of, regular_size
 from neurovis_spec.runtime.mcap_records import Channel, DamagedError, Found, Message, Schema, Topic
 from neurovis_spec.runtime.npz_file import frame_bytes, frame_of, recording_errors
-from neurovis_spec.runtime.recording import After, Recording, after_rows, ended
-from neurovis_spec.runtime.ros_messages import ARRAY, STRING, label_of
-from neurovis_spec.runtime.rotated import following
-from neurovis_spec.runtime.rows import RowWriter, Steps
-from neurovis_spec.runtime.unfinished import Part, move, part_of
-from neurovis_spec.runtime.wire import ENCODINGS, ArrayForm, Encoding, text_message, text_of
+from neurovis_spec.runtime.recording import Recording, after_rows, ended
+from neurovis_spec.runtime.rows import KINDS, After, Rows, RowWriter, Steps
+from neurovis_spec.runtime.wire import ARRAY, ENCODINGS, STRING, ArrayForm, Encoding, label_of, text_message, text_of
 from neurovis_spec.version import __version__
 
 #: the attachment that holds what does not grow with the steps
@@ -321,3 +318,24 @@ class _Reading:
             raise RecordingError(f"'reached' is {reached}")
         given = {str(name): float(value) for name, value in dict(told["set_parameters"]).items()}
         return After(values, reached, given, *lost)
+
+
+def numbered(path: Path, number: int) -> Path:
+    """The path of the file with a number, from 0; of a folder, the file in it."""
+    if not path.suffix:
+        return path / f"{path.name}_{number}.mcap"
+    return path if not number else path.with_name(f"{path.stem}-{number}{path.suffix}")
+
+
+def following(path: Path, about: Mapping[str, str], about_of: Callable[[Path], Mapping[str, str]]) -> Iterator[Path]:
+    """The further files of a recording, by what each says ``about`` itself: it is one of the same recording."""
+    number = 1
+    while "recording" in about and numbered(path, number).is_file():
+        try:
+            said = about_of(numbered(path, number))
+        except RecordingError:
+            return
+        if said.get("recording") != about["recording"]:
+            return
+        yield numbered(path, number)
+        number += 1

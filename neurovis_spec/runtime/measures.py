@@ -1,15 +1,17 @@
 """Measures of a run: ``rms(O - T, last=129)`` for the networks at hand, step by step or many steps at a time.
 
 In: the text of a measure, a Network, activities. Out: a Measure, whose names mean neurons and parameters, or SpecError
-with every finding; a Meter, which gives its value after each step.
+with every finding; a Meter, which gives its value after each step; of a Recording, its values after all of them.
 """
 
 from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterable, Mapping
+from collections import deque
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -26,10 +28,12 @@ from neurovis_spec.language.expressions.tree import Name, Tree, is_square, names
 from neurovis_spec.language.references import Arrow, parse_sum, state_of
 from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.columns import Probe, probe_of
-from neurovis_spec.runtime.errors import UnknownNameError
+from neurovis_spec.runtime.controls import Controls
+from neurovis_spec.runtime.errors import RecordingError, UnknownNameError
 from neurovis_spec.runtime.names import Names, names_of
+from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.references import find_states
-from neurovis_spec.runtime.state import constants
+from neurovis_spec.runtime.state import constants, initial_state
 from neurovis_spec.runtime.windows import running
 
 #: Names that mean the same in every measure.
@@ -271,3 +275,39 @@ class Meter:
 def _broadcast(tree: Tree, known: Mapping[str, float | FloatArray], count: int) -> FloatArray:
     read = {name: known[name] for name in names(tree)}
     return np.array(np.broadcast_to(evaluate_array(tree, read), (count,)), dtype=np.float64)
+
+
+LABEL = "<measure>"
+
+
+def over(text: str, network: Network, recording: Recording) -> FloatArray:
+    """What a measure is after each step of a recording, (rows,); NaN while it has no value. Parameters are those that
+    the network and its events give. Raises SpecError, and RecordingError for a recording of another network or of some
+    steps only."""
+    first = int(recording.step[0]) if len(recording) else 0
+    meter = Meter(measure_of(text, network, LABEL), first)
+    if recording.neurons != network.neurons.names:
+        raise RecordingError("a measure is of a recording of all neurons of the network, and this one has others")
+    stop = first + len(recording)
+    if not np.array_equal(recording.step, np.arange(first, stop)):
+        raise RecordingError("a measure is of every step, and the recording holds some of them only")
+    states = _states(meter.measure.probe.names, recording)
+    state, controls = initial_state(network), Controls(network)
+    edges = sorted({first, stop, *(change.at for change in network.changes if first < change.at < stop)})
+    changes = deque(sorted(network.changes, key=lambda change: change.at))
+    parts = [np.zeros(0)]
+    for begin, end in pairwise(edges):
+        while changes and changes[0].at <= begin:
+            with np.errstate(all="ignore"):
+                controls.apply(state, changes.popleft())
+        rows = slice(begin - first, end - first)
+        parts.append(meter.rows(recording.activity[rows], state.conditions.parameters, states[rows]))
+    return np.concatenate(parts)
+
+
+def _states(names: Sequence[str], recording: Recording) -> FloatArray:
+    """The columns of these states."""
+    for name in names:
+        if name not in recording.state_names:
+            raise RecordingError(f"the state '{name}' was not recorded")
+    return recording.states[:, [recording.state_names.index(name) for name in names]]

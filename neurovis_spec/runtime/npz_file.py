@@ -24,19 +24,16 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import IntArray
-from neurovis_spec.body import BodyError, Skeleton
-from neurovis_spec.body.skeletons import skeleton_of, text_of
+from neurovis_spec.body import BodyError, Skeleton, skeleton_of, text_of
 from neurovis_spec.compiler.limits import DEEPEST
 from neurovis_spec.language.data.npy import LONGEST_HEADER, read_header
 from neurovis_spec.language.data.table import CellError
 from neurovis_spec.real_paths import reason_of
 from neurovis_spec.runtime.errors import RecordingError
-from neurovis_spec.runtime.files import regular_size, replacing
+from neurovis_spec.runtime.files import Part, part_of, regular_size, replacing
 from neurovis_spec.runtime.journal import Journal, JournalWriter, is_begun, read_journal
-from neurovis_spec.runtime.kinds import KINDS, Rows, Widths
-from neurovis_spec.runtime.recording import After, Recording, after_rows, ended
-from neurovis_spec.runtime.rows import RowWriter, Steps
-from neurovis_spec.runtime.unfinished import Part, part_of
+from neurovis_spec.runtime.recording import Recording, after_rows, ended
+from neurovis_spec.runtime.rows import KINDS, After, Rows, RowWriter, Steps, Widths
 
 Array: TypeAlias = npt.NDArray[np.generic]
 

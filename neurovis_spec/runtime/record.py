@@ -28,11 +28,10 @@ from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.embodied import Embodied
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.inputs import STRETCH, InputReader
-from neurovis_spec.runtime.kinds import Rows, Widths
 from neurovis_spec.runtime.memory import check_room
-from neurovis_spec.runtime.recording import After, Recording
+from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.resume import resumed_state
-from neurovis_spec.runtime.rows import RowSink, Steps
+from neurovis_spec.runtime.rows import After, Rows, RowSink, Steps, Widths
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.runtime.until import Watched
 from neurovis_spec.runtime.watch import Watch

@@ -23,10 +23,9 @@ from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.formats import StreamingFormat, load, settle
 from neurovis_spec.runtime.inputs import STRETCH
-from neurovis_spec.runtime.kinds import Rows
 from neurovis_spec.runtime.parts import beside
-from neurovis_spec.runtime.recording import After, Recording, for_path
-from neurovis_spec.runtime.rows import RowWriter, Steps
+from neurovis_spec.runtime.recording import Recording, for_path
+from neurovis_spec.runtime.rows import After, Rows, RowWriter, Steps
 from neurovis_spec.runtime.state import State
 from neurovis_spec.runtime.stream import OFTEN, frame_of
 

@@ -24,9 +24,9 @@ from neurovis_spec.compiler.limits import plural
 from neurovis_spec.diagnostics import listed
 from neurovis_spec.runtime import pairwise
 from neurovis_spec.runtime.errors import RecordingError, UnknownNameError, unknown
-from neurovis_spec.runtime.kinds import Rows, Widths
 from neurovis_spec.runtime.named_array import NamedArray
 from neurovis_spec.runtime.names import Found, Names
+from neurovis_spec.runtime.rows import After, Rows, Widths, no_indices
 from neurovis_spec.runtime.traces import Traced, traces
 
 if TYPE_CHECKING:
@@ -53,26 +53,6 @@ class Snapshot:
     pose: FloatArray | None = None
     #: what the body sensed then, which the step was given
     sensors: FloatArray | None = None
-
-
-def _no_indices() -> IntArray:
-    return np.zeros(0, dtype=np.int64)
-
-
-@dataclass(frozen=True, eq=False)
-class After:
-    """What is true after the last step that was made, which need not be one that was recorded.
-
-    ``weights`` (p,) are those of the changing connections after that step's update; ``reached`` is how many steps were
-    made, with those of the runs that were continued; ``set_parameters`` are the parameters whose values do not come
-    from the spec, ``lesioned_neurons`` and ``lesioned_connections`` the indices of what lesions have taken out.
-    """
-
-    weights: FloatArray
-    reached: int
-    set_parameters: Mapping[str, float] = field(default_factory=dict)
-    lesioned_neurons: IntArray = field(default_factory=_no_indices)
-    lesioned_connections: IntArray = field(default_factory=_no_indices)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -109,8 +89,8 @@ class Recording:
     weights_after: FloatArray
     reached: int
     set_parameters: Mapping[str, float] = field(default_factory=dict)
-    lesioned_neurons: IntArray = field(default_factory=_no_indices)
-    lesioned_connections: IntArray = field(default_factory=_no_indices)
+    lesioned_neurons: IntArray = field(default_factory=no_indices)
+    lesioned_connections: IntArray = field(default_factory=no_indices)
     #: names besides those of neurons: neuron indices, and whether a single neuron is meant
     views: Mapping[str, tuple[tuple[int, ...], bool]] = field(default_factory=dict)
     network: str = ""

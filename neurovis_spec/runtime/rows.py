@@ -1,19 +1,72 @@
-"""Rows of a recording on their way to a file.
+"""Rows of a recording: numbers of five kinds, each with columns of its own, and what is true after the last of them.
 
-In: the numbers of some steps. Out: whatever a format makes of them.
+In: how many columns there are of each kind, the numbers of some steps. Out: arrays for rows; whatever a format makes of
+them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
-from neurovis_spec.arrays import IntArray
-from neurovis_spec.runtime.kinds import Rows
-from neurovis_spec.runtime.recording import After
+from neurovis_spec.arrays import FloatArray, IntArray
+
+#: in the order of Widths and Rows; in messages the last part of the topics
+KINDS: Final = ("activity", "weights", "states", "sensors", "pose")
+
+
+class Widths(NamedTuple):
+    """How many numbers of a row are activities, changing weights, states of models and rules, sensors of a body, and
+    its pose."""
+
+    activity: int
+    weights: int
+    states: int
+    sensors: int = 0
+    pose: int = 0
+
+
+class Rows(NamedTuple):
+    """Rows, a kind an array: (rows, columns)."""
+
+    activity: FloatArray
+    weights: FloatArray
+    states: FloatArray
+    sensors: FloatArray
+    pose: FloatArray
+
+    @classmethod
+    def room(cls, widths: Widths, count: int) -> Rows:
+        """Room for so many rows."""
+        return cls(*(np.empty((count, width)) for width in widths))
+
+    def part(self, rows: slice) -> Rows:
+        """Some of the rows; no array is copied."""
+        return Rows(*(array[rows] for array in self))
+
+
+def no_indices() -> IntArray:
+    """None of what indices tell."""
+    return np.zeros(0, dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class After:
+    """What is true after the last step that was made, which need not be one that was recorded.
+
+    ``weights`` (p,) are those of the changing connections after that step's update; ``reached`` is how many steps were
+    made, with those of the runs that were continued; ``set_parameters`` are the parameters whose values do not come
+    from the spec, ``lesioned_neurons`` and ``lesioned_connections`` the indices of what lesions have taken out.
+    """
+
+    weights: FloatArray
+    reached: int
+    set_parameters: Mapping[str, float] = field(default_factory=dict)
+    lesioned_neurons: IntArray = field(default_factory=no_indices)
+    lesioned_connections: IntArray = field(default_factory=no_indices)
 
 
 @dataclass(frozen=True, slots=True)

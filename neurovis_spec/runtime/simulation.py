@@ -37,9 +37,10 @@ from neurovis_spec.runtime.errors import RecordingError, UnknownNameError, unkno
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.record import after
-from neurovis_spec.runtime.recording import After, Recording
+from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.references import find_neurons, find_parts
 from neurovis_spec.runtime.resume import resumed_state
+from neurovis_spec.runtime.rows import After
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.runtime.watch import Watch
 

@@ -19,11 +19,10 @@ from neurovis_spec.runtime.columns import Columns, columns_of, recording_of
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.formats import StreamingFormat, settle
 from neurovis_spec.runtime.inputs import STRETCH
-from neurovis_spec.runtime.kinds import Rows, Widths
 from neurovis_spec.runtime.memory import check_disk
 from neurovis_spec.runtime.record import InMemory, after, begun, go, keep_state, record
-from neurovis_spec.runtime.recording import After, Recording, for_path
-from neurovis_spec.runtime.rows import RowWriter, Steps
+from neurovis_spec.runtime.recording import Recording, for_path
+from neurovis_spec.runtime.rows import After, Rows, RowWriter, Steps, Widths
 from neurovis_spec.runtime.state import State
 
 #: seconds after which rows are handed on, so that so much of a run can be lost and a step

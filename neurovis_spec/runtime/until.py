@@ -12,9 +12,8 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.runtime.kinds import Rows
 from neurovis_spec.runtime.measures import Measure, Meter, measure_of
-from neurovis_spec.runtime.rows import RowSink
+from neurovis_spec.runtime.rows import Rows, RowSink
 from neurovis_spec.runtime.state import State
 
 LABEL = "<until>"

@@ -17,7 +17,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.body.model import Solid
+from neurovis_spec.body import Solid
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.model import Disc, Group, Point, Polyline, Rectangle, Redrawn, Shape, Text, Theme
 from neurovis_spec.scene.parts import Changes, Part

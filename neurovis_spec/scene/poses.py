@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.body.model import Skeleton
+from neurovis_spec.body import Skeleton
 from neurovis_spec.runtime.recording import Recording
 
 #: Metres from the middle that are shown at least, of a body that is a point.

@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Collection
 from dataclasses import replace
 
-from neurovis_spec.body.kinds import BodyMissingError
+from neurovis_spec.body import BodyMissingError
 from neurovis_spec.compiler.drawing.drawing_settings import StatedGain
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.course import Course

@@ -22,9 +22,9 @@ from neurovis_spec.runtime.backend import BackendError
 from neurovis_spec.runtime.columns import Columns, Keep, columns_of
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.inputs import STRETCH, InputError
-from neurovis_spec.runtime.kinds import Rows
 from neurovis_spec.runtime.measures import Measure, Meter, parsed, resolved
 from neurovis_spec.runtime.record import go
+from neurovis_spec.runtime.rows import Rows
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.sweeps.grid import SEED, Point
 
