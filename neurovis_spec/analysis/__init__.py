@@ -7,7 +7,6 @@ docs/measures.md lists all measures, with equations and sources.
 from __future__ import annotations
 
 from neurovis_spec.analysis.gait import gait, stretches
-from neurovis_spec.analysis.importance import importance
 from neurovis_spec.analysis.recorded import (
     awake_at_once,
     connection_matrix,
@@ -18,7 +17,7 @@ from neurovis_spec.analysis.recorded import (
     weight_changes,
     weights,
 )
-from neurovis_spec.analysis.sensitivity import sensitivity
+from neurovis_spec.analysis.trials import importance, sensitivity
 from neurovis_spec.runtime.named_array import Axis, NamedArray
 from neurovis_spec.runtime.pairwise import coactivation, cross_correlation, mutual_information, printed_correlation
 

@@ -17,7 +17,6 @@ import numpy.typing as npt
 from neurovis_spec.analysis import pictures
 from neurovis_spec.analysis.catalogue import catalogue
 from neurovis_spec.analysis.gait import gait, stretches
-from neurovis_spec.analysis.importance import importance_by
 from neurovis_spec.analysis.page import PAGE, Shown, page_of
 from neurovis_spec.analysis.recorded import (
     awake_at_once,
@@ -30,8 +29,7 @@ from neurovis_spec.analysis.recorded import (
     weight_changes,
     weights,
 )
-from neurovis_spec.analysis.sensitivity import sensitivity_by
-from neurovis_spec.analysis.trials import STEPS, Trials
+from neurovis_spec.analysis.trials import STEPS, Trials, importance_by, sensitivity_by
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.layout.model import LayoutRefusalError

@@ -1,13 +1,19 @@
 """Trials: runs of a network from one and the same state, each with something changed.
 
 In: a compiled network, the step at which the trials begin, how many steps they have. Out: the outputs of a trial, step
-by step. The run up to the first step is made once, and so is the code that makes steps.
+by step. The run up to the first step is made once, and so is the code that makes steps. What is measured by them:
+
+- *Importance*: what the outputs lose without a neuron or an input: how far they go elsewhere where it is removed
+  (lesion: a neuron takes no part, an input is 0) and where it no longer changes (occlusion: held at its mean).
+- *Sensitivity* (saliency): how much the outputs change with a weight, a parameter or an input: the derivative of the
+  outputs by central differences, runs with a little more and a little less of it. Where a smaller difference gives
+  another derivative there is none: a threshold is crossed, and the outputs jump.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,14 +23,16 @@ from neurovis_spec import arguments
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.network import Input, Network
+from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.backend import Stepper, ready
 from neurovis_spec.runtime.columns import ALL, columns_of
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.embodied import embodied
 from neurovis_spec.runtime.errors import RecordingError
+from neurovis_spec.runtime.named_array import Axis, NamedArray
 from neurovis_spec.runtime.record import InMemory, Last, go
 from neurovis_spec.runtime.rows import RowSink, Steps
-from neurovis_spec.runtime.simulation import Simulation
+from neurovis_spec.runtime.simulation import ParameterError, Simulation
 from neurovis_spec.runtime.state import State, initial_state
 
 #: Steps of a trial where nothing else is asked for.
@@ -150,3 +158,152 @@ def _neurons(network: Network, of: str | Sequence[str]) -> IntArray:
             raise RecordingError(found)
         result.update(dict.fromkeys(found.neurons))
     return np.array(list(result), dtype=np.int64)
+
+
+_OF_IMPORTANCE = ("lesion", "occlusion", "lesion share", "occlusion share")
+
+
+def importance(
+    network: CompiledNetwork,
+    start: int | None = None,
+    steps: int | None = None,
+    inputs: Mapping[str, npt.ArrayLike] | None = None,
+    of: str | Sequence[str] | None = None,
+    progress: Progress | None = None,
+) -> NamedArray:
+    """A row for each input and each neuron that is not itself an output: the root mean square of the difference of the
+    outputs from those of the intact network, and the share of it in how much these vary (1: as if they were held at
+    their mean). See ``Trials`` for the arguments. NaN where the network cannot be held so."""
+    return importance_by(Trials(network, start, steps, inputs, of), progress)
+
+
+def importance_by(trials: Trials, progress: Progress | None = None) -> NamedArray:
+    """``importance`` for trials that have been prepared."""
+    network = trials.network
+    names = network.neurons.names
+    own = [index for index in range(len(names)) if index not in set(trials.outputs.tolist())]
+    labels = [*(entry.name for entry in network.inputs), *(names[index] for index in own)]
+    twice = {entry.name for entry in network.inputs} & set(names)
+    labels = [f"input {label}" if place < len(network.inputs) and label in twice else label
+              for place, label in enumerate(labels)]  # fmt: skip
+    found: list[tuple[float, float]] = []
+    for entry in network.inputs:
+        with np.errstate(all="ignore"):
+            mean = trials.given[:, entry.start : entry.start + entry.size].mean(axis=0)
+        silent = trials.with_input(entry, np.zeros_like)
+        held = trials.with_input(entry, lambda _, mean=mean: mean)  # type: ignore[misc]
+        found.append((_apart(trials, silent), _apart(trials, held)))
+        _tell(progress, len(found), len(labels))
+    for index in own:
+        with np.errstate(all="ignore"):
+            level = float(trials.activity[:, index].mean())
+        removed = trials.changed(lambda simulation, name=names[index]: simulation.lesion(name))  # type: ignore[misc]
+        occluded = float("nan")
+        if np.isfinite(level):
+            clamped = trials.changed(lambda simulation, name=names[index], x=level: simulation.clamp(name, x))  # type: ignore[misc]
+            occluded = _apart(trials, clamped)
+        found.append((_apart(trials, removed), occluded))
+        _tell(progress, len(found), len(labels))
+    lost = np.array(found, dtype=np.float64).reshape(-1, 2)
+    with np.errstate(all="ignore"):
+        varies = float(np.sqrt(np.mean((trials.intact - trials.intact.mean(axis=0)) ** 2)))
+        share = lost / varies if varies > 0 else np.full_like(lost, np.nan)
+    values = np.concatenate([lost, share], axis=1)
+    return NamedArray("importance", values, Axis("without", tuple(labels)), Axis("quantity", _OF_IMPORTANCE))
+
+
+def _apart(trials: Trials, outputs: FloatArray) -> float:
+    with np.errstate(all="ignore"):
+        return float(np.sqrt(np.mean((outputs - trials.intact) ** 2)))
+
+
+def _tell(progress: Progress | None, done: int, total: int) -> None:
+    if progress is not None:
+        progress(done, total)
+
+
+_OF_SENSITIVITY = ("mean", "rms", "elasticity")
+#: How far to either side, of the size of what is changed; where that is 0, of 1.
+STEP = 1e-4
+#: The second difference, of the first; how far both derivatives may be apart, of the larger one and of the rounding.
+_FINER, _APART, _ROUNDING = 0.25, 0.1, 1e3
+
+#: What moves something by so much, and gives the outputs; ParameterError where it cannot be there.
+Move = Callable[[float], FloatArray]
+
+
+def sensitivity(
+    network: CompiledNetwork,
+    start: int | None = None,
+    steps: int | None = None,
+    inputs: Mapping[str, npt.ArrayLike] | None = None,
+    of: str | Sequence[str] | None = None,
+    progress: Progress | None = None,
+) -> NamedArray:
+    """A row for each input, each parameter that can be set in a run and each connection: the ``mean`` over steps and
+    outputs of ∂output/∂it, its root mean square (``rms``), and the ``elasticity``, the rms times the size of it: how
+    much the outputs change where it changes by its own size. A weight that learns goes on learning; an input is changed
+    by the same at all steps. NaN where there is no derivative. See ``Trials`` for the arguments."""
+    return sensitivity_by(Trials(network, start, steps, inputs, of), progress)
+
+
+def sensitivity_by(trials: Trials, progress: Progress | None = None) -> NamedArray:
+    """``sensitivity`` for trials that have been prepared."""
+    network = trials.network
+    total = len(network.inputs) + len(network.parameters) - len(network.structural) + len(network.connections)
+    labels, found = [], []
+    for label, size, move in _moves(trials):
+        mean, rms = _derivative(move, trials.intact, STEP * (size or 1.0))
+        found.append((mean, rms, rms * size))
+        labels.append(label)
+        if progress is not None:
+            progress(min(len(found), total), total)
+    values = np.array(found, dtype=np.float64).reshape(-1, len(_OF_SENSITIVITY))
+    return NamedArray("sensitivity", values, Axis("to", tuple(labels)), Axis("quantity", _OF_SENSITIVITY))
+
+
+def _moves(trials: Trials) -> Iterator[tuple[str, float, Move]]:
+    """Each input, parameter and connection: its name, the size of its value, and a function that runs it changed."""
+    network = trials.network
+    for entry in network.inputs:
+        given = trials.given[:, entry.start : entry.start + entry.size]
+        with np.errstate(all="ignore"):
+            size = float(np.sqrt(np.mean(given**2)))
+        yield f"input {entry.name}", size, lambda h, entry=entry: trials.with_input(entry, lambda x: x + h)  # type: ignore[misc]
+    for name in network.parameters:
+        if name not in network.structural:
+            value = trials.parameter(name)
+
+            def move(h: float, name: str = name, value: float = value) -> FloatArray:
+                return trials.changed(lambda simulation: simulation.set({name: value + h}))
+
+            yield f"parameter {name}", abs(value), move
+    weights = trials.weights
+    for index, name in enumerate(network.connection_names):
+        yield name, abs(float(weights[index])), lambda h, index=index: trials.with_weight(index, h)  # type: ignore[misc]
+
+
+def _derivative(move: Move, intact: FloatArray, h: float) -> tuple[float, float]:
+    """The mean and the root mean square of the derivative; NaN where there is none."""
+    finer = h * _FINER
+    with np.errstate(all="ignore"):
+        slope = _slope(move, intact, h)
+        one, other = (float(np.sqrt(np.mean(values**2))) for values in (slope, _slope(move, intact, finer)))
+        rounding = _ROUNDING * float(np.finfo(np.float64).eps * np.abs(intact).max()) / finer
+    if not abs(one - other) <= _APART * max(one, other) + rounding:
+        return float("nan"), float("nan")
+    return float(np.mean(slope)), one
+
+
+def _slope(move: Move, intact: FloatArray, h: float) -> FloatArray:
+    """The derivative by the difference of both sides; of one where the other is not allowed."""
+    sides: list[tuple[float, FloatArray]] = []
+    for by in (h, -h):
+        try:
+            sides.append((by, move(by)))
+        except ParameterError:
+            sides.append((0.0, intact))
+    (more, above), (less, below) = sides
+    with np.errstate(all="ignore"):
+        slope: FloatArray = np.asarray(above - below, dtype=np.float64)
+        return slope / (more - less) if more != less else np.full_like(intact, np.nan)

@@ -21,11 +21,10 @@ from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.located import Located
-from neurovis_spec.lsp.files import Files
+from neurovis_spec.lsp.files import Files, Page
 from neurovis_spec.lsp.index import Index
 from neurovis_spec.lsp.names import Name
 from neurovis_spec.lsp.outline import Item
-from neurovis_spec.lsp.page import Page
 from neurovis_spec.lsp.text import Place, Text, holds
 from neurovis_spec.real_paths import real_path
 

@@ -18,10 +18,9 @@ from neurovis_spec.language.places import role_of
 from neurovis_spec.language.yaml.scalars import resolve
 from neurovis_spec.lsp.check import check
 from neurovis_spec.lsp.document import Document
-from neurovis_spec.lsp.files import CrowdedError
+from neurovis_spec.lsp.files import CrowdedError, Page
 from neurovis_spec.lsp.index import SHARED, Found, Index, is_common
 from neurovis_spec.lsp.names import Name
-from neurovis_spec.lsp.page import Page
 from neurovis_spec.lsp.text import Place, Text
 
 #: How many specs that share a declaration are compiled to see whether a rename does harm; each takes its time.

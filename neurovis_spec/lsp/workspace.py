@@ -15,8 +15,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Diagnostic
 from neurovis_spec.lsp.check import Checked, place_of
 from neurovis_spec.lsp.document import Document
-from neurovis_spec.lsp.files import Files
-from neurovis_spec.lsp.page import Page
+from neurovis_spec.lsp.files import Files, Page
 
 _Found = Mapping[Path, tuple[Diagnostic, ...]]
 
