@@ -7,23 +7,18 @@ with the imports that it is made of. import-linter's own contract of the kind is
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import cast
 
 import networkx as nx
 from grimp import ImportGraph
-from importlinter import Contract, ContractCheck, fields, output
+from importlinter import Contract, ContractCheck, output
 
 
 class AcyclicContract(Contract):
-    """``type = "acyclic"``; ``ignore_imports`` (``a -> b``, with wildcards) are those that do not count."""
+    """``type = "acyclic"``; it has no options."""
 
     type_name = "acyclic"
-    ignore_imports = fields.ListField(subfield=fields.StringField(), required=False)
 
     def check(self, graph: ImportGraph, verbose: bool) -> ContractCheck:
-        for expression in cast("list[str] | None", self.ignore_imports) or ():
-            for one in graph.find_matching_direct_imports(expression):
-                graph.remove_import(importer=one["importer"], imported=one["imported"])
         found = {" <-> ".join(circle): list(imports(graph, circle)) for circle in circles(graph)}
         return ContractCheck(kept=not found, metadata={"circles": found})
 
