@@ -1,6 +1,7 @@
 """Saving: what was shown, as files: a picture, a film of the last steps, a recording.
 
 In: what was seen, step by step, and how it is drawn. Out: the bytes of a file, of the same picture as the page has.
+What was turned by hand is part of what changes in it, as events of the spec are.
 """
 
 from __future__ import annotations
@@ -13,13 +14,18 @@ from pathlib import Path
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray, frozen
+from neurovis_spec.compiler.events.changes import Change
+from neurovis_spec.compiler.events.settable import ParameterFormula
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.live.as_turned import as_turned
+from neurovis_spec.language.expressions.tree import Number
 from neurovis_spec.live.source import NOTHING, Drawn, Mask, Seen, Source, Turned
+from neurovis_spec.live.turns import Lesion, Mend, Set
 from neurovis_spec.live.view import View
 from neurovis_spec.runtime.columns import Numbers, columns_of, recording_of
+from neurovis_spec.runtime.names import names_of
 from neurovis_spec.runtime.recording import Recording
+from neurovis_spec.runtime.references import find_parts
 from neurovis_spec.runtime.rows import After, Rows
 from neurovis_spec.scene import Film
 from neurovis_spec.scene.figure import PAGE, with_body
@@ -27,6 +33,32 @@ from neurovis_spec.scene.film import filmed, still
 from neurovis_spec.scene.film_size import frames_a_second
 from neurovis_spec.scene.poses import Poses
 from neurovis_spec.scene.renderers import drawing, renderer_for
+
+
+def as_turned(network: Network, turned: Sequence[Turned]) -> Network:
+    """The network with the parameters that were set by hand, and the lesions, among what changes; by its hash it is
+    the one that it was."""
+    changes, names = {change.at: change for change in network.changes}, names_of(network)
+    for at, what in ((entry.step + 1, entry.turn) for entry in turned):
+        before = changes.get(at, Change(at))
+        if isinstance(what, Set):
+            changes[at] = before._replace(parameters=(*before.parameters, *_parameters(network, what)))
+        elif isinstance(what, Lesion | Mend):  # one that is mended before a step is made is none
+            neurons, connections = find_parts(network, what.part, names)
+            joined = np.union1d if isinstance(what, Lesion) else np.setdiff1d
+            changes[at] = before._replace(
+                lesioned_neurons=frozen(joined(before.lesioned_neurons, neurons)),
+                lesioned_connections=frozen(joined(before.lesioned_connections, connections)),
+            )
+    if len(changes) == len(network.changes) and all(change is changes[change.at] for change in network.changes):
+        return network
+    return replace(network, changes=tuple(changes[at] for at in sorted(changes)))
+
+
+def _parameters(network: Network, what: Set) -> tuple[tuple[int, ParameterFormula], ...]:
+    slots = network.settable.index
+    return tuple((slots[name], ParameterFormula(Number(value), {})) for name, value in what.values.items())
+
 
 #: The most steps that are looked back, the most numbers in them, and the most seconds of a film.
 MOST_STEPS, _NUMBERS, MOST_SECONDS = 10_000, 8_000_000, 60
