@@ -1,7 +1,7 @@
-"""Arguments of the Python interface, checked where they come in.
+"""Who calls the Python interface: arguments are checked where they come in, warnings are about the caller's line.
 
-In: what an argument is called, and a value. Out: the value as the type that is wanted; else a TypeError or a ValueError
-that names the argument, rather than an error from deep within.
+In: what an argument is called, and a value; the call stack. Out: the value as the type that is wanted; else a TypeError
+or a ValueError that names the argument, rather than an error from deep within. A ``stacklevel``.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import math
 import operator
 import os
 from collections.abc import Iterable, Mapping
+from inspect import currentframe
 from pathlib import Path
 from typing import SupportsFloat, SupportsIndex, TypeVar
 
@@ -141,3 +142,12 @@ def _wrong(name: str, what: str, value: object) -> TypeError:
 def _shown(whole: int) -> str:
     """An integer of any length."""
     return str(whole) if abs(whole) < 10**15 else f"about {'-' if whole < 0 else ''}2^{whole.bit_length() - 1}"
+
+
+def callers_level() -> int:
+    """The ``stacklevel`` by which ``warnings.warn``, called where this is called, points at the line that called this
+    package."""
+    frame, level = currentframe(), 0
+    while frame is not None and str(frame.f_globals.get("__name__", "")).partition(".")[0] == "neurovis_spec":
+        frame, level = frame.f_back, level + 1
+    return level

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Final, Literal, TypedDict, TypeVar, cast
 import numpy.typing as npt
 
 from neurovis_spec import arguments
-from neurovis_spec.callers import callers_level
+from neurovis_spec.arguments import callers_level
 from neurovis_spec.compilation import Compilation
 from neurovis_spec.compiler.drawing.drawing_settings import Panel
 from neurovis_spec.compiler.network import Network

@@ -13,8 +13,8 @@ from functools import cache
 from typing import Final, Literal, Protocol, runtime_checkable
 
 from neurovis_spec import plugins
+from neurovis_spec.arguments import callers_level
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.callers import callers_level
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.expressions.functions import NUMPY, Library

@@ -14,7 +14,7 @@ from io import FileIO
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from neurovis_spec.callers import callers_level
+from neurovis_spec.arguments import callers_level
 from neurovis_spec.real_paths import real_path
 from neurovis_spec.runtime.csv_file import csv_size, finish_csv, held_csv, read_csv, recover_csv, stream_csv, write_csv
 from neurovis_spec.runtime.errors import RecordingError

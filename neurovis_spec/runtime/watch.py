@@ -13,8 +13,8 @@ from math import isfinite
 
 import numpy as np
 
+from neurovis_spec.arguments import callers_level
 from neurovis_spec.arrays import BoolArray, FloatArray
-from neurovis_spec.callers import callers_level
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Check
 from neurovis_spec.runtime.state import State

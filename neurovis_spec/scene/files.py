@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Final, TypeAlias
 
-from neurovis_spec.callers import callers_level
+from neurovis_spec.arguments import callers_level
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.progress import Progress
 from neurovis_spec.scene.film import still

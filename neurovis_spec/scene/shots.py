@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from neurovis_spec.arguments import callers_level
 from neurovis_spec.arrays import IntArray
-from neurovis_spec.callers import callers_level
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.fitting import fitted
