@@ -92,7 +92,7 @@ def remember(spec: Spec, request: Request, network: Network, findings: Findings)
     """The earlier layout that the spec names, if it names one."""
     if spec.layout is None or spec.layout.file is None:
         return None
-    from neurovis_spec.layout.remember import read_memory
+    from neurovis_spec.layout.file import read_memory
 
     return read_memory(spec.layout.file, request.base, request.root, network, findings)
 

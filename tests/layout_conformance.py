@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from neurovis_spec.layout import RADIUS, Arrangement, Direction, Layout, LayoutProblem, LayoutRefusalError, Point
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.geometry import distance, sampled
-from neurovis_spec.layout.problem import canonical
+from neurovis_spec.layout.problem import NamedProblem
 
 #: Farther than rounding to the grid of coordinates goes.
 _SLACK = 1 / 128
@@ -51,7 +51,7 @@ def use_case_one(
     """The paper's first: two neurons of a rhythm, eight kernels, an output; T stands alone."""
     c, k = members("C", 2), members("K", 8)
     edges = named(full(c, c)) + named(full(c, k), 0) + named(full(k, ["O"]), 0)
-    return canonical(
+    return NamedProblem(
         "cpg_rbf",
         [*c, *k, "O", "T"],
         [("C", c), ("K", k), ("O", ["O"]), ("T", ["T"])],
@@ -59,7 +59,7 @@ def use_case_one(
         direction=direction,
         arrange=arrange,
         boxes=[("rhythm", c), ("kernels", k)],
-    )
+    ).canonical()
 
 
 @st.composite
@@ -76,7 +76,7 @@ def problems(draw: st.DrawFn, pinned: bool = True) -> LayoutProblem:
     floats = st.floats(-1e6, 1e6)
     anywhere = st.lists(st.tuples(floats, floats), min_size=len(names), max_size=len(names))
     places = draw(anywhere) if draw(st.booleans()) else []
-    return canonical(
+    return NamedProblem(
         "drawn",
         names,
         groups,
@@ -85,22 +85,24 @@ def problems(draw: st.DrawFn, pinned: bool = True) -> LayoutProblem:
         draw(st.sampled_from(["down", "up", "right", "left"])),
         boxes=boxes,
         places=dict(zip(names, places, strict=False)),
-    )
+    ).canonical()
 
 
 def extremes() -> list[LayoutProblem]:
     """Networks at the edge of what there is: very long, very deep, very loose, very centred, all in one place."""
     many = members("N", 5000)
     places = {name: (float(i), 0.0) for i, name in enumerate(many)}
-    chain = canonical("chain", many, [("N", many)], named(pairwise(many)), places=places)
+    chain = NamedProblem("chain", many, [("N", many)], named(pairwise(many)), places=places).canonical()
     paths = [".".join(f"a{i}" for i in range(depth + 1)) for depth in range(40)]
     deepest = [f"{path}.X" for path in paths]
     modules = [(path, "m") for path in paths]
-    deep = canonical("deep", deepest, [(n, [n]) for n in deepest], named(pairwise(deepest)), modules=modules)
+    deep = NamedProblem(
+        "deep", deepest, [(n, [n]) for n in deepest], named(pairwise(deepest)), modules=modules
+    ).canonical()
     few = members("N", 150)
-    loose = canonical("loose", few, places=dict.fromkeys(few, (1.0, 1.0)))
-    pairs = canonical("pairs", few, edges=named(zip(few[::2], few[1::2], strict=True)))
-    star = canonical("star", few, edges=named((few[0], name) for name in few))
+    loose = NamedProblem("loose", few, places=dict.fromkeys(few, (1.0, 1.0))).canonical()
+    pairs = NamedProblem("pairs", few, edges=named(zip(few[::2], few[1::2], strict=True))).canonical()
+    star = NamedProblem("star", few, edges=named((few[0], name) for name in few)).canonical()
     return [chain, deep, loose, pairs, star]
 
 

@@ -13,9 +13,8 @@ import pytest
 from neurovis_renderers.animated_svg import AnimatedSvgRenderer
 from neurovis_renderers.canvas import paint
 from neurovis_renderers.frames import frames
-from neurovis_renderers.png import png
 from neurovis_renderers.raster import PillowRenderer
-from neurovis_renderers.svg import SvgRenderer
+from neurovis_renderers.svg import SvgRenderer, png
 from PIL import Image as Pillow
 
 from neurovis_spec.scene import (

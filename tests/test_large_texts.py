@@ -17,7 +17,7 @@ from neurovis_spec.language.expressions import undefined
 from neurovis_spec.language.unknown import Names
 from neurovis_spec.language.yaml import brackets, refusals
 from neurovis_spec.language.yaml.reader import read_text
-from neurovis_spec.scene.cut import Cut
+from neurovis_spec.scene.texts import Cut
 
 HEAD = "neurovis: 1\nname: x\n"
 LONG = "W" * 100_000

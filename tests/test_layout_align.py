@@ -15,7 +15,7 @@ import neurovis_spec as nv
 from neurovis_spec.layout import Point
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.geometry import distance
-from neurovis_spec.layout.problem import canonical
+from neurovis_spec.layout.problem import NamedProblem
 
 LAYERS = """\
 neurovis: 1
@@ -118,7 +118,9 @@ def test_a_line_undoes_a_ring_that_nobody_asked_for(lines: list[list[str]]) -> N
     names = {group: suite.members(group, 3) for group in "AC"}
     pairs = [(a, c) for c in names["C"] for a in (*names["A"], *names["C"]) if a != c]
     every = [*names["A"], *names["C"]]
-    at = lay_out_problem(canonical("ring", every, names.items(), suite.named(pairs), align=lines), "layered").positions
+    at = lay_out_problem(
+        NamedProblem("ring", every, names.items(), suite.named(pairs), align=lines).canonical(), "layered"
+    ).positions
     for line in lines:
         assert len(heights(at, line)) == 1
     assert all(distance(a, b) >= 0.6 for a, b in combinations(at.values(), 2))
@@ -129,7 +131,9 @@ def test_rings_that_two_lines_hold_at_different_heights_give_way() -> None:
     pairs = [(a, b) for of in names.values() for a in of for b in of if a != b]
     every = [*names["C"], *names["D"]]
     lines = [["C1", "D2"], ["C3", "D5"]]
-    at = lay_out_problem(canonical("rings", every, names.items(), suite.named(pairs), align=lines), "layered").positions
+    at = lay_out_problem(
+        NamedProblem("rings", every, names.items(), suite.named(pairs), align=lines).canonical(), "layered"
+    ).positions
     assert all(len(heights(at, line)) == 1 for line in lines)
 
 
@@ -149,7 +153,7 @@ def test_lines_hold_in_any_network_and_the_order_of_the_spec_does_not_show(data:
         for of in (some, order, on):
             shuffled.shuffle(of)
         # never refused: nobody asked for what could hold these apart
-        return lay_out_problem(canonical("any", order, parts, some, align=on), "layered").positions
+        return lay_out_problem(NamedProblem("any", order, parts, some, align=on).canonical(), "layered").positions
 
     at = laid("ABC", random.Random(1))
     assert laid("CBA", random.Random(2)) == at

@@ -10,17 +10,16 @@ from neurovis_spec import plugins
 from neurovis_spec.layout import Capabilities, Layout, LayoutProblem, LayoutRefusalError, Point
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.choose import choose_engine
-from neurovis_spec.layout.engines import engine_of
+from neurovis_spec.layout.engines import engine_of, refuse
 from neurovis_spec.layout.geometry import straight
 from neurovis_spec.layout.model import LayoutMirror, LayoutModule
-from neurovis_spec.layout.problem import canonical
-from neurovis_spec.layout.refusals import refuse
+from neurovis_spec.layout.problem import NamedProblem
 
-PAIR = canonical("pair", ["A", "B"], [("A", ["A"]), ("B", ["B"])], suite.named([("A", "B")]))
+PAIR = NamedProblem("pair", ["A", "B"], [("A", ["A"]), ("B", ["B"])], suite.named([("A", "B")])).canonical()
 
 
 def test_auto_is_manual_where_everything_is_pinned() -> None:
-    pinned = canonical("pair", ["A", "B"], pins={"A": (0.0, 0.0), "B": (1.0, 0.0)})
+    pinned = NamedProblem("pair", ["A", "B"], pins={"A": (0.0, 0.0), "B": (1.0, 0.0)}).canonical()
     assert choose_engine(pinned)[0] == "manual"
     assert lay_out_problem(pinned).engine == "manual"
     assert choose_engine(PAIR)[0] == "layered"
@@ -33,7 +32,7 @@ def tangle(count: int, steps: tuple[int, ...] = (1, 7, 11)) -> LayoutProblem:
     """Every neuron drives those ``steps`` after it, round a circle."""
     names = [f"N{i}" for i in range(count)]
     pairs = [(names[i], names[(i + step) % count]) for i in range(count) for step in steps]
-    return canonical("tangle", names, [("N", names)], suite.named(pairs))
+    return NamedProblem("tangle", names, [("N", names)], suite.named(pairs)).canonical()
 
 
 def test_auto_draws_tangles_as_clusters_and_complete_ones_on_a_ring() -> None:
@@ -74,7 +73,7 @@ def test_auto_draws_large_tangles_by_an_engine_that_takes_them(boxed: bool) -> N
 
 def test_auto_takes_the_engine_for_many_neurons_also_where_nothing_connects_them() -> None:
     names = [f"N{i:06}" for i in range(100_001)]
-    engine, why = choose_engine(canonical("many", names, [("N", names)]))
+    engine, why = choose_engine(NamedProblem("many", names, [("N", names)]).canonical())
     assert engine == "organic"
     assert "'layered' does not draw so many" in why
 
@@ -95,7 +94,7 @@ def test_auto_draws_mirror_images_as_it_draws_what_has_none() -> None:
     pairs = sorted(
         {(f"{a}{i}", f"{b}{(7 * i + 31 * k) % 150}") for i in range(150) for k in range(2) for a in "LR" for b in "LR"}
     )
-    many = canonical("worm", names, edges=suite.named(pairs))
+    many = NamedProblem("worm", names, edges=suite.named(pairs)).canonical()
     mirror = (LayoutMirror(-1, tuple((i, i + 150) for i in range(150))),)
     assert choose_engine(many)[0] == choose_engine(replace(many, mirrors=mirror))[0] == "organic"
     few = replace(many, edges=many.edges[:100])
@@ -107,7 +106,9 @@ def test_auto_draws_mirror_images_as_it_draws_what_has_none() -> None:
 
 def grouped(groups: str, size: int, pairs: list[tuple[str, str]]) -> LayoutProblem:
     members = [(name, [f"{name}{i}" for i in range(size)]) for name in groups]
-    return canonical("grouped", [neuron for _, of in members for neuron in of], members, suite.named(pairs))
+    return NamedProblem(
+        "grouped", [neuron for _, of in members for neuron in of], members, suite.named(pairs)
+    ).canonical()
 
 
 def test_auto_keeps_the_flow_of_long_chains_and_of_trees() -> None:
@@ -185,23 +186,23 @@ def test_manual_names_a_neuron_without_a_position() -> None:
 def test_pins_closer_than_a_disc_are_refused_by_name(engine: str) -> None:
     pins = {"A": (0.0, 0.0), "B": (0.4, 0.4)}
     with pytest.raises(LayoutRefusalError, match=r"'A' and 'B' are closer than 0\.6") as caught:
-        lay_out_problem(canonical("close", ["A", "B"], pins=pins), engine)
+        lay_out_problem(NamedProblem("close", ["A", "B"], pins=pins).canonical(), engine)
     assert caught.value.code == "pins-too-close"
 
 
 def test_pins_just_a_disc_apart_are_fine() -> None:
     pins = {"A": (0.0, 0.0), "B": (0.6, 0.0), "C": (0.3, 0.6), "D": (1.2, 0.0)}
-    assert lay_out_problem(canonical("near", list(pins), pins=pins)).positions == pins
+    assert lay_out_problem(NamedProblem("near", list(pins), pins=pins).canonical()).positions == pins
 
 
 @pytest.mark.parametrize(
     ("problem", "code"),
     [
-        (canonical("p", ["A", "B"], pins={"A": (0.0, 0.0)}), "layout-pins-unsupported"),
-        (canonical("p", ["A"], arrange=[(["A"], "row")]), "layout-arrange-unsupported"),
-        (canonical("p", ["A"], boxes=[("frame", ["A"])]), "layout-boxes-unsupported"),
-        (canonical("p", ["A"], direction="right"), "layout-direction-unsupported"),
-        (canonical("p", ["A", "B", "C"]), "layout-too-large"),
+        (NamedProblem("p", ["A", "B"], pins={"A": (0.0, 0.0)}).canonical(), "layout-pins-unsupported"),
+        (NamedProblem("p", ["A"], arrange=[(["A"], "row")]).canonical(), "layout-arrange-unsupported"),
+        (NamedProblem("p", ["A"], boxes=[("frame", ["A"])]).canonical(), "layout-boxes-unsupported"),
+        (NamedProblem("p", ["A"], direction="right").canonical(), "layout-direction-unsupported"),
+        (NamedProblem("p", ["A", "B", "C"]).canonical(), "layout-too-large"),
     ],
 )
 def test_what_an_engine_cannot_do_is_refused(problem: LayoutProblem, code: str) -> None:
@@ -213,7 +214,7 @@ def test_what_an_engine_cannot_do_is_refused(problem: LayoutProblem, code: str) 
 def test_circular_and_grid_say_that_they_cannot_arrange() -> None:
     for engine in ("circular", "grid"):
         with pytest.raises(LayoutRefusalError, match=f"'{engine}' cannot arrange"):
-            lay_out_problem(canonical("p", ["A"], arrange=[(["A"], "row")]), engine)
+            lay_out_problem(NamedProblem("p", ["A"], arrange=[(["A"], "row")]).canonical(), engine)
 
 
 @dataclass

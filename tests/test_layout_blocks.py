@@ -14,7 +14,7 @@ from neurovis_spec.layout import Direction, Layout, LayoutProblem, Point
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.clashes import clashes
 from neurovis_spec.layout.metrics import metrics
-from neurovis_spec.layout.problem import canonical, problem_of
+from neurovis_spec.layout.problem import NamedProblem, problem_of
 
 
 @st.composite
@@ -37,7 +37,7 @@ def bodies(draw: st.DrawFn, pinned: bool = False) -> LayoutProblem:
         chosen = draw(st.lists(st.sampled_from(names), unique=True, max_size=3))
         pins = {name: (0.7 * x, 0.9 * y) for name, (x, y) in zip(chosen, spots, strict=False)}
     directions: tuple[Direction, ...] = ("down", "up", "right", "left")
-    return canonical(
+    return NamedProblem(
         "body",
         names,
         edges=suite.named(pairs),
@@ -45,7 +45,7 @@ def bodies(draw: st.DrawFn, pinned: bool = False) -> LayoutProblem:
         direction=draw(st.sampled_from(directions)),
         modules=modules,
         relative=relative,
-    )
+    ).canonical()
 
 
 def drawn(layout: Layout, problem: LayoutProblem, number: int) -> tuple[list[Point], dict[str, list[Point]]]:
@@ -95,8 +95,8 @@ def test_an_instance_that_no_pin_touches_keeps_its_drawing() -> None:
     names = [f"m{i}.N{j}" for i in range(1, 5) for j in range(1, 5)]
     pairs = suite.named((f"m{i}.N{j}", f"m{i}.N{j + 1}") for i in range(1, 5) for j in range(1, 4))
     modules = [(f"m{i}", "m") for i in range(1, 5)]
-    free = canonical("x", names, edges=pairs, modules=modules)
-    pinned = canonical("x", names, edges=pairs, modules=modules, pins={"m2.N1": (40.0, 40.0)})
+    free = NamedProblem("x", names, edges=pairs, modules=modules).canonical()
+    pinned = NamedProblem("x", names, edges=pairs, modules=modules, pins={"m2.N1": (40.0, 40.0)}).canonical()
     for engine in ("grid", "circular"):
         before, now = lay_out_problem(free, engine), lay_out_problem(pinned, engine)
         assert now.positions["m2.N1"] == (40.0, 40.0)

@@ -11,7 +11,7 @@ from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.frames import Frames
 from neurovis_spec.layout.geometry import Rect, distance, meet
 from neurovis_spec.layout.model import LayoutProblem
-from neurovis_spec.layout.problem import canonical
+from neurovis_spec.layout.problem import NamedProblem
 
 
 def classes(count: int, edges: int, boxes: int, seed: int, inside: float) -> LayoutProblem:
@@ -28,7 +28,7 @@ def classes(count: int, edges: int, boxes: int, seed: int, inside: float) -> Lay
             pairs.add((a, b))
     named = [(f"N{a} -> N{b}", f"N{a}", f"N{b}", 1) for a, b in sorted(pairs)]
     boxed = [(f"class{k}", [f"N{i}" for i in range(k, count, boxes) if i % 10]) for k in range(boxes)]
-    return canonical("classes", names, [("N", names)], named, boxes=boxed)
+    return NamedProblem("classes", names, [("N", names)], named, boxes=boxed).canonical()
 
 
 @pytest.mark.parametrize("engine", ["organic", "large"])
@@ -74,7 +74,9 @@ def test_boxes_within_boxes_hold_nothing_foreign(engine: str) -> None:
 
 @pytest.mark.parametrize("engine", ["organic", "large"])
 def test_a_box_is_as_large_as_its_neurons_need_wherever_else_they_would_be(engine: str) -> None:
-    chain = canonical("chain", [f"N{i}" for i in range(60)], edges=named((f"N{i}", f"N{i + 1}") for i in range(59)))
+    chain = NamedProblem(
+        "chain", [f"N{i}" for i in range(60)], edges=named((f"N{i}", f"N{i + 1}") for i in range(59))
+    ).canonical()
     for members in ((0, 59), (0, 30, 59), tuple(range(0, 60, 12))):
         (x0, y0, x1, y1), *_ = assert_apart(replace(chain, boxes=(("far", members),)), engine)
         assert (x1 - x0) * (y1 - y0) < 12 * len(members)

@@ -17,7 +17,7 @@ from neurovis_spec.layout import Arrangement, Direction, Layout, LayoutProblem, 
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.geometry import distance, sampled
 from neurovis_spec.layout.metrics import metrics
-from neurovis_spec.layout.problem import canonical
+from neurovis_spec.layout.problem import NamedProblem
 
 T = TypeVar("T")
 Rect = tuple[float, float, float, float]
@@ -52,7 +52,9 @@ def walkers(draw: st.DrawFn, pinned: bool = False, mirrored: bool | None = None)
     directions: tuple[Direction, ...] = ("down", "up", "right", "left")
     direction = draw(st.sampled_from(directions))
     edges = suite.named(pairs, draw(st.integers(0, 1)))
-    return canonical("walker", names, groups, edges, pins, direction, boxes=boxes, modules=modules, mirrors=mirrors)
+    return NamedProblem(
+        "walker", names, groups, edges, pins, direction, boxes=boxes, modules=modules, mirrors=mirrors
+    ).canonical()
 
 
 def offsets(layout: Layout, problem: LayoutProblem, number: int) -> tuple[Point, ...]:
@@ -151,7 +153,7 @@ def test_the_order_of_the_input_does_not_show(problem: LayoutProblem, seed: int)
     def mixed(items: Sequence[T]) -> list[T]:
         return shuffle(list(items), len(items))
 
-    again = canonical(
+    again = NamedProblem(
         problem.network,
         mixed(names),
         [(group.name, [names[m] for m in group.members]) for group in mixed(problem.groups)],
@@ -167,7 +169,7 @@ def test_the_order_of_the_input_does_not_show(problem: LayoutProblem, seed: int)
             )
             for mirror in mixed(problem.mirrors)
         ],
-    )
+    ).canonical()
     assert lay_out_problem(again, "layered") == lay_out_problem(problem, "layered")
 
 
@@ -313,12 +315,15 @@ def test_what_lines_and_mirrors_cannot_keep_is_refused() -> None:
     names = ["A", "B", "C"]
     column: list[tuple[list[str], Arrangement]] = [(["A", "B"], "column")]
     for problem, code in (
-        (canonical("x", names, arrange=column, align=[["A", "B"]]), "align-conflict"),
-        (canonical("x", names, arrange=column, mirrors=[("", [("A", "B")], [])]), "mirror-arrange"),
-        (canonical("x", ["m.A", "B"], modules=[("m", "m")], mirrors=[("", [("m.A", "B")], [])]), "mirror-frames"),
+        (NamedProblem("x", names, arrange=column, align=[["A", "B"]]).canonical(), "align-conflict"),
+        (NamedProblem("x", names, arrange=column, mirrors=[("", [("A", "B")], [])]).canonical(), "mirror-arrange"),
         (
-            canonical("x", ["m.A", "m.B", "C", "D"], pins={"m.A": (0, 0), "m.B": (4, 0), "C": (2, 0)},
-                      modules=[("m", "m")]),
+            NamedProblem("x", ["m.A", "B"], modules=[("m", "m")], mirrors=[("", [("m.A", "B")], [])]).canonical(),
+            "mirror-frames",
+        ),
+        (
+            NamedProblem("x", ["m.A", "m.B", "C", "D"], pins={"m.A": (0, 0), "m.B": (4, 0), "C": (2, 0)},
+                      modules=[("m", "m")]).canonical(),
             "pin-in-frame",
         ),
     ):  # fmt: skip
@@ -330,7 +335,9 @@ def test_foreign_routes_go_round_frames() -> None:
     names = [f"m{i}.{n}" for i in (1, 2, 3) for n in ("A", "B", "C")]
     inner = [(f"m{i}.A", f"m{i}.{n}") for i in (1, 2, 3) for n in ("B", "C")]
     pairs = [("m1.B", "m3.B"), ("m3.B", "m1.B"), ("m1.C", "m2.B"), ("m2.B", "m1.C")]
-    problem = canonical("round", names, [], suite.named(inner + pairs), modules=[(f"m{i}", "m") for i in (1, 2, 3)])
+    problem = NamedProblem(
+        "round", names, [], suite.named(inner + pairs), modules=[(f"m{i}", "m") for i in (1, 2, 3)]
+    ).canonical()
     layout = lay_out_problem(problem, "layered")
     rect = frame(layout, problem, problem.modules[1].members, 0.5)
     for name in ("m1.B -> m3.B", "m3.B -> m1.B"):

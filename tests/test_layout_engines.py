@@ -22,7 +22,7 @@ from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.file import dump
 from neurovis_spec.layout.geometry import distance, sampled
 from neurovis_spec.layout.metrics import metrics
-from neurovis_spec.layout.problem import canonical
+from neurovis_spec.layout.problem import NamedProblem
 
 
 @pytest.mark.parametrize("engine", suite.ENGINES)
@@ -36,8 +36,8 @@ def test_every_engine_keeps_the_contract_or_refuses(engine: str, problem: Layout
 
 @pytest.mark.parametrize("engine", suite.ENGINES)
 def test_every_engine_lays_out_nothing_and_one(engine: str) -> None:
-    assert lay_out_problem(canonical("none", []), engine) == Layout("none", engine, {}, {})
-    one = canonical("one", ["A"], [("A", ["A"])], suite.named([("A", "A")]), {"A": (0.0, 0.0)})
+    assert lay_out_problem(NamedProblem("none", []).canonical(), engine) == Layout("none", engine, {}, {})
+    one = NamedProblem("one", ["A"], [("A", ["A"])], suite.named([("A", "A")]), {"A": (0.0, 0.0)}).canonical()
     layout = suite.check(one, engine)
     assert layout is not None
     assert layout.positions == {"A": (0.0, 0.0)}
@@ -60,8 +60,10 @@ def test_every_engine_keeps_what_it_remembers(engine: str) -> None:
     names = suite.members("N", 12)
     pairs = suite.named([(a, b) for i, a in enumerate(names) for b in names[i + 1 : i + 3]])
     places = {name: (float(i % 4), float(i // 4)) for i, name in enumerate([*names, "Z"])}
-    before = lay_out_problem(canonical("x", names, edges=pairs, places=places), engine)
-    later = canonical("x", [*names, "Z"], edges=[*pairs, ("N1 -> Z", "N1", "Z", 1)], places=places, memory=before)
+    before = lay_out_problem(NamedProblem("x", names, edges=pairs, places=places).canonical(), engine)
+    later = NamedProblem(
+        "x", [*names, "Z"], edges=[*pairs, ("N1 -> Z", "N1", "Z", 1)], places=places, memory=before
+    ).canonical()
     now = lay_out_problem(later, engine)
     assert all(now.positions[name] == before.positions[name] for name in names)
     assert suite.nearest(list(now.positions.values())) >= 0.6
@@ -123,7 +125,7 @@ def test_arrivals_come_in_the_order_of_their_sources() -> None:
 
 def test_straight_routes_keep_their_control_points_on_the_line() -> None:
     names = suite.members("N", 12)
-    chain = canonical("chain", names, [("N", names)], suite.named(pairwise(names)))
+    chain = NamedProblem("chain", names, [("N", names)], suite.named(pairwise(names))).canonical()
     layout = lay_out_problem(chain, "layered")
     assert [layout.positions[name] for name in names] == [(0.0, 2.0 * i) for i in range(12)]
     assert all(x == 0 for route in layout.routes.values() for x, _ in route)
@@ -132,7 +134,9 @@ def test_straight_routes_keep_their_control_points_on_the_line() -> None:
 def test_a_group_that_drives_itself_in_a_ring_is_drawn_as_one() -> None:
     names = suite.members("R", 16)
     around = [(a, b) for a, b in pairwise([*names, names[0]])]
-    problem = canonical("ring", names, [("R", names)], suite.named([*around, *((b, a) for a, b in around)]))
+    problem = NamedProblem(
+        "ring", names, [("R", names)], suite.named([*around, *((b, a) for a, b in around)])
+    ).canonical()
     layout = lay_out_problem(problem, "layered")
     middle = [sum(c) / 16 for c in zip(*layout.positions.values(), strict=True)]
     radii = [distance(point, (middle[0], middle[1])) for point in layout.positions.values()]
@@ -142,7 +146,9 @@ def test_a_group_that_drives_itself_in_a_ring_is_drawn_as_one() -> None:
 
 def test_what_spans_ranks_goes_round_the_neurons_between() -> None:
     names = ["A", "B", "C"]
-    problem = canonical("skip", names, [(n, [n]) for n in names], suite.named([("A", "B"), ("B", "C"), ("A", "C")]))
+    problem = NamedProblem(
+        "skip", names, [(n, [n]) for n in names], suite.named([("A", "B"), ("B", "C"), ("A", "C")])
+    ).canonical()
     layout = lay_out_problem(problem, "layered")
     line = sampled(layout.routes["A -> C"])
     assert min(distance(point, layout.positions["B"]) for point in line) > 0.4
@@ -151,7 +157,7 @@ def test_what_spans_ranks_goes_round_the_neurons_between() -> None:
 def test_feedback_stands_against_the_direction_and_apart() -> None:
     h, o = suite.members("H", 3), ["O"]
     pairs = suite.named([*suite.full(["I"], h), *suite.full(h, o)], 0) + suite.named(suite.full(o, h))
-    problem = canonical("fb", ["I", *h, *o], [("I", ["I"]), ("H", h), ("O", o)], pairs)
+    problem = NamedProblem("fb", ["I", *h, *o], [("I", ["I"]), ("H", h), ("O", o)], pairs).canonical()
     layout = suite.check(problem, "layered")
     assert layout is not None
     heights = [layout.positions[name][1] for name in ("I", "H1", "H2", "H3", "O")]
@@ -160,7 +166,9 @@ def test_feedback_stands_against_the_direction_and_apart() -> None:
 
 def test_what_runs_within_a_step_decides_where_a_loop_is_cut() -> None:
     edges = suite.named([("B", "A")], 0) + suite.named([("A", "B")], 1)
-    places = lay_out_problem(canonical("cut", ["A", "B"], [("A", ["A"]), ("B", ["B"])], edges), "layered").positions
+    places = lay_out_problem(
+        NamedProblem("cut", ["A", "B"], [("A", ["A"]), ("B", ["B"])], edges).canonical(), "layered"
+    ).positions
     assert places["B"][1] < places["A"][1]
 
 
@@ -170,7 +178,7 @@ def test_members_of_a_box_stay_together() -> None:
     pairs = [(names[i], targets[(3 * i) % 6]) for i in range(6)]
     groups = [(n, [n]) for n in names + targets]
     boxed = [names[0], names[3], names[5]]
-    problem = canonical("boxes", names + targets, groups, suite.named(pairs), boxes=[("frame", boxed)])
+    problem = NamedProblem("boxes", names + targets, groups, suite.named(pairs), boxes=[("frame", boxed)]).canonical()
     places = lay_out_problem(problem, "layered").positions
     rank = sorted((x, name) for name, (x, y) in places.items() if y == places[boxed[0]][1])
     at = [i for i, (_, name) in enumerate(rank) if name in boxed]
@@ -191,7 +199,7 @@ def test_arranged_groups_keep_their_formation() -> None:
 
 
 def test_arranging_a_neuron_twice_is_refused() -> None:
-    problem = canonical("twice", ["A", "B"], arrange=[(["A", "B"], "row"), (["A"], "ring")])
+    problem = NamedProblem("twice", ["A", "B"], arrange=[(["A", "B"], "row"), (["A"], "ring")]).canonical()
     with pytest.raises(LayoutRefusalError, match="'A' is arranged twice"):
         lay_out_problem(problem, "layered")
 
@@ -220,16 +228,20 @@ def test_one_pin_moves_the_whole() -> None:
 
 def test_a_long_chain_and_many_components_do_not_recurse() -> None:
     names = suite.members("N", 2000)
-    layout = LayeredEngine().lay_out(canonical("long", names, [("N", names)], suite.named(pairwise(names))))
+    layout = LayeredEngine().lay_out(
+        NamedProblem("long", names, [("N", names)], suite.named(pairwise(names))).canonical()
+    )
     assert len(set(layout.positions.values())) == 2000
-    pairs = canonical("pairs", names, [(n, [n]) for n in names], suite.named(zip(names[::2], names[1::2], strict=True)))
+    pairs = NamedProblem(
+        "pairs", names, [(n, [n]) for n in names], suite.named(zip(names[::2], names[1::2], strict=True))
+    ).canonical()
     assert len(set(LayeredEngine().lay_out(pairs).positions.values())) == 2000
 
 
 def test_the_same_bytes_whatever_the_hash_seed() -> None:
     code = (
         "import layout_conformance as s; from neurovis_spec.layout.arrange import lay_out_problem as l;"
-        "from neurovis_spec.layout.file import dump; from neurovis_spec.layout.problem import canonical as c;"
+        "from neurovis_spec.layout.file import dump; from neurovis_spec.layout.problem import NamedProblem as c;"
         "n = s.members('R', 9); e = s.named([(n[i * 5 % 9], n[i * i % 7]) for i in range(20)]);"
         "p = c('x', n + ['A', 'B'], [('R', n[:5])], e + s.named(s.full(['A'], n)), boxes=[('b', n[:3])]);"
         "print(dump(l(p, 'layered')), dump(l(s.use_case_one(), 'layered')))"
@@ -254,9 +266,9 @@ def test_the_order_of_the_spec_does_not_show(problem: LayoutProblem, random: obj
     places = list(zip(problem.neurons, problem.places, strict=False))
     for parts in (names, groups, edges, pins, boxes, places):
         random.shuffle(parts)
-    shuffled = canonical(
+    shuffled = NamedProblem(
         problem.network, names, groups, edges, dict(pins), problem.direction, boxes=boxes, places=dict(places)
-    )
+    ).canonical()
     assert shuffled == problem
     for engine in ("layered", "organic", "large"):
         assert _made(shuffled, engine) == _made(problem, engine)
@@ -272,7 +284,7 @@ def _made(problem: LayoutProblem, engine: str) -> str:
 
 def test_the_same_network_under_other_names_in_the_same_order_lies_the_same() -> None:
     problem = suite.use_case_one()
-    renamed = canonical(
+    renamed = NamedProblem(
         "other",
         [f"x{name}" for name in problem.neurons],
         [(f"x{g.name}", [f"x{problem.neurons[m]}" for m in g.members]) for g in problem.groups],
@@ -282,7 +294,7 @@ def test_the_same_network_under_other_names_in_the_same_order_lies_the_same() ->
             for a, b in [(problem.neurons[e.source], problem.neurons[e.target])]
         ],
         boxes=[(name, [f"x{problem.neurons[m]}" for m in of]) for name, of in problem.boxes],
-    )
+    ).canonical()
     first, second = lay_out_problem(problem), lay_out_problem(renamed)
     assert list(first.positions.values()) == list(second.positions.values())
     assert list(first.routes.values()) == list(second.routes.values())

@@ -15,7 +15,7 @@ import neurovis_spec as nv
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.geometry import Rect, meet
 from neurovis_spec.layout.metrics import metrics
-from neurovis_spec.layout.problem import canonical, problem_of
+from neurovis_spec.layout.problem import NamedProblem, problem_of
 
 corners = st.tuples(*(st.integers(0, 20) for _ in range(4)))
 pieces = st.lists(
@@ -44,7 +44,9 @@ def test_a_pair_that_nothing_connects_stands_in_a_gap() -> None:
     wide = [("a", f"w{i}") for i in range(6)]
     long = [(f"w{i}", f"w{i}.{k}") if k == 0 else (f"w{i}.{k - 1}", f"w{i}.{k}") for i in (0, 5) for k in range(8)]
     pairs = [*wide, *long, ("p", "q")]
-    problem = canonical("x", list(dict.fromkeys(name for pair in pairs for name in pair)), edges=named(pairs))
+    problem = NamedProblem(
+        "x", list(dict.fromkeys(name for pair in pairs for name in pair)), edges=named(pairs)
+    ).canonical()
     layout = lay_out_problem(problem, "layered")
     rest = [place for name, place in layout.positions.items() if name not in "pq"]
     for k in (0, 1):

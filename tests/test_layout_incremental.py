@@ -24,7 +24,7 @@ from neurovis_spec.layout.file import dump, parse
 from neurovis_spec.layout.geometry import distance, sampled
 from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point
-from neurovis_spec.layout.problem import canonical, problem_of
+from neurovis_spec.layout.problem import NamedProblem, problem_of
 
 ENGINES = ("layered", "organic", "large", "circular", "grid")
 LEG = """
@@ -424,8 +424,8 @@ def _edits(draw: st.DrawFn) -> tuple[LayoutProblem, LayoutProblem]:
     left = [name for name in names if name not in gone] + new
     kept = [(a, b) for a, b in sorted(pairs | more) if a in left and b in left]
     return (
-        canonical("x", names, edges=[(f"{a} -> {b}", a, b, 1) for a, b in sorted(pairs)]),
-        canonical("x", left or ["Z"], edges=[(f"{a} -> {b}", a, b, 1) for a, b in kept]),
+        NamedProblem("x", names, edges=[(f"{a} -> {b}", a, b, 1) for a, b in sorted(pairs)]).canonical(),
+        NamedProblem("x", left or ["Z"], edges=[(f"{a} -> {b}", a, b, 1) for a, b in kept]).canonical(),
     )
 
 

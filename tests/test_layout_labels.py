@@ -18,7 +18,7 @@ from neurovis_spec.layout.file import dump, parse
 from neurovis_spec.layout.geometry import Rect, meet
 from neurovis_spec.layout.labels import WIDEST, label_rect
 from neurovis_spec.layout.metrics import metrics
-from neurovis_spec.layout.problem import canonical, problem_of
+from neurovis_spec.layout.problem import NamedProblem, problem_of
 from neurovis_spec.scene import Disc, Rectangle, Text
 from neurovis_spec.scene.texts import width
 
@@ -353,11 +353,11 @@ connections: {A -> H: 1, H -> B: 1}
 
 
 def test_of_mirror_images_one_alone_may_have_a_label_beside_its_disc() -> None:
-    problem = canonical(
+    problem = NamedProblem(
         "x",
         ["A", "B", "C"],
         edges=[("A -> C", "A", "C", 1), ("B -> C", "B", "C", 1)],
         mirrors=[("", [("A", "B")], [])],
         labels={"A": (0.9, 0.25)},
-    )
+    ).canonical()
     assert lay_out_problem(problem, "layered").labels.keys() == {"A"}

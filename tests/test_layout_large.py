@@ -20,7 +20,7 @@ from neurovis_spec.layout import Direction, LayoutProblem
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.geometry import near_pairs
 from neurovis_spec.layout.metrics import metrics
-from neurovis_spec.layout.problem import canonical
+from neurovis_spec.layout.problem import NamedProblem
 
 SIZE = 20
 
@@ -38,7 +38,7 @@ def clusters(count: int, direction: Direction = "down", modules: bool = False) -
     names = [f"M{i // SIZE}.N{i % SIZE}" for i in range(total)]
     edges = suite.named((names[a], names[b]) for a, b in sorted(pairs))
     paths = [(f"M{i}", "m") for i in range(count)] if modules else []
-    return canonical("clusters", names, edges=edges, direction=direction, modules=paths)
+    return NamedProblem("clusters", names, edges=edges, direction=direction, modules=paths).canonical()
 
 
 @pytest.mark.parametrize("direction", ["down", "left"])
@@ -70,7 +70,7 @@ def along(kind: str) -> list[tuple[int, int]]:
 def test_all_connections_of_sparse_networks_run_along_the_direction(kind: str) -> None:
     pairs = along(kind)
     names = [f"N{i}" for i in range(max(max(pair) for pair in pairs) + 1)]
-    problem = canonical(kind, names, edges=suite.named((names[a], names[b]) for a, b in pairs))
+    problem = NamedProblem(kind, names, edges=suite.named((names[a], names[b]) for a, b in pairs)).canonical()
     layout = lay_out_problem(problem, "large")
     suite.check_positions(problem, layout)
     assert metrics(layout, problem)["flow"] == 1
@@ -86,7 +86,7 @@ def test_heights_in_flow_are_the_given_ones_where_these_are(pairs: list[tuple[in
 
 def test_instances_of_modules_are_drawn_together_even_if_nothing_connects_them() -> None:
     names = [f"{m}.N{i}" for m in ("a", "b") for i in range(10)]
-    layout = lay_out_problem(canonical("x", names, modules=[("a", "m"), ("b", "m")]), "large")
+    layout = lay_out_problem(NamedProblem("x", names, modules=[("a", "m"), ("b", "m")]).canonical(), "large")
     a, b = (np.array([layout.positions[f"{m}.N{i}"] for i in range(10)]) for m in ("a", "b"))
     assert (a.max(axis=0) < b.min(axis=0)).any() or (b.max(axis=0) < a.min(axis=0)).any()
 
@@ -119,9 +119,9 @@ def test_levels_halve_a_network_and_lose_nothing() -> None:
     assert all(b <= 0.7 * a for a, b in pairwise(counts))
     assert counts[-1] <= 30
     assert coarsest.mass.sum() == pytest.approx(wiring.mass.sum()) == 400
-    star = wiring_of(canonical("star", suite.members("N", 500), edges=suite.named(
+    star = wiring_of(NamedProblem("star", suite.members("N", 500), edges=suite.named(
         ("N1", f"N{i}") for i in range(2, 501)
-    )), np.arange(500))  # fmt: skip
+    )).canonical(), np.arange(500))  # fmt: skip
     assert levels_of(star)[1].count < 30
 
 
@@ -188,7 +188,7 @@ def test_what_hangs_on_one_connection_leaves_the_rest_its_room(tail: int) -> Non
     pairs = {(i, j) for i in range(300) for j in random.sample(range(300), 4) if i != j}
     pairs |= {(299 + i, 300 + i) for i in range(tail)}
     names = [f"N{i}" for i in range(300 + tail)]
-    problem = canonical("tail", names, edges=suite.named((names[a], names[b]) for a, b in sorted(pairs)))
+    problem = NamedProblem("tail", names, edges=suite.named((names[a], names[b]) for a, b in sorted(pairs))).canonical()
     places = np.array(list(lay_out_problem(problem, "large").positions.values()))
     core, whole = np.ptp(np.quantile(places[:300], [0.05, 0.95], axis=0), axis=0), np.ptp(places, axis=0)
     assert (core > whole / 4).all()
@@ -203,6 +203,8 @@ def test_many_clusters_with_few_connections_between_them_stay_close() -> None:
         j = random.randrange(600) if random.random() < 0.01 else i - i % 30 + random.randrange(30)
         pairs |= {(i, j)} if i != j else set()
     names = [f"N{i}" for i in range(600)]
-    problem = canonical("clusters", names, edges=suite.named((names[a], names[b]) for a, b in sorted(pairs)))
+    problem = NamedProblem(
+        "clusters", names, edges=suite.named((names[a], names[b]) for a, b in sorted(pairs))
+    ).canonical()
     places = np.array(list(lay_out_problem(problem, "large").positions.values()))
     assert np.ptp(places, axis=0).prod() < 21 * len(places)

@@ -12,7 +12,7 @@ import neurovis_spec as nv
 from neurovis_spec.layout import Layout, LayoutProblem
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.geometry import distance, sampled
-from neurovis_spec.layout.problem import canonical, problem_of
+from neurovis_spec.layout.problem import NamedProblem, problem_of
 
 NEIGHBOURS: tuple[tuple[tuple[str, str], ...], ...] = (
     (),
@@ -36,7 +36,7 @@ def least_between_loops(layout: Layout, problem: LayoutProblem) -> float:
 @pytest.mark.parametrize("others", NEIGHBOURS)
 @pytest.mark.parametrize("count", [2, 3, 4, 5])
 def test_loops_of_one_neuron_are_apart(engine: str, others: tuple[tuple[str, str], ...], count: int) -> None:
-    problem = canonical("loops", [*"ABCDE"], edges=suite.named([*[("A", "A")] * count, *others]))
+    problem = NamedProblem("loops", [*"ABCDE"], edges=suite.named([*[("A", "A")] * count, *others])).canonical()
     assert least_between_loops(lay_out_problem(problem, engine), problem) >= 0.12
 
 

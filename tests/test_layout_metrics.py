@@ -14,7 +14,7 @@ from neurovis_spec.layout import Direction, Layout, LayoutProblem, Point, Route
 from neurovis_spec.layout import metrics as measures
 from neurovis_spec.layout.geometry import cubic, distance, pieces_of, snap, straight, turn
 from neurovis_spec.layout.metrics import metrics
-from neurovis_spec.layout.problem import canonical
+from neurovis_spec.layout.problem import NamedProblem
 
 
 def drawn(
@@ -24,7 +24,7 @@ def drawn(
     pins: dict[str, Point] | None = None,
     routes: dict[str, Route] | None = None,
 ) -> tuple[Layout, LayoutProblem]:
-    problem = canonical("x", places, edges=suite.named(pairs), pins=pins, direction=direction)
+    problem = NamedProblem("x", places, edges=suite.named(pairs), pins=pins or {}, direction=direction).canonical()
     lines = {
         e.name: straight(places[problem.neurons[e.source]], places[problem.neurons[e.target]]) for e in problem.edges
     }
@@ -122,7 +122,7 @@ def test_area_symmetry_pins_and_counts() -> None:
 
 
 def test_an_empty_layout_has_metrics() -> None:
-    found = metrics(Layout("x", "grid", {}, {}), canonical("x", []))
+    found = metrics(Layout("x", "grid", {}, {}), NamedProblem("x", []).canonical())
     assert found["area"] == 0
     assert found["flow"] == 1
 

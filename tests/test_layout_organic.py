@@ -13,12 +13,14 @@ from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.frames import Frames
 from neurovis_spec.layout.geometry import distance, meet
 from neurovis_spec.layout.metrics import metrics
-from neurovis_spec.layout.problem import canonical
+from neurovis_spec.layout.problem import NamedProblem
 
 
 def test_a_ring_becomes_a_ring() -> None:
     names = suite.members("N", 24)
-    ring = canonical("ring", names, edges=suite.named((names[i], names[(i + 1) % 24]) for i in range(24)))
+    ring = NamedProblem(
+        "ring", names, edges=suite.named((names[i], names[(i + 1) % 24]) for i in range(24))
+    ).canonical()
     layout = lay_out_problem(ring, "organic")
     points = [layout.positions[name] for name in names]
     middle = (sum(x for x, _ in points) / 24, sum(y for _, y in points) / 24)
@@ -31,7 +33,7 @@ def reservoir() -> LayoutProblem:
     units = suite.members("R", 60)
     pairs = [(units[i], units[(i * step + 7 * step) % 60]) for i in range(60) for step in (1, 3, 11)]
     pairs += [("I", unit) for unit in units[::6]] + [(unit, "O") for unit in units[3::6]]
-    return canonical("reservoir", [*units, "I", "O"], edges=suite.named(sorted(set(pairs))))
+    return NamedProblem("reservoir", [*units, "I", "O"], edges=suite.named(sorted(set(pairs)))).canonical()
 
 
 def test_what_drives_a_loop_stands_above_and_what_reads_it_below() -> None:
@@ -70,7 +72,7 @@ def test_boxes_are_compact_and_pins_stay() -> None:
 def test_parts_do_not_overlap_however_small_the_spacing(engine: str) -> None:
     names = suite.members("N", 12)
     edges = suite.named([("N1", "N2"), ("N3", "N4"), ("N4", "N5"), ("N5", "N3")])
-    suite.check(canonical("parts", names, edges=edges, spacing=(0.2, 0.5)), engine)
+    suite.check(NamedProblem("parts", names, edges=edges, spacing=(0.2, 0.5)).canonical(), engine)
 
 
 def two_sided(sides: int, middle: int, connections: int, *, seed: int, direction: Direction = "down") -> LayoutProblem:
@@ -86,7 +88,9 @@ def two_sided(sides: int, middle: int, connections: int, *, seed: int, direction
         if random.random() < 0.7:
             pairs[image.get(a, a), image.get(b, b)] = None
     both = list(zip(left, right, strict=True))
-    return canonical("two-sided", names, edges=suite.named(pairs), direction=direction, mirrors=[("", both, [])])
+    return NamedProblem(
+        "two-sided", names, edges=suite.named(pairs), direction=direction, mirrors=[("", both, [])]
+    ).canonical()
 
 
 @pytest.mark.parametrize("direction", ["down", "left"])
@@ -128,7 +132,7 @@ def test_sides_of_a_tangle_do_not_mix() -> None:
 
 
 def test_mirror_images_within_an_instance_are_for_engines_with_frames() -> None:
-    problem = canonical("x", ["m.A", "m.B"], modules=[("m", "m")], mirrors=[("m", [("m.A", "m.B")], [])])
+    problem = NamedProblem("x", ["m.A", "m.B"], modules=[("m", "m")], mirrors=[("m", [("m.A", "m.B")], [])]).canonical()
     with pytest.raises(LayoutRefusalError) as found:
         lay_out_problem(problem, "organic")
     assert found.value.code == "layout-mirror-unsupported"

@@ -9,7 +9,7 @@ import pytest
 
 from neurovis_spec.layout.geometry import bounds, distance
 from neurovis_spec.layout.metrics import metrics
-from neurovis_spec.layout.problem import canonical
+from neurovis_spec.layout.problem import NamedProblem
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "benchmarks"))
 from layout_peers import PEERS
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.node
 
 NAMES = ["I", *(f"{m}.{n}" for m in ("a", "b") for n in ("X", "Y")), "O"]
 PAIRS = [("I", "a.X"), ("I", "b.Y"), ("a.X", "a.Y"), ("b.Y", "b.X"), ("a.Y", "O"), ("b.X", "O"), ("O", "O"), ("O", "I")]
-PROBLEM = canonical("pair", NAMES, edges=suite.named(PAIRS), modules=[("a", "m"), ("b", "m")])
+PROBLEM = NamedProblem("pair", NAMES, edges=suite.named(PAIRS), modules=[("a", "m"), ("b", "m")]).canonical()
 
 
 @pytest.mark.parametrize("peer", ["elk", "elk, clusters"])

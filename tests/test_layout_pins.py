@@ -18,7 +18,7 @@ from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.clashes import clashes
 from neurovis_spec.layout.geometry import distance
 from neurovis_spec.layout.metrics import metrics
-from neurovis_spec.layout.problem import canonical, problem_of
+from neurovis_spec.layout.problem import NamedProblem, problem_of
 
 LEGS = """
 neurovis: 1
@@ -98,7 +98,7 @@ def test_many_pinned_instances_that_cannot_stay_alike_are_each_drawn_as_there_is
     pins = {f"{path}.a": (1.6 * (i % 5), 1.5 * (i // 5)) for i, path in enumerate(paths[:10])}
     modules = [(path, "col") for path in paths]
     names = [f"{path}.{n}" for path in paths for n in "abc"]
-    problem = canonical("x", names, edges=suite.named(pairs), pins=pins, modules=modules)
+    problem = NamedProblem("x", names, edges=suite.named(pairs), pins=pins, modules=modules).canonical()
     with patch.object(Occupancy, "_free", autospec=True, side_effect=Occupancy._free) as looked:
         layout = lay_out_problem(problem, "grid")
     check_pins(problem, layout)
@@ -169,7 +169,7 @@ def walkers(draw: st.DrawFn, most: int) -> LayoutProblem:
         relative = {leg: {f"{leg}.{name}": (1.5 * k, 0.75 * k) for k, name in enumerate(own[:2])} for leg in legs}
     groups = [("C", middle)] if middle else []
     groups += [(f"{leg}.S", [f"{leg}.{name}" for name in suite.members("S", size)]) for leg in legs]
-    return canonical(
+    return NamedProblem(
         "walker",
         names,
         groups,
@@ -181,7 +181,7 @@ def walkers(draw: st.DrawFn, most: int) -> LayoutProblem:
         relative=relative,
         origins=origins,
         mirrors=mirrors,
-    )
+    ).canonical()
 
 
 def attempt(problem: LayoutProblem) -> tuple[Layout | None, str]:
@@ -246,7 +246,7 @@ def test_instances_without_a_pin_keep_off_the_frames_of_those_that_have_one(engi
     ]
     paths = [(f"x{i}", "col") for i in range(1, 5)]
     pins = {"x2.a": (10.0, 3.0), "x3.b": (-3.0, 1.0), "x4.a": (0.0, 10.0), "x4.c": (2.0, 10.0), "O": (20.0, 20.0)}
-    problem = canonical("x", [*names, "I", "O"], edges=suite.named(pairs), pins=pins, modules=paths)
+    problem = NamedProblem("x", [*names, "I", "O"], edges=suite.named(pairs), pins=pins, modules=paths).canonical()
     layout = suite.check(problem, engine)
     assert layout is not None
     assert not clashes(problem, layout)

@@ -18,7 +18,7 @@ from neurovis_spec.layout.frames import Frames
 from neurovis_spec.layout.geometry import Rect
 from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.model import Seat
-from neurovis_spec.layout.problem import canonical, problem_of
+from neurovis_spec.layout.problem import NamedProblem, problem_of
 
 LEG = """\
   leg:
@@ -259,7 +259,7 @@ def test_what_has_no_mirror_image_keeps_off_what_has_one(plan: str, pairs: list[
 @pytest.mark.parametrize(("width", "fits"), [(2, True), (3, False)])
 def test_empty_cells_say_where_the_middle_of_the_page_is(width: int, fits: bool) -> None:
     plan = [("", [name], Seat(0, column, 1, 1, 1, width)) for column, name in enumerate("AB")]
-    problem = canonical("pair", ["A", "B"], plan=plan, mirrors=[("", [("A", "B")], [])])
+    problem = NamedProblem("pair", ["A", "B"], plan=plan, mirrors=[("", [("A", "B")], [])]).canonical()
     if fits:
         (ax, ay), (bx, by) = lay_out_problem(problem, "layered").positions.values()
         assert ax < bx

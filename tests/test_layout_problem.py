@@ -10,7 +10,7 @@ from networks_by_hand import cpg_rbf
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.naming import edge_key, natural_key
-from neurovis_spec.layout.problem import canonical, problem_of
+from neurovis_spec.layout.problem import NamedProblem, problem_of
 
 
 def test_numbers_in_names_count_as_numbers() -> None:
@@ -35,12 +35,12 @@ def test_edges_stand_by_source_target_and_number() -> None:
 @given(st.lists(st.tuples(*[st.sampled_from(["K", "K2", "K10", "K02", "left2.K1", "left10.K1", "_x"])] * 2)))
 def test_edges_of_a_problem_stand_as_their_names_do(pairs: list[tuple[str, str]]) -> None:
     edges = suite.named(pairs)
-    problem = canonical("x", sorted({name for pair in pairs for name in pair}), edges=edges)
+    problem = NamedProblem("x", sorted({name for pair in pairs for name in pair}), edges=edges).canonical()
     assert [edge.name for edge in problem.edges] == sorted((name for name, *_ in edges), key=edge_key)
 
 
 def test_a_problem_is_in_canonical_order() -> None:
-    problem = canonical(
+    problem = NamedProblem(
         "x",
         ["K10", "B", "K2"],
         [("K", ["K2", "K10"]), ("B", ["B"])],
@@ -49,7 +49,7 @@ def test_a_problem_is_in_canonical_order() -> None:
         boxes=[("b", ["K10"]), ("a", ["B"]), ("b", ["K2"])],
         spacing=(1.5, 3.0),
         exits=["B"],
-    )
+    ).canonical()
     assert problem.neurons == ("B", "K2", "K10")
     assert [(g.name, g.members) for g in problem.groups] == [("B", (0,)), ("K", (1, 2))]
     assert [(e.name, e.source, e.target, e.delay) for e in problem.edges] == [

@@ -15,7 +15,7 @@ from neurovis_layouts.layered.simplex import shortened
 import neurovis_spec as nv
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.metrics import metrics
-from neurovis_spec.layout.problem import canonical
+from neurovis_spec.layout.problem import NamedProblem
 
 Arcs = dict[tuple[int, int], float]
 
@@ -97,7 +97,7 @@ def test_all_that_is_in_no_loop_runs_along_whatever_groups_there_are(random: Ran
     ends = [sorted(random.sample(range(len(names)), 2)) for _ in range(16)]
     ends += [[b, a] for a, b in ends[:2]]
     edges = named(sorted({(names[a], names[b]) for a, b in ends}))
-    problem = canonical("x", names, groups, edges)
+    problem = NamedProblem("x", names, groups, edges).canonical()
     assert metrics(lay_out_problem(problem, "layered"), problem)["flow"] == 1
 
 

@@ -20,7 +20,7 @@ from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.geometry import distance, sampled, straight
 from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.model import Point, Route
-from neurovis_spec.layout.problem import canonical, problem_of
+from neurovis_spec.layout.problem import NamedProblem, problem_of
 
 HEAD = "neurovis: 1\nname: pair\nneurons: {L: {count: 2, bias: 1}, R: {count: 2}, M: {}}\n"
 DIRECTIONS: tuple[Direction, ...] = ("down", "up", "right", "left")
@@ -188,7 +188,7 @@ def test_bows_over_a_row_are_nested() -> None:
     """What leads over a neuron in a row is not on what leads to the next one."""
     pins = {name: (float(x), 0.0) for x, name in enumerate("ABCD")}
     wired = [("A", "B"), ("B", "C"), ("A", "C"), ("A", "D"), ("D", "A"), ("C", "C"), ("C", "A")]
-    problem = canonical("row", list("ABCD"), edges=suite.named(wired), pins=pins)
+    problem = NamedProblem("row", list("ABCD"), edges=suite.named(wired), pins=pins).canonical()
     routes = lay_out_problem(problem, "manual").routes
     for one, other in (("A -> D", "A -> C"), ("D -> A", "C -> A")):
         assert together(routes[other], routes[one], 0.08) == 0.0
@@ -199,7 +199,9 @@ def test_a_bow_is_not_raised_on_to_another_between_the_same_ends() -> None:
     wired = [("A", "A")] * 2 + [("A", "B")] * 2 + [("A", "C"), ("A", "D")] + [("B", "A")] * 5 + [("C", "B")] * 2
     wired += [("C", "C")] * 2 + [("D", "A")] * 3
     pins = {"A": (0.0, -0.9), "C": (0.0, 2.7)}
-    problem = canonical("raised", list("ABCD"), edges=suite.named(wired), pins=pins, boxes=[("frame", list("ABCD"))])
+    problem = NamedProblem(
+        "raised", list("ABCD"), edges=suite.named(wired), pins=pins, boxes=[("frame", list("ABCD"))]
+    ).canonical()
     suite.check(problem, "large")
 
 
@@ -214,13 +216,17 @@ def sheaves(draw: st.DrawFn) -> LayoutProblem:
     lattice = st.tuples(st.integers(-4, 4), st.integers(-4, 4))
     spots = draw(st.lists(lattice, unique=True, max_size=3))
     pins = {name: (0.7 * x, 0.9 * y) for name, (x, y) in zip(names, spots, strict=False)}
-    return canonical("sheaf", names, edges=suite.named(pairs), pins=pins, direction=draw(st.sampled_from(DIRECTIONS)))
+    return NamedProblem(
+        "sheaf", names, edges=suite.named(pairs), pins=pins, direction=draw(st.sampled_from(DIRECTIONS))
+    ).canonical()
 
 
 @pytest.mark.parametrize("engine", ["layered", "circular"])
 def test_a_sheaf_of_six_is_six_lines(engine: str) -> None:
     for pairs in ([("A", "B")] * 6, [("A", "B")] * 5 + [("B", "A")], [("A", "B"), ("B", "A")] * 3):
-        problem = canonical("sheaf", ["A", "B", "C"], edges=suite.named([*pairs, ("A", "C"), ("B", "C")]))
+        problem = NamedProblem(
+            "sheaf", ["A", "B", "C"], edges=suite.named([*pairs, ("A", "C"), ("B", "C")])
+        ).canonical()
         routes = lay_out_problem(problem, engine).routes
         between = [name for name in routes if "C" not in name]
         for one, other in combinations(between, 2):

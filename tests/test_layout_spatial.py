@@ -10,13 +10,13 @@ from neurovis_spec.layout import LayoutProblem, LayoutRefusalError
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.geometry import sampled
 from neurovis_spec.layout.model import RADIUS
-from neurovis_spec.layout.problem import canonical
+from neurovis_spec.layout.problem import NamedProblem
 
 BODY = {"A": (0.0, 0.0), "B": (1e-6, 0.0), "C": (0.0, 2e-6), "D": (3e-6, 2e-6)}
 
 
 def body(**changes: object) -> LayoutProblem:
-    return canonical("body", list(BODY), places=BODY, **changes)  # type: ignore[arg-type]
+    return NamedProblem("body", list(BODY), places=BODY, **changes).canonical()  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("direction", ["down", "right"])
@@ -32,7 +32,7 @@ def test_one_factor_scales_both_axes_whatever_the_direction(direction: str) -> N
 def test_what_coincides_stands_side_by_side() -> None:
     names = [f"N{i}" for i in range(40)]
     places = {name: (float(i // 4), 5.0) for i, name in enumerate(names)}
-    layout = lay_out_problem(canonical("x", names, places=places), "spatial")
+    layout = lay_out_problem(NamedProblem("x", names, places=places).canonical(), "spatial")
     xs = [layout.positions[name][0] for name in names]
     groups = [sum(xs[i : i + 4]) / 4 for i in range(0, 40, 4)]
     assert groups == sorted(groups)
@@ -41,7 +41,7 @@ def test_what_coincides_stands_side_by_side() -> None:
 
 def test_almost_one_place_does_not_make_the_picture_endless() -> None:
     places = {"A": (0.0, 0.0), "B": (0.0, 1.0), "C": (0.0, 1e-169)}
-    layout = lay_out_problem(canonical("x", list(places), places=places), "spatial")
+    layout = lay_out_problem(NamedProblem("x", list(places), places=places).canonical(), "spatial")
     assert max(y for _, y in layout.positions.values()) < 200
 
 
@@ -54,15 +54,17 @@ def test_pins_win_and_the_rest_goes_with_them() -> None:
 
 def test_without_any_position_the_engine_refuses_and_a_pin_will_do() -> None:
     with pytest.raises(LayoutRefusalError, match=r"'E', 'F' have none") as caught:
-        lay_out_problem(canonical("x", ["E", "F"]), "spatial")
+        lay_out_problem(NamedProblem("x", ["E", "F"]).canonical(), "spatial")
     assert caught.value.code == "position-missing"
-    pinned = canonical("x", [*BODY, "E"], places=BODY, pins={"E": (9.0, 9.0)})
+    pinned = NamedProblem("x", [*BODY, "E"], places=BODY, pins={"E": (9.0, 9.0)}).canonical()
     assert lay_out_problem(pinned, "spatial").positions["E"] == (9.0, 9.0)
 
 
 def test_neurons_without_a_position_stand_beside_what_they_are_connected_to() -> None:
     edges = [("A -> E", "A", "E", 1), ("C -> E", "C", "E", 1), ("E -> F", "E", "F", 1)]
-    at = lay_out_problem(canonical("x", [*BODY, "E", "F", "G", "H"], edges=edges, places=BODY), "spatial").positions
+    at = lay_out_problem(
+        NamedProblem("x", [*BODY, "E", "F", "G", "H"], edges=edges, places=BODY).canonical(), "spatial"
+    ).positions
     assert at["E"][0] < at["D"][0] / 2
     assert at["A"][1] < at["E"][1] < at["C"][1]
     assert abs(at["F"][1] - at["E"][1]) + abs(at["F"][0] - at["E"][0]) < 2
@@ -72,8 +74,8 @@ def test_neurons_without_a_position_stand_beside_what_they_are_connected_to() ->
 def test_what_has_no_position_gives_way_to_what_has_one() -> None:
     places = {"A": (0.0, 0.0), "B": (2.0, 0.0), "C": (4.0, 1.0)}
     edges = [(f"{name} -> {other}", name, other, 1) for name, other in ("AE", "BE", "CE", "EF")]
-    alone = lay_out_problem(canonical("x", [*"ABC"], places=places), "spatial").positions
-    among = lay_out_problem(canonical("x", [*"ABCEF"], edges=edges, places=places), "spatial").positions
+    alone = lay_out_problem(NamedProblem("x", [*"ABC"], places=places).canonical(), "spatial").positions
+    among = lay_out_problem(NamedProblem("x", [*"ABCEF"], edges=edges, places=places).canonical(), "spatial").positions
     for axis in (0, 1):  # E would stand close to B, between all three
         assert len({alone[name][axis] - among[name][axis] for name in "ABC"}) == 1
     assert math.dist(among["E"], among["B"]) >= 2 * RADIUS
@@ -85,7 +87,7 @@ def test_routes_do_not_make_the_picture_much_larger_than_what_it_shows(wide: int
     places = {name: (float(i % wide), float(i // wide)) for i, name in enumerate(names)}
     pairs = [(a, b) for k, a in enumerate(names) for b in names[:: 1 + k % 3] if a != b][:600]
     edges = [(f"{a} -> {b}", a, b, 1) for a, b in pairs]
-    layout = lay_out_problem(canonical("x", names, edges=edges, places=places), "spatial")
+    layout = lay_out_problem(NamedProblem("x", names, edges=edges, places=places).canonical(), "spatial")
     points = [point for route in layout.routes.values() for point in sampled(route, 0.2)]
     for axis in (0, 1):
         held = [point[axis] for point in layout.positions.values()]
@@ -98,7 +100,7 @@ def test_routes_are_straight_where_nothing_is_in_the_way() -> None:
     places = {name: ((i * 7919) % 101 / 5, (i * 104729) % 97 / 7) for i, name in enumerate(names)}
     pairs = sorted({tuple(sorted((names[(i * 11) % 30], names[(i * i + 3 * i + 5) % 30]))) for i in range(70)})
     edges = [(f"{a} -> {b}", a, b, 1) for a, b in pairs if a != b]
-    layout = lay_out_problem(canonical("x", names, edges=edges, places=places), "spatial")
+    layout = lay_out_problem(NamedProblem("x", names, edges=edges, places=places).canonical(), "spatial")
     straight = 0
     for name, a, b, _ in edges:
         (x, y), (u, v) = layout.positions[a], layout.positions[b]

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from neurovis_spec.layout import Direction, LayoutProblem
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.metrics import metrics
-from neurovis_spec.layout.problem import canonical
+from neurovis_spec.layout.problem import NamedProblem
 
 Pairs = list[tuple[int, int]]
 
@@ -20,7 +20,7 @@ Pairs = list[tuple[int, int]]
 def made(pairs: Pairs, direction: Direction = "down", spacing: float = 1.0) -> LayoutProblem:
     names = [f"N{i}" for i in range(1 + max((max(pair) for pair in pairs), default=0))]
     edges = suite.named((names[a], names[b]) for a, b in pairs)
-    return canonical("tree", names, edges=edges, direction=direction, spacing=(spacing, 2.0))
+    return NamedProblem("tree", names, edges=edges, direction=direction, spacing=(spacing, 2.0)).canonical()
 
 
 def check(problem: LayoutProblem) -> dict[str, float | int]:

@@ -16,7 +16,7 @@ from neurovis_spec.diagnostics import Findings
 from neurovis_spec.layout import Direction, Layout, LayoutProblem, LayoutRefusalError, Point
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.file import dump, parse
-from neurovis_spec.layout.problem import canonical, problem_of
+from neurovis_spec.layout.problem import NamedProblem, problem_of
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Walker:
         mirrors = [("", images, sides)] if self.mirror and sides else []
         mirrors += [("", [("C1", "C2")], [])] if self.mirror and self.pair and self.middle > 1 else []
         knees = [(f"{leg}.knee", "knee") for leg in self.legs if "knee.K1" in self.own]
-        return canonical(
+        return NamedProblem(
             "walker",
             names,
             [("C", suite.members("C", self.middle))],
@@ -61,7 +61,7 @@ class Walker:
             origins={name: point for name, point in self.pins if name in self.legs},
             mirrors=mirrors,
             memory=earlier,
-        )
+        ).canonical()
 
 
 def spot(draw: Random) -> Point:

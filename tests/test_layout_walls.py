@@ -21,7 +21,7 @@ from neurovis_spec.layout import Direction, Layout, LayoutEdge, LayoutProblem, L
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.geometry import Rect, distance, sampled, straight
 from neurovis_spec.layout.metrics import metrics
-from neurovis_spec.layout.problem import canonical, problem_of
+from neurovis_spec.layout.problem import NamedProblem, problem_of
 
 ROOT = Path(__file__).parent.parent
 SPECS = sorted(p for p in (ROOT / "specs").rglob("*.yaml") if "neurons:" in p.read_text() and "modules" not in p.parts)
@@ -55,9 +55,9 @@ def bodies(draw: st.DrawFn, pinned: bool = False, named: bool = False) -> Layout
     direction = draw(st.sampled_from(directions))
     wide = set(draw(st.lists(st.sampled_from(own + middle), max_size=3))) if named else set[str]()
     labels = {name: (1.8, 0.3) for name in names if name in wide or name.partition(".")[2] in wide}
-    return canonical(
+    return NamedProblem(
         "body", names, groups, edges, pins, direction, boxes=boxes, modules=modules, mirrors=mirrors, labels=labels
-    )
+    ).canonical()
 
 
 def attempt(problem: LayoutProblem) -> tuple[Layout | None, str]:
@@ -122,9 +122,9 @@ def test_frames_in_a_row_are_gone_round_above_or_below() -> None:
     names = [f"m{i}.N{j}" for i in range(1, 6) for j in (1, 2)]
     pairs = [(f"m{i}.N1", f"m{i}.N2") for i in range(1, 6)] + [("m1.N1", "m5.N1"), ("m5.N2", "m1.N2")]
     pins = {f"m{i}.N{j}": (3.0 * i, 1.5 * j) for i in range(1, 6) for j in (1, 2)}
-    problem = canonical(
+    problem = NamedProblem(
         "row", names, edges=suite.named(pairs), pins=pins, modules=[(f"m{i}", "m") for i in range(1, 6)]
-    )
+    ).canonical()
     layout = lay_out_problem(problem, "layered")
     check(layout, problem)
     over = [y for x, y in sampled(layout.routes["m1.N1 -> m5.N1"]) if 5 < x < 13]

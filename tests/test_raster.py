@@ -18,14 +18,13 @@ import pytest
 from hand_networks import use_case_1
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from neurovis_renderers import canvas, coverage, films, moving
-from neurovis_renderers.canvas import paint
+from neurovis_renderers import canvas, coverage, moving, raster
+from neurovis_renderers.canvas import paint, slots
 from neurovis_renderers.coverage import Fragments
 from neurovis_renderers.frames import frames
 from neurovis_renderers.lettering import font, lettering
 from neurovis_renderers.moving import Moving, Painter
 from neurovis_renderers.raster import PillowRenderer
-from neurovis_renderers.stack import slots
 from PIL import Image
 
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
@@ -236,7 +235,7 @@ def test_a_gif_lasts_as_long_as_its_frames_also_where_nothing_changes_for_hours(
     first, second = np.zeros((8, 9, 3), np.uint8), np.zeros((8, 9, 3), np.uint8)
     second[3:5, 2:7] = 200
     file = io.BytesIO()
-    films.gif(iter([first, first, second, first]), [20, 2_000_000, 40, 30], file)
+    raster.gif(iter([first, first, second, first]), [20, 2_000_000, 40, 30], file)
     data = file.getvalue()
     lasts, shown = [], []
     with Image.open(io.BytesIO(data)) as picture:
@@ -252,7 +251,7 @@ def test_a_gif_lasts_as_long_as_its_frames_also_where_nothing_changes_for_hours(
 _BOUNDED = """
 import io, resource, sys
 import numpy as np
-from neurovis_renderers import films
+from neurovis_renderers import raster
 
 def frames(count):
     for frame in range(count):
@@ -262,7 +261,7 @@ def frames(count):
 
 def make(pictures, lasts):
     file = io.BytesIO()
-    getattr(films, sys.argv[1])(pictures, lasts, file)
+    getattr(raster, sys.argv[1])(pictures, lasts, file)
     return file.getvalue()
 
 make(frames(3), [40] * 3)

@@ -13,8 +13,7 @@ import neurovis_spec as nv
 from neurovis_spec.layout.geometry import meet, sampled
 from neurovis_spec.layout.model import RADIUS
 from neurovis_spec.scene import Spline, Text
-from neurovis_spec.scene.boxes import Box, boxes_of
-from neurovis_spec.scene.sectors import Sector, sector
+from neurovis_spec.scene.boxes import Box, Sector, boxes_of, sector
 
 RING = """
 neurovis: 1

@@ -19,10 +19,10 @@ from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.scene import Disc, Group, Rectangle, Scene, Spline, Text
-from neurovis_spec.scene.cut import Cut
 from neurovis_spec.scene.film import film
 from neurovis_spec.scene.renderers import RendererError
 from neurovis_spec.scene.shown import LeftOut
+from neurovis_spec.scene.texts import Cut
 
 GAINS = "render: {gain: {activity: 2, signal: 3, thickness: 5, change: 1}}"
 LARGE = "layout: {engine: large}"

@@ -24,8 +24,7 @@ from neurovis_spec.scene.called import names_of
 from neurovis_spec.scene.film import film, scene_of_step
 from neurovis_spec.scene.gains import choose_gains
 from neurovis_spec.scene.geometry import sample, samples
-from neurovis_spec.scene.legend_entry import LegendEntry
-from neurovis_spec.scene.legend_scales import nice_weights
+from neurovis_spec.scene.legend_scales import LegendEntry, nice_weights
 from neurovis_spec.scene.lines import trimmed
 
 CASE = use_case_1(400)
@@ -469,7 +468,7 @@ def test_a_film_needs_a_frame() -> None:
 def test_curves_are_cut_together_as_they_are_one_by_one() -> None:
     chooser = np.random.default_rng(3)
     routes = [chooser.uniform(0, 9, (1 + 3 * k, 2)) + np.linspace(0, 90, 1 + 3 * k)[:, None] for k in (1, 1, 2, 1, 3)]
-    together, alone = trimmed(routes, 4.0, 1.0, 3.0), [trimmed([route], 4.0, 1.0, 3.0)[0] for route in routes]
+    together, alone = trimmed(routes, 4.0, 4.0), [trimmed([route], 4.0, 4.0)[0] for route in routes]
     for one, other, route in zip(together, alone, routes, strict=True):
         assert one == other
         start, end = np.array(one.points[0]), np.array(one.tip)

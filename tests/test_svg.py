@@ -11,8 +11,7 @@ import pytest
 from hand_networks import C, Case, G, network, plain_gains, straight_layout, use_case_1
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from neurovis_renderers.markup import escape, exact, num, path
-from neurovis_renderers.svg import SvgRenderer
+from neurovis_renderers.svg import SvgRenderer, escape, exact, num, path
 
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.scene import encoding

@@ -28,13 +28,12 @@ from neurovis_spec.scene.figure import PageGains, figure
 from neurovis_spec.scene.heat import strongest
 from neurovis_spec.scene.look import Look
 from neurovis_spec.scene.matrix import order_of
-from neurovis_spec.scene.palette import MOST, distinct
 from neurovis_spec.scene.panels import ViewError, panels_of
 from neurovis_spec.scene.series import chosen, full_name
 from neurovis_spec.scene.shots import Shots, shots_of
 from neurovis_spec.scene.shown import LeftOut
 from neurovis_spec.scene.texts import width
-from neurovis_spec.scene.themes import contrast
+from neurovis_spec.scene.themes import MOST, contrast, distinct
 
 NS = "{http://www.w3.org/2000/svg}"
 SPEC = """

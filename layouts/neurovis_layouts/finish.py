@@ -23,7 +23,7 @@ from neurovis_layouts.routing.images import Images
 from neurovis_layouts.symmetry import Symmetry, exact, routed_alike
 from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.geometry import Rect, near_pairs, snap, straight
-from neurovis_spec.layout.label_overlaps import label_overlaps
+from neurovis_spec.layout.metrics import label_overlaps
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point, Side
 
 #: With more connections than this, routes do not go round discs: they would only run over others.

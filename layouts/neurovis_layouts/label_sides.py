@@ -19,8 +19,8 @@ from neurovis_layouts.label_room import best_first, flipped
 from neurovis_spec.layout import FloatArray
 from neurovis_spec.layout.frames import TITLE
 from neurovis_spec.layout.geometry import Cells, Rect, meet, pieces_of, points_in_turn
-from neurovis_spec.layout.label_overlaps import Ground
 from neurovis_spec.layout.labels import ASIDE, UNIT, label_rect
+from neurovis_spec.layout.metrics import Ground
 from neurovis_spec.layout.model import Direction, Layout, LayoutProblem, Side
 
 #: How far apart points on lines are, at most, and how near to a label a line may be.

@@ -13,13 +13,12 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.runtime.named_array import NamedArray
 from neurovis_spec.scene import strips, texts
+from neurovis_spec.scene.caption import HEADER, caption_text, title_text
 from neurovis_spec.scene.frame import MARGIN
-from neurovis_spec.scene.heading import HEADER, caption_text, title_text
 from neurovis_spec.scene.heat import Band, bands_of
 from neurovis_spec.scene.model import Group, Image, Polyline, Ramp, Rectangle, Scene, Shape, Text, Theme, shifted
-from neurovis_spec.scene.palette import distinct
 from neurovis_spec.scene.strips import SMALL, Span
-from neurovis_spec.scene.themes import blend, colours, readable
+from neurovis_spec.scene.themes import blend, colours, distinct, readable
 from neurovis_spec.scene.traces import Trace, Traces
 
 #: How wide a picture over time is, and the cells of a table of pairs.

@@ -11,7 +11,7 @@ from typing import cast
 
 from neurovis_spec.gc_paused import uncollected
 from neurovis_spec.layout.choose import choose_engine
-from neurovis_spec.layout.engines import engine_of
+from neurovis_spec.layout.engines import engine_of, refuse
 from neurovis_spec.layout.geometry import distance, snap
 from neurovis_spec.layout.model import (
     Layout,
@@ -21,7 +21,6 @@ from neurovis_spec.layout.model import (
     ReportingEngine,
     Route,
 )
-from neurovis_spec.layout.refusals import refuse
 from neurovis_spec.progress import Progress
 
 

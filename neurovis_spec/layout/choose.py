@@ -9,9 +9,8 @@ import math
 from collections import Counter
 from collections.abc import Sequence, Set
 
-from neurovis_spec.layout.engines import engine_of, engines_that
+from neurovis_spec.layout.engines import engine_of, engines_that, refuse
 from neurovis_spec.layout.model import LayoutProblem, LayoutRefusalError, Suits
-from neurovis_spec.layout.refusals import refuse
 
 #: A component of so many neurons, with so many connections each within their group, is a tangle.
 _LARGE, _DENSE = 40, 2.5

@@ -1,7 +1,9 @@
-"""Layout files (§11): a Layout as YAML, and back.
+"""Layout files (§11): a Layout as YAML, and back; and the one that a spec names, to be remembered.
 
-In: a Layout, or a text. Out: a text whose numbers read back exactly, or a Layout. A file that the layout command
-writes holds every neuron and every route; one written by hand may hold any part.
+In: a Layout, or a text. Out: a text whose numbers read back exactly, or a Layout. A file that the layout command writes
+holds every neuron and every route; one written by hand may hold any part. The one that a spec names may be of an
+earlier network: what it says of this network's neurons is remembered. One that is not there yet is a warning: the
+layout command makes it (``--update``).
 """
 
 from __future__ import annotations
@@ -9,10 +11,16 @@ from __future__ import annotations
 import json
 import math
 import re
+from pathlib import Path
 
 from neurovis_spec.compiler.drawing.pins import FARTHEST
-from neurovis_spec.diagnostics import Findings
-from neurovis_spec.language.yaml.reader import read_content, read_text
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.diagnostics import Findings, Span, shorten
+from neurovis_spec.language.data.files import NamedFile, locate
+from neurovis_spec.language.located import Located
+from neurovis_spec.language.unknown import UNKNOWN
+from neurovis_spec.language.yaml.opening import FileFault, read_bytes
+from neurovis_spec.language.yaml.reader import LARGEST, read_content, read_text
 from neurovis_spec.language.yaml.source import AnyList, Mapping, Node, Scalar, SourceDocument, describe
 from neurovis_spec.layout.model import SIDES, Layout, Point, Route, Side
 from neurovis_spec.layout.naming import edge_key, natural_key
@@ -214,3 +222,38 @@ def _read_route(node: Node, name: str, findings: Findings) -> Route | None:
         return None
     whole = tuple(point for point in points if point is not None)
     return whole if len(whole) == len(items) else None
+
+
+def read_memory(path: Located[str], folder: Path, root: Path, network: Network, findings: Findings) -> Layout | None:
+    """The earlier layout, without what it says of neurons that this network does not have, which is a warning.
+
+    Codes: those of data files, those of layout files, ``layout-file-missing`` and ``forgotten-neuron`` (warnings).
+    """
+    place = locate(NamedFile(path.value, root, folder, path.span), findings)
+    if place is UNKNOWN:
+        return None
+    data = read_bytes(place, LARGEST)
+    if isinstance(data, FileFault):
+        if data.code == "file-missing":
+            message = f"there is no layout file '{shorten(path.value)}' yet"
+            hint = f"make it with: neurovis layout SPEC --update {path.value}"
+            findings.warning("layout-file-missing", path.span, message, hint)
+        else:
+            findings.error(data.code, path.span, f"the file '{shorten(path.value)}' {data.reason}")
+        return None
+    name = str(Path(path.span.file).parent / path.value)
+    layout = parse_bytes(data, name, findings)
+    return None if layout is None else known_part(layout, network, path.span, findings)
+
+
+def known_part(layout: Layout, network: Network, span: Span, findings: Findings) -> Layout:
+    """What a layout says of the neurons of a network; names that this does not have are a warning at ``span``."""
+    strange = [name for name in layout.positions if name not in network.neuron_index]
+    if strange:
+        more = f" and {len(strange) - 1} more" if len(strange) > 1 else ""
+        message = f"the layout file places '{strange[0]}'{more}, which this network does not have"
+        findings.warning("forgotten-neuron", span, message, "neurovis layout --update takes them out")
+    positions = {name: point for name, point in layout.positions.items() if name in network.neuron_index}
+    routes = {name: route for name, route in layout.routes.items() if name in network.connection_index}
+    labels = {name: side for name, side in layout.labels.items() if name in network.neuron_index}
+    return Layout(layout.network, layout.engine, positions, routes, labels)

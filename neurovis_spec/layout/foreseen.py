@@ -14,9 +14,8 @@ from typing import Final, cast
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.located import Located
-from neurovis_spec.layout.engines import engine_of, engines_that, they_can
+from neurovis_spec.layout.engines import engine_of, engines_that, refuse, they_can
 from neurovis_spec.layout.model import CheckingEngine, LayoutProblem, LayoutRefusalError
-from neurovis_spec.layout.refusals import refuse
 from neurovis_spec.plugins import PluginError
 
 #: With more neurons or connections than this an engine takes too long to say what pins it refuses.

@@ -19,6 +19,8 @@ from neurovis_spec.layout.model import GRID, Point, Route
 
 #: x0, y0, x1, y1
 Rect: TypeAlias = tuple[float, float, float, float]
+#: (2, …) their parts across and along
+Vectors: TypeAlias = FloatArray | tuple[FloatArray, FloatArray]
 
 _PER_UNIT = round(1 / GRID)
 _PI = 3.141592653589793
@@ -231,13 +233,11 @@ def squared_distances(x: FloatArray, y: FloatArray, ux: FloatArray, uy: FloatArr
     return squared
 
 
-def crossing(
-    ax: FloatArray, ay: FloatArray, ux: FloatArray, uy: FloatArray,
-    bx: FloatArray, by: FloatArray, vx: FloatArray, vy: FloatArray,
-) -> tuple[FloatArray, BoolArray]:  # fmt: skip
+def crossing(a: Vectors, u: Vectors, b: Vectors, v: Vectors) -> tuple[FloatArray, BoolArray]:
     """Whether segments a to a + u and b to b + v cross (half-open, so that a corner counts once; parallel ones never
-    do), and for those that do, at what share of u: the shares of these alone, and the whole answer."""
-    bx, by = bx - ax, by - ay
+    do), and for those that do, at what share of u: the shares of these alone, and the whole answer (…)."""
+    (ux, uy), (vx, vy) = u, v
+    bx, by = b[0] - a[0], b[1] - a[1]
     cross = ux * vy - uy * vx
     sign, whole = np.sign(cross), np.abs(cross)
     s, t = sign * (bx * vy - by * vx), sign * (bx * uy - by * ux)

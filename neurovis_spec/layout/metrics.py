@@ -1,7 +1,9 @@
 """What a layout is worth: crossings, overlaps, routes over discs, flow, area.
 
 In: a layout and its problem. Out: the numbers of ``neurovis layout --metrics`` (§12), computed from the routes as
-drawn: splines flattened to short segments, which meet only in the cells of a grid.
+drawn: splines flattened to short segments, which meet only in the cells of a grid. Labels overlap something, in a
+picture that is not reduced, if they lie on another disc, on another label, on the frame of others, or across the line
+of a frame that their neuron is in; or if no room is kept for them.
 """
 
 from __future__ import annotations
@@ -13,8 +15,19 @@ import networkx as nx
 import numpy as np
 
 from neurovis_spec.arrays import BoolArray, FloatArray, IntArray
-from neurovis_spec.layout.geometry import Cells, crossing, cubic, near_pairs, pieces_of, squared_distances
-from neurovis_spec.layout.label_overlaps import label_overlaps
+from neurovis_spec.layout.frames import Frames, entered
+from neurovis_spec.layout.geometry import (
+    Cells,
+    Rect,
+    crossing,
+    cubic,
+    meet,
+    near_pairs,
+    padded,
+    pieces_of,
+    squared_distances,
+)
+from neurovis_spec.layout.labels import label_rect
 from neurovis_spec.layout.model import RADIUS, Direction, Layout, LayoutProblem, Point, Route
 
 #: Crossings this close to a neuron that both routes have are how edges meet, not how they cross.
@@ -33,6 +46,7 @@ _AT_ONCE = 1 << 14
 #: Pairs of segments that are compared, about; of more than that a sample of the routes is.
 _MOST_PAIRS = 20_000_000
 _ALONG: dict[Direction, Point] = {"down": (0, 1), "up": (0, -1), "right": (1, 0), "left": (-1, 0)}
+_TOUCHING = 1e-6
 
 
 def metrics(layout: Layout, problem: LayoutProblem) -> dict[str, float | int]:
@@ -135,7 +149,7 @@ def _crossings(segments: _Segments, ends: IntArray, centres: FloatArray) -> tupl
     for first, second in _pairs(keys):
         other = edge[first] != edge[second]
         i, j = first[other], second[other]
-        share, hit = crossing(a[0][i], a[1][i], u[0][i], u[1][i], a[0][j], a[1][j], u[0][j], u[1][j])
+        share, hit = crossing((a[0][i], a[1][i]), (u[0][i], u[1][i]), (a[0][j], a[1][j]), (u[0][j], u[1][j]))
         i, j = i[hit], j[hit]
         where = (a[:, i] + share * u[:, i]).T
         # a pair may share several cells: it counts in the one that the point lies in
@@ -223,3 +237,53 @@ def _area(centres: FloatArray) -> float:
         return 0.0
     width, height = (centres.max(axis=0) - centres.min(axis=0) + 2 * RADIUS).tolist()
     return float(width * height)
+
+
+def label_overlaps(layout: Layout, problem: LayoutProblem) -> int:
+    """The labels that overlap something, or that nobody says where to put."""
+    beside = [i for i, (wide, _) in enumerate(problem.labels) if wide]
+    sides = {i: layout.labels[name] for i in beside if (name := problem.neurons[i]) in layout.labels}
+    rects = {i: label_rect(layout.positions[problem.neurons[i]], problem.labels[i], side) for i, side in sides.items()}
+    ground = Ground(layout, problem)
+    return sum(
+        i not in rects
+        or not ground.free(i, rects[i], -_TOUCHING)
+        or any(meet(rects[i], other, -_TOUCHING) for k, other in rects.items() if k != i)
+        for i in beside
+    )
+
+
+class Ground:
+    """What labels stand on: discs, and the frames that are drawn."""
+
+    def __init__(self, layout: Layout, problem: LayoutProblem) -> None:
+        places = [layout.positions[name] for name in problem.neurons]
+        routes = {i: layout.routes[edge.name] for i, edge in enumerate(problem.edges)}
+        frames = Frames(problem, layout.labels)
+        self._centres: FloatArray = np.array(places, dtype=np.float64).reshape(-1, 2)
+        self._frames = [
+            (own, rect)
+            for own, rect in zip(frames.members, frames.rects(dict(enumerate(places)), routes), strict=True)
+            if rect is not None and not entered(self._centres, rect, own)
+        ]
+
+    def free(self, neuron: int, rect: Rect, air: float, title: float = 0.0) -> bool:
+        """Whether the label of a neuron comes no nearer than ``air`` to another disc, to the frame of others, or to the
+        line of a frame that holds the neuron, below whose top so much is left for its ``title``."""
+        x0, y0, x1, y1 = rect
+        away = np.maximum(np.maximum((x0, y0) - self._centres, self._centres - (x1, y1)), 0.0)
+        far = np.hypot(away[:, 0], away[:, 1])
+        far[neuron] = np.inf
+        if (far < RADIUS + air).any():
+            return False
+        for members, frame in self._frames:
+            if neuron not in members:
+                if meet(rect, frame, air):
+                    return False
+            elif not _within(padded(rect, air), (frame[0], frame[1] + title, *frame[2:])):
+                return False
+        return True
+
+
+def _within(rect: Rect, frame: Rect) -> bool:
+    return rect[0] >= frame[0] and rect[1] >= frame[1] and rect[2] <= frame[2] and rect[3] <= frame[3]

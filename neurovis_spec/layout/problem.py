@@ -1,14 +1,15 @@
 """The layout problem of a network, in canonical order.
 
-In: a Network. Out: a LayoutProblem: neurons in the natural order of their names, edges in the natural order of
-theirs. Whatever order the keys of the spec were written in, an engine sees the same problem, and so gives the same
-layout; what the author lists, such as the names of a group, is in the order of the list.
+In: a Network, or parts by name (NamedProblem). Out: a LayoutProblem: neurons in the natural order of their names, edges
+in the natural order of theirs. Whatever order the keys of the spec were written in, an engine sees the same problem,
+and so gives the same layout; what the author lists, such as the names of a group, is in the order of the list.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import cast
 
 import numpy as np
@@ -16,7 +17,6 @@ import numpy as np
 from neurovis_spec.compiler.drawing.drawing_settings import Seat
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.labels import label_room
-from neurovis_spec.layout.makes import modules_of
 from neurovis_spec.layout.model import (
     Arrangement,
     Direction,
@@ -25,6 +25,7 @@ from neurovis_spec.layout.model import (
     LayoutEdge,
     LayoutGroup,
     LayoutMirror,
+    LayoutModule,
     LayoutProblem,
     Point,
 )
@@ -34,99 +35,165 @@ _NOWHERE = (math.nan, math.nan)
 _ON_DISC = (0.0, 0.0)
 
 
-def canonical(
-    network: str,
-    neurons: Iterable[str],
-    groups: Iterable[tuple[str, Iterable[str]]] = (),
-    edges: Iterable[tuple[str, str, str, int]] = (),
-    pins: Mapping[str, Point] | None = None,
-    direction: Direction = "down",
-    arrange: Iterable[tuple[Iterable[str], Arrangement]] = (),
-    boxes: Iterable[tuple[str, Iterable[str]]] = (),
-    spacing: tuple[float, float] = (1.0, 2.0),
-    entries: Iterable[str] = (),
-    exits: Iterable[str] = (),
-    modules: Iterable[tuple[str, str]] = (),
-    relative: Mapping[str, Mapping[str, Point]] | None = None,
-    origins: Mapping[str, Point] | None = None,
-    mirrors: Iterable[tuple[str, Iterable[tuple[str, str]], Iterable[tuple[str, str]]]] = (),
-    align: Iterable[Iterable[str]] = (),
-    plan: Iterable[tuple[str, Iterable[str], Seat]] = (),
-    places: Mapping[str, Point] | None = None,
-    labels: Mapping[str, Point] | None = None,
-    memory: Layout | None = None,
-    aspect: float | None = None,
-) -> LayoutProblem:
-    """The problem made of these parts, in canonical order.
+@dataclass(frozen=True, slots=True)
+class NamedProblem:
+    """A layout problem whose parts are known by name, in any order.
 
-    ``edges`` are (name, source, target, delay); ``spacing`` is that of neurons, then that of ranks. Equal parts in
-    any order give an equal problem. The members of a group and of an arrangement keep the order in which they are given
-    (that of their numbers, or as the author lists them). ``modules`` are the paths of instances and the names of their
-    modules (their neurons are those whose names begin with the path), ``relative`` the pins within instances,
-    ``origins`` the places of these, ``mirrors`` the scope's path, the pairs of neurons and the pairs of instances;
-    ``plan`` the path of the instance that is divided, what stands in which row and column of it, and how many of them
-    that spans; ``places`` where neurons are as data; ``labels`` how wide and high are those that discs cannot hold;
-    ``aspect`` the width of the page by its height, where one is asked for.
+    >>> NamedProblem("pair", ["B", "A"], edges=[("B -> A", "B", "A", 1)]).canonical().neurons
+    ('A', 'B')
     """
-    names = tuple(sorted(neurons, key=natural_key))
-    index = {name: i for i, name in enumerate(names)}
 
-    def members(of: Iterable[str]) -> tuple[int, ...]:
-        return tuple(sorted({index[name] for name in of}))
+    network: str
+    neurons: Iterable[str]
+    #: their names and members, in the order of these
+    groups: Iterable[tuple[str, Iterable[str]]] = ()
+    #: name, source, target, delay
+    edges: Iterable[tuple[str, str, str, int]] = ()
+    pins: Mapping[str, Point] = field(default_factory=dict)
+    direction: Direction = "down"
+    #: members, in the order in which they are arranged, and how
+    arrange: Iterable[tuple[Iterable[str], Arrangement]] = ()
+    #: boxes of one name are one box
+    boxes: Iterable[tuple[str, Iterable[str]]] = ()
+    #: of neurons, and of ranks
+    spacing: tuple[float, float] = (1.0, 2.0)
+    entries: Iterable[str] = ()
+    exits: Iterable[str] = ()
+    #: the paths of instances and the names of their modules: their neurons are those whose names begin with the path
+    modules: Iterable[tuple[str, str]] = ()
+    #: by path, the pins within instances, and the places of instances
+    relative: Mapping[str, Mapping[str, Point]] = field(default_factory=dict)
+    origins: Mapping[str, Point] = field(default_factory=dict)
+    #: the scope's path, the pairs of neurons and the pairs of instances
+    mirrors: Iterable[tuple[str, Iterable[tuple[str, str]], Iterable[tuple[str, str]]]] = ()
+    align: Iterable[Iterable[str]] = ()
+    #: the path of the instance that is divided, what stands in a cell of it, and where that is
+    plan: Iterable[tuple[str, Iterable[str], Seat]] = ()
+    #: where neurons are as data
+    places: Mapping[str, Point] = field(default_factory=dict)
+    #: how wide and high the labels are that discs cannot hold
+    labels: Mapping[str, Point] = field(default_factory=dict)
+    memory: Layout | None = None
+    #: the width of the page by its height, where one is asked for
+    aspect: float | None = None
 
-    pinned = {index[name]: (float(x), float(y)) for name, (x, y) in (pins or {}).items()}
-    known = (LayoutEdge(name, index[source], index[target], delay) for name, source, target, delay in edges)
-    # as `edge_key` orders their names, without a key for each of 50,000: neurons are in their order already
-    ordered_edges = tuple(sorted(known, key=lambda edge: (edge.source, edge.target, len(edge.name), edge.name)))
-    ordered_groups = tuple(
-        LayoutGroup(name, tuple(index[member] for member in of))
-        for name, of in sorted(groups, key=lambda group: natural_key(group[0]))
-    )
-    arranged = tuple(sorted((tuple(index[member] for member in of), how) for of, how in arrange))
-    framed = tuple(sorted(_merged((name, members(of)) for name, of in boxes), key=lambda box: natural_key(box[0])))
-    instances = modules_of(
-        names, tuple(modules), ordered_edges, ordered_groups, arranged, framed, relative or {}, origins or {}
-    )
-    where = {instance.path: place for place, instance in enumerate(instances)}
-    return LayoutProblem(
-        network=network,
-        neurons=names,
-        groups=ordered_groups,
-        edges=ordered_edges,
-        pins=dict(sorted(pinned.items())),
-        direction=direction,
-        arrange=arranged,
-        boxes=framed,
-        neuron_spacing=spacing[0],
-        rank_spacing=spacing[1],
-        aspect=aspect,
-        entries=members(entries),
-        exits=members(exits),
-        modules=instances,
-        mirrors=tuple(
-            sorted(
-                (
-                    LayoutMirror(
-                        where.get(scope, -1),
-                        tuple(sorted((index[one], index[other]) for one, other in pairs)),
-                        tuple(sorted((where[one], where[other]) for one, other in paths)),
-                    )
-                    for scope, pairs, paths in mirrors
-                ),
-                key=lambda mirror: mirror.pairs,
+    def canonical(self) -> LayoutProblem:
+        """The problem in canonical order: equal parts in any order give an equal problem. The members of a group and of
+        an arrangement keep the order in which they are given (that of their numbers, or as the author lists them)."""
+        names = tuple(sorted(self.neurons, key=natural_key))
+        index = {name: i for i, name in enumerate(names)}
+
+        def members(of: Iterable[str]) -> tuple[int, ...]:
+            return tuple(sorted({index[name] for name in of}))
+
+        pins = {index[name]: (float(x), float(y)) for name, (x, y) in self.pins.items()}
+        boxes = _merged((name, members(of)) for name, of in self.boxes)
+        free = LayoutProblem(
+            network=self.network,
+            neurons=names,
+            groups=tuple(
+                LayoutGroup(name, tuple(index[member] for member in of))
+                for name, of in sorted(self.groups, key=lambda group: natural_key(group[0]))
+            ),
+            edges=_in_order(LayoutEdge(name, index[a], index[b], delay) for name, a, b, delay in self.edges),
+            pins=dict(sorted(pins.items())),
+            direction=self.direction,
+            arrange=tuple(sorted((tuple(index[member] for member in of), how) for of, how in self.arrange)),
+            boxes=tuple(sorted(boxes, key=lambda box: natural_key(box[0]))),
+            neuron_spacing=self.spacing[0],
+            rank_spacing=self.spacing[1],
+            aspect=self.aspect,
+            entries=members(self.entries),
+            exits=members(self.exits),
+            align=tuple(sorted(members(line) for line in self.align)),
+            places=tuple(self.places.get(name, _NOWHERE) for name in names) if self.places else (),
+            labels=tuple(self.labels.get(name, _ON_DISC) for name in names) if self.labels else (),
+            memory=self.memory,
+        )
+        modules = modules_of(free, tuple(self.modules), self.relative, self.origins)
+        where = {module.path: number for number, module in enumerate(modules)}
+        cells = (LayoutCell(members(of), seat, where.get(scope, -1)) for scope, of, seat in self.plan)
+        mirrors = (
+            LayoutMirror(
+                where.get(scope, -1),
+                tuple(sorted((index[one], index[other]) for one, other in pairs)),
+                tuple(sorted((where[one], where[other]) for one, other in paths)),
             )
-        ),
-        align=tuple(sorted(members(line) for line in align)),
-        plan=tuple(
-            sorted(
-                (LayoutCell(members(of), seat, where.get(scope, -1)) for scope, of, seat in plan),
-                key=lambda cell: (cell.scope, cell.members),
-            )
-        ),
-        places=tuple((places or {}).get(name, _NOWHERE) for name in names) if places else (),
-        labels=tuple((labels or {}).get(name, _ON_DISC) for name in names) if labels else (),
-        memory=memory,
-    )
+            for scope, pairs, paths in self.mirrors
+        )
+        return replace(
+            free,
+            modules=modules,
+            mirrors=tuple(sorted(mirrors, key=lambda mirror: mirror.pairs)),
+            plan=tuple(sorted(cells, key=lambda cell: (cell.scope, cell.members))),
+        )
+
+
+def _in_order(edges: Iterable[LayoutEdge]) -> tuple[LayoutEdge, ...]:
+    """As ``edge_key`` orders their names, without a key for each of 50,000: neurons are in their order already."""
+    return tuple(sorted(edges, key=lambda edge: (edge.source, edge.target, len(edge.name), edge.name)))
+
+
+def modules_of(
+    problem: LayoutProblem,
+    modules: Sequence[tuple[str, str]],
+    relative: Mapping[str, Mapping[str, Point]],
+    origins: Mapping[str, Point],
+) -> tuple[LayoutModule, ...]:
+    """The instances in the natural order of their paths, each with its neurons and its make: two are of one make if
+    they are of one module and everything within them that a picture shows is equal: the names of the neurons in them,
+    the connections among these with their delays, what is arranged or pinned."""
+    names, ordered = problem.neurons, sorted(modules, key=lambda item: natural_key(item[0]))
+    place = {path: number for number, (path, _) in enumerate(ordered)}
+    ways = [_around(name, place) for name in names]
+    members: list[list[int]] = [[] for _ in ordered]
+    for neuron, way in enumerate(ways):
+        for around in way:
+            members[around].append(neuron)
+    inside = _inside(problem, [path for path, _ in ordered], ways)
+    known: dict[object, str] = {}
+    numbers: dict[str, int] = {}
+    result: list[LayoutModule] = []
+    for number, (path, module) in enumerate(ordered):
+        start, pins = len(path) + 1, relative.get(path, {})
+        own = {index: pins[names[index]] for index in members[number] if names[index] in pins}
+        make = (
+            module,
+            tuple(names[index][start:] for index in members[number]),
+            tuple(inside[number]),
+            tuple((names[index][start:], point) for index, point in own.items()),
+        )
+        if make not in known:
+            numbers[module] = numbers.get(module, 0) + 1
+            known[make] = module if numbers[module] == 1 else f"{module} ({numbers[module]})"
+        parent = place.get(path.rpartition(".")[0], -1)
+        result.append(LayoutModule(path, module, parent, tuple(members[number]), known[make], own, origins.get(path)))
+    return tuple(result)
+
+
+def _inside(problem: LayoutProblem, paths: Sequence[str], ways: Sequence[Sequence[int]]) -> list[list[object]]:
+    """For each instance the connections, groups, arrangements and boxes that are all in it, by the names within.
+    ``ways`` are the instances that each neuron is in."""
+    inside: list[list[object]] = [[] for _ in paths]
+    parts: list[tuple[Sequence[int], object]] = [((e.source, e.target), ("edge", e.delay)) for e in problem.edges]
+    parts += [(group.members, "group") for group in problem.groups]
+    parts += [*problem.arrange, *((members, "box") for _, members in problem.boxes)]
+    for ends, what in parts:
+        for around in set(ways[ends[0]]).intersection(*(ways[end] for end in ends[1:])) if ends else ():
+            start = len(paths[around]) + 1
+            inside[around].append((what, tuple(problem.neurons[end][start:] for end in ends)))
+    return inside
+
+
+def _around(name: str, place: Mapping[str, int]) -> tuple[int, ...]:
+    """The instances that a neuron is in, the outermost first."""
+    found: list[int] = []
+    end = name.find(".")
+    while end >= 0:
+        if name[:end] in place:
+            found.append(place[name[:end]])
+        end = name.find(".", end + 1)
+    return tuple(found)
 
 
 def _merged(boxes: Iterable[tuple[str, tuple[int, ...]]]) -> list[tuple[str, tuple[int, ...]]]:
@@ -154,32 +221,32 @@ def problem_of(network: Network, memory: Layout | None = None) -> LayoutProblem:
         connections.delays.tolist(),
         strict=True,
     )
-    return canonical(
-        network.name,
-        names,
-        [(group.name, named(group.indices)) for group in network.neurons.groups],
-        edges,
-        {names[i]: position for i, position in settings.positions.items()},
-        settings.direction,
-        [(named(members), cast(Arrangement, how)) for members, how in settings.arrange],
-        boxes,
-        (settings.neuron_spacing, settings.rank_spacing),
-        named(_entries(network)),
-        named(_exits(network)),
-        [(instance.path, instance.module) for instance in network.instances],
-        {path: {names[i]: point for i, point in pins.items()} for path, pins in settings.relative},
-        settings.origins,
-        [
+    return NamedProblem(
+        network=network.name,
+        neurons=names,
+        groups=[(group.name, named(group.indices)) for group in network.neurons.groups],
+        edges=edges,
+        pins={names[i]: position for i, position in settings.positions.items()},
+        direction=settings.direction,
+        arrange=[(named(members), cast(Arrangement, how)) for members, how in settings.arrange],
+        boxes=boxes,
+        spacing=(settings.neuron_spacing, settings.rank_spacing),
+        entries=named(_entries(network)),
+        exits=named(_exits(network)),
+        modules=[(instance.path, instance.module) for instance in network.instances],
+        relative={path: {names[i]: point for i, point in pins.items()} for path, pins in settings.relative},
+        origins=settings.origins,
+        mirrors=[
             (mirror.scope, [(names[a], names[b]) for a, b in mirror.pairs], mirror.instances)
             for mirror in settings.mirrors
         ],
-        [named(line) for line in settings.align],
-        [(cell.scope, named(cell.members), cell.seat) for cell in settings.plan],
-        _places(network),
-        dict(zip(names, label_room(network), strict=False)),
-        memory,
+        align=[named(line) for line in settings.align],
+        plan=[(cell.scope, named(cell.members), cell.seat) for cell in settings.plan],
+        places=_places(network),
+        labels=dict(zip(names, label_room(network), strict=False)),
+        memory=memory,
         aspect=None if network.render.size is None else network.render.size[0] / network.render.size[1],
-    )
+    ).canonical()
 
 
 def _places(network: Network) -> dict[str, Point]:

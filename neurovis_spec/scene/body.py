@@ -22,9 +22,8 @@ from neurovis_spec.scene import texts
 from neurovis_spec.scene.model import Disc, Group, Point, Polyline, Rectangle, Redrawn, Shape, Text, Theme
 from neurovis_spec.scene.parts import Changes, Part
 from neurovis_spec.scene.poses import Poses
-from neurovis_spec.scene.strips import SMALL, TITLE
+from neurovis_spec.scene.strips import SMALL, TITLE, words
 from neurovis_spec.scene.themes import channels
-from neurovis_spec.scene.ticks import words
 
 Side: TypeAlias = Literal["above", "side"]
 

@@ -1,18 +1,19 @@
 """Named boxes: the frame around their neurons.
 
 In: the groups' ``box``, the layout section's ``boxes`` and the instances of modules. Out: rectangles in layout units,
-largest first; sectors where all stand on a ring and rectangles would hold others. ``titles`` finds room for their
-titles.
+largest first; where all of a box follow each other on a ring, and a rectangle would hold others, a sector: a stretch of
+that ring. ``titles`` finds room for their titles.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Group, Network
 from neurovis_spec.layout.frames import (
     BOX_DOWN,
@@ -23,12 +24,94 @@ from neurovis_spec.layout.frames import (
     entered,
     titled,
 )
-from neurovis_spec.layout.geometry import Rect, meet, padded, united
+from neurovis_spec.layout.geometry import Rect, meet, padded, sampled, straight, united
+from neurovis_spec.layout.geometry import bounds as bounds_of_points
 from neurovis_spec.layout.labels import BOX_WEIGHT, TITLE_HIGH, instance_titles, title_room, widened
-from neurovis_spec.layout.model import RADIUS
+from neurovis_spec.layout.model import RADIUS, Point, Route
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.geometry import bounds, sample
-from neurovis_spec.scene.sectors import Sector, sector
+
+#: How far a sector reaches to both sides of the centres, and how much of the way to the next neuron along the ring.
+HALF, _SHARE = RADIUS + 0.25, 0.42
+#: Fewer neurons than this are no ring; on one they stand this close to the circle.
+_FEWEST_ON_RING, _ON_RING = 5, 0.02
+#: A cubic piece of an arc turns by this at most.
+_PIECE = math.pi / 4
+_GREEK = {"sigma": "σ", "beta": "β", "alpha": "α", "gamma": "γ", "theta": "θ", "tau": "τ"}
+
+
+@dataclass(frozen=True, slots=True)
+class Sector:
+    """A stretch of a ring about ``centre``, from one angle to a larger one, clockwise in the picture."""
+
+    centre: Point
+    radius: float
+    first: float
+    last: float
+
+    def outline(self) -> Route:
+        """The spline along its border, back to where it begins."""
+        outer, inner = self._arc(self.radius + HALF), self._arc(max(self.radius - HALF, 0.0))[::-1]
+        return (*outer, *straight(outer[-1], inner[0])[1:], *inner[1:], *straight(inner[-1], outer[0])[1:])
+
+    def _arc(self, radius: float) -> Route:
+        count = math.ceil((self.last - self.first) / _PIECE)
+        step = (self.last - self.first) / count
+        hold = 4 / 3 * math.tan(step / 4)
+        points = [self._at(self.first, radius)]
+        for k in range(count):
+            a, b = self.first + k * step, self.first + (k + 1) * step
+            start, end = self._at(a, radius), self._at(b, radius)
+            towards, back = self._at(a + math.pi / 2, radius * hold), self._at(b - math.pi / 2, radius * hold)
+            points += [
+                (start[0] + towards[0] - self.centre[0], start[1] + towards[1] - self.centre[1]),
+                (end[0] + back[0] - self.centre[0], end[1] + back[1] - self.centre[1]),
+                end,
+            ]
+        return tuple(points)
+
+    def _at(self, angle: float, radius: float) -> Point:
+        return self.centre[0] + radius * math.cos(angle), self.centre[1] + radius * math.sin(angle)
+
+    def rect(self) -> Rect:
+        """The rectangle around it."""
+        return bounds_of_points(sampled(self.outline(), 0.05))
+
+    def outmost(self) -> Rect:
+        """The place on its outer side where there is most room beyond, as a rectangle without extent, for a title
+        beside it: close to a diagonal, as a picture has room in its corners."""
+        quarter, inset = math.pi / 2, (self.last - self.first) / 8
+        diagonal = quarter * (math.floor((self.first + self.last) / 2 / quarter) + 0.5)
+        x, y = self._at(min(max(diagonal, self.first + inset), self.last - inset), self.radius + HALF)
+        return x, y, x, y
+
+    def border(self, step: float) -> FloatArray:
+        """(k, 2) points on its border, about so far apart."""
+        return np.array(sampled(self.outline(), step))
+
+
+def sector(positions: FloatArray, ring: IntArray, members: IntArray) -> Sector | None:
+    """The sector of the ``members``, of all that are on a ring, None where these form no ring, or others stand between
+    the members, or there are no others."""
+    count = len(ring)
+    if count < _FEWEST_ON_RING or not 0 < len(members) < count or not np.isin(members, ring).all():
+        return None
+    middle = positions[ring].mean(axis=0)
+    x, y = (positions[ring] - middle).T
+    radius = float(np.sqrt(x * x + y * y).mean())
+    if np.abs(np.sqrt(x * x + y * y) - radius).max() > _ON_RING:
+        return None
+    angle = np.array([math.atan2(b, a) for a, b in zip(x.tolist(), y.tolist(), strict=True)])
+    order = np.argsort(angle, kind="stable")
+    angle, own = angle[order], np.isin(ring[order], members)
+    begins = np.flatnonzero(own & ~np.roll(own, 1))
+    if len(begins) != 1:
+        return None
+    place = (int(begins[0]) + np.arange(count + 1) - 1) % count  # from the one before the first to it again
+    line = np.unwrap(angle[place])
+    last = len(members)
+    room = min(HALF / radius, _SHARE * float(line[1] - line[0]), _SHARE * float(line[last + 1] - line[last]))
+    return Sector((float(middle[0]), float(middle[1])), radius, float(line[1]) - room, float(line[last]) + room)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,30 +146,7 @@ def boxes_of(
     beside their discs) and titles are within their frames. Layout units."""
     named = _named(network)
     within = {n: frozenset(n.members) for n in named}
-    inner = _routes_within(network, routes, named)
-    titles = _titles(network, named)
-
-    def beside(item: _Named) -> list[Rect]:
-        return [padded(labels[i], PAD_LABEL) for i in item.members if i in labels] if labels else []
-
-    rects: dict[_Named, Rect] = {}
-    for tight in (False, True):
-        for item in named:  # what is held by another comes before it
-            held = [rects[o] for o in named if o is not item and o in rects and within[o] < within[item]]
-            centres, lines = bounds([positions[list(item.members)]]), bounds(inner.get(item, []))
-            assert centres is not None
-            if item.kind == "instance":
-                rect = titled(enclosing(centres, lines, held, beside(item)))
-                wide = widened(rect, titles[item])
-                rects[item] = rect if entered(positions, wide, item.members) else wide
-            elif not tight:
-                rects[item] = widened(boxed(centres, lines, held, beside(item)), titles[item])
-            elif any(
-                meet(rects[item], rects[o])
-                for o in named
-                if not (within[o] <= within[item] or within[item] <= within[o])
-            ):
-                rects[item] = boxed(centres, lines, held, tight=True)
+    rects = _rects(network, positions, routes, named, labels or {})
     clean = [n for n in named if not entered(positions, rects[n], n.members)]
     framed = [
         n
@@ -97,16 +157,46 @@ def boxes_of(
     sectors = _sectors(network, positions, named)
     if sectors.keys() <= set(framed):
         sectors = {}
+    drawn: list[tuple[_Named, Rect, Sector | None]] = [(n, rects[n], None) for n in framed if n not in sectors]
+    drawn += [(n, one.rect(), one) for n, one in sectors.items()]
     boxes = [
-        Box(_titled(network, n), n.path.rpartition(".")[2], n.members, rects[n], n.kind, n.path)
-        for n in framed
-        if n not in sectors
-    ]
-    boxes += [
-        Box(_titled(network, n), n.path.rpartition(".")[2], n.members, one.rect(), n.kind, n.path, one)
-        for n, one in sectors.items()
+        Box(_titled(network, n), n.path.rpartition(".")[2], n.members, rect, n.kind, n.path, one)
+        for n, rect, one in drawn
     ]
     return sorted(boxes, key=lambda b: (-(b.rect[2] - b.rect[0]) * (b.rect[3] - b.rect[1]), b.kind, b.path))
+
+
+def _rects(
+    network: Network,
+    positions: FloatArray,
+    routes: Sequence[FloatArray],
+    named: Sequence[_Named],
+    labels: Mapping[int, Rect],
+) -> dict[_Named, Rect]:
+    """The rectangles around what is named, those of boxes tighter where they would touch."""
+    within = {n: frozenset(n.members) for n in named}
+    inner = _routes_within(network, routes, named)
+    titles = _titles(network, named)
+    rects: dict[_Named, Rect] = {}
+    for tight in (False, True):
+        for item in named:  # what is held by another comes before it
+            held = [rects[o] for o in named if o is not item and o in rects and within[o] < within[item]]
+            beside = [padded(labels[i], PAD_LABEL) for i in item.members if i in labels]
+            centres, lines = bounds([positions[list(item.members)]]), bounds(inner.get(item, []))
+            assert centres is not None
+            if item.kind == "instance":
+                rect = titled(enclosing(centres, lines, held, beside))
+                wide = widened(rect, titles[item])
+                rects[item] = rect if entered(positions, wide, item.members) else wide
+            elif not tight:
+                rects[item] = widened(boxed(centres, lines, held, beside), titles[item])
+            elif any(
+                meet(rects[item], rects[o])
+                for o in named
+                if not (within[o] <= within[item] or within[item] <= within[o])
+            ):
+                rects[item] = boxed(centres, lines, held, tight=True)
+    return rects
 
 
 def entitled(boxes: Sequence[Box], positions: FloatArray, scale: float, rooms: Mapping[int, Rect]) -> list[Box]:
@@ -218,9 +308,6 @@ def _title(network: Network, name: str, members: tuple[int, ...]) -> str:
     told = {_computes(group) for group in groups}
     only = told.pop() if len(told) == 1 else ""
     return f"{name} · {only}" if only else name
-
-
-_GREEK = {"sigma": "σ", "beta": "β", "alpha": "α", "gamma": "γ", "theta": "θ", "tau": "τ"}
 
 
 def _computes(group: Group) -> str:

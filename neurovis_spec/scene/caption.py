@@ -1,6 +1,8 @@
-"""The line under the title: the step, the time where the spec gives a time step, the error where a rule has a target.
+"""The heading of a picture: its title, and the line under it: the step, the time where the spec gives a time step, the
+error where a rule has a target.
 
-In: a network and activities. Out: texts such as ``step 160 · 8.00 s · error +0.28``.
+In: texts; a network and activities. Out: texts with their places, cut to the width of the picture, such as ``step 160 ·
+8.00 s · error +0.28``.
 """
 
 from __future__ import annotations
@@ -11,6 +13,23 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.scene import texts
+from neurovis_spec.scene.frame import MARGIN
+from neurovis_spec.scene.model import Text, Theme
+
+TITLE, CAPTION = 17.0, 11.5
+TITLE_Y, CAPTION_Y, HEADER = 35.0, 54.0, 58.0
+
+
+def title_text(title: str, width: float, theme: Theme) -> Text:
+    """The title of a picture of this width."""
+    words = texts.shorten(title, TITLE, width - 2 * MARGIN, 600)
+    return Text((MARGIN, TITLE_Y), words, TITLE, theme.ink, weight=600)
+
+
+def caption_text(words: str, width: float, theme: Theme) -> Text:
+    """The line under the title."""
+    return Text((MARGIN, CAPTION_Y), texts.shorten(words, CAPTION, width - 2 * MARGIN), CAPTION, theme.muted)
 
 
 def caption(network: Network, step: int, activity: FloatArray) -> str:

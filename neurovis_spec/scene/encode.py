@@ -1,12 +1,14 @@
 """Encode: a network's activities and weights at a step become colours and widths, and with a Plan a Scene (Eqs. 2–5).
 
-In: a network, a Snapshot, gains, a Plan. Out: the Scene that a Film starts from.
+In: a network, a Snapshot, gains, a Plan. Out: the Scene that a Film starts from. A disc that stands for several neurons
+has a second ring, and the number of these under its name.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,16 +19,24 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.scene import encoding, texts
 from neurovis_spec.scene.fading import seconds_of
 from neurovis_spec.scene.gains import Gains
-from neurovis_spec.scene.glyphs import marks_of
 from neurovis_spec.scene.lesions import FAINT
-from neurovis_spec.scene.model import Disc, Group, Scene, Shape, Spline, ended
+from neurovis_spec.scene.model import Disc, Group, Point, Scene, Shape, Spline, Text, ended
 from neurovis_spec.scene.plan import Plan
 from neurovis_spec.scene.themes import colours, readable
 
 if TYPE_CHECKING:
     from neurovis_spec.runtime.recording import Snapshot
 
+
 CAPTION = "caption"
+#: The second ring: its radius in radii, its width in rings.
+_INNER, _WIDTH = 0.87, 0.6
+#: The number beside the label in its sizes: how large it is, and how far below.
+_SMALLER, _BELOW = 0.85, 0.95
+#: Of a glyph whose label does not stand on it, in radii.
+_ALONE = 0.7
+#: A quarter of a circle as a cubic spline.
+_QUARTER = 0.5522847498
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,3 +233,29 @@ def _range(low: float, high: float) -> str:
     if low == high or not (np.isfinite(low) and np.isfinite(high)):
         return texts.number(low, 4)
     return f"{texts.number(low, 4)} … {texts.number(high, 4)}"
+
+
+def marks_of(planned: Plan, index: int, ink: str) -> tuple[Shape, ...]:
+    """The second ring of a glyph, and how many neurons it stands for."""
+    (x, y), radius = planned.centres[index], planned.radii[index]
+    ring = Spline(circle((x, y), _INNER * radius), planned.theme.ring, _WIDTH * planned.rings[index])
+    label, words = planned.labels[index], f"×{planned.sizes[index]:,}"
+    if label is not None and label.on_disc:
+        size, y = _SMALLER * label.size, label.point[1] + _BELOW * label.size
+    else:
+        size = _ALONE * radius
+        y += 0.36 * size
+    if texts.width(words, size) > 1.9 * radius:
+        return (ring,)
+    return ring, Text((x, y), words, size, ink, "middle", on_disc=True)
+
+
+def circle(centre: Point, radius: float) -> tuple[Point, ...]:
+    """A circle as a cubic spline."""
+    x, y = centre
+    corners = [(1, 0), (0, 1), (-1, 0), (0, -1), (1, 0)]
+    points: list[Point] = [(x + radius, y)]
+    for (ax, ay), (bx, by) in pairwise(corners):
+        for px, py in ((ax + _QUARTER * bx, ay + _QUARTER * by), (bx + _QUARTER * ax, by + _QUARTER * ay), (bx, by)):
+            points.append((x + radius * px, y + radius * py))
+    return tuple(points)

@@ -15,12 +15,11 @@ from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene.body import PLOT, BodyPicture
-from neurovis_spec.scene.caption import caption
+from neurovis_spec.scene.caption import HEADER, caption, caption_text, title_text
 from neurovis_spec.scene.encode import CAPTION
 from neurovis_spec.scene.film import film
 from neurovis_spec.scene.frame import DENSEST, DENSITIES, MARGIN, MOST, whole
 from neurovis_spec.scene.gains import Gains
-from neurovis_spec.scene.heading import HEADER, caption_text, title_text
 from neurovis_spec.scene.look import Look
 from neurovis_spec.scene.model import Film, Group, Theme
 from neurovis_spec.scene.parts import Page, Part, moved, stacked

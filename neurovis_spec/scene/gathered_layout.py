@@ -16,7 +16,7 @@ from neurovis_spec.compiler.network import Instance, Network
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import RADIUS, Layout, LayoutProblem, Point
-from neurovis_spec.layout.problem import canonical
+from neurovis_spec.layout.problem import NamedProblem
 from neurovis_spec.scene.collapse import Gathered
 
 #: How a glyph grows with the number of its neurons: so much for ten times as many, and at most.
@@ -137,7 +137,7 @@ def _problem(drawn: Gathered, pins: dict[str, Point], spacing: float) -> LayoutP
         for a, b in mirror.pairs
         if not mirror.scope and all(names[end] in framed or names[end] not in held for end in (a, b))
     ]
-    return canonical(
+    return NamedProblem(
         network.name,
         names,
         [(group.name + f"/{group.start}", [names[i] for i in group.indices]) for group in network.neurons.groups],
@@ -148,7 +148,7 @@ def _problem(drawn: Gathered, pins: dict[str, Point], spacing: float) -> LayoutP
         spacing=(spacing * settings.neuron_spacing, spacing * settings.rank_spacing),
         modules=() if pins else [(instance.path, instance.module) for instance in network.instances],
         mirrors=() if pins or not pairs else [("", pairs, alike)],
-    )
+    ).canonical()
 
 
 def _inside(network: Network, instance: Instance) -> tuple[str, ...]:

@@ -15,11 +15,11 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.scene import strips, texts
-from neurovis_spec.scene.cut import Cut
 from neurovis_spec.scene.model import Group, Image, Polyline, Shape, Text, Theme
 from neurovis_spec.scene.parts import Changes, Part
 from neurovis_spec.scene.scales import ScaleLabel
 from neurovis_spec.scene.strips import SMALL, TITLE, Span
+from neurovis_spec.scene.texts import Cut
 from neurovis_spec.scene.themes import blend, channels
 
 #: How high a row is at most, and a raster.

@@ -39,10 +39,10 @@ from neurovis_spec.layout.labels import (
 from neurovis_spec.layout.model import RADIUS, Point, Side
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.beside import placed
-from neurovis_spec.scene.cut import Cut
 from neurovis_spec.scene.model import Text
 from neurovis_spec.scene.obstacles import Obstacles
 from neurovis_spec.scene.spots import Field, Slot, Wanted
+from neurovis_spec.scene.texts import Cut
 
 #: on the disc: not smaller than the first for the sake of others, never larger than the second
 _READABLE, _LARGEST = 10.5, 14.0
@@ -144,7 +144,7 @@ def labels_of(
         for index in counted:
             until[index] = latest
     alone = _told_alone(network, ground, chosen)
-    beside = _beside(network, ground, obstacles, chosen, partners, until, sides, alone)
+    beside = _beside(network, ground, obstacles, chosen, until, sides, alone)
     for index in chosen:  # it is easier to read beside a disc than where it has to be very small
         result[index] = beside.get(index) or result[index]
     for index, label in beside.items():
@@ -202,7 +202,6 @@ def _beside(
     ground: Ground,
     obstacles: Obstacles,
     chosen: Sequence[int],
-    partners: Mapping[int, int],
     until: Sequence[float],
     sides: Mapping[int, Side],
     alone: frozenset[int],
@@ -210,7 +209,7 @@ def _beside(
     """Labels beside discs, by neuron, as far as there is room for them at this scale or a smaller one, on the ``sides``
     with room for them if that is enough; from the scale ``until`` on a label stands on its disc. Those whose number
     ``alone`` says who they are are not cut."""
-    among, words = set(chosen), _whole(network)
+    among, partners, words = set(chosen), partners_of(network), _whole(network)
     cut = Cut(base for base, _ in words)
     lines = _lines(network, ground, chosen)
     said: dict[int, list[tuple[str, str]]] = {}

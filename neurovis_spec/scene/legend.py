@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from neurovis_spec.scene import legend_scales, texts
 from neurovis_spec.scene.delays import bead
 from neurovis_spec.scene.gains import Gains
-from neurovis_spec.scene.legend_entry import FIRST_Y, SAMPLE_Y, SECOND_Y, SMALL, LegendEntry, heading, stroke
+from neurovis_spec.scene.legend_scales import FIRST_Y, SAMPLE_Y, SECOND_Y, SMALL, LegendEntry, heading, stroke
 from neurovis_spec.scene.lesions import FAINT
 from neurovis_spec.scene.model import Arrowhead, Disc, Group, Shape, Spline, Text, Theme, ended, shifted
 from neurovis_spec.scene.teachers import dash

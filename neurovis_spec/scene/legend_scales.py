@@ -1,34 +1,29 @@
-"""The scales in a legend: which activities and signals have which colour, which weights which thickness, how far what
-changes glows.
+"""The entries of a legend that show scales: which activities and signals have which colour, which weights which
+thickness, how far what changes glows.
 
-In: gains, a theme. Out: Entries. Where all have one scale, an entry is a sample and a line for it; else there is a line
-for each scale, with the names of what has it. A line says how far values go that a scale does not show.
+In: gains, a theme. Out: LegendEntry: shapes with their corner at the origin. Where all have one scale, an entry is a
+sample and a line for it; else there is a line for each scale, with the names of what has it. A line says how far values
+go that a scale does not show.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.encoding import FAINTEST, THINNEST, glow_width
 from neurovis_spec.scene.gains import Gains, Scale
-from neurovis_spec.scene.legend_entry import (
-    FIRST_Y,
-    LINE,
-    SAMPLE_Y,
-    SECOND_Y,
-    SMALL,
-    LegendEntry,
-    heading,
-    high,
-    stroke,
-)
-from neurovis_spec.scene.model import Ramp, Shape, Text, Theme
+from neurovis_spec.scene.model import Ramp, Shape, Spline, Text, Theme
 from neurovis_spec.scene.themes import colours
 
+HEADING, SMALL = 11.5, 11.0
+#: the middle of the sample under the heading, and the baselines of the lines of text under it
+SAMPLE_Y, FIRST_Y, SECOND_Y = 20.0, 41.0, 55.0
+LINE = SECOND_Y - FIRST_Y
 _RAMP, _STRIPES = 150.0, 75
 _STROKE, _STROKE_GAP, _WIDEST = 36.0, 10.0, 8.6
 #: in a table of scales: the length of a stroke, and the gaps beside its number
@@ -39,6 +34,30 @@ _TABLE_Y = 26.0
 _NAMES = 132.0
 #: what goes less than this beyond a scale is not worth a word
 _BEYOND = 1.05
+
+
+@dataclass(frozen=True, slots=True)
+class LegendEntry:
+    """Shapes with their corner at the origin, and how wide and high they are."""
+
+    shapes: tuple[Shape, ...]
+    width: float
+    height: float = SECOND_Y + 3.0
+
+
+def high(lines: int) -> float:
+    """How high an entry is with so many lines of text: two, at least."""
+    return FIRST_Y + LINE * (max(lines, 2) - 1) + 3.0
+
+
+def heading(words: str, theme: Theme) -> Text:
+    """What an entry is called."""
+    return Text((0, 9), words, HEADING, theme.ink, weight=600)
+
+
+def stroke(x: float, length: float, colour: str, width: float, y: float = SAMPLE_Y) -> Spline:
+    """A horizontal line."""
+    return Spline(((x, y), (x + length / 3, y), (x + length * 2 / 3, y), (x + length, y)), colour, width)
 
 
 def colour(gains: Gains, lines: bool, theme: Theme) -> list[LegendEntry]:

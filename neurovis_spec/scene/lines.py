@@ -46,11 +46,14 @@ def routes_of(names: Sequence[str], ends: Sequence[tuple[str, str]], layout: Lay
     return routes
 
 
-def trimmed(routes: Sequence[FloatArray], radius: FloatArray | float, gap: float, head: float) -> list[Line]:
-    """Lines for routes between discs of ``radius``, one or (m, 2), those of the sources and of the targets: ``gap`` is
-    left free, a head is ``head`` long."""
+def trimmed(
+    routes: Sequence[FloatArray], radii: FloatArray | float, usual: float, unit: float = 1.0, air: float = 0.0
+) -> list[Line]:
+    """Lines for routes between discs of ``radii``, one or (m, 2), those of the sources and of the targets. Gaps and
+    heads are those beside discs of the ``usual`` radius, in ``unit``s; ``air`` is left free besides."""
     lines: list[Line | None] = [None] * len(routes)
-    radii = np.broadcast_to(radius, (len(routes), 2)) + gap
+    gap, head = unit * _gap(usual) + air, unit * _head(usual)
+    radii = np.broadcast_to(radii, (len(routes), 2)) + gap
     for members, batch in batches(routes):
         backward = batch[:, ::-1]
         k = (batch.shape[1] - 1) // 3
@@ -66,6 +69,16 @@ def trimmed(routes: Sequence[FloatArray], radius: FloatArray | float, gap: float
             route = [(x, y) for x, y in batch[index].tolist()]
             lines[members[index]] = _line(route, float(starts[index]), float(notches[index]), float(tips[index]), head)
     return [line for line in lines if line is not None]
+
+
+def _gap(radius: float) -> float:
+    """The distance between the ends of lines and the rims of discs."""
+    return min(1.5, 0.1 * radius)
+
+
+def _head(radius: float) -> float:
+    """How long heads are: a little longer for their discs where these are small, so that they still can be seen."""
+    return min(10.0, max(0.5 * radius, min(6.5, 0.75 * radius)))
 
 
 def _cut(curves: FloatArray, starts: FloatArray, notches: FloatArray, tips: FloatArray, head: float) -> list[Line]:

@@ -17,11 +17,11 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.labels import parts_of
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene import texts
-from neurovis_spec.scene.cut import Cut
 from neurovis_spec.scene.heat import Band, bands_of
 from neurovis_spec.scene.model import Group, Image, Polyline, Rectangle, Shape, Text, Theme
 from neurovis_spec.scene.parts import Changes, Part
 from neurovis_spec.scene.scales import ScaleLabel
+from neurovis_spec.scene.texts import Cut
 from neurovis_spec.scene.themes import blend, channels, colours
 
 #: The side of a cell at most, the side of the whole where there is room.

@@ -7,7 +7,7 @@ arranged in page units; the Plan is in user units (``frame``).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,17 +18,17 @@ from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.geometry import Rect
 from neurovis_spec.layout.labels import BESIDE, UNIT, label_rects, label_room
-from neurovis_spec.layout.model import RADIUS, Layout, Point
+from neurovis_spec.layout.model import RADIUS, Layout, Point, Side
 from neurovis_spec.layout.naming import natural_key
 from neurovis_spec.scene import delays, encoding, legend, texts
 from neurovis_spec.scene.boxes import Box, boxes_of, entitled
+from neurovis_spec.scene.caption import CAPTION, CAPTION_Y, HEADER, TITLE, caption_text, title_text
 from neurovis_spec.scene.collapse import Gathered
 from neurovis_spec.scene.fading import seconds_of
 from neurovis_spec.scene.frame import MARGIN, MOST, Frame, Margins, fit, unit_for
 from neurovis_spec.scene.gains import Gains, in_pages
 from neurovis_spec.scene.gathered_layout import radius_of
 from neurovis_spec.scene.geometry import batches, bounds, samples
-from neurovis_spec.scene.heading import CAPTION, CAPTION_Y, HEADER, TITLE, caption_text, title_text
 from neurovis_spec.scene.labels import (
     Ground,
     Label,
@@ -39,7 +39,7 @@ from neurovis_spec.scene.labels import (
     room_beside,
     size_beside,
 )
-from neurovis_spec.scene.legend_entry import LegendEntry
+from neurovis_spec.scene.legend_scales import LegendEntry
 from neurovis_spec.scene.lesions import Lesions, lesions_of
 from neurovis_spec.scene.line_labels import line_labels
 from neurovis_spec.scene.lines import Line, routes_of, trimmed
@@ -49,8 +49,7 @@ from neurovis_spec.scene.scaling import at, scaled_group, scaled_label, scaled_l
 from neurovis_spec.scene.shown import Shown, shown
 from neurovis_spec.scene.spots import beyond
 from neurovis_spec.scene.teachers import Teacher, dash, dotted, fewer, label_of, room_of, teachers_of
-from neurovis_spec.scene.themes import theme_of
-from neurovis_spec.scene.tints import tints_of
+from neurovis_spec.scene.themes import theme_of, tints_of
 from neurovis_spec.scene.titles import Titled, elsewhere, in_one_place, outline
 
 #: how high a line is that says what is left out; what texts keep of the picture's edge
@@ -116,108 +115,168 @@ def plan(
     magnitudes of its weights in what is drawn, by default those at first. Without a stated size the picture is at least
     ``narrowest`` wide (page units). Raises KeyError for a theme that does not exist, RendererError for a path that is
     none."""
-    network = drawn.network
     theme = theme_of(settings)
-    positions, routes = _in_units(network, layout)
-    weights = np.abs(network.connections.weights.whole()) if peaks is None else peaks
-    widths = encoding.thickness(weights, gains.thickness)
-    seen = shown(network, drawn.asked(settings), weights, _lengths(routes))
-    factors = np.array([radius_of(size) for size in drawn.sizes.tolist()]) * np.where(seen.focus, 1.0, _UNFOCUSED)
-    rooms = _rooms(network, layout) if settings.labels else {}
-    boxes = boxes_of(network, positions, routes, rooms)
-    teachers, notes = _dotted(network, seen)
-    beside = room_beside(network, RADIUS * UNIT) if settings.labels else []
-    beside = [(index, reach) for index, reach in beside if index not in rooms]
-    extent = _extent(positions, factors, routes, boxes, beside, rooms.values())
-    smallest = float(factors[seen.focus].min(initial=RADIUS))
-    wanted = _Wanted(network, gains, settings, theme, teachers, notes, extent, narrowest, frozenset(rooms))
-    title, items, frame, unit, margin = _framed(wanted, smallest, encoding.clamped(widths[seen.lines]))
-    boxes = entitled(boxes, positions, frame.scale, _rooms(network, layout, frame.scale))
-    gains = in_pages(gains, unit)
-    centres = frame.map(positions)
-    radii = factors * frame.scale
-    radius = RADIUS * frame.scale
-    gap, head = _gap(radius), _head(radius)
-    ends = np.stack([radii[network.connections.sources.whole()], radii[network.connections.targets.whole()]], axis=1)
-    kept = np.flatnonzero(seen.lines).tolist()
-    trim = trimmed([frame.map(routes[index]) for index in kept], ends[kept], gap, head)
-    lines, reaches = dict(zip(kept, trim, strict=True)), _reaches(network, gains, frame.widest)
-    obstacles = Obstacles(_dots(trim), [reaches[index] for index in kept], centres, radii)
-    top = _top(title is not None, len(notes)) or 4.0
-    bottom = frame.height - legend.height(items, frame.width - 2 * MARGIN) - (MARGIN if items else 4.0)
-    picture = (6.0, top, frame.width - 6.0, bottom - (8.0 if items else 0.0))
-    frames = [(box.members, _mapped(box.rect, frame)) for box in boxes]
-    around = [room_of(teacher, frames, picture) for teacher in teachers]
-    guides = dotted(teachers, partners_of(network), centres, radius, gap, head, obstacles, around)
-    dots = list(zip(teachers, guides, strict=True))
-    for points in _dots(guides):
-        obstacles.add_line(points)
-    for box in boxes:
-        sector = box.sector
-        obstacles.add_frame(outline(_mapped(box.rect, frame)) if sector is None else frame.map(sector.border(0.1)))
-    header = _header(title, frame, theme) if title is not None else None
-    noted = _noted(notes, title is not None, frame, theme)
-    spots: list[Point] = [(x, y) for x, y in centres.tolist()]
+    weights = np.abs(drawn.network.connections.weights.whole()) if peaks is None else peaks
+    content = _content(drawn, layout, settings, weights)
+    network, seen = content.network, content.seen
+    widths = encoding.clamped(encoding.thickness(weights, gains.thickness)[seen.lines])
+    framed = _framed(_Wanted(content, gains, settings, theme, narrowest), widths)
+    frame, gains = framed.frame, in_pages(gains, framed.unit)
+    page = _on_page(content, framed, gains, layout)
     sizes = {unit: size for unit, size in enumerate(drawn.sizes.tolist()) if drawn.glyph[unit]}
-    titled = _titled(boxes, frame, picture)
-    titles = in_one_place(titled, obstacles, theme, [_mapped(rect, frame) for rect in rooms.values()])
-    labels: list[Label | None] = [None] * len(spots)
-    if settings.labels:
-        borders = [outline(box.rect, 4 / UNIT) if box.sector is None else box.sector.border(4 / UNIT) for box in boxes]
-        inner = [(points - (frame.left, frame.top)) / frame.scale for points in _dots(guides)]
-        inner += samples([routes[i] for i in kept], 24)
-        reach = margin_beside(network, RADIUS * frame.scale, wanted.rooms) if margin > MARGIN else 0.0
-        ground = Ground(
-            positions,
-            factors,
-            frame.scale,
-            (frame.left, frame.top),
-            np.concatenate([np.zeros((0, 2)), *inner]),
-            np.concatenate([np.zeros((0, 2)), *borders]),
-            extent,
-            reach,
-            obstacles.texts(),
-            [box.members for box in boxes],
-        )
-        sides = {index: layout.labels[network.neurons.names[index]] for index in rooms}
-        labels = labels_of(network, ground, obstacles, (~seen.focus).tolist(), sizes, sides)
-    named = line_labels(network, lines, obstacles, theme, picture) if settings.labels else {}
-    left = [index for index in range(len(boxes)) if index not in titles]
-    unsaid = {titled[index].computes for index, text in titles.items() if text.text != boxes[index].title}
-    others = elsewhere([titled[index] for index in left], obstacles, theme, unsaid)
-    titles |= {index: text for index, text in zip(left, others, strict=True) if text is not None}
-    front = [
-        *(Group((text,), id=f"label:{entry}") for entry, text in named.items()),
-        *(Group((titles[index],), id=f"title:{box.path}") for index, box in enumerate(boxes) if index in titles),
-        *([header] if header else []),
-        *([noted] if noted else []),
-    ]
-    if items:
-        front.append(legend.flow(items, frame.width - 2 * MARGIN, MARGIN, bottom))
-    rings = np.minimum(2.5, 0.12 * radii)
+    said = _texts(content, page, settings, sizes)
+    rings = np.minimum(2.5, 0.12 * page.radii)
     made = Plan(
         network=network,
         gains=gains,
         theme=theme,
         title=network.title or network.name,
         frame=frame,
-        radii=tuple((radii - rings / 2).tolist()),
+        radii=tuple((page.radii - rings / 2).tolist()),
         rings=tuple(rings.tolist()),
-        centres=tuple(spots),
+        centres=tuple((x, y) for x, y in page.centres.tolist()),
         sizes=sizes,
         counts={line: count for line, count in enumerate(drawn.counts.tolist()) if drawn.sheaf[line]},
-        lines=lines,
+        lines=page.lines,
         order=_order(network, encoding.thickness(network.connections.weights.whole(), gains.thickness), seen.lines),
-        beads=delays.beads(network, lines, radius, theme),
+        beads=delays.beads(network, page.lines, RADIUS * frame.scale, theme),
         lesions=lesions_of(network),
-        labels=tuple(raised(labels, sizes)),
-        back=(*_box_frames(boxes, frame, theme), *_dotted_groups(network, dots, theme)),
-        front=tuple(front),
-        captioned=header is not None,
+        labels=tuple(raised(said.labels, sizes)),
+        back=(*_box_frames(page.boxes, frame, theme), *_dotted_groups(content, page, theme)),
+        front=(
+            *(Group((text,), id=f"label:{entry}") for entry, text in said.lines.items()),
+            *(Group((said.titles[index],), id=f"title:{page.boxes[index].path}") for index in sorted(said.titles)),
+            *framed.around(content.notes, theme),
+        ),
+        captioned=framed.title is not None,
         unit=1.0,
-        notes=notes,
+        notes=content.notes,
     )
-    return made if unit == 1 else _in_user_units(made, unit)
+    return made if framed.unit == 1 else _in_user_units(made, framed.unit)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Content:
+    """What is in a picture, in units of the layout, before it is known how large that is."""
+
+    network: Network
+    #: (n, 2) of every neuron, and the route of every connection
+    positions: FloatArray
+    routes: Sequence[FloatArray]
+    seen: Shown
+    #: (n,) radii of discs
+    radii: FloatArray
+    #: what the labels cover for which the layout kept room, by neuron, and on which side they stand
+    rooms: Mapping[int, Rect]
+    sides: Mapping[int, Side]
+    boxes: Sequence[Box]
+    #: who has a dotted line to whom
+    teachers: Sequence[Teacher]
+    notes: tuple[str, ...]
+    extent: Rect
+
+
+def _content(drawn: Gathered, layout: Layout, settings: RenderSettings, weights: FloatArray) -> _Content:
+    network = drawn.network
+    positions, routes = _in_units(network, layout)
+    seen = shown(network, drawn.asked(settings), weights, _lengths(routes))
+    radii = np.array([radius_of(size) for size in drawn.sizes.tolist()]) * np.where(seen.focus, 1.0, _UNFOCUSED)
+    rooms = _rooms(network, layout) if settings.labels else {}
+    sides = {index: layout.labels[network.neurons.names[index]] for index in rooms}
+    boxes = boxes_of(network, positions, routes, rooms)
+    teachers, notes = _dotted(network, seen)
+    beside = room_beside(network, RADIUS * UNIT) if settings.labels else []
+    beside = [(index, reach) for index, reach in beside if index not in rooms]
+    extent = _extent(positions, radii, routes, boxes, beside, rooms.values())
+    return _Content(network, positions, routes, seen, radii, rooms, sides, boxes, teachers, notes, extent)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _OnPage:
+    """Where that is on the page, in page units: centres (n, 2) and radii (n,) of discs, the lines that are drawn by
+    connection, dotted ones, boxes in units of the layout; what is in the way of texts; what of the page the network
+    has, and how much is left free beside it."""
+
+    frame: Frame
+    centres: FloatArray
+    radii: FloatArray
+    lines: Mapping[int, Line]
+    guides: Sequence[Line]
+    boxes: Sequence[Box]
+    obstacles: Obstacles
+    picture: Rect
+    margin: float
+
+
+def _on_page(content: _Content, framed: _Framed, gains: Gains, layout: Layout) -> _OnPage:
+    network, frame = content.network, framed.frame
+    boxes = entitled(content.boxes, content.positions, frame.scale, _rooms(network, layout, frame.scale))
+    centres, radii = frame.map(content.positions), content.radii * frame.scale
+    ends = np.stack([radii[network.connections.sources.whole()], radii[network.connections.targets.whole()]], axis=1)
+    kept = np.flatnonzero(content.seen.lines).tolist()
+    lines = trimmed([frame.map(content.routes[index]) for index in kept], ends[kept], RADIUS * frame.scale)
+    reaches = _reaches(network, gains, frame.widest)
+    obstacles = Obstacles(_dots(lines), [reaches[index] for index in kept], centres, radii)
+    picture = framed.picture(len(content.notes))
+    frames = [(box.members, _mapped(box.rect, frame)) for box in boxes]
+    around = [room_of(teacher, frames, picture) for teacher in content.teachers]
+    guides = dotted(content.teachers, partners_of(network), centres, RADIUS * frame.scale, obstacles, around)
+    for points in _dots(guides):
+        obstacles.add_line(points)
+    for box in boxes:
+        sector = box.sector
+        obstacles.add_frame(outline(_mapped(box.rect, frame)) if sector is None else frame.map(sector.border(0.1)))
+    drawn = dict(zip(kept, lines, strict=True))
+    return _OnPage(frame, centres, radii, drawn, guides, boxes, obstacles, picture, framed.margin)
+
+
+@dataclass(frozen=True, slots=True)
+class _Texts:
+    """Titles by box, labels of neurons, and by entry those of connections."""
+
+    titles: Mapping[int, Text]
+    labels: Sequence[Label | None]
+    lines: Mapping[str, Text]
+
+
+def _texts(content: _Content, page: _OnPage, settings: RenderSettings, sizes: Mapping[int, int]) -> _Texts:
+    """The texts in the network; each is in the way of those after it: titles all in one place, labels of neurons, of
+    connections, the other titles. ``sizes`` are those of glyphs."""
+    network, obstacles, boxes, theme = content.network, page.obstacles, page.boxes, theme_of(settings)
+    titled = _titled(boxes, page.frame, page.picture)
+    titles = in_one_place(titled, obstacles, theme, [_mapped(rect, page.frame) for rect in content.rooms.values()])
+    labels: list[Label | None] = [None] * len(network.neurons)
+    lines: Mapping[str, Text] = {}
+    if settings.labels:
+        hidden = (~content.seen.focus).tolist()
+        labels = labels_of(network, _ground(content, page), obstacles, hidden, sizes, content.sides)
+        lines = line_labels(network, page.lines, obstacles, theme, page.picture)
+    left = [index for index in range(len(boxes)) if index not in titles]
+    unsaid = {titled[index].computes for index, text in titles.items() if text.text != boxes[index].title}
+    others = elsewhere([titled[index] for index in left], obstacles, theme, unsaid)
+    titles |= {index: text for index, text in zip(left, others, strict=True) if text is not None}
+    return _Texts(titles, labels, lines)
+
+
+def _ground(content: _Content, page: _OnPage) -> Ground:
+    """What the labels of neurons stand on."""
+    network, frame, boxes = content.network, page.frame, page.boxes
+    borders = [outline(box.rect, 4 / UNIT) if box.sector is None else box.sector.border(4 / UNIT) for box in boxes]
+    inner = [(points - (frame.left, frame.top)) / frame.scale for points in _dots(page.guides)]
+    inner += samples([content.routes[i] for i in page.lines], 24)
+    rooms = frozenset(content.rooms)
+    return Ground(
+        content.positions,
+        content.radii,
+        frame.scale,
+        (frame.left, frame.top),
+        np.concatenate([np.zeros((0, 2)), *inner]),
+        np.concatenate([np.zeros((0, 2)), *borders]),
+        content.extent,
+        margin_beside(network, RADIUS * frame.scale, rooms) if page.margin > MARGIN else 0.0,
+        page.obstacles.texts(),
+        [box.members for box in boxes],
+    )
 
 
 def _dotted(network: Network, seen: Shown) -> tuple[list[Teacher], tuple[str, ...]]:
@@ -258,7 +317,7 @@ def rerouted(planned: Plan, layout: Layout, connections: Sequence[int]) -> list[
         [network.connection_names[index] for index in connections], [(names[a], names[b]) for a, b in pairs], layout
     )
     discs = np.array([(radii[a], radii[b]) for a, b in pairs]).reshape(-1, 2)
-    return trimmed([frame.map(route) for route in routes], discs, unit * _gap(radius), unit * _head(radius))
+    return trimmed([frame.map(route) for route in routes], discs, radius, unit)
 
 
 def _lengths(routes: Sequence[FloatArray]) -> FloatArray:
@@ -313,34 +372,60 @@ def _extent(
 
 @dataclass(frozen=True, slots=True)
 class _Wanted:
-    """What a frame goes by."""
+    """What a frame goes by. The picture is at least ``narrowest`` wide, in page units."""
 
-    network: Network
+    content: _Content
     gains: Gains
     settings: RenderSettings
     theme: Theme
-    teachers: list[Teacher]
-    notes: tuple[str, ...]
-    extent: Rect
     narrowest: float
-    #: the neurons for whose labels the layout kept room
-    rooms: frozenset[int]
 
     def margin(self, frame: Frame | None) -> float:
         """What is left free on either side, so that there is room for the labels of discs at the rim."""
         if not self.settings.labels or frame is None:
             return MARGIN
-        reach = margin_beside(self.network, RADIUS * frame.scale, self.rooms)
-        return _EDGE + beyond(self.extent, frame.scale, reach)
+        content = self.content
+        reach = margin_beside(content.network, RADIUS * frame.scale, frozenset(content.rooms))
+        return _EDGE + beyond(content.extent, frame.scale, reach)
 
 
-def _framed(
-    wanted: _Wanted, smallest: float, widths: FloatArray
-) -> tuple[str | None, list[LegendEntry], Frame, float, float]:
-    """The title (None: no header), the legend's entries, the frame in page units, the user units in one of these,
-    and the margin: none of the ``widths`` is wider than the discs of the ``smallest`` radius (layout units). A picture
-    that is part of another has the units of that."""
-    delayed, unit = delays.label_of(wanted.network), 1.0
+@dataclass(frozen=True, slots=True)
+class _Framed:
+    """The title (None: no header), the legend's entries, the frame in page units, the user units in one of these, and
+    what is left free on either side."""
+
+    title: str | None
+    items: Sequence[LegendEntry]
+    frame: Frame
+    unit: float
+    margin: float
+
+    @property
+    def bottom(self) -> float:
+        """Where the legend begins."""
+        below = legend.height(self.items, self.frame.width - 2 * MARGIN)
+        return self.frame.height - below - (MARGIN if self.items else 4.0)
+
+    def picture(self, notes: int) -> Rect:
+        """What the network has of the page, below so many notes."""
+        top = _top(self.title is not None, notes) or 4.0
+        return 6.0, top, self.frame.width - 6.0, self.bottom - (8.0 if self.items else 0.0)
+
+    def around(self, notes: Sequence[str], theme: Theme) -> Iterator[Group]:
+        """Title, notes and legend."""
+        if self.title is not None:
+            yield Group((title_text(self.title, self.frame.width, theme),), id="title")
+        if notes:
+            yield _noted(notes, self.title is not None, self.frame, theme)
+        if self.items:
+            yield legend.flow(self.items, self.frame.width - 2 * MARGIN, MARGIN, self.bottom)
+
+
+def _framed(wanted: _Wanted, widths: FloatArray) -> _Framed:
+    """The frame of a picture; no line, of these ``widths``, is wider than the discs in focus. A picture that is part of
+    another has the units of that."""
+    content, delayed, unit = wanted.content, delays.label_of(wanted.content.network), 1.0
+    smallest = float(content.radii[content.seen.focus].min(initial=RADIUS))
     title, items, frame = _frame(wanted, wanted.gains, delayed, MARGIN)
     if not delays.visible(RADIUS * frame.scale):
         delayed = ""
@@ -350,12 +435,13 @@ def _framed(
         before, unit = unit, 1.0 if wanted.narrowest else unit_for(smallest * frame.scale, widths)
         if (unit, margin) != (before, MARGIN):
             title, items, frame = _frame(wanted, in_pages(wanted.gains, unit), delayed, margin)
-    return title, items, frame, unit, margin
+    return _Framed(title, items, frame, unit, margin)
 
 
 def _frame(wanted: _Wanted, gains: Gains, delayed: str, margin: float) -> tuple[str | None, list[LegendEntry], Frame]:
     """The title, the legend's entries, and the frame. In a picture too small for them both go."""
-    network, settings, theme = wanted.network, wanted.settings, wanted.theme
+    content, settings, theme = wanted.content, wanted.settings, wanted.theme
+    network = content.network
     words = settings.title if isinstance(settings.title, str) else network.title or network.name
     title = words if settings.title is not False and words else None
     wide, high = MOST if settings.size is None else settings.size
@@ -364,7 +450,7 @@ def _frame(wanted: _Wanted, gains: Gains, delayed: str, margin: float) -> tuple[
         contents = legend.Contents(
             lines=len(network.connections) > 0,
             learns=len(network.changing) > 0,
-            teaches=label_of(wanted.teachers) if wanted.teachers else "",
+            teaches=label_of(content.teachers) if content.teachers else "",
             delays=delayed,
             lesions=bool(lesions_of(network)),
             inhibits=_inhibits(network),
@@ -379,7 +465,7 @@ def _frame(wanted: _Wanted, gains: Gains, delayed: str, margin: float) -> tuple[
             items = []
     if title is not None and high < 4 * HEADER:
         title = None
-    noted = max((texts.width(note, CAPTION) for note in wanted.notes), default=0.0)
+    noted = max((texts.width(note, CAPTION) for note in content.notes), default=0.0)
     across = max(noted, texts.width(title, TITLE, 600) if title is not None else 0.0)
 
     def footer(width: float) -> float:
@@ -387,9 +473,9 @@ def _frame(wanted: _Wanted, gains: Gains, delayed: str, margin: float) -> tuple[
 
     fitting = min(max(legend.widest_row(items, _ROOM - 2 * MARGIN) + 2 * MARGIN, 120.0), _ROOM)
     narrowest = max(fitting, wanted.narrowest)
-    header = (min(across, _ROOM - 2 * MARGIN), _top(title is not None, len(wanted.notes)))
+    header = (min(across, _ROOM - 2 * MARGIN), _top(title is not None, len(content.notes)))
     margins = Margins(header, footer, narrowest, margin)
-    return title, items, fit(wanted.extent, margins, settings.size)
+    return title, items, fit(content.extent, margins, settings.size)
 
 
 def _top(titled: bool, notes: int) -> float:
@@ -397,10 +483,8 @@ def _top(titled: bool, notes: int) -> float:
     return (HEADER if titled else 8.0 if notes else 0.0) + _NOTE_LINE * notes
 
 
-def _noted(notes: Sequence[str], titled: bool, frame: Frame, theme: Theme) -> Group | None:
+def _noted(notes: Sequence[str], titled: bool, frame: Frame, theme: Theme) -> Group:
     """What is left out, below the caption."""
-    if not notes:
-        return None
     first = (CAPTION_Y if titled else 4.0) + _NOTE_LINE
     room = frame.width - 2 * MARGIN
     lines = [
@@ -422,10 +506,6 @@ def _inhibits(network: Network) -> bool:
     return bool((connections.weights.kept < 0).any() or (connections.low[changing] < 0).any())
 
 
-def _header(title: str, frame: Frame, theme: Theme) -> Group:
-    return Group((title_text(title, frame.width, theme),), id="title")
-
-
 def _order(network: Network, widths: FloatArray, lines: npt.NDArray[np.bool_]) -> tuple[int, ...]:
     """The ``lines`` that are drawn. Those that can glow come first, so that their glow lies beneath all others; then
     thin ones before thick ones, so that what matters is seen in a dense picture; else as in the network."""
@@ -433,16 +513,6 @@ def _order(network: Network, widths: FloatArray, lines: npt.NDArray[np.bool_]) -
     fixed[network.changing] = False
     order = np.lexsort((np.arange(len(widths)), np.nan_to_num(widths, posinf=np.inf), fixed))
     return tuple(order[lines[order]].tolist())
-
-
-def _gap(radius: float) -> float:
-    """The distance between the ends of lines and the rims of discs."""
-    return min(1.5, 0.1 * radius)
-
-
-def _head(radius: float) -> float:
-    """How long heads are: a little longer for their discs where these are small, so that they still can be seen."""
-    return min(10.0, max(0.5 * radius, min(6.5, 0.75 * radius)))
 
 
 def _reaches(network: Network, gains: Gains, widest: float) -> list[float]:
@@ -501,10 +571,10 @@ def _mapped(rect: Rect, frame: Frame) -> Rect:
     return x0, y0, x1, y1
 
 
-def _dotted_groups(network: Network, dots: Sequence[tuple[Teacher, Line]], theme: Theme) -> list[Group]:
-    names = network.neurons.names
+def _dotted_groups(content: _Content, page: _OnPage, theme: Theme) -> list[Group]:
+    names = content.network.neurons.names
     groups = []
-    for teacher, line in dots:
+    for teacher, line in zip(content.teachers, page.guides, strict=True):
         source, target = names[teacher.source], names[teacher.target]
         words = f"{source} ⇢ {target}\n{source} is the {teacher.signal} of {teacher.rule}"
         width = 1.6 if line.head > 5 else 0.9

@@ -1,11 +1,13 @@
 """Strips: what all views over time share: where a step lies across the page, the frame, the ticks, the cursor.
 
 In: the steps that are shown and those of the frames. Out: a Span; shapes. A strip is a title, a plot, and beneath the
-last of several the axis of the time.
+last of several the axis of the time. Ticks are round values, 1, 2 or 5 times a power of ten apart, with as many
+decimals as tell them apart.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,7 +16,6 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.model import Group, Polyline, Rectangle, Shape, Text, Theme
-from neurovis_spec.scene.ticks import ticks, words
 
 SMALL = 11.0
 #: A strip's title is as high as this, and so is the axis of the time.
@@ -117,3 +118,35 @@ def spread(wanted: Sequence[float], apart: float, top: float, bottom: float) -> 
         found[place] = high = min(high, found[place])
         high -= apart
     return found
+
+
+def ticks(low: float, high: float, most: int) -> list[float]:
+    """Up to ``most`` (at least two) round values from ``low`` to ``high``, as many as there can be.
+
+    >>> ticks(-1.02, 0.98, 5), ticks(0, 128, 6), ticks(3.0, 3.0, 5)
+    ([-1.0, -0.5, 0.0, 0.5], [0.0, 50.0, 100.0], [3.0])
+    """
+    if not (math.isfinite(low) and math.isfinite(high)) or high <= low:
+        return [low]
+    exponent = math.floor(math.log10(high / most - low / most))
+    for power in range(exponent, exponent + 3):
+        for factor in (1, 2, 5):
+            step = float(f"{factor}e{power}")
+            if step <= 0 or not math.isfinite(step):
+                continue
+            first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+            if last - first + 1 <= most:
+                return [float(f"{number * step:.12g}") for number in range(first, last + 1)] or [low]
+    return [low]
+
+
+def words(values: list[float]) -> list[str]:
+    """How ticks are written: all with as many decimals as the one that needs most, where these are few.
+
+    >>> words([-0.5, 0.0, 0.5]), words([0.0, 50.0]), words([0.0, 1e-7]), words([2e9, 4e9])
+    (['−0.5', '0', '0.5'], ['0', '50'], ['0', '1e−7'], ['2e9', '4e9'])
+    """
+    if any(abs(value) >= 1e6 or 0 < abs(value) < 1e-4 for value in values):
+        return [texts.number(value) for value in values]
+    decimals = max((len(f"{value:.6f}".rstrip("0").partition(".")[2]) for value in values), default=0)
+    return ["0" if value == 0 else f"{value:.{decimals}f}".replace("-", "−") for value in values]

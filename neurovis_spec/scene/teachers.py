@@ -70,13 +70,12 @@ def dotted(
     images: Mapping[int, int],
     centres: FloatArray,
     radius: float,
-    gap: float,
-    head: float,
     obstacles: Obstacles,
     rooms: Sequence[Rect],
 ) -> list[Line]:
-    """The dotted lines of pairs: straight, or bent where they would run over a disc or along other lines, but never out
-    of their ``rooms``; between mirror ``images`` mirrored, by what both would run over."""
+    """The dotted lines of pairs, between discs of a ``radius``: straight, or bent where they would run over a disc or
+    along other lines, but never out of their ``rooms``; between mirror ``images`` mirrored, by what both would run
+    over."""
     number = {(teacher.source, teacher.target): i for i, teacher in enumerate(teachers)}
     found: dict[int, Line] = {}
     for i, teacher in enumerate(teachers):
@@ -89,7 +88,7 @@ def dotted(
             for k, side in {image: -1, i: 1}.items():
                 ends = (teachers[k].source, teachers[k].target)
                 start, end = centres[ends[0]], centres[ends[1]]
-                (lines[k],) = trimmed([_bent(start, end, side * bend)], radius, gap + 1, head)
+                (lines[k],) = trimmed([_bent(start, end, side * bend)], radius, radius, air=1.0)
                 dots = sample(lines[k].points, max(8, int(math.dist(start, end) / 6)))
                 out = bend and not _within(dots, rooms[k])
                 cost += math.inf if out else obstacles.path_hits(dots[2:-2], ends)
@@ -115,7 +114,7 @@ def dash(width: float) -> tuple[float, float]:
     return 0.01, 3.2 * width
 
 
-def label_of(teachers: list[Teacher]) -> str:
+def label_of(teachers: Sequence[Teacher]) -> str:
     """What the legend says of them: ``target of delta``, or the signals alone where they are several.
 
     >>> label_of([Teacher(0, 1, "reward", "walk"), Teacher(2, 1, "policy", "walk")])

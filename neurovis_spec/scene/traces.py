@@ -16,12 +16,11 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.scene import strips, texts
-from neurovis_spec.scene.cut import Cut
 from neurovis_spec.scene.model import Disc, Group, Point, Polyline, Shape, Text, Theme
-from neurovis_spec.scene.palette import MOST, distinct
 from neurovis_spec.scene.parts import Changes, Part
-from neurovis_spec.scene.strips import SMALL, TITLE, Span
-from neurovis_spec.scene.ticks import ticks, words
+from neurovis_spec.scene.strips import SMALL, TITLE, Span, ticks, words
+from neurovis_spec.scene.texts import Cut
+from neurovis_spec.scene.themes import MOST_DISTINCT, distinct
 
 #: How high a plot is where nothing else is asked for.
 PLOT = 96.0
@@ -57,7 +56,7 @@ class Traces:
     @property
     def strips(self) -> list[tuple[Trace, ...]]:
         """The curves of each strip."""
-        count = max(1, math.ceil(len(self.traces) / MOST))
+        count = max(1, math.ceil(len(self.traces) / MOST_DISTINCT))
         cuts = np.linspace(0, len(self.traces), count + 1).round().astype(int).tolist()
         return [self.traces[low:high] for low, high in pairwise(cuts)]
 

@@ -24,7 +24,6 @@ from neurovis_spec.scene.gains import Scale as Own
 from neurovis_spec.scene.heat import Heat, bands_of
 from neurovis_spec.scene.matrix import MatrixCells, order_of
 from neurovis_spec.scene.model import Film, Group, Text, Theme
-from neurovis_spec.scene.palette import MOST as MOST_COLOURS
 from neurovis_spec.scene.parts import Part
 from neurovis_spec.scene.poses import Poses, posed_of, start_of
 from neurovis_spec.scene.scales import ScaleLabel, scale_of
@@ -32,10 +31,11 @@ from neurovis_spec.scene.series import chosen, full_name, kind_of, short_names, 
 from neurovis_spec.scene.shots import Shots
 from neurovis_spec.scene.strips import SMALL, Span
 from neurovis_spec.scene.texts import number
+from neurovis_spec.scene.themes import MOST_DISTINCT
 from neurovis_spec.scene.traces import PLOT, Trace, Traces
 
 #: The most curves of a view that names them, and of one that chooses them.
-_MOST_NAMED, _MOST_CHOSEN = 4 * MOST_COLOURS, MOST_COLOURS
+_MOST_NAMED, _MOST_CHOSEN = 4 * MOST_DISTINCT, MOST_DISTINCT
 #: Columns of a recording that are compared at a time.
 _TOGETHER = 512
 #: The share of the weights of a scale that do not go beyond its full colour in a matrix.

@@ -21,7 +21,7 @@ from zlib import crc32
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_renderers.markup import document, element, escape, num, open_group, pairs, unchanging
+from neurovis_renderers.svg import document, element, escape, num, open_group, pairs, unchanging
 from neurovis_spec.scene import (
     HEAD_MORE,
     HEAD_OF_LENGTH,

@@ -206,51 +206,25 @@ def strokes(pieces: Pieces, halves: FloatArray, size: Size, hidden: BoolArray | 
     Each piece is drawn column by column (row by row where it is steep), so that no pixel is counted twice but where
     the direction of columns changes and at corners: there pieces overlap.
     """
-    steep = np.abs(pieces.ends - pieces.starts)
-    steep = steep[:, 1] > steep[:, 0]
-    u0, v0 = _turned(pieces.starts, steep)
-    u1, v1 = _turned(pieces.ends, steep)
-    back = u1 < u0
-    before, after = np.where(back, pieces.after, pieces.before), np.where(back, pieces.before, pieces.after)
-    opens, closes = np.where(back, pieces.last, pieces.first), np.where(back, pieces.first, pieces.last)
-    u0, u1, v0, v1 = np.where(back, u1, u0), np.where(back, u0, u1), np.where(back, v1, v0), np.where(back, v0, v1)
-    slope = (v1 - v0) / (u1 - u0)
-    secant = np.hypot(1.0, slope)
-    sideways = halves * np.abs(slope) / secant  # how far the corners of a butt end reach along the columns
-    share = sideways / np.maximum(halves, 1e-9)
-    ahead, behind = np.where(before == 2, 1.0, share * before), np.where(after == 2, 1.0, share * after)
-    low = u0 - np.where(opens, sideways + 1, halves * ahead)
-    high = u1 + np.where(closes, sideways + 1, halves * behind)
-    wide, tall = np.where(steep, size[1], size[0]), np.where(steep, size[0], size[1])
-    first = np.clip(np.ceil(low - 0.5), 0, wide).astype(np.int64)
-    columns = np.clip(np.ceil(high - 0.5), 0, wide).astype(np.int64) - first
-    piece, place = _ranges(np.maximum(columns, 0))
-    u = place + first[piece]
-    middle = v0[piece] + slope[piece] * (u + 0.5 - u0[piece])
+    runs = _runs(pieces)
+    slope, secant = runs.slope, runs.secant
+    piece, u = _columns(runs, halves, size)
+    # of each column the rows that it touches
+    middle = runs.v0[piece] + slope[piece] * (u + 0.5 - runs.u0[piece])
     around = (halves * secant + np.abs(slope) / 2)[piece]
-    most = tall[piece]
+    most = np.where(runs.steep, size[0], size[1])[piece]
     top = np.clip(np.floor(middle - around), 0, most).astype(np.int64)
     rows = np.clip(np.floor(middle + around) + 1, 0, most).astype(np.int64) - top
     column, place = _ranges(np.maximum(rows, 0))
-    stride = np.where(steep, 1, size[0])
-    start = u * np.where(steep, size[0], 1)[piece] + top * stride[piece]
+    stride = np.where(runs.steep, 1, size[0])
+    start = u * np.where(runs.steep, size[0], 1)[piece] + top * stride[piece]
     pixels = start[column] + place * stride[piece][column]
     if hidden is not None:
         seen = np.flatnonzero(~hidden[pixels])
         column, place, pixels = column[seen], place[seen], pixels[seen]
-    origin = piece[column]
     beside = ((top - middle).astype(np.float32) + np.float32(0.5))[column] + place
-    within, beyond = np.ones(len(pixels), np.float32), np.zeros(len(pixels), np.float32)
-    for end, is_end, sign in ((u0, opens, -1.0), (u1, closes, 1.0)):
-        over = is_end[piece] | (sign * (u + 0.5 - end[piece]) > 0)
-        near = np.flatnonzero(over[column])
-        at = origin[near]
-        # how far along the piece, from its end outwards
-        past = (sign * (u[column[near]] + 0.5 - end[at])) * secant[at] + sign * slope[at] / secant[at] * beside[near]
-        last = is_end[at]
-        within[near] *= np.where(last, np.clip(0.5 - past, 0, 1), 1)
-        far = np.where(last | (past <= 0), 0, np.hypot(past, beside[near] / secant[at]))
-        beyond[near] = np.maximum(beyond[near], far)
+    within, beyond = _at_ends(runs, piece, u, column, beside)
+    origin = piece[column]
     return Strokes(
         pieces.owners[origin],
         pixels,
@@ -260,6 +234,72 @@ def strokes(pieces: Pieces, halves: FloatArray, size: Size, hidden: BoolArray | 
         within,
         beyond,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Runs:
+    """Pieces (n,) as they are drawn: from (u0, v0) to u1, where u counts columns, and grows, and v rows; the other way
+    round where a piece is ``steep``. ``slope`` is v by u, ``secant`` how much longer a way across the piece is along
+    the column. How it meets its neighbours ``before`` and ``after`` (as in Pieces), and whether the stroke begins with
+    it (``opens``) or ends (``closes``)."""
+
+    steep: BoolArray
+    u0: FloatArray
+    u1: FloatArray
+    v0: FloatArray
+    slope: FloatArray
+    secant: FloatArray
+    before: npt.NDArray[np.int8]
+    after: npt.NDArray[np.int8]
+    opens: BoolArray
+    closes: BoolArray
+
+
+def _runs(pieces: Pieces) -> _Runs:
+    steep = np.abs(pieces.ends - pieces.starts)
+    steep = steep[:, 1] > steep[:, 0]
+    u0, v0 = _turned(pieces.starts, steep)
+    u1, v1 = _turned(pieces.ends, steep)
+    back = u1 < u0
+    before, after = np.where(back, pieces.after, pieces.before), np.where(back, pieces.before, pieces.after)
+    opens, closes = np.where(back, pieces.last, pieces.first), np.where(back, pieces.first, pieces.last)
+    u0, u1, v0, v1 = np.where(back, u1, u0), np.where(back, u0, u1), np.where(back, v1, v0), np.where(back, v0, v1)
+    slope = (v1 - v0) / (u1 - u0)
+    return _Runs(steep, u0, u1, v0, slope, np.hypot(1.0, slope), before, after, opens, closes)
+
+
+def _columns(runs: _Runs, halves: FloatArray, size: Size) -> tuple[IntArray, IntArray]:
+    """The columns that pieces with half widths (n,) touch: of each the piece, and its number."""
+    sideways = halves * np.abs(runs.slope) / runs.secant  # how far the corners of a butt end reach along the columns
+    share = sideways / np.maximum(halves, 1e-9)
+    ahead = np.where(runs.before == 2, 1.0, share * runs.before)
+    behind = np.where(runs.after == 2, 1.0, share * runs.after)
+    low = runs.u0 - np.where(runs.opens, sideways + 1, halves * ahead)
+    high = runs.u1 + np.where(runs.closes, sideways + 1, halves * behind)
+    wide = np.where(runs.steep, size[1], size[0])
+    first = np.clip(np.ceil(low - 0.5), 0, wide).astype(np.int64)
+    columns = np.clip(np.ceil(high - 0.5), 0, wide).astype(np.int64) - first
+    piece, place = _ranges(np.maximum(columns, 0))
+    return piece, place + first[piece]
+
+
+def _at_ends(runs: _Runs, piece: IntArray, u: IntArray, column: IntArray, beside: Numbers) -> tuple[Numbers, Numbers]:
+    """For pixels in these columns what share of each lies before the ends of its stroke, and how far each lies beyond
+    the end of its piece where another follows. ``piece`` and ``u`` are by column, ``beside`` as in Strokes."""
+    origin = piece[column]
+    within, beyond = np.ones(len(column), np.float32), np.zeros(len(column), np.float32)
+    for end, is_end, sign in ((runs.u0, runs.opens, -1.0), (runs.u1, runs.closes, 1.0)):
+        over = is_end[piece] | (sign * (u + 0.5 - end[piece]) > 0)
+        near = np.flatnonzero(over[column])
+        at = origin[near]
+        slope, secant = runs.slope[at], runs.secant[at]
+        # how far along the piece, from its end outwards
+        past = (sign * (u[column[near]] + 0.5 - end[at])) * secant + sign * slope / secant * beside[near]
+        last = is_end[at]
+        within[near] *= np.where(last, np.clip(0.5 - past, 0, 1), 1)
+        far = np.where(last | (past <= 0), 0, np.hypot(past, beside[near] / secant))
+        beyond[near] = np.maximum(beyond[near], far)
+    return within, beyond
 
 
 def _turned(points: FloatArray, steep: BoolArray) -> tuple[FloatArray, FloatArray]:

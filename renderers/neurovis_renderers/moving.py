@@ -16,10 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_renderers import coverage
-from neurovis_renderers.canvas import Pixels, bands, portions, veiled
+from neurovis_renderers.canvas import COVERED, Pixels, Stack, bands, portions, slots, veiled
 from neurovis_renderers.coverage import BoolArray, Fragments, Heads, Numbers, Size, Strokes
 from neurovis_renderers.sheet import LANE, WHOLE, Sheet, packed, packed_all
-from neurovis_renderers.stack import COVERED, Stack, slots
 from neurovis_spec.scene import (
     HEAD_MORE,
     HEAD_OF_LENGTH,

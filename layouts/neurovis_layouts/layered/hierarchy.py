@@ -128,14 +128,39 @@ class Composer:
         """Where everything stands with these parts; ``known`` are boxes that are drawn already."""
         pieces = [self._piece(problem, parts, known, True, part, problem.direction) for part in parts]
         kin: dict[str, int] = {}
-        families: dict[tuple[str, int], list[int]] = {}
         for number, piece in enumerate(pieces, len(problem.groups)):
             if piece.part.family:
                 kin.setdefault(piece.part.family, number)
-                families.setdefault((piece.part.family, piece.part.kind), []).append(min(piece.part.members))
         bound = {m for module in problem.modules for m in module.pins}
         frames = [_unit(piece, kin.get(piece.part.family, -1), pair, bound) for piece in pieces]
         units = symmetric_units(problem, frames, pair)
+        rows, behind = self._in_rows(problem, pieces, units, pair, kind)
+        units, bonds = bonded(problem, _spread(problem, units), pair, rows)
+        # a ring or a line of which a box holds some alone can be in no strip of its own
+        columns = {box for box in columns if _whole(units, problem.boxes[box][1])}
+        few = FEW if kind >= 0 or problem.modules else 1
+        wanted = Wanted(self._shape.bands(kind), few)
+        edges = range(len(problem.edges))
+        plan = planned(RankProblem(problem, units, bonds, edges, pair, columns, behind, wanted, self._shape.draft))
+        self._folds[kind, RANKS] = range(2, plan.cuts + 2)
+        resting = [_resting(plan, piece) for piece in pieces]
+        rests = pinned(problem, plan, resting, pair, partial(self._redrawn, problem))
+        return Standing.of(problem, plan, rests, units, columns)
+
+    def _in_rows(
+        self,
+        problem: LayoutProblem,
+        pieces: Sequence[Piece],
+        units: Sequence[Unit],
+        pair: Mapping[int, int],
+        kind: int,
+    ) -> tuple[list[list[int]], list[tuple[int, int]]]:
+        """The rows in which instances declared together (a family) stand, each known by a neuron of it; and pairs of
+        neurons of which the second stands in a later row. Notes in how many rows they may stand."""
+        families: dict[tuple[str, int], list[int]] = {}
+        for piece in pieces:
+            if piece.part.family:
+                families.setdefault((piece.part.family, piece.part.kind), []).append(min(piece.part.members))
         rows: list[list[int]] = []
         behind: list[tuple[int, int]] = []
         lines = {m for line in problem.align for m in line}
@@ -155,18 +180,7 @@ class Composer:
                 own = in_rows(family, count or 1)
                 behind += [(before[0], after[0]) for before, after in pairwise(own)]
                 rows += own
-        units, bonds = bonded(problem, _spread(problem, units), pair, rows)
-        # a ring or a line of which a box holds some alone can be in no strip of its own
-        columns = {box for box in columns if _whole(units, problem.boxes[box][1])}
-        few = FEW if kind >= 0 or problem.modules else 1
-        wanted = Wanted(self._shape.bands(kind), few)
-        edges = range(len(problem.edges))
-        plan = planned(RankProblem(problem, units, bonds, edges, pair, columns, behind, wanted, self._shape.draft))
-        self._folds[kind, RANKS] = range(2, plan.cuts + 2)
-
-        resting = [_resting(plan, piece) for piece in pieces]
-        rests = pinned(problem, plan, resting, pair, partial(self._redrawn, problem))
-        return Standing.of(problem, plan, rests, units, columns)
+        return rows, behind
 
     def _upright(self, kind: int) -> bool:
         """Whether no frame around a kind of instance is reflected so that it stands on its head."""

@@ -28,7 +28,7 @@ def unrelated(lines: Sequence[tuple[int, int]]) -> tuple[IntArray, IntArray]:
 def crossings(lines: FloatArray, one: IntArray, other: IntArray) -> int:
     """How many of these pairs of straight lines (n, 2, 2) cross."""
     (a, b), (c, d) = lines[one].transpose(1, 2, 0), lines[other].transpose(1, 2, 0)
-    return int(crossing(*a, *(b - a), *c, *(d - c))[1].sum())
+    return int(crossing(a, b - a, c, d - c)[1].sum())
 
 
 def run_over(lines: FloatArray, places: FloatArray) -> int:

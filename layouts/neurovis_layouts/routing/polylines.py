@@ -242,7 +242,7 @@ def _left(points: FloatArray, starts: IntArray, lines: IntArray, ring: float) ->
 def crossings(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
     """Which segments from ``a`` to ``b`` cross which from ``c`` to ``d``, and at what share of their way."""
     i, j = close_segments(a, b, c, d, 0.0)
-    share, hit = crossing(*a[i].T, *(b - a)[i].T, *c[j].T, *(d - c)[j].T)
+    share, hit = crossing(a[i].T, (b - a)[i].T, c[j].T, (d - c)[j].T)
     return i[hit], j[hit], share
 
 

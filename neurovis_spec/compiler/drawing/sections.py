@@ -1,17 +1,27 @@
 """The sections ``layout`` and ``render``: references resolved, values checked.
 
-In: the sections as written, who finds what they name. Out: LayoutSettings, RenderSettings.
+In: the sections as written, who finds what they name. Out: LayoutSettings, RenderSettings. Of the gains that an author
+states for what references name, a later one goes before an earlier one: where references overlap, the one that names
+the fewest.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
+from typing import Literal
 
 from neurovis_spec import plugins
-from neurovis_spec.compiler.drawing.drawing_settings import Cell, LayoutSettings, Mirror, RenderSettings, StatedTrace
-from neurovis_spec.compiler.drawing.gains import stated_gains
+from neurovis_spec.compiler.drawing.drawing_settings import (
+    Cell,
+    LayoutSettings,
+    Mirror,
+    RenderSettings,
+    StatedGain,
+    StatedTrace,
+)
 from neurovis_spec.compiler.drawing.mirrors import check_pins, lines_of, mirrors_of
-from neurovis_spec.compiler.drawing.page_plan import check_plan, plan_of
+from neurovis_spec.compiler.drawing.page_plan import WrittenPlan, check_plan, plan_of
 from neurovis_spec.compiler.drawing.pins import DIAMETER, FARTHEST, pins_of
 from neurovis_spec.compiler.names.finder import Finder
 from neurovis_spec.compiler.names.references import Directory, check_keys, key_of, resolve, resolve_end
@@ -19,7 +29,7 @@ from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, Span, shorten
-from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, RenderModel, ThemeModel
+from neurovis_spec.language.drawing import GainValue, LayoutModel, ModuleLayoutModel, Range, RenderModel, ThemeModel
 from neurovis_spec.language.located import Formula, Located, said
 from neurovis_spec.language.references import Sum, parse
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
@@ -32,6 +42,7 @@ from neurovis_spec.themes import COLOURS
 #: The most pixels of a picture: 8K is a little less. Its bytes take some 250 MB of memory.
 _MOST_PIXELS = 1 << 25
 _NOTHING = LayoutModel.model_validate(SourceMapping((), Span("", 1, 1, 1, 1)), context=Findings())
+Sort = Literal["activity", "signal", "thickness", "change"]
 
 
 def layout_settings(
@@ -91,13 +102,13 @@ def _plans(
     for title, members in [*boxes, *grouped]:
         titled[title] = (*titled.get(title, ()), *members)
     cells: list[Cell] = []
-    names = census.neurons.names
     for scope, directory in zip(scopes, census.directories, strict=True):
         rows = () if scope.section.layout is None else scope.section.layout.plan
         start = scope.called("")
         own = {title.removeprefix(start): found for title, found in titled.items() if title.startswith(start)}
-        found = plan_of(scope.path, rows, directory, own, names, findings)
-        check_plan(scope.path, rows, found, mirrors, lines, direction, names, findings)
+        plan = WrittenPlan(scope.path, rows, census.neurons.names)
+        found = plan_of(plan, directory, own, findings)
+        check_plan(plan, found, mirrors, lines, direction, findings)
         cells += found
     return tuple(cells)
 
@@ -233,3 +244,73 @@ def _side(formula: Formula, constants: Constants) -> int | Unknown:
         constants.findings.error("out-of-range", formula.span, message)
         return UNKNOWN
     return int(value)
+
+
+def stated_gains(
+    written: tuple[GainValue, ...], sort: Sort, finder: Finder, constants: Constants
+) -> tuple[StatedGain, ...]:
+    """The gains of one sort; what is invalid in them is reported and left out."""
+    found: list[tuple[StatedGain, Span]] = []
+    for one in written:
+        value = _value(one, constants)
+        members = None if one.key is None else _members(one.key, sort, finder)
+        if value is UNKNOWN:
+            continue
+        if one.key is None:
+            found.append((StatedGain(value[0], None, "", value[1]), one.span))
+        elif members is not UNKNOWN:
+            found.append((StatedGain(value[0], members, parse(one.key.value).normal, value[1]), one.key.span))
+    found.sort(key=lambda item: math.inf if item[0].members is None else len(item[0].members))
+    _check_ties(found, constants)
+    return tuple(stated for stated, _ in reversed(found))
+
+
+def _value(one: GainValue, constants: Constants) -> tuple[float, float] | Unknown:
+    """The gain, and what is drawn as 0."""
+    findings = constants.findings
+    if isinstance(one.value, Range):
+        low, high = (constants.scalar(end) for end in (one.value.low, one.value.high))
+        if low is UNKNOWN or high is UNKNOWN:
+            return UNKNOWN
+        gain = 2 / (high - low) if high > low else math.inf
+        if not math.isfinite(gain):
+            message = f"a range goes from low to high, this one from {low:g} to {high:g}"
+            findings.error("out-of-range", one.span, message, "write [low, high]")
+            return UNKNOWN
+        return gain, low / 2 + high / 2
+    value = UNKNOWN if one.value is None else constants.scalar(one.value)
+    if value is UNKNOWN:
+        return UNKNOWN
+    if value < 0:
+        findings.error("out-of-range", one.span, f"a gain is not negative, this is {value:g}")
+        return UNKNOWN
+    return value, 0.0
+
+
+def _members(key: Located[str], sort: Sort, finder: Finder) -> tuple[int, ...] | Unknown:
+    """What a reference names: neurons, or connections."""
+    if sort == "activity":
+        if not isinstance(parse(key.value), Sum):
+            message = f"'{shorten(key.value)}' is a connection; 'activity' is the colour of neurons"
+            finder.findings.error("wrong-type", key.span, message, "the colour of connections is 'signal'")
+            return UNKNOWN
+        found = finder.neurons(key)
+    else:
+        found = finder.connections(key)
+    return UNKNOWN if found is UNKNOWN else tuple(found.tolist())
+
+
+def _check_ties(found: list[tuple[StatedGain, Span]], constants: Constants) -> None:
+    """Of two references that name as many, neither goes before the other where they overlap. ``found`` begins with
+    those that name the fewest."""
+    held: dict[int, StatedGain] = {}
+    for one, span in found:
+        members = one.members or ()
+        for member in members:
+            other = held.setdefault(member, one)
+            if len(other.members or ()) == len(members) and (other.gain, other.centre) != (one.gain, one.centre):
+                what = "connections" if "->" in one.name else "neurons"
+                message = f"'{shorten(one.name)}' and '{shorten(other.name)}' name the same {what}, and as many"
+                hint = "where references overlap, the one that names the fewest holds"
+                constants.findings.error("repeated-reference", span, message, hint)
+                break
