@@ -468,7 +468,7 @@ def test_a_film_needs_a_frame() -> None:
 def test_curves_are_cut_together_as_they_are_one_by_one() -> None:
     chooser = np.random.default_rng(3)
     routes = [chooser.uniform(0, 9, (1 + 3 * k, 2)) + np.linspace(0, 90, 1 + 3 * k)[:, None] for k in (1, 1, 2, 1, 3)]
-    together, alone = trimmed(routes, 4.0, 4.0), [trimmed([route], 4.0, 4.0)[0] for route in routes]
+    together, alone = trimmed(routes, 4.0, 4.0, air=0.6), [trimmed([route], 4.0, 4.0, air=0.6)[0] for route in routes]
     for one, other, route in zip(together, alone, routes, strict=True):
         assert one == other
         start, end = np.array(one.points[0]), np.array(one.tip)
