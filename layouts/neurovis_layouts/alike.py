@@ -1,8 +1,15 @@
 """Alike: the neurons whose places follow from each other, as copies in other instances or as mirror images.
 
 In: a problem and the places of some of its neurons. Out: for a neuron, its copies in other instances of the same make,
-and its mirror image, each with the move that takes its place to theirs. The moves are found from the neurons that have
+and its mirror image, each with the Move that takes its place to theirs. The moves are found from the neurons that have
 places already.
+
+Say ``l`` and ``r`` are instances of one module with the neurons A, B and C::
+
+    l.A (0, 0)   l.B (1, 2)   l.C (2, 0)        r.A (9, 0)   r.B (8, 2)   r.C: new
+
+A and B tell that r is l reflected and shifted (x becomes 9 − x), so r.C belongs at (7, 0): ``of`` of l.C gives l.C as
+it is, and r.C with that move.
 """
 
 from __future__ import annotations

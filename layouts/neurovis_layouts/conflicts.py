@@ -5,6 +5,10 @@ each neuron that the earlier one knew, and who of these is there for the first t
 where the file's routes begin or end; it stays, and what it lies on then gives way. Where the earlier places break a
 symmetry of the spec, the symmetry wins: neurons of an instance follow the first instance of the same make; of a
 mirrored pair the one that was not moved by hand follows the other (else the second follows the first).
+
+A and B are mirror images about x = 0, and the file has A at (−1, 0) and B at (1, 0), with a route from (1, 0): nobody
+was moved, and both stay. Had somebody written (3, 0) for B, its route would still begin at (1, 0): B was moved by hand,
+and A follows it to (−3, 0); what stands there gives way.
 """
 
 from __future__ import annotations

@@ -4,6 +4,10 @@ In: frames, what is placed, and bodies (neurons that move together), each with t
 Out: the free place nearest to a wish: off all discs, its frame off those of others, nobody in a frame who does not
 belong there, mirror images on their sides. All that is moved off something, by a pin or by an earlier layout, is moved
 here; coordinates are those of the picture.
+
+A place is sought around the wish in growing steps, first by the strictest rules (off the lines, with room between),
+then, where no place near or far is free by these, by laxer ones, in the end only off other discs; and beyond all that
+is drawn as the last resort.
 """
 
 from __future__ import annotations
@@ -91,6 +95,8 @@ class _Rules:
     off_lines: bool = False
 
 
+#: Off the lines and with ample room; with ample room; near others, so that a line passes between; however near; off
+#: discs, whatever frame they are in.
 _CLEAR = _Rules(0.75, 0.4, 0.5, off_lines=True)
 _AMPLE = _Rules(0.75, 0.4, 0.5)
 _NEAR = _Rules(_TOUCHING, RADIUS, 0.4)

@@ -1,7 +1,8 @@
 """A sheet: the shapes of a scene as arrays in pixels, from which fragments are made for any part of its order.
 
 In: groups of a Scene. Out: for shapes ``low`` to ``high`` of their order from back to front the fragments. A shape of
-a scene may have several places in the order: a disc has one for its filling and one for its ring.
+a scene may have several places in the order: a disc has one for its filling and one for its ring. So of a group that
+holds a line, a disc and a text the line is at 0, the filling at 1, the ring at 2, the text at 3.
 """
 
 from __future__ import annotations
@@ -40,7 +41,11 @@ WHOLE, LANE = 1 << 13, 21
 
 
 def packed(colour: str) -> int:
-    """A colour as an integer of three lanes."""
+    """A colour as an integer of three lanes.
+
+    >>> [packed("#010203") >> lane & 255 for lane in (0, LANE, 2 * LANE)]
+    [1, 2, 3]
+    """
     number = int(colour[1:], 16)
     return number >> 16 | (number >> 8 & 255) << LANE | (number & 255) << 2 * LANE
 
@@ -53,7 +58,11 @@ def packed_all(colours: npt.NDArray[np.uint8]) -> IntArray:
 
 
 def unpacked(sums: IntArray) -> npt.NDArray[np.uint8]:
-    """Sums of colours times weights that add up to ``WHOLE``, as colours (n, 3)."""
+    """Sums of colours times weights that add up to ``WHOLE``, as colours (n, 3).
+
+    >>> unpacked(np.array([packed("#000000") * (WHOLE // 2) + packed("#646464") * (WHOLE // 2)])).tolist()
+    [[50, 50, 50]]
+    """
     result = np.empty((len(sums), 3), np.uint8)
     for lane in range(3):
         value = sums >> (lane * LANE)

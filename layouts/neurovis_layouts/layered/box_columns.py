@@ -4,6 +4,11 @@ In: Levels and the boxes that are to be columns. Out: levels with a spine throug
 within boxes marked as theirs; an order in which whatever hangs together outside a box is on one side of it; places
 across that leave each box its strip. So a box may stand beside what it drives and is driven by, which a block cannot.
 After Sander (1996), Layout of compound directed graphs.
+
+The stages, in the order in which they are called: ``with_spines`` gives a box a node in each of its ranks, joined to a
+line, which holds the box together while ranks are ordered; ``straightened`` moves what hangs together outside to one
+side of that; ``tied`` takes away the spines where the box has nodes of its own, which are tied to each other instead;
+``Strips`` keeps, when nodes find their places across, the left and the right line of each strip as two more nodes.
 """
 
 from __future__ import annotations
@@ -25,7 +30,9 @@ from neurovis_spec.layout.model import LayoutProblem
 
 #: From the line of a strip to centres and to lines, within and outside; between two strips.
 _INSIDE_DISC, _INSIDE_LINE, _OUTSIDE_DISC, _OUTSIDE_LINE, _BETWEEN = 0.65, 0.2, 0.55, 0.25, 0.4
+#: How strongly the spine of a box holds together, and its neurons in neighbouring ranks.
 _SPINE, _TIED = 8.0, 3.0
+#: Sweeps in which strips and what is around them find their places.
 _ROUNDS = 24
 
 

@@ -2,7 +2,12 @@
 better: a drawing in ranks and its mirror image cross as often, so that names may choose between the two.
 
 In: Levels in order, and which frames may be reflected. Out: Levels in which some are reflected, in which order, and
-which these are. What may not be reflected, such as a row that is asked for, changes only its place.
+which these are. What may not be reflected, such as a row that is asked for, changes only its place. If C leads to B,
+and D to A, the frame of A and B is turned::
+
+     C   D           C   D
+       X       →     |   |
+    [A   B]         [B   A]
 """
 
 from __future__ import annotations

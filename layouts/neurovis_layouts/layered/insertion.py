@@ -7,6 +7,17 @@ to which the shortest paths of all of its connections are shortest together (aft
 2005, who insert into planar graphs). All numbers are integers: the result is the same on every machine. Mirror images
 are taken out and put back together: the one before the axis where it costs least, the other and its connections as
 that has it.
+
+Two ranks of two nodes, A connected with C and B with D, have three slots each. What a line from slot p above to slot q
+below would cross is a table with a row for each p, which grows and shrinks with the ranks::
+
+    slots   0   1   2
+    above     A   B             q = 0  1  2
+              |   |      p = 0      0  1  2
+    below     C   D          1      1  0  1
+    slots   0   1   2        2      2  1  0
+
+To put in another line is to add 1 where it would be crossed; to take one out is to subtract it.
 """
 
 from __future__ import annotations

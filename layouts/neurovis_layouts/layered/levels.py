@@ -1,7 +1,14 @@
 """Levels: the units of one component, rank by rank, with a passage through every rank that a connection crosses.
 
 In: a problem, units, ranks. Out: Levels: nodes (a neuron, a block, or a passage), which rank they are in, and the
-segments between neighbouring ranks.
+segments between neighbouring ranks. A drives B and C, B drives C, each is in a rank of its own. The line from A to C
+passes the rank of B, so that there is a node for it (·)::
+
+    rank 0    A         nodes      0: A   1: B   2: C   3: the passage
+            ┌─┴─┐       ranks      [0], [1, 3], [2]
+    rank 1  B   ·       segments   [0–1, 0–3], [1–2, 3–2]
+            └─┬─┘       passages   {the number of A -> C: [3]}
+    rank 2    C
 """
 
 from __future__ import annotations

@@ -1,7 +1,9 @@
 """Polylines: many routes as lines of few points, measured all at once.
 
 In: routes. Out: how long they are, how much they bend, where they leave a disc, what cells they run through, how often
-they cross segments; one figure a line.
+they cross segments; one figure a line. All points stand in one array: a line of three points and one of two are
+``points`` (5, 2) with ``starts`` 0, 3, 5; they have three segments, from ``a`` (3, 2) to ``b`` (3, 2), of the ``owner``
+0, 0, 1.
 """
 
 from __future__ import annotations
