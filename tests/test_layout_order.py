@@ -11,8 +11,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from neurovis_layouts.layered.crossings import Ints, Segments, inversions
-from neurovis_layouts.layered.halves import Halves
-from neurovis_layouts.layered.levels import Levels, Node, Segment
+from neurovis_layouts.layered.levels import Halves, Levels, Node, Segment
 from neurovis_layouts.layered.order import Exchange, Order, crossings, ordered, places
 
 

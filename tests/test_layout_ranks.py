@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from layout_conformance import members, named
-from neurovis_layouts.layered.ranks import ranks_of
-from neurovis_layouts.layered.simplex import shortened
+from neurovis_layouts.layered.ranks import ranks_of, shortened
 
 import neurovis_spec as nv
 from neurovis_spec.layout.arrange import lay_out_problem

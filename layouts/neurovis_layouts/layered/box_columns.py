@@ -23,8 +23,7 @@ import networkx as nx
 import numpy as np
 
 from neurovis_layouts.layered.crossings import Segments
-from neurovis_layouts.layered.halves import Halves
-from neurovis_layouts.layered.levels import Levels, Node, Segment
+from neurovis_layouts.layered.levels import Halves, Levels, Node, Segment
 from neurovis_layouts.layered.order import Exchange, places
 from neurovis_spec.layout.model import LayoutProblem
 

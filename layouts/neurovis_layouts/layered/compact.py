@@ -3,7 +3,8 @@
 In: a problem, and how it is drawn in a shape. Out: the shape in which it takes least of a page: in how many bands (see
 ``bands``) the ranks of each kind of instance, and those of the whole, stand, and in how many rows the instances of a
 kind that are declared together. What is near to these proportions is left as it is, so that signals run one way. Shapes
-are tried as drafts, which show how large the whole becomes; only the one that is chosen is drawn in full.
+are tried as drafts, which show how large the whole becomes, and how often connections would cross each other and run
+over discs if they were straight; only the one that is chosen is drawn in full.
 """
 
 from __future__ import annotations
@@ -18,9 +19,9 @@ from typing import TypeAlias
 import numpy as np
 
 from neurovis_layouts.layered.drawing import Drawing
-from neurovis_layouts.layered.straight_lines import crossings, unrelated
-from neurovis_spec.layout import IntArray
-from neurovis_spec.layout.geometry import lengths
+from neurovis_layouts.routing.obstacles import REACH
+from neurovis_spec.layout import FloatArray, IntArray
+from neurovis_spec.layout.geometry import crossing, lengths, squared_distances
 from neurovis_spec.layout.model import Direction, LayoutProblem
 
 #: The number of the whole, beside those of kinds of instances; and of what is never folded.
@@ -51,6 +52,8 @@ _MOST_FOLDS, _MOST = 8, 3000
 Fold: TypeAlias = tuple[int, int]
 #: What of a shape concerns a drawing, and whether that is a draft.
 ShapeKey: TypeAlias = tuple[bool, tuple[tuple[Fold, int], ...]]
+#: Of more lines than so many nothing is counted.
+_MOST_LINES = 300
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,3 +160,27 @@ def _cost(
     back = int((ends[:, 0, 1] > ends[:, 1, 1]).sum())
     many = max(1, len(lines))
     return page * length * (1 + _BACK * back / many) * (1 + _CROSSING * crossings(ends, *apart) / many)
+
+
+def unrelated(lines: Sequence[tuple[int, int]]) -> tuple[IntArray, IntArray]:
+    """Every two of these pairs of neurons that have none in common; none where they are too many to be followed."""
+    one, other = np.triu_indices(len(lines) if len(lines) <= _MOST_LINES else 0, 1)
+    ends = np.array(lines, dtype=np.int64).reshape(-1, 2)
+    shared = (ends[one][:, :, None] == ends[other][:, None, :]).any(axis=(1, 2))
+    return one[~shared], other[~shared]
+
+
+def crossings(lines: FloatArray, one: IntArray, other: IntArray) -> int:
+    """How many of these pairs of straight lines (n, 2, 2) cross."""
+    (a, b), (c, d) = lines[one].transpose(1, 2, 0), lines[other].transpose(1, 2, 0)
+    return int(crossing(a, b - a, c, d - c)[1].sum())
+
+
+def run_over(lines: FloatArray, places: FloatArray) -> int:
+    """How many discs at these places (k, 2) straight lines (n, 2, 2) run over, but for those at their ends."""
+    if len(lines) > _MOST_LINES:
+        return 0
+    x, y = (places[None] - lines[:, None, 0]).transpose(2, 0, 1)
+    dx, dy = (lines[:, 1] - lines[:, 0]).T[:, :, None]
+    over = squared_distances(x, y, dx, dy) < REACH * REACH
+    return int(over.sum()) - 2 * len(lines)

@@ -19,8 +19,7 @@ from neurovis_layouts.label_room import at_ends, covered, sides_of
 from neurovis_layouts.layered.bands import Bands, Wanted, banded
 from neurovis_layouts.layered.box_columns import straightened, tied, with_spines
 from neurovis_layouts.layered.flips import Reading, reflected
-from neurovis_layouts.layered.fold_ports import PlacedRanks, with_exits
-from neurovis_layouts.layered.folds import Folds, folded, interleaved, stacked
+from neurovis_layouts.layered.folds import Folds, PlacedRanks, folded, interleaved, stacked, with_exits
 from neurovis_layouts.layered.levels import Levels, levels_of
 from neurovis_layouts.layered.mirror import mirrored
 from neurovis_layouts.layered.order import Order, crossings, ordered

@@ -30,8 +30,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_layouts.layered.halves import Halves
-from neurovis_layouts.layered.levels import Levels
+from neurovis_layouts.layered.levels import Halves, Levels
 
 Counts = npt.NDArray[np.int32]
 BoolArray = npt.NDArray[np.bool_]

@@ -9,6 +9,9 @@ passes the rank of B, so that there is a node for it (·)::
     rank 1  B   ·       segments   [0–1, 0–3], [1–2, 3–2]
             └─┬─┘       passages   {the number of A -> C: [3]}
     rank 2    C
+
+Of levels that are to be symmetric, Halves say who stands before the axis and who behind it: a rank is made from the
+order of those that stand before it, what is nobody's image stands in the middle.
 """
 
 from __future__ import annotations
@@ -20,8 +23,11 @@ from dataclasses import dataclass, field, replace
 from itertools import accumulate, pairwise
 from operator import itemgetter
 
+import numpy as np
+
 from neurovis_layouts.label_room import excess, sides_of
 from neurovis_layouts.layered.units import Unit
+from neurovis_spec.layout import IntArray as Ints
 from neurovis_spec.layout.model import LayoutProblem, Point, Side
 
 #: Passages in all; beyond it the longest connections get none.
@@ -183,3 +189,23 @@ def connect(levels: Levels, i: int, ends: Ends) -> None:
     for step, (one, other) in enumerate(pairwise(line)):
         ends_here = (step == 0) + (step == len(line) - 2)
         levels.segments[top + step].append(Segment(*one, *other, (8.0, 2.0, 1.0)[ends_here], i in levels.idle))
+
+
+class Halves:
+    """``image`` (n,) of each node, itself where it has none; ``side`` (n,) where it stands: -1 before the axis, which
+    is the one of a pair that comes first in its rank, 0 in the middle, 1 behind."""
+
+    def __init__(self, levels: Levels) -> None:
+        self.image: Ints = np.arange(len(levels.nodes), dtype=np.int64)
+        if levels.images:
+            self.image[list(levels.images)] = list(levels.images.values())
+        place = np.zeros(len(levels.nodes), dtype=np.int64)
+        for rank in levels.ranks:
+            place[rank] = np.arange(len(rank), dtype=np.int64)
+        self.side: Ints = np.sign(place - place[self.image])
+
+    def whole(self, rank: Ints) -> Ints:
+        """A rank with those before the axis and those in the middle in the order in which they are in this one."""
+        side = self.side[rank]
+        before = rank[side < 0]
+        return np.concatenate((before, rank[side == 0], self.image[before[::-1]])) if len(before) else rank

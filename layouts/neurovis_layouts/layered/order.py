@@ -19,8 +19,7 @@ from operator import itemgetter
 import numpy as np
 
 from neurovis_layouts.layered.crossings import Floats, Ints, Segments
-from neurovis_layouts.layered.halves import Halves
-from neurovis_layouts.layered.levels import Levels
+from neurovis_layouts.layered.levels import Halves, Levels
 from neurovis_layouts.layered.reinsertion import reinserted
 from neurovis_spec.layout.model import Effort
 

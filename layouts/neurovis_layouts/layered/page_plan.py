@@ -18,11 +18,10 @@ import numpy as np
 
 from neurovis_layouts.alike import Move, shifted_by
 from neurovis_layouts.frame import from_picture, to_picture
-from neurovis_layouts.layered.compact import stretched
+from neurovis_layouts.layered.compact import crossings, run_over, stretched, unrelated
 from neurovis_layouts.layered.drawing import Drawing, Piece
 from neurovis_layouts.layered.parts import Part, imaged, part_of_module, symmetric
 from neurovis_layouts.layered.plan_places import Slot, placed
-from neurovis_layouts.layered.straight_lines import crossings, run_over, unrelated
 from neurovis_spec.layout.geometry import Rect, lengths, united
 from neurovis_spec.layout.model import Direction, LayoutProblem, LayoutRefusalError, Point, Seat
 

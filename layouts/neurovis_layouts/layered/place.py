@@ -4,7 +4,7 @@ In: Levels and the order. Out: x and y of every node. Across, each rank is moved
 nodes are connected to, in sweeps; within a rank that is an isotonic regression, so that what is symmetric stays
 symmetric. Along, ranks are as far apart as asked, farther where blocks are high or the ranks so wide that lines would
 run flat over discs. Ranks that make a drawing much wider than a page are staggered: every other neuron stands a step
-behind its neighbours, and connections run in the gaps between those before (``fold_ports``).
+behind its neighbours, and connections run in the gaps between those before (``folds``).
 """
 
 from __future__ import annotations
