@@ -33,7 +33,7 @@ from neurovis_spec.scene.series import chosen, full_name
 from neurovis_spec.scene.shots import Shots, shots_of
 from neurovis_spec.scene.shown import LeftOut
 from neurovis_spec.scene.texts import width
-from neurovis_spec.scene.themes import MOST, contrast, distinct
+from neurovis_spec.scene.themes import MOST_DISTINCT, contrast, distinct
 
 NS = "{http://www.w3.org/2000/svg}"
 SPEC = """
@@ -280,10 +280,10 @@ def test_what_a_view_leaves_out_is_said() -> None:
     many = "neurovis: 1\nname: many\ntime: {steps: 5}\nneurons: {N: {count: 40}}\nconnections:\n"
     many += "  N -> N: {pattern: ring, weight: 0.5, plasticity: {hebbian: {rate: 0.1}}}\n"
     network = nv.compile_text(many)
-    assert any(f"{MOST} of 40" in text for text in texts(film("traces", network=network).scene))
+    assert any(f"{MOST_DISTINCT} of 40" in text for text in texts(film("traces", network=network).scene))
     assert any("24 of 40" in text for text in texts(film("traces: N", network=network).scene))
     assert any("12 of 40, those that change most" in text for text in texts(film("weights", network=network).scene))
-    assert len(groups(film("traces", network=network).scene, "trace")) == MOST
+    assert len(groups(film("traces", network=network).scene, "trace")) == MOST_DISTINCT
 
 
 def test_of_a_long_run_each_extreme_is_drawn_and_the_svg_stays_small(tmp_path: Path) -> None:
@@ -348,7 +348,7 @@ def test_a_view_with_nothing_to_show_says_so() -> None:
 @pytest.mark.parametrize("theme", sorted(THEMES))
 def test_curves_are_told_apart_and_from_the_background_with_any_vision(theme: str) -> None:
     found = distinct(THEMES[theme])
-    assert len(set(found)) == MOST == 6
+    assert len(set(found)) == MOST_DISTINCT == 6
     for colour in found:
         assert contrast(colour, THEMES[theme].background) >= 3
     for one, other in combinations(found, 2):
