@@ -1,13 +1,13 @@
 """Plug-ins: engines, renderers, backends and formats are found by name, through entry points.
 
 In: a group and a name. Out: what the entry point names, called without arguments. Ours are registered in the same way
-as anybody's. Nothing is listed or imported before somebody asks; then a group is listed once in a process.
+as anybody's. Nothing is listed or imported before somebody asks; then all are listed, once in a process.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -29,9 +29,15 @@ class PluginError(ValueError):
 
 @cache
 def _points(group: str) -> Mapping[str, EntryPoint]:
+    return {point.name: point for point in sorted(_select()(group=group), key=lambda p: (p.name, p.value))}
+
+
+@cache
+def _select() -> Callable[..., Iterable[EntryPoint]]:
+    """What gives some of all entry points there are: to find those of a group takes as long as to find all."""
     from importlib.metadata import entry_points  # slow to import, and the help of a command needs none of it
 
-    return {point.name: point for point in sorted(entry_points(group=group), key=lambda p: (p.name, p.value))}
+    return entry_points().select
 
 
 def names(group: str) -> tuple[str, ...]:
