@@ -160,7 +160,7 @@ def through_let(read: Iterable[Hazards], let: tuple[tuple[str, Tree], ...]) -> l
     found = [hazard for formula in formulas for hazard in formula.found]
     reads: list[Read] = [read for formula in formulas for read in formula.names]
     for name, tree in reversed(let):
-        one = together(read for read in reads if read.name == name)
+        one = together(reads, name)
         if one is not None:
             made = hazards(tree, one.hidden, one.where)
             found += made.found

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import chain
@@ -232,9 +233,14 @@ class Constants:
         called = f"{self.path}.{name}" if self.path else name
         self.slots.append(Slot(called, value, formula, low, high, given and not self.path, own))
 
-    def following(self) -> Following:
+    @contextmanager
+    def following(self) -> Iterator[list[Part]]:
         """Collect what follows parameters, of all that is evaluated within."""
-        return Following(self)
+        outer, self._parts = self._parts, []
+        try:
+            yield self._parts
+        finally:
+            self._parts = outer
 
     def follow(self, parts: Iterable[Part]) -> None:
         """Add to what is being collected."""
@@ -371,20 +377,6 @@ class Constants:
             if name in self.names and name not in self.structural:
                 self.structural.add(name)
                 waiting += self.uses.get(name, ())
-
-
-class Following:
-    """Parts that are collected in a ``with`` block; there are several of these for each entry of a spec."""
-
-    def __init__(self, constants: Constants) -> None:
-        self._constants = constants
-
-    def __enter__(self) -> list[Part]:
-        self._outer, self._constants._parts = self._constants._parts, []
-        return self._constants._parts
-
-    def __exit__(self, *_: object) -> None:
-        self._constants._parts = self._outer
 
 
 class _Drawing:

@@ -14,7 +14,7 @@ import operator
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import reduce
+from functools import cached_property, reduce
 from types import MappingProxyType
 from typing import Final, Literal, NamedTuple, TypeAlias
 
@@ -221,7 +221,7 @@ class Operation:
         return (hides,) * len(arguments) if isinstance(hides, Hidden) else hides(*arguments)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Function(Operation):
     """A function. Of one of any number of arguments the usage ends in an ellipsis; its code takes two, and is folded.
 
@@ -238,7 +238,7 @@ class Function(Operation):
         """What it is called."""
         return self.usage.partition("(")[0]
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """What its formulas call its arguments, as its usage does."""
         return tuple(name for name in self.usage.partition("(")[2].rstrip(")").split(", ") if name != "…")

@@ -154,7 +154,7 @@ class _Reading(Visitor[_Rest]):
             return self.operation(FUNCTIONS[node.function], node.arguments)
         self.made.calls.append(Called(node, self.hidden, self.where))
         read = hazards(self.functions[node.function], self.hidden).names
-        inside = together(one for one in read if one.name == "x")
+        inside = together(read, "x")
         return [(node.arguments[0], Hidden.ALL if inside is None else inside.hidden, self.where)]
 
     def draw(self, node: Draw) -> _Rest:
@@ -162,9 +162,8 @@ class _Reading(Visitor[_Rest]):
 
     def operation(self, row: Operation, arguments: tuple[Tree, ...]) -> _Rest:
         """Where an operation is undefined, as far as that is hidden; its arguments, of which it may hide more."""
-        undefined = ((), row.infinite, row.undefined)[self.hidden]
-        given = dict(zip(row.names, arguments, strict=False))
-        for what, where, further in undefined:
+        for what, where, further in ((), row.infinite, row.undefined)[self.hidden]:
+            given = dict(zip(row.names, arguments, strict=True))
             condition = _put(where, given)
             if further:
                 more = _put(further, given)
@@ -200,13 +199,13 @@ def either(conditions: Iterable[Tree]) -> Tree:
     return Chain(tuple("or" for _ in others), (first, *others)) if others else first
 
 
-def together(reads: Iterable[Read]) -> Read | None:
-    """Several reads of one name as one: what all of them hide. None where there are none."""
-    several = list(reads)
+def together(reads: Iterable[Read], name: str) -> Read | None:
+    """Several reads of a name as one: what all of them hide. None where there are none."""
+    several = [read for read in reads if read.name == name]
     if not several:
         return None
     always = [read for read in several if read.where is None]
     if always:
-        return Read(always[0].name, min(read.hidden for read in always), None)
+        return Read(name, min(read.hidden for read in always), None)
     where = either(read.where for read in several if read.where is not None)
-    return Read(several[0].name, max(read.hidden for read in several), where)
+    return Read(name, max(read.hidden for read in several), where)
