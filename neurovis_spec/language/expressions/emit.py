@@ -160,7 +160,7 @@ class Writer(Visitor[Code]):
     def comparison(self, node: Binary) -> Code:
         """``a < b``, a truth."""
         left, right = (self.tight(part, self.compared) for part in node.parts)
-        return Code(f"{left} {node.operator} {right}", self.levels[node.operator], True)
+        return Code(f"{left} {self.sign(OPERATORS[node.operator])} {right}", self.levels[node.operator], True)
 
     def logic(self, node: Chain) -> Code:
         """``a and b``, a truth."""

@@ -191,8 +191,9 @@ Agreement: TypeAlias = Literal["bits", "zeros", "rounding"]
 class Operation:
     """An operator between a and b, and what it is to each consumer.
 
-    ``usage`` is how it is written. ``code`` and ``c`` are templates with ``{0}``, ``{1}``, … for the code of its
-    arguments, in C with ``{s}`` for the suffix of functions and literals, or the sign of an infix operator.
+    ``usage`` is how it is written. ``code`` and ``c`` are templates of calls with ``{0}``, ``{1}``, … for the code of
+    its arguments (``-{0}`` where a sign stands before one), in C with ``{s}`` for the suffix of functions and literals;
+    or the sign of an operator.
     ``derivative`` gives, by each argument, a formula over them; None: it jumps, and is constant in between.
     ``hides`` is what its value hides of its arguments, or gives that for each of them: mostly NaN gives NaN, and an
     infinity either. ``infinite`` says where it gives an infinity, ``undefined`` where an infinity or NaN; that a number
