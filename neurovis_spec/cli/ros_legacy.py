@@ -59,9 +59,7 @@ def command(output: str | None, namespace: str, network: str, desk: Desk, meetin
         listener.look()
         tell(f"ready: {namespace}, ROS {node.ros}")
         begun = time.monotonic()
-        while not (
-            asked or node.ended or (meeting.seconds is not None and time.monotonic() - begun >= meeting.seconds)
-        ):
+        while not (asked or node.ended or meeting.is_over(begun)):
             listener.hear(0.05)
             if not listener.known and listener.settled:
                 listener.know()

@@ -8,6 +8,7 @@ is shown and recorded for a block.
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -88,6 +89,10 @@ class Meeting:
         finally:
             with deferred():  # until what was sent is on its way
                 opened.close()
+
+    def is_over(self, begun: float) -> bool:
+        """Whether its seconds have passed since then (``time.monotonic``)."""
+        return self.seconds is not None and time.monotonic() - begun >= self.seconds
 
     def show(self, summary: Summary) -> None:
         """Print the summary."""

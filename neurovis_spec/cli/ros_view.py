@@ -58,8 +58,7 @@ def command(spec: str | None, network: str | None, settings: dict[str, float], d
     with meeting.node("neurovis_view", anonymous=True) as node, heeded() as asked:
 
         def stopped() -> bool:
-            over = meeting.seconds is not None and time.monotonic() - begun >= meeting.seconds
-            return bool(asked) or node.ended or over
+            return bool(asked) or node.ended or meeting.is_over(begun)
 
         if compiled is None:
             compiled, base = _announced(node, network, stopped)
