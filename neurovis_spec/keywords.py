@@ -187,20 +187,20 @@ def course_of(
     from neurovis_spec.runtime.until import Until
 
     check(backend=given["backend"], start=given["start"], progress=given["progress"], inputs=inputs)
-    keep, until, checkpoint = keep_of(given, given.get("last", False)), given["until"], given["checkpoint"]
+    until, checkpoint = given["until"], given["checkpoint"]
+    if isinstance(until, str):
+        until = Until(until, network)
+    elif until is not None:
+        arguments.instance("until", until, Until, "a text or an Until")
     return Course(
-        None if steps is None else arguments.integer("steps", steps, 0, arguments.MOST_STEPS),
-        arguments.integer("every", given["every"], 1, arguments.MOST_STEPS),
-        inputs,
-        given["backend"],
-        given["start"],
-        Until(until, network)
-        if isinstance(until, str)
-        else None
-        if until is None
-        else arguments.instance("until", until, Until, "a text or an Until"),
-        keep,
-        None if checkpoint is None else arguments.path("checkpoint", checkpoint),
+        steps=None if steps is None else arguments.integer("steps", steps, 0, arguments.MOST_STEPS),
+        every=arguments.integer("every", given["every"], 1, arguments.MOST_STEPS),
+        inputs=inputs,
+        backend=given["backend"],
+        start=given["start"],
+        until=until,
+        keep=keep_of(given, given.get("last", False)),
+        checkpoint=None if checkpoint is None else arguments.path("checkpoint", checkpoint),
     )
 
 

@@ -59,9 +59,9 @@ def command(
     """
     if every is not None and frames is not None:
         raise click.UsageError("--every and --frames say the same in two ways: give one of them")
-    network, look = drawing.made_for(output)
-    options: FilmKeywords = {**look, "steps": steps, "start": start, "fps": fps, "every": every, "frames": frames}
+    network, given = drawing.made_for(output)
+    options: FilmKeywords = {**given, "steps": steps, "start": start, "fps": fps, "every": every, "frames": frames}
     with progress("drawing") as bar, writing(output):
         network.animate(output, **(options | {"progress": bar}))
-    show_warnings(network, look)
+    show_warnings(network, given)
     click.echo(str(output))

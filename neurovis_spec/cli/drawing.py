@@ -72,10 +72,10 @@ class Drawing:
         }
 
 
-def show_warnings(network: CompiledNetwork, look: PictureKeywords, effort: str | None = None) -> None:
+def show_warnings(network: CompiledNetwork, given: PictureKeywords, effort: str | None = None) -> None:
     """Write the warnings about the layout, where one was drawn, to standard error."""
-    if network.needs_layout(look["view"]):
-        show(network.drawn(look["engine"], effort).warnings, network.sources)
+    if network.needs_layout(given["view"]):
+        show(network.drawn(given["engine"], effort).warnings, network.sources)
 
 
 def _views() -> Iterable[str]:

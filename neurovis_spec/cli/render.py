@@ -57,13 +57,13 @@ def command(
     Colours show activities and signals, thickness shows weights, glow shows how weights change (the legend gives the
     scales).
     """
-    network, look = drawing.made_for(output)
-    steps = network.steps_to_draw(step, look["recording"], look["inputs"], look["view"])
+    network, given = drawing.made_for(output)
+    steps = network.steps_to_draw(step, given["recording"], given["inputs"], given["view"])
     if steps and on_terminal():
-        why = "" if look["view"] or network.network.render.figure else _why(network, step, steps)
+        why = "" if given["view"] or network.network.render.figure else _why(network, step, steps)
         click.echo(f"running {count(steps, 'step')}{why}", err=True)
-    options: StillKeywords = {**look, "step": step, "effort": effort, "window": window, "dpi": dpi}
+    options: StillKeywords = {**given, "step": step, "effort": effort, "window": window, "dpi": dpi}
     with progress("drawing") as bar, writing(output):
         network.render(output, **(options | {"progress": bar}))
-    show_warnings(network, look, effort)
+    show_warnings(network, given, effort)
     click.echo(str(output))
