@@ -308,11 +308,9 @@ def read_array(file: IO[bytes], name: str, size: int, kinds: str, dimensions: in
     return header.array(file.read(header.count * header.dtype.itemsize))
 
 
-def _recording(arrays: Mapping[str, Array]) -> Recording:
-    rows, n = arrays["activity"].shape
-    n = len(arrays["neurons"]) if "recorded" in arrays else n
-    m, p = len(arrays["sources"]), len(arrays["plastic"])
-    recorded = _integers(arrays, "recorded", 0, n, ascending=True) if "recorded" in arrays else None
+def _check_shapes(arrays: Mapping[str, Array], n: int, recorded: IntArray | None) -> None:
+    """Raise RecordingError where arrays of a network of ``n`` neurons do not fit to each other."""
+    rows, m, p = len(arrays["activity"]), len(arrays["sources"]), len(arrays["plastic"])
     shapes = {
         "activity": (rows, n if recorded is None else len(recorded)),
         "neurons": (n,),
@@ -329,14 +327,26 @@ def _recording(arrays: Mapping[str, Array]) -> Recording:
             raise RecordingError(f"'{name}' has the shape {arrays[name].shape}, where the others ask for {shape}")
     if "state_names" in arrays and "states" not in arrays:
         raise RecordingError("it names states and holds none")
-    neurons = tuple(str(name) for name in arrays["neurons"].tolist())
-    state_names = tuple(str(name) for name in arrays["state_names"].tolist()) if "state_names" in arrays else ()
-    if len(set(state_names)) != len(state_names):
-        raise RecordingError("'state_names' holds a name twice")
+
+
+def _names(arrays: Mapping[str, Array], name: str) -> tuple[str, ...]:
+    """The texts of an array, each of which is there once. Raises RecordingError."""
+    found = tuple(str(one) for one in arrays[name].tolist())
+    if len(set(found)) != len(found):
+        raise RecordingError(f"'{name}' holds a name twice")
+    return found
+
+
+def _recording(arrays: Mapping[str, Array]) -> Recording:
+    rows, n = arrays["activity"].shape
+    n = len(arrays["neurons"]) if "recorded" in arrays else n
+    m, p = len(arrays["sources"]), len(arrays["plastic"])
+    recorded = _integers(arrays, "recorded", 0, n, ascending=True) if "recorded" in arrays else None
+    _check_shapes(arrays, n, recorded)
+    state_names = _names(arrays, "state_names") if "state_names" in arrays else ()
     skeleton = _body(arrays, rows)
+    neurons = _names(arrays, "neurons")
     dt = float(arrays["dt"].astype(np.float64))
-    if len(set(neurons)) != n:
-        raise RecordingError("'neurons' holds a name twice")
     if not (math.isfinite(dt) and dt > 0):
         raise RecordingError(f"'dt' is {dt}")
     about = _about(arrays)
