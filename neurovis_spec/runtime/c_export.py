@@ -7,7 +7,7 @@ that changes is in a struct of the caller's.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -152,73 +152,79 @@ class Exported:
         """The text of NAME.h."""
         network, name, macro = self.network, self.name, self.macro
         n, m = len(network.neurons), len(network.connections)
-        slots = len(network.settable.slots)
-        lines = [
-            "/*",
-            f" * {words(network.title or network.name)}",
-            " *",
-            f" * A network of {plural(n, 'neuron')} and {plural(m, 'connection')}, made by neurovis export."
-            " C99 and C++17; needs libm.",
-            " */",
-            f"#ifndef {macro}_H",
-            f"#define {macro}_H",
-            "",
-            "#include <stdint.h>",
-            "",
-            "#ifdef __cplusplus",
-            'extern "C" {',
-            "#endif",
-            "",
-            f"#define {macro}_NEURONS {n}",
-            f"#define {macro}_CONNECTIONS {m}",
-            f'#define {macro}_SPEC_HASH "{network.hash}"',
-            "",
-            "/* The names of the neurons, in order. */",
-            f"extern const char *const {name}_neuron_names[{max(n, 1)}];",
-            "",
-            "/* All that changes. Copy it to keep a state, and copy it back to go on from there. */",
-            f"typedef struct {name}_state {{",
+        inputs = [(own, entry.size) for own, entry in zip(self.input_names, self.inputs, strict=True)]
+        outputs = [(own, len(entry.neurons)) for own, entry in zip(self.output_names, network.outputs, strict=True)]
+        setters = "".join(map(self._setter, self.settable, self.settable_names))
+        return f"""/*
+ * {words(network.title or network.name)}
+ *
+ * A network of {plural(n, "neuron")} and {plural(m, "connection")}, made by neurovis export. C99 and C++17; needs libm.
+ */
+#ifndef {macro}_H
+#define {macro}_H
+
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {{
+#endif
+
+#define {macro}_NEURONS {n}
+#define {macro}_CONNECTIONS {m}
+#define {macro}_SPEC_HASH "{network.hash}"
+
+/* The names of the neurons, in order. */
+extern const char *const {name}_neuron_names[{max(n, 1)}];
+
+/* All that changes. Copy it to keep a state, and copy it back to go on from there. */
+{self._struct("state", self._state_fields())}
+
+/* The inputs of a step that have no source of their own. */
+{self._struct("inputs", [f"{self.real} {own}[{size}];" for own, size in inputs])}
+
+/* The outputs of a step. */
+{self._struct("outputs", [f"{self.real} {own}[{size}];" for own, size in outputs])}
+
+/* Make a state ready for step 0, whatever its memory holds. */
+void {name}_init({name}_state *state);
+
+/* Make one step. in may be NULL: its inputs are 0. out may be NULL. */
+void {name}_step({name}_state *state, const {name}_inputs *in, {name}_outputs *out);
+{setters}
+#ifdef __cplusplus
+}}
+#endif
+
+#endif
+"""
+
+    def _struct(self, kind: str, fields: Sequence[str]) -> str:
+        """The type NAME_kind, of these fields."""
+        within = "".join(f"    {field}\n" for field in fields or ["char unused;"])
+        return f"typedef struct {self.name}_{kind} {{\n{within}}} {self.name}_{kind};"
+
+    def _state_fields(self) -> list[str]:
+        found = [
+            f"{self.real} {member.name}[{len(member.begin)}]; /* {member.about} */"
+            if len(member.begin)
+            else f"{self.real} {member.name}[1]; /* there are none */"
+            for member in self.members
         ]
-        for member in self.members:
-            if len(member.begin):
-                lines.append(f"    {self.real} {member.name}[{len(member.begin)}]; /* {member.about} */")
-            else:
-                lines.append(f"    {self.real} {member.name}[1]; /* there are none */")
-        lines.append("    int64_t k; /* the step to come */")
-        if slots:
-            lines.append(f"    unsigned char chosen[{slots}]; /* parameters that were set */")
+        found.append("int64_t k; /* the step to come */")
+        if slots := len(self.network.settable.slots):
+            found.append(f"unsigned char chosen[{slots}]; /* parameters that were set */")
         if len(self.phases) > 1:
-            lines.append("    int32_t phase; /* events that have happened */")
+            found.append("int32_t phase; /* events that have happened */")
         if self.holding:
-            lines.append(f"    unsigned char held[{n}]; /* neurons that are held */")
-        lines += [f"}} {name}_state;", "", "/* The inputs of a step that have no source of their own. */"]
-        lines.append(f"typedef struct {name}_inputs {{")
-        lines += [
-            f"    {self.real} {own}[{entry.size}];" for own, entry in zip(self.input_names, self.inputs, strict=True)
-        ] or ["    char unused;"]
-        lines += [f"}} {name}_inputs;", "", "/* The outputs of a step. */", f"typedef struct {name}_outputs {{"]
-        lines += [
-            f"    {self.real} {own}[{len(entry.neurons)}];"
-            for own, entry in zip(self.output_names, network.outputs, strict=True)
-        ] or ["    char unused;"]
-        lines += [
-            f"}} {name}_outputs;",
-            "",
-            "/* Make a state ready for step 0, whatever its memory holds. */",
-            f"void {name}_init({name}_state *state);",
-            "",
-            "/* Make one step. in may be NULL: its inputs are 0. out may be NULL. */",
-            f"void {name}_step({name}_state *state, const {name}_inputs *in, {name}_outputs *out);",
-        ]
-        for parameter, own in zip(self.settable, self.settable_names, strict=True):
-            lines += [
-                "",
-                f"/* Set the parameter {words(parameter, 40)} from the next step on, and what follows it. Gives 1; or",
-                "   0, and nothing has changed, where a number would not be finite or leave its bounds. */",
-                f"int {name}_set_{own}({name}_state *state, {self.real} value);",
-            ]
-        lines += ["", "#ifdef __cplusplus", "}", "#endif", "", "#endif", ""]
-        return "\n".join(lines)
+            found.append(f"unsigned char held[{len(self.network.neurons)}]; /* neurons that are held */")
+        return found
+
+    def _setter(self, parameter: str, own: str) -> str:
+        return f"""
+/* Set the parameter {words(parameter, 40)} from the next step on, and what follows it. Gives 1; or
+   0, and nothing has changed, where a number would not be finite or leave its bounds. */
+int {self.name}_set_{own}({self.name}_state *state, {self.real} value);
+"""
 
     # ---- the source --------------------------------------------------------------------------------------------
 

@@ -149,19 +149,7 @@ def _cost(made: Exported) -> str:
 def _readme(made: Exported) -> str:
     name, network = made.name, made.network
     neurons, connections = plural(len(network.neurons), "neuron"), plural(len(network.connections), "connection")
-    sets = "\n".join(
-        f"- `{name}_set_{own}`: {words(parameter)}"
-        for parameter, own in zip(made.settable, made.settable_names, strict=True)
-    )
     kept = "".join(f"\n{line}. `--set` of the export gives it another.\n" for line in _fixed(made))
-    inputs = "\n".join(
-        f"- `in->{own}`: {entry.size} number{'s' * (entry.size > 1)} for {words(entry.name)}"
-        for own, entry in zip(made.input_names, made.inputs, strict=True)
-    )
-    outputs = "\n".join(
-        f"- `out->{own}`: {len(entry.neurons)} number{'s' * (len(entry.neurons) > 1)} of {words(entry.name)}"
-        for own, entry in zip(made.output_names, network.outputs, strict=True)
-    )
     return f"""# {words(network.title or network.name)}
 
 Made by neurovis export: a network of {neurons} and {connections} as C99 (or C++17). It needs libm
@@ -179,17 +167,7 @@ and nothing else: no heap, no files, no variables that change but the struct tha
 After call k, `state.activity` is a[k - 1] and `state.weights` w[k], in the order of a recording. Events of the spec
 apply at their steps. A copy of the struct is a copy of all that the run carries.
 
-## Inputs
-
-{inputs or "None: all inputs have a source of their own."}
-
-## Outputs
-
-{outputs or "The spec names none; read `state.activity`."}
-
-## Parameters
-
-{sets or "None can be set."}
+{_interface(made)}
 
 Each gives 1, or 0 where the value cannot be taken; then nothing has changed.
 {kept}
@@ -208,6 +186,33 @@ The state takes {size_of_state(made)} bytes where a pointer has 8. A step takes
 and `-fno-builtin-exp` and its like from working out functions itself; so the numbers are those of
 `neurovis run --backend c`, bit for bit where the C library is the same.
 """
+
+
+def _interface(made: Exported) -> str:
+    """What goes in and comes out, and what can be set, by its name in C."""
+    inputs = "\n".join(
+        f"- `in->{own}`: {entry.size} number{'s' * (entry.size > 1)} for {words(entry.name)}"
+        for own, entry in zip(made.input_names, made.inputs, strict=True)
+    )
+    outputs = "\n".join(
+        f"- `out->{own}`: {len(entry.neurons)} number{'s' * (len(entry.neurons) > 1)} of {words(entry.name)}"
+        for own, entry in zip(made.output_names, made.network.outputs, strict=True)
+    )
+    sets = "\n".join(
+        f"- `{made.name}_set_{own}`: {words(parameter)}"
+        for parameter, own in zip(made.settable, made.settable_names, strict=True)
+    )
+    return f"""## Inputs
+
+{inputs or "None: all inputs have a source of their own."}
+
+## Outputs
+
+{outputs or "The spec names none; read `state.activity`."}
+
+## Parameters
+
+{sets or "None can be set."}"""
 
 
 def _example(made: Exported) -> str:
