@@ -18,6 +18,11 @@ from typing import Final, Protocol, cast
 from neurovis_spec import plugins
 from neurovis_spec.arrays import FloatArray as FloatArray  # kinds of bodies see this module of ours alone
 
+#: What our own kinds need besides, and what installs it.
+_NEEDS: Final = {"mujoco": "MuJoCo", "gymnasium": "Gymnasium"}
+#: points, links, feet and solids of a skeleton that is read, each
+_MOST = 100_000
+
 
 class BodyError(ValueError):
     """A body cannot be opened, or cannot do what is asked of it; ``hint``, which a traceback shows, says what would
@@ -162,10 +167,6 @@ class BodyKind(Protocol):
         ...
 
 
-#: What our own kinds need besides, and what installs it.
-_NEEDS: Final = {"mujoco": "MuJoCo", "gymnasium": "Gymnasium"}
-
-
 class BodyMissingError(BodyError):
     """What a kind of body needs is not installed."""
 
@@ -196,10 +197,6 @@ def open_body(kind: str, given: str, path: Path | None, dt: float, substeps: int
         raise
     except Exception as error:  # whatever a body's own code raises
         raise BodyError(f"'{given}' cannot be opened: {type(error).__name__}: {error}", key=kind) from error
-
-
-#: points, links, feet and solids of a skeleton that is read, each
-_MOST = 100_000
 
 
 def text_of(skeleton: Skeleton) -> str:

@@ -35,6 +35,18 @@ _DOUBLES: Final = {**dict(zip(*_CYRILLIC, strict=True)), **dict(zip(*_GREEK, str
 _UNSEEN: Final = frozenset({"Zs", "Cf", "Cc", "Zl", "Zp"})
 _NOT_ASCII: Final = re.compile(r"[^\x00-\x7f]")
 
+#: What a first letter that is right is worth, as it is seldom mistyped; how alike names are at least that have the same
+#: letters (letters changed over are the commonest slip), of which one begins the other, or that differ in their number.
+_FIRST, _LETTERS, _BEGINS, _STEM = 0.05, 0.97, 0.75, 0.7
+#: What is less alike is not offered, nor what is less so than the best by more than this.
+_LEAST, _WORSE = 0.6, 0.12
+#: So many like names are looked for.
+MOST: Final = 6
+#: More names than this are prepared; of names the beginning of this length, by which a longer one is not judged.
+_FEW, _LONGEST = 60, 63
+#: Rounding of bounds.
+_SLACK = 1e-9
+
 
 def unseen(character: str) -> bool:
     """Whether a character is none of ASCII and is not seen, or seen as a blank."""
@@ -67,19 +79,6 @@ def in_ascii(text: str) -> str:
 def strange(text: str) -> tuple[str, ...]:
     """The characters of a text that are no ASCII, each once."""
     return () if text.isascii() else tuple(dict.fromkeys(_NOT_ASCII.findall(text)))
-
-
-#: What a first letter that is right is worth, as it is seldom mistyped; how alike names are at least that have the same
-#: letters (letters changed over are the commonest slip), of which one begins the other, or that differ in their number.
-_FIRST, _LETTERS, _BEGINS, _STEM = 0.05, 0.97, 0.75, 0.7
-#: What is less alike is not offered, nor what is less so than the best by more than this.
-_LEAST, _WORSE = 0.6, 0.12
-#: So many like names are looked for.
-MOST: Final = 6
-#: More names than this are prepared; of names the beginning of this length, by which a longer one is not judged.
-_FEW, _LONGEST = 60, 63
-#: Rounding of bounds.
-_SLACK = 1e-9
 
 
 def nearest(name: str, known: Iterable[str], most: int = 3) -> tuple[str, ...]:

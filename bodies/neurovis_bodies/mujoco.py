@@ -62,6 +62,12 @@ _SLIDING: Final = {"POS": "m", "VEL": "m/s", "FRC": "N"}
 _OF_JOINT: Final = ("JOINTPOS", "JOINTVEL", "JOINTACTFRC", "JOINTLIMITPOS", "JOINTLIMITVEL", "JOINTLIMITFRC")
 _OF_ACTUATOR: Final = ("ACTUATORPOS", "ACTUATORVEL", "ACTUATORFRC")
 
+#: all that MuJoCo carries from step to step, the solver's warm start included
+_STATE: Final = mujoco.mjtState.mjSTATE_INTEGRATION
+#: what is wrong with a simulation that MuJoCo would go on with
+_UNSTABLE: Final = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
+_FULL: Final = ("mjWARN_CONTACTFULL", "mjWARN_CNSTRFULL")
+
 
 def unit_of_sensor(model: mujoco.MjModel, sensor: int) -> str:
     """What a sensor's numbers are measured in."""
@@ -101,13 +107,6 @@ def _joint_of(model: mujoco.MjModel, actuator: int) -> int | None:
 
 def _units(model: mujoco.MjModel, joint: int) -> dict[str, str]:
     return _SLIDING if int(model.jnt_type[joint]) == int(mujoco.mjtJoint.mjJNT_SLIDE) else _TURNING
-
-
-#: all that MuJoCo carries from step to step, the solver's warm start included
-_STATE: Final = mujoco.mjtState.mjSTATE_INTEGRATION
-#: what is wrong with a simulation that MuJoCo would go on with
-_UNSTABLE: Final = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
-_FULL: Final = ("mjWARN_CONTACTFULL", "mjWARN_CNSTRFULL")
 
 
 class MujocoKind:

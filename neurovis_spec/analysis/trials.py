@@ -38,6 +38,15 @@ from neurovis_spec.runtime.state import State, initial_state
 #: Steps of a trial where nothing else is asked for.
 STEPS = 500
 
+_OF_IMPORTANCE = ("lesion", "occlusion", "lesion share", "occlusion share")
+_OF_SENSITIVITY = ("mean", "rms", "elasticity")
+#: How far to either side, of the size of what is changed; where that is 0, of 1.
+STEP = 1e-4
+#: The second difference, of the first; how far both derivatives may be apart, of the larger one and of the rounding.
+_FINER, _APART, _ROUNDING = 0.25, 0.1, 1e3
+#: What moves something by so much, and gives the outputs; ParameterError where it cannot be there.
+Move = Callable[[float], FloatArray]
+
 
 @dataclass(frozen=True)
 class _Turned:
@@ -160,9 +169,6 @@ def _neurons(network: Network, of: str | Sequence[str]) -> IntArray:
     return np.array(list(result), dtype=np.int64)
 
 
-_OF_IMPORTANCE = ("lesion", "occlusion", "lesion share", "occlusion share")
-
-
 def importance(
     network: CompiledNetwork,
     start: int | None = None,
@@ -220,16 +226,6 @@ def _apart(trials: Trials, outputs: FloatArray) -> float:
 def _tell(progress: Progress | None, done: int, total: int) -> None:
     if progress is not None:
         progress(done, total)
-
-
-_OF_SENSITIVITY = ("mean", "rms", "elasticity")
-#: How far to either side, of the size of what is changed; where that is 0, of 1.
-STEP = 1e-4
-#: The second difference, of the first; how far both derivatives may be apart, of the larger one and of the rounding.
-_FINER, _APART, _ROUNDING = 0.25, 0.1, 1e3
-
-#: What moves something by so much, and gives the outputs; ParameterError where it cannot be there.
-Move = Callable[[float], FloatArray]
 
 
 def sensitivity(

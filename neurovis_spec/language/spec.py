@@ -27,6 +27,8 @@ from neurovis_spec.language.unknown import Unknown
 from neurovis_spec.language.values import ParametersField, ReferenceField
 from neurovis_spec.language.yaml.source import Mapping
 
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
 
 class Spec(Library):
     """A whole spec."""
@@ -105,9 +107,6 @@ def is_library(data: Mapping) -> bool:
     """Whether this holds modules or definitions alone: then it is no spec, but may be a file that specs include."""
     there = {entry.name for entry in data.entries}
     return bool(there & set(INCLUDED)) and not there & {"neurons", "instances", "connections"}
-
-
-DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 class _Written(GenerateJsonSchema):

@@ -43,6 +43,9 @@ from neurovis_spec.scene.lesions import FAINT
 from neurovis_spec.scene.matrix import Order
 from neurovis_spec.scene.plan import Plan, rerouted
 
+#: A line: its points one after the other, the tip of its head, and the direction of this.
+Run = tuple[list[float], list[float], list[float]]
+
 
 def content(
     network: Network,
@@ -127,10 +130,6 @@ def _short(value: float) -> float:
 def _points(points: Sequence[tuple[float, float]]) -> list[float]:
     """Coordinates one after the other, to hundredths of a unit, as in an SVG."""
     return [_short(value) for point in points for value in point]
-
-
-#: A line: its points one after the other, the tip of its head, and the direction of this.
-Run = tuple[list[float], list[float], list[float]]
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,6 +27,13 @@ from neurovis_spec.runtime.files import replacing
 #: Positions by hand are multiples of this (units of the layout).
 STEP: Final = 1 / 16
 
+#: Compiles a text in place of that of the spec's file. Raises SpecError.
+Compile: TypeAlias = Callable[[str], Compilation]
+#: Places nearer than this are the same.
+_SAME: Final = 16 * GRID
+#: How often further pins are added.
+_ROUNDS: Final = 4
+
 
 @dataclass(frozen=True, eq=False)
 class Placed:
@@ -83,15 +90,6 @@ def _images(compiled: Compilation, neuron: int) -> set[int]:
     """The neurons whose places follow from that of this one."""
     pairs = (pair for mirror in compiled.network.layout.mirrors for pair in mirror.pairs)
     return {b if a == neuron else a for a, b in pairs if neuron in (a, b) and a != b}
-
-
-#: Compiles a text in place of that of the spec's file. Raises SpecError.
-Compile: TypeAlias = Callable[[str], Compilation]
-
-#: Places nearer than this are the same.
-_SAME: Final = 16 * GRID
-#: How often further pins are added.
-_ROUNDS: Final = 4
 
 
 class SavingError(ValueError):

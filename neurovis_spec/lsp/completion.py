@@ -35,6 +35,18 @@ from neurovis_spec.manual.words import functions_of
 _MARK: Final = "\ue000"
 _COLON: Final = re.compile(r"[\"']?[ \t]*:")
 
+_WORD = re.compile(r"(?:(?<![\w.])[A-Za-z_]\w*\.(?!\.))*(?:(?<!\w)[A-Za-z_]\w*)?$", re.ASCII)
+_REST = re.compile(r"\w*", re.ASCII)
+#: The instances on the way to a name that is being typed, and the begin of a range that it ends.
+_WAY = re.compile(r"(?:(?<![\w.])|(?<=\.\.))(?:[A-Za-z_]\w*\.(?!\.))+$", re.ASCII)
+_RANGE = re.compile(r"(?<![\w.])[A-Za-z_][\w.]*\.\.(?=(?:[A-Za-z_]\w*\.)*$)", re.ASCII)
+#: Of a larger group only the first and the last neuron are offered; of one that is larger than any, none.
+_FEW = 40
+_MANY = 999_999
+#: A path that no document has, for asking what a key of a mapping is.
+_ANY = "\0"
+Sort = Literal["key", "neuron", "parameter", "input", "function", "constant", "definition", "word", "module", "local"]
+
 
 @dataclass(frozen=True, slots=True)
 class Where:
@@ -97,20 +109,6 @@ def _section(text: Text, number: int) -> tuple[int, list[str]]:
 
 def _within(line: str) -> bool:
     return (line[:1] or " ") in " \t#-]}"
-
-
-_WORD = re.compile(r"(?:(?<![\w.])[A-Za-z_]\w*\.(?!\.))*(?:(?<!\w)[A-Za-z_]\w*)?$", re.ASCII)
-_REST = re.compile(r"\w*", re.ASCII)
-#: The instances on the way to a name that is being typed, and the begin of a range that it ends.
-_WAY = re.compile(r"(?:(?<![\w.])|(?<=\.\.))(?:[A-Za-z_]\w*\.(?!\.))+$", re.ASCII)
-_RANGE = re.compile(r"(?<![\w.])[A-Za-z_][\w.]*\.\.(?=(?:[A-Za-z_]\w*\.)*$)", re.ASCII)
-#: Of a larger group only the first and the last neuron are offered; of one that is larger than any, none.
-_FEW = 40
-_MANY = 999_999
-#: A path that no document has, for asking what a key of a mapping is.
-_ANY = "\0"
-
-Sort = Literal["key", "neuron", "parameter", "input", "function", "constant", "definition", "word", "module", "local"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,6 +30,13 @@ from neurovis_spec.lsp.outline import Item, item_at, outline
 from neurovis_spec.lsp.text import Place, Text
 from neurovis_spec.real_paths import real_path
 
+#: How many entries of the folders of a workspace are looked through for specs, and the largest of these.
+_MOST_ENTRIES: Final = 20_000
+_LARGEST_SPEC: Final = 4 << 20
+_PASSED_OVER: Final = frozenset({"node_modules", "__pycache__", "venv", "build", "dist"})
+#: What a file was when it was read: the text that is open, else time and size.
+_Stamp: TypeAlias = str | tuple[int, int]
+
 
 @dataclass(frozen=True)
 class Page:
@@ -84,14 +91,6 @@ class Page:
     def item_at(self, place: Place) -> Item | None:
         """The key or the text at a place."""
         return None if self.root is None else item_at(self.root, place)
-
-
-#: How many entries of the folders of a workspace are looked through for specs, and the largest of these.
-_MOST_ENTRIES: Final = 20_000
-_LARGEST_SPEC: Final = 4 << 20
-_PASSED_OVER: Final = frozenset({"node_modules", "__pycache__", "venv", "build", "dist"})
-#: What a file was when it was read: the text that is open, else time and size.
-_Stamp: TypeAlias = str | tuple[int, int]
 
 
 class CrowdedError(Exception):

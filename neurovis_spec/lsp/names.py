@@ -22,6 +22,13 @@ from neurovis_spec.language.templates import Hole, pieces
 from neurovis_spec.lsp.outline import Item, Path
 from neurovis_spec.lsp.text import Text
 
+#: The kinds that definitions declare, by section.
+DEFINITIONS: Final[Mapping[str, Kind]] = {"activations": "activation", "models": "model", "rules": "rule"}
+SECTIONS: Final[Mapping[Kind, str]] = {kind: section for section, kind in DEFINITIONS.items()}
+#: A name in an expression, and the parenthesis behind the name of a function.
+_IN_FORMULA = re.compile(r"(?<![\w.])([A-Za-z_]\w*)(\s*\()?", re.ASCII)
+_WORDS = frozenset({"and", "or", "not", "if", "else"})
+
 
 @dataclass(frozen=True, slots=True)
 class Scope:
@@ -29,11 +36,6 @@ class Scope:
 
     module: str | None = None
     definition: tuple[str, str] | None = None
-
-
-#: The kinds that definitions declare, by section.
-DEFINITIONS: Final[Mapping[str, Kind]] = {"activations": "activation", "models": "model", "rules": "rule"}
-SECTIONS: Final[Mapping[Kind, str]] = {kind: section for section, kind in DEFINITIONS.items()}
 
 
 def scope_of(path: Path) -> Scope:
@@ -47,11 +49,6 @@ def scope_of(path: Path) -> Scope:
     if len(path) > 2 and path[0] in DEFINITIONS:
         return Scope(None, (str(path[0]), str(path[1])))
     return Scope()
-
-
-#: A name in an expression, and the parenthesis behind the name of a function.
-_IN_FORMULA = re.compile(r"(?<![\w.])([A-Za-z_]\w*)(\s*\()?", re.ASCII)
-_WORDS = frozenset({"and", "or", "not", "if", "else"})
 
 
 @dataclass(frozen=True, slots=True)

@@ -49,6 +49,18 @@ _SEPARATORS: Final = re.compile(r"[,/;\s]+")
 _NUMBER: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(inf(inity)?|nan)", re.IGNORECASE)
 _RULE: Final = "received"
 
+_QUALITY: Final = Quality("offered", "volatile", 4000)
+#: messages that wait to be read
+_ROOM: Final = 100_000
+#: bytes of activities and weights that wait for their network, and what each takes besides its own
+_WAITING: Final = 64 << 20
+_EACH: Final = 300
+#: a description is taken when it has stayed as it is for so many seconds
+_SETTLED: Final = 0.5
+_LOOK: Final = 0.2
+#: what activities and weights are called in this version
+_NAMES: Final[Mapping[Kind, str]] = {"activity": ACTIVITY, "weightsAll": WEIGHTS}
+
 
 def types_of(kind: Kind) -> tuple[str, ...]:
     """The types that a topic may have."""
@@ -278,21 +290,6 @@ def identifiers(names: Sequence[str]) -> list[str]:
         kept.add(name)
         result.append(name)
     return result
-
-
-_QUALITY: Final = Quality("offered", "volatile", 4000)
-#: messages that wait to be read
-_ROOM: Final = 100_000
-#: bytes of activities and weights that wait for their network, and what each takes besides its own
-_WAITING: Final = 64 << 20
-_EACH: Final = 300
-#: a description is taken when it has stayed as it is for so many seconds
-_SETTLED: Final = 0.5
-_LOOK: Final = 0.2
-
-
-#: what activities and weights are called in this version
-_NAMES: Final[Mapping[Kind, str]] = {"activity": ACTIVITY, "weightsAll": WEIGHTS}
 
 
 class LegacyListener:

@@ -39,6 +39,8 @@ from neurovis_spec.runtime.windows import running
 #: Names that mean the same in every measure.
 _OF_TIME: Final = ("k", "t", "dt", "pi", "e")
 
+LABEL = "<measure>"
+
 
 @dataclass(frozen=True, eq=False)
 class Measure:
@@ -275,9 +277,6 @@ class Meter:
 def _broadcast(tree: Tree, known: Mapping[str, float | FloatArray], count: int) -> FloatArray:
     read = {name: known[name] for name in names(tree)}
     return np.array(np.broadcast_to(evaluate_array(tree, read), (count,)), dtype=np.float64)
-
-
-LABEL = "<measure>"
 
 
 def over(text: str, network: Network, recording: Recording) -> FloatArray:

@@ -29,6 +29,12 @@ _ALIKE = 0.5
 #: A repetition nearly as good as the best one counts as one: twice the period is as good as the period.
 _NEARLY = 0.95
 
+#: A measure of pairs is of at most so many neurons: its tables have the square of it.
+MOST_NEURONS = 400
+MOST_BINS = 1000
+#: As Fig. 6 has it.
+THRESHOLD = 0.05
+
 
 def period_of(activity: FloatArray) -> float | None:
     """After how many rows the activities (rows, neurons) repeat.
@@ -91,13 +97,6 @@ def _peak(values: FloatArray, place: int) -> float:
     before, top, after = values[place - 1 : place + 2].tolist()
     bend = before - 2 * top + after
     return place + (0.5 * (before - after) / bend if bend < 0 else 0.0)
-
-
-#: A measure of pairs is of at most so many neurons: its tables have the square of it.
-MOST_NEURONS = 400
-MOST_BINS = 1000
-#: As Fig. 6 has it.
-THRESHOLD = 0.05
 
 
 def cross_correlation(

@@ -27,6 +27,17 @@ _LITTLE: Final = b"\0\1\0\0"
 #: dimensions of an array that are read; a layout of more describes no array
 _MOST_DIMENSIONS: Final = 64
 
+_SEPARATOR: Final = "=" * 80
+_DIMENSION: Final = "string label\nuint32 size\nuint32 stride\n"
+_LAYOUT: Final = "MultiArrayDimension[] dim\nuint32 data_offset\n"
+#: schemas: name and text
+ARRAY: Final = (
+    "std_msgs/msg/Float64MultiArray",
+    f"MultiArrayLayout layout\nfloat64[] data\n{_SEPARATOR}\nMSG: std_msgs/MultiArrayLayout\n{_LAYOUT}"
+    f"{_SEPARATOR}\nMSG: std_msgs/MultiArrayDimension\n{_DIMENSION}",
+)
+STRING: Final = ("std_msgs/msg/String", "string data\n")
+
 
 class WireError(ValueError):
     """Bytes that are no message of the type."""
@@ -164,19 +175,6 @@ def text_message(text: str, encoding: Encoding) -> bytes:
     if encoding == "ros1":
         return struct.pack("<I", len(data)) + data
     return _LITTLE + struct.pack("<I", len(data) + 1) + data + b"\0"
-
-
-_SEPARATOR: Final = "=" * 80
-_DIMENSION: Final = "string label\nuint32 size\nuint32 stride\n"
-_LAYOUT: Final = "MultiArrayDimension[] dim\nuint32 data_offset\n"
-
-#: schemas: name and text
-ARRAY: Final = (
-    "std_msgs/msg/Float64MultiArray",
-    f"MultiArrayLayout layout\nfloat64[] data\n{_SEPARATOR}\nMSG: std_msgs/MultiArrayLayout\n{_LAYOUT}"
-    f"{_SEPARATOR}\nMSG: std_msgs/MultiArrayDimension\n{_DIMENSION}",
-)
-STRING: Final = ("std_msgs/msg/String", "string data\n")
 
 
 def label_of(hash_: str) -> str:

@@ -34,6 +34,13 @@ from neurovis_spec.language.data.table import CellError, Faults, Room, Table, ch
 #: cells of a row among which one that is invalid is searched
 _FEW: Final = 1 << 10
 
+#: what is said of such a file where its rows are steps, and what to do
+NUMBERED = "the first row, 0, 1, …, seems to number the columns; it is read as step 0"
+AS_TEXTS = "remove it, or give the columns names; in pandas, that is the argument header of to_csv"
+_POINT = re.compile(rb"[.eE]")
+#: rows without which nothing can be said: the first one and two others
+_LEAST = 3
+
 
 def parse_numbers(data: bytes, room: Room | None = None) -> Table:
     """Numbers in rows of one width, after a header of texts, if there is one. Raises CellError."""
@@ -134,14 +141,6 @@ def cell_at(data: bytes, file: str, at: tuple[int, int]) -> Span:
     cell = line[begin:end]
     begin += (len(cell) - len(cell.lstrip())) % (len(cell) + 1)
     return Span(file, row, begin + 1, row, max(begin + 1, begin + len(cell.strip())) + 1)
-
-
-#: what is said of such a file where its rows are steps, and what to do
-NUMBERED = "the first row, 0, 1, …, seems to number the columns; it is read as step 0"
-AS_TEXTS = "remove it, or give the columns names; in pandas, that is the argument header of to_csv"
-_POINT = re.compile(rb"[.eE]")
-#: rows without which nothing can be said: the first one and two others
-_LEAST = 3
 
 
 def numbers_columns(data: bytes, values: NDArray[np.float64]) -> bool:

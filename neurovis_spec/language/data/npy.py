@@ -55,6 +55,15 @@ _KINDS: Final = {
     **{"M": "dates", "m": "spans of time", "O": "Python objects", "V": "structures"},
 }
 
+MOST_MEMBERS: Final = 4_000
+#: what each entry of an archive's directory begins with
+_ENTRY: Final = b"PK\x01\x02"
+_SUFFIX: Final = ".npy"
+#: names that are listed, and compared with one that is unknown
+_SHOWN, _COMPARED = 8, 200
+#: what an archive holds that scipy.sparse.save_npz wrote, beside the places of its entries
+_SPARSE = frozenset({"format", "shape", "data"})
+
 
 @dataclass(frozen=True, slots=True)
 class Header:
@@ -170,16 +179,6 @@ def _named(kinds: str) -> str:
 
 def _bytes(number: int) -> str:
     return f"{number} bytes" if number < 10**_LONGEST_SIZE else "more bytes than any file has"
-
-
-MOST_MEMBERS: Final = 4_000
-#: what each entry of an archive's directory begins with
-_ENTRY: Final = b"PK\x01\x02"
-_SUFFIX: Final = ".npy"
-#: names that are listed, and compared with one that is unknown
-_SHOWN, _COMPARED = 8, 200
-#: what an archive holds that scipy.sparse.save_npz wrote, beside the places of its entries
-_SPARSE = frozenset({"format", "shape", "data"})
 
 
 class Archive:

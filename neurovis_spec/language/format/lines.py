@@ -20,6 +20,12 @@ from neurovis_spec.language.format.gaps import Comment
 
 _BLANKS: Final = 2  # before a comment behind code
 
+_WIDEST: Final = 40  # a column with a wider cell is left as it is: one long text would push all others away
+_NUMBER: Final = re.compile(r"([-+]?[0-9]*)((?:\.[0-9]*)?(?:[eE][-+]?[0-9]+)?)|null|~")
+_NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_.]*")
+_HEADER: Final = re.compile(r"([|>])([-+0-9]*)([ \t]*)(#[^\n]*)?")
+_BLANK_LINES: Final = re.compile(r"[ \t]*(?:\n *(?=\n|\Z))*")
+
 
 class _Line(NamedTuple):
     code: str  # empty for a blank line and for a comment on a line of its own
@@ -114,11 +120,6 @@ def _in_one_column(run: list[_Line], column: int) -> list[str]:
     return [line.code + " " * (place - len(line.code)) + line.comment.text for line in run if line.comment is not None]
 
 
-_WIDEST: Final = 40  # a column with a wider cell is left as it is: one long text would push all others away
-_NUMBER: Final = re.compile(r"([-+]?[0-9]*)((?:\.[0-9]*)?(?:[eE][-+]?[0-9]+)?)|null|~")
-_NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_.]*")
-
-
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     """The rows, each in its brackets.
 
@@ -152,10 +153,6 @@ def _pads(cells: Sequence[str]) -> list[tuple[int, int]]:
     left = max(before)
     right = max(len(cell) - part for cell, part in zip(cells, before, strict=True))
     return [(left - part, right - (len(cell) - part)) for cell, part in zip(cells, before, strict=True)]
-
-
-_HEADER: Final = re.compile(r"([|>])([-+0-9]*)([ \t]*)(#[^\n]*)?")
-_BLANK_LINES: Final = re.compile(r"[ \t]*(?:\n *(?=\n|\Z))*")
 
 
 class Lines(NamedTuple):

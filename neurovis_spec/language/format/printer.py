@@ -30,6 +30,8 @@ _START: Final = re.compile(r"(?<![^\n])---(?=[ \t\n])")
 #: A scalar as it is written: on one line, over several, or behind | or >.
 _Written: TypeAlias = str | Lines | Block
 
+_NAMES: Final = re.compile(r"[A-Za-z0-9_.]+")
+
 
 class _Level(NamedTuple):
     """A block: the column in which it stood, and that in which it is written."""
@@ -397,9 +399,6 @@ def _bare(key: _Written | None) -> str:
 
 def _row(cells: list[str]) -> str:
     return "[" + ", ".join(cells) + "]"
-
-
-_NAMES: Final = re.compile(r"[A-Za-z0-9_.]+")
 
 
 def names_connections(path: Path, is_key: bool) -> bool:

@@ -27,6 +27,14 @@ _SHORTEST = 3
 _KEY = r"(?![\[\]{}#\s])[^\n]*?:(?=[ \r\n])"
 _BEGIN = re.compile(rf"^( *)(?:(-)(?=[ \r\n])((?: *\r?\n)? +(?:\{{|{_KEY}))?|{_KEY})", re.MULTILINE)
 
+DEEPEST: Final = 64
+_MOST_FINDINGS: Final = 1000
+_USE_NAMES = "a constant used in several places belongs in `parameters`, a part used in several places in `modules`"
+TOO_MANY: Final = f"a mapping has at most {MOST_ENTRIES:,} entries; this is one more"
+TOO_LONG: Final = f"a list has at most {MOST_ENTRIES:,} mappings; this is one more"
+ONE_GROUP: Final = "neurons that are alike are one group: K: {count: 1000}"
+TABLE: Final = "very many connections are one entry, with 'edges' from a file"
+
 
 def crowded(text: str, most: int = MOST_ENTRIES) -> int | None:
     """The offset of the first entry that its mapping is too large for, or mapping (its dash) that its list is; None
@@ -50,16 +58,6 @@ def crowded(text: str, most: int = MOST_ENTRIES) -> int | None:
             return begin.end(1)
         counts.append((depth, number))
     return None
-
-
-DEEPEST: Final = 64
-_MOST_FINDINGS: Final = 1000
-
-_USE_NAMES = "a constant used in several places belongs in `parameters`, a part used in several places in `modules`"
-TOO_MANY: Final = f"a mapping has at most {MOST_ENTRIES:,} entries; this is one more"
-TOO_LONG: Final = f"a list has at most {MOST_ENTRIES:,} mappings; this is one more"
-ONE_GROUP: Final = "neurons that are alike are one group: K: {count: 1000}"
-TABLE: Final = "very many connections are one entry, with 'edges' from a file"
 
 
 class ReadingStoppedError(Exception):
