@@ -344,7 +344,9 @@ def test_the_seed_given_counts_like_the_seed_written() -> None:
 
 def test_every_array_of_a_network_is_frozen() -> None:
     network = nv.compile_text(HEAD + BASE).network
-    arrays = [getattr(network.connections, name).whole() for name in ("sources", "targets", "weights", "delays", "centres")]
+    arrays = [
+        getattr(network.connections, name).whole() for name in ("sources", "targets", "weights", "delays", "centres")
+    ]
     arrays += [network.neurons.bias, network.neurons.initial, network.neurons.input, network.neurons.position]
     for population in network.populations:
         arrays += [population.members, population.drive.incoming, population.drive.slots]

@@ -9,7 +9,7 @@ Names of kinds and fields are those of the first version, whatever the types are
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.digest import TREES, Content, Record, content, digest
 from neurovis_spec.compiler.names.state_references import singles
 from neurovis_spec.compiler.network import Connections, Group, Input, Network, Neurons, Noise, Output
-from neurovis_spec.compiler.program import Definition, Population, Projection, Quantity
+from neurovis_spec.compiler.program import ACTIVATION, MODEL, RULE, Definition, Population, Projection, Quantity
 
 #: What of each type is content. What follows parameters shows by the parameters; ``starts`` and states of outputs are
 #: put behind the rest, where there are some.
@@ -37,6 +37,7 @@ SCHEMA: Mapping[type, Content] = {
     ),
     Input: content("Input", "name start size expression table", "slots parts"),
     Output: content("Output", "name neurons scalar", "states"),
+    Quantity: content("Quantity", "name initial each_step each_episode"),
     Noise: content("Noise", "name members start expression parameters", "slots widths"),
 }
 
@@ -58,8 +59,8 @@ def content_hash(network: Network) -> str:
         network.connections,
         arranged,
         sorted(network.outputs, key=lambda output: output.name),
-        [_block(one) for one in network.populations],
-        [_plasticity(one, moved) for one in network.projections],
+        [_population(one) for one in network.populations],
+        [_projection(one, moved) for one in network.projections],
         network.noises,
         *((output.name, *singles(output.states)) for output in network.outputs if output.states),
         *([("starts", neurons.starts)] if neurons.starts else []),
@@ -79,61 +80,36 @@ def _arranged(inputs: Sequence[Input]) -> tuple[list[Input], IntArray]:
     return result, places
 
 
-def _block(population: Population) -> Record:
+def _population(population: Population) -> Record:
     fields: dict[str, object] = {
         "level": population.level,
         "members": population.members,
         "combine": population.drive.combine,
-        "activation": _activation(population.activation.definition),
+        "activation": _definition(population.activation.definition),
         "activation_parameters": population.activation.parameters,
-        "model": _model(population.model.definition),
+        "model": _definition(population.model.definition),
         "model_parameters": population.model.parameters,
         "incoming": population.drive.incoming,
     }
     return Record("Block", fields)
 
 
-def _plasticity(one: Projection, moved: IntArray) -> Record:
+def _projection(one: Projection, moved: IntArray) -> Record:
     """``moved``: where each place of all activities and inputs is here."""
     signals = {name: moved[indices] for name, indices in one.signals.items()}
-    rule, parameters = _rule(one.rule.definition), one.rule.parameters
+    rule, parameters = _definition(one.rule.definition), one.rule.parameters
     fields = {"rule": rule, "members": one.members, "parameters": parameters, "signals": signals}
     return Record("Plasticity", fields)
 
 
-def _activation(one: Definition) -> Record:
-    value = one.given.each_step
-    return Record("Activation", {"name": one.name, "parameters": sorted(one.parameters), "value": value})
-
-
-def _model(one: Definition) -> Record:
-    shared = {"name": one.name, "parameters": sorted(one.parameters), "let": one.let, "state": _states(one.state)}
-    return Record("Model", {**shared, "activity": one.given.each_step})
-
-
-def _rule(one: Definition) -> Record:
-    fields: dict[str, object] = {
-        "name": one.name,
-        "parameters": sorted(one.parameters),
-        "signals": sorted(one.signals),
-        "let": one.let,
-        "state": _states(one.state),
-        "each_step": one.given.each_step,
-        "each_episode": one.given.each_episode,
-    }
-    return Record("Rule", fields)
-
-
-def _states(states: Iterable[Quantity]) -> list[Record]:
-    return [
-        Record(
-            "Quantity",
-            {
-                "name": one.name,
-                "initial": one.initial,
-                "each_step": one.each_step,
-                "each_episode": one.each_episode,
-            },
-        )
-        for one in sorted(states, key=lambda state: state.name)
-    ]
+def _definition(made: Definition) -> Record:
+    named = {"name": made.name, "parameters": sorted(made.parameters)}
+    if made.kind == ACTIVATION:
+        return Record("Activation", {**named, "value": made.given.each_step})
+    inner = {"let": made.let, "state": sorted(made.state, key=lambda state: state.name)}
+    if made.kind == MODEL:
+        return Record("Model", {**named, **inner, "activity": made.given.each_step})
+    if made.kind == RULE:
+        steps = {"each_step": made.given.each_step, "each_episode": made.given.each_episode}
+        return Record("Rule", {**named, "signals": sorted(made.signals), **inner, **steps})
+    raise TypeError(f"no schema says what of a {made.kind.name} is content")

@@ -16,6 +16,7 @@ import numpy as np
 from neurovis_spec.arrays import IntArray, frozen
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.connections.plasticity import Learning
+from neurovis_spec.compiler.neurons.groups import Built
 from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.program import (
     Gather,
@@ -30,7 +31,6 @@ from neurovis_spec.compiler.program import (
     Update,
     Use,
 )
-from neurovis_spec.compiler.values.arguments import Settled
 
 
 class Cycle(NamedTuple):
@@ -100,14 +100,10 @@ def make_populations(census: Census, sources: IntArray, targets: IntArray, level
     slot = np.zeros(len(home), dtype=np.int64)
     for some in members:
         slot[some] = np.arange(len(some))
-    chosen = [
-        [(one.group.start, used) for one, used in zip(groups, column, strict=True)]
-        for column in zip(*(one.kind for one in groups), strict=True)
-    ]
     populations = []
     for number, (some, incoming) in enumerate(zip(members, _split(home[targets], len(members)), strict=True)):
         first = groups[group[some[0]]]
-        activation, model = (_use(number, some, group[some], settled) for settled in chosen)
+        activation, model = (_use(number, some, group[some], groups, which) for which in (0, 1))
         drive = Port("drive", first.group.combine, frozen(incoming), frozen(slot[targets[incoming]]))
         populations.append(Population(int(levels[some[0]]), frozen(some), activation, model, (drive,)))
     return tuple(populations)
@@ -129,18 +125,17 @@ def _split(populations: IntArray, number: int) -> list[IntArray]:
     return [order[start:end].astype(np.int64) for start, end in pairwise(ends)]
 
 
-def _use(number: int, members: IntArray, own: IntArray, settled: Sequence[tuple[int, Settled]]) -> Use:
-    """A definition in use at a population; ``own`` are the groups of its members, and ``settled`` of all groups where
-    they start and what they say of it."""
-    definition = settled[own[0]][1].definition
+def _use(number: int, members: IntArray, own: IntArray, groups: Sequence[Built], which: int) -> Use:
+    """A definition in use at a population: that of ``which`` kind of its groups, the ``own`` of each member."""
+    definition = groups[own[0]].kind[which].definition
     owner = Owner(definition.kind.name, number)
     if not definition.parameters:
         return Use(owner, definition, {})
     starts = np.flatnonzero(np.diff(own, prepend=-1))
     ends = pairwise((*starts.tolist(), len(own)))
     parts = [
-        (used.parameters, members[start:end] - first)
-        for (first, used), (start, end) in zip((settled[place] for place in own[starts].tolist()), ends, strict=True)
+        (one.kind[which].parameters, members[start:end] - one.group.start)
+        for one, (start, end) in zip((groups[place] for place in own[starts].tolist()), ends, strict=True)
     ]
     parameters = {
         name: frozen(np.concatenate([values[name][rows] for values, rows in parts])) for name in definition.parameters

@@ -8,9 +8,10 @@ carried out.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, Rend
 from neurovis_spec.compiler.events.changes import Change
 from neurovis_spec.compiler.events.settable import Binding, ParameterFormula, Part, Settable
 from neurovis_spec.compiler.names.state_references import StateOf
-from neurovis_spec.compiler.program import Holder, Operation, Population, Projection, Use
+from neurovis_spec.compiler.program import Each, Holder, Operation, Population, Projection, Use
 from neurovis_spec.compiler.ros_settings import RosSettings
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.language.words import Combine, NeuronRole
@@ -182,6 +183,15 @@ class Output:
         return sum(one.size for one in self.states) if self.states else len(self.neurons)
 
 
+class Located(NamedTuple):
+    """Whoever has definitions in use, for each neuron or connection the number of the one that it is a member of (−1:
+    of none), and its position among these members."""
+
+    holders: Sequence[Holder]
+    numbers: IntArray
+    positions: IntArray
+
+
 @dataclass(frozen=True, eq=False)
 class Network:
     """A compiled network. ``hash`` is the SHA-256 of its canonical content (§12, inspect)."""
@@ -229,6 +239,16 @@ class Network:
     def holders(self) -> tuple[Holder, ...]:
         """Whatever has definitions in use, in the order in which their states are kept."""
         return *self.populations, *self.projections
+
+    def located(self, each: Each) -> Located:
+        """The populations and all neurons, or the projections and all connections."""
+        holders: Sequence[Holder] = self.populations if each == "neuron" else self.projections
+        count = len(self.neurons if each == "neuron" else self.connections)
+        numbers, positions = np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=np.int64)
+        for number, holder in enumerate(holders):
+            numbers[holder.members] = number
+            positions[holder.members] = np.arange(len(holder.members))
+        return Located(holders, numbers, positions)
 
     @property
     def uses(self) -> Iterator[tuple[Holder, Use]]:

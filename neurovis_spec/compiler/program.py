@@ -6,7 +6,7 @@ projections say for which neurons and connections which are in use; operations a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -34,13 +34,17 @@ class Check(Quantity):
     other number shows (``compiler/run_checks.py``), else 0. ``name`` says it: ``the model 'm' divides by 0``."""
 
 
+#: What there is one of a state, or of a parameter, for.
+Each: TypeAlias = Literal["neuron", "connection"]
+
+
 @dataclass(frozen=True, slots=True)
 class Kind:
     """What all definitions of a kind have in common. Its name is that of the owners of states and parameters, too."""
 
     name: str
     #: what there is one of its states and parameters for
-    each: Literal["neuron", "connection"]
+    each: Each
     #: what it gives
     gives: str
     #: whether that is kept from step to step, so that it is seen by its name and replaced as a state is; else it is
@@ -103,16 +107,15 @@ class Definition:
         return {one.name: one.each_step for one in self.gives if one.each_step is not None}
 
     @property
-    def formulas(self) -> Iterator[Tree]:
-        """All that is computed in a run."""
-        yield from (tree for _, tree in self.let)
-        for one in (*self.state, *self.gives):
-            yield from (tree for tree in (one.each_step, one.each_episode) if tree is not None)
-
-    @property
     def read(self) -> frozenset[str]:
         """All names that its formulas read in a run."""
-        return frozenset().union(*map(names, self.formulas))
+        found: set[str] = set()
+        for _, tree in self.let:
+            found |= names(tree)
+        for one in (*self.state, *self.gives):
+            for part in (one.each_step, one.each_episode):
+                found |= frozenset() if part is None else names(part)
+        return frozenset(found)
 
     @property
     def reads_activation(self) -> bool:

@@ -128,26 +128,22 @@ class _Checks:
         """The checks of a definition, of which what it gives is ``hidden`` to this degree, and what it calls of
         ``functions``. What is computed shows, but for what an episode's end replaces."""
         made = use.definition
-        steps = [
-            _with_new(hazards(one.each_step, functions=functions), made)
-            for one in made.fleeting
-            if one.each_step is not None
-        ]
-        calls = [call for formula in steps for call in formula.calls]
-        lasting = [(one, hidden) for one in made.gives if made.kind.lasting]
-        lasting += [(one, Hidden.NOTHING) for one in made.state]
-        steps += [
-            hazards(one.each_step, Hidden.ALL if self._replaced(one) else degree)
-            for one, degree in lasting
-            if one.each_step is not None
-        ]
-        ends = [hazards(one.each_episode, degree) for one, degree in lasting if one.each_episode is not None]
+        steps: list[Hazards] = []
+        ends: list[Hazards] = []
+        calls: list[Called] = []
+        for one in made.fleeting:
+            if one.each_step is not None:
+                steps.append(_with_new(hazards(one.each_step, functions=functions), made))
+                calls += steps[-1].calls
+        for one in (*made.gives, *made.state) if made.kind.lasting else made.state:
+            degree = hidden if one in made.gives else Hidden.NOTHING
+            if one.each_step is not None:
+                replaced = self.network.episode is not None and one.each_episode is not None
+                steps.append(hazards(one.each_step, Hidden.ALL if replaced else degree))
+            if one.each_episode is not None:
+                ends.append(hazards(one.each_episode, degree))
         found, last = through_let(steps, made.let), through_let(ends, made.let)
         return list(_check(f"{made.kind.name} '{made.name}'", found, last, self.known(use))), calls
-
-    def _replaced(self, one: Quantity) -> bool:
-        """Whether the end of an episode replaces what a step gives."""
-        return self.network.episode is not None and one.each_episode is not None
 
 
 def _with_states(use: Use, states: list[Check]) -> Use:

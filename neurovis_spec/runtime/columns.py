@@ -15,8 +15,8 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.body import Skeleton
 from neurovis_spec.compiler.names.state_references import StateOf, singles
-from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Owner, Population, Projection
+from neurovis_spec.compiler.network import Located, Network
+from neurovis_spec.compiler.program import Owner
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.references import find_neurons, find_states
@@ -135,10 +135,10 @@ def probe_of(network: Network, states: Iterable[StateOf]) -> Probe:
 
 def _probe(network: Network, wanted: list[tuple[str, str, int]]) -> Probe:
     places: dict[tuple[Owner, str], tuple[list[int], list[int]]] = {}
-    located: dict[str, tuple[Sequence[Population | Projection], IntArray, IntArray]] = {}
+    located: dict[str, Located] = {}
     for column, (state, what, index) in enumerate(wanted):
         if what not in located:
-            located[what] = _located(network, what)
+            located[what] = network.located("neuron" if what == "neuron" else "connection")
         holders, numbers, positions = located[what]
         uses = holders[int(numbers[index])].uses
         owner = next(use.owner for use in uses if any(one.name == state for one in use.definition.state))
@@ -156,18 +156,6 @@ def _probe(network: Network, wanted: list[tuple[str, str, int]]) -> Probe:
         neuron = what == "neuron"
         names += network.state_names([StateOf(state, one if neuron else none, none if neuron else one)])
     return Probe(tuple(names), parts)
-
-
-def _located(network: Network, what: str) -> tuple[Sequence[Population | Projection], IntArray, IntArray]:
-    """The populations, for each neuron its own, and its place there; or the projections, for each connection; −1
-    without one."""
-    holders: Sequence[Population | Projection] = network.projections if what == "connection" else network.populations
-    count = len(network.connections if what == "connection" else network.neurons)
-    numbers, positions = np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=np.int64)
-    for number, holder in enumerate(holders):
-        numbers[holder.members] = number
-        positions[holder.members] = np.arange(len(holder.members))
-    return holders, numbers, positions
 
 
 @dataclass(frozen=True, eq=False)

@@ -116,10 +116,11 @@ def _idle(network: Network) -> Mask:
         return quiet
     for population in network.populations:
         quiet[population.members] &= _stays_at_zero(population, network)
+    owners = set()
     for binding in network.set_by_events:  # what an event makes of a neuron is not checked
+        owners.add(binding.array.owner)
         if binding.array == BIAS:
             quiet[binding.places] = False
-    owners = {binding.array.owner for binding in network.set_by_events}
     for population in network.populations:
         if any(use.owner in owners for use in population.uses):
             quiet[population.members] = False

@@ -30,10 +30,13 @@ from neurovis_spec.compiler.events.settable import (
     Variable,
     table_of,
 )
-from neurovis_spec.compiler.network import Network, Noise
+from neurovis_spec.compiler.network import Located, Network, Noise
 from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.program import Key, Owner
 from neurovis_spec.language.expressions.tree import Number
+
+#: Fields that are no numbers of a network: the first weights of what learns, and positions.
+_ELSEWHERE = ("first", "position")
 
 
 class Found(NamedTuple):
@@ -45,14 +48,41 @@ class Found(NamedTuple):
 
 
 def found_in(network: Network, census: Census, bundles: tuple[Bundle, ...]) -> Iterator[Found]:
-    """What follows parameters in all of a network."""
-    yield from _of_neurons(census, network)
-    yield from _of_connections(bundles, network)
-    yield from _of_inputs(network)
+    """What follows parameters in all of a network: of neurons, connections, and tables of inputs."""
+    neurons, connections = network.located("neuron"), network.located("connection")
+    for one in census.groups:
+        for part in one.parts:
+            yield from _found(part, one.group.start + part.within(one.group.count), neurons)
+    start = 0
+    for bundle in bundles:
+        count = len(bundle.sources)
+        for part in bundle.parts if count else ():
+            yield from _found(part, start + part.within(count), connections)
+        start += count
+    for number, entry in enumerate(network.inputs):
+        for part in entry.parts:
+            assert entry.table is not None
+            yield Found(table_of(number), part.within(entry.table.size), part)
+
+
+def _found(part: Part, members: IntArray, located: Located) -> Iterator[Found]:
+    """A part of some neurons or connections: of a definition, which may be in use at several populations, or of what
+    the network has one of."""
+    if part.name:
+        numbers = located.numbers[members]
+        owners = np.unique(numbers).tolist()
+        for number in owners:
+            inside = np.flatnonzero(numbers == number)
+            own = part if len(owners) == 1 else part.some(inside)
+            yield Found(Key(Owner(part.field, number), part.name), located.positions[members[inside]], own)
+    elif part.field not in _ELSEWHERE:
+        yield Found(Key(None, part.field), members, part)
 
 
 def make_settable(network: Network, slots: tuple[Slot, ...], found: Iterable[Found]) -> Settable:
     """The bindings of a network, those of the same formula as one, and the arrays that they write to."""
+    if not slots:  # nothing can be set
+        return Settable()
     arrays = _arrays(network)
     merged = list(_merged([one for one in found if len(one.places)]))  # a cell may be of no connection
     by_array: dict[Key, list[Found]] = {}
@@ -122,51 +152,6 @@ def own_weights(slots: tuple[Slot, ...], bundles: tuple[Bundle, ...], weights: F
                 result[start + part.within(count)] = part.formula.values(own)
         start += count
     return frozen(result)
-
-
-def _of_neurons(census: Census, network: Network) -> Iterator[Found]:
-    n = len(census.neurons)
-    home, position = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
-    for number, population in enumerate(network.populations):
-        home[population.members] = number
-        position[population.members] = np.arange(len(population.members))
-    for group, part in ((one.group, part) for one in census.groups for part in one.parts):
-        members = group.start + part.within(group.count)
-        if part.field == BIAS.name:
-            yield Found(BIAS, members, part)
-        elif part.name:  # of a definition; neurons of a group may belong to several populations
-            blocked = np.unique(home[members])
-            for number in blocked.tolist():
-                inside = np.flatnonzero(home[members] == number)
-                own = part if len(blocked) == 1 else part.some(inside)
-                yield Found(Key(Owner(part.field, number), part.name), position[members[inside]], own)
-
-
-def _of_connections(bundles: tuple[Bundle, ...], network: Network) -> Iterator[Found]:
-    connections = network.connections
-    position = np.zeros(len(connections), dtype=np.int64)
-    for rule in network.projections:
-        position[rule.members] = np.arange(len(rule.members))
-    start = 0
-    for bundle in bundles:
-        count = len(bundle.sources)
-        for part in bundle.parts if count else ():
-            members = start + part.within(count)
-            if part.field == "first":
-                continue
-            if part.name:  # of a definition
-                owner = Owner(part.field, int(connections.rules[start]))
-                yield Found(Key(owner, part.name), position[members], part)
-            else:
-                yield Found(Key(None, part.field), members, part)
-        start += count
-
-
-def _of_inputs(network: Network) -> Iterator[Found]:
-    for number, entry in enumerate(network.inputs):
-        for part in entry.parts:
-            assert entry.table is not None
-            yield Found(table_of(number), part.within(entry.table.size), part)
 
 
 def _is_one_number(formula: Dependent) -> bool:

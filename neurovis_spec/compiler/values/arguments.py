@@ -89,7 +89,7 @@ def settled_of(
         check_settings(choice, constants, each.names)
         return UNKNOWN
     made = found.definition
-    known = (*(default.name for default in found.defaults), *made.signals)
+    known = (*made.parameters, *made.signals)
     home = Home((kind.section, made.name), ("parameters", "signals"))
     entries = settings_of(choice.settings, known, "parameter", "it has no parameters", constants.findings, home)
     with constants.following() as parts:
