@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from neurovis_spec.arrays import FloatArray, FloatColumn
-from neurovis_spec.compiler.events.settable import BIAS, CENTRES, HIGH, LOW
+from neurovis_spec.compiler.events.settable import BIAS, CENTRES, HIGH, LOW, Variable
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Gather, Key, Learn, Operation, Population, ReadInputs, Send, Update, Use
 from neurovis_spec.language.expressions.evaluate import evaluate
@@ -56,6 +56,12 @@ class ReferenceStepper:
     def __init__(self, network: Network) -> None:
         self.network, self.functions = network, PLAIN
         self.offsets = signal_layout(network).offsets
+        variables = network.settable.variables
+        #: the parameters of definitions in use, with what of them can be set
+        self.settings = {
+            use.owner: [(name, values, variables.get(Key(use.owner, name))) for name, values in use.parameters.items()]
+            for _, use in network.uses
+        }
         #: u[t] of the members of each population, as they were gathered last
         self.drives: dict[int, list[float]] = {}
 
@@ -85,18 +91,15 @@ class ReferenceStepper:
 
     def number(self, array: Key, values: FloatArray | FloatColumn, place: int, state: State) -> float:
         """A number of the network; of an array that can be set, as it is by now."""
-        variable = self.network.settable.variables.get(array)
-        if variable is None:
-            return float(values[place])
-        return float(state.conditions.variables[variable.start + (place if variable.size > 1 else 0)])
+        return now(self.network.settable.variables.get(array), values, place, state)
 
     def known(self, use: Use, place: int, state: State) -> dict[str, float]:
         """What the formulas of a definition in use see, whatever its kind: the clock, and its parameters for one of the
         members."""
-        numbers = {
-            name: self.number(Key(use.owner, name), values, place, state) for name, values in use.parameters.items()
-        }
-        return self.clock(state) | numbers
+        known = self.clock(state)
+        for name, values, variable in self.settings[use.owner]:
+            known[name] = now(variable, values, place, state)
+        return known
 
     def arriving(self, connection: int, state: State) -> float:
         """w[t−d]·a[t−d]: of this step for d = 0, else what was sent d steps ago."""
@@ -143,17 +146,19 @@ class ReferenceStepper:
         at once, then what does not last from the new states; at an episode's end once more from what these gave.
         ``lasting`` is what it gives and lasts, within its bounds. States are replaced, all is returned."""
         made, cells = use.definition, state.cells[use.owner]
-        old = {quantity.name: float(cells[quantity.name][position]) for quantity in made.state}
+        old = {name: float(values[position]) for name, values in cells.items()}
         old |= {name: one.value for name, one in lasting.items()}
         known = with_let({**seen, **old}, made.let)
-        new = changed(old, {one.name: one.each_step for one in made.lasting}, known, lasting, functions)
-        fleeting = changed({}, {one.name: one.each_step for one in made.fleeting}, known | new, {}, functions)
+        new = changed(old, [(one.name, one.each_step) for one in made.lasting], known, lasting, functions)
+        fleeting = [(one.name, one.each_step) for one in made.fleeting]
+        given = changed(new, fleeting, known | new, {}, functions) if fleeting else new
         if self.ends_episode(state):
-            ends = {one.name: one.each_episode for one in made.lasting}
+            ends = [(one.name, one.each_episode) for one in made.lasting]
             new = changed(new, ends, with_let({**seen, **new}, made.let), lasting)
-        for quantity in made.state:
-            cells[quantity.name][position] = new[quantity.name]
-        return new | fleeting
+            given = given | new
+        for name, values in cells.items():
+            values[position] = new[name]
+        return given
 
     def send(self, state: State) -> None:
         """w[t]·a[t] of every delayed connection leaves; a[t] is remembered."""
@@ -206,6 +211,13 @@ class ReferenceStepper:
         return self.network.episode is not None and (state.k + 1) % self.network.episode == 0
 
 
+def now(variable: Variable | None, values: FloatArray | FloatColumn, place: int, state: State) -> float:
+    """A number of an array of the network, which can be set where there is a variable: then it is as it is by now."""
+    if variable is None:
+        return float(values[place])
+    return float(state.conditions.variables[variable.start + (place if variable.size > 1 else 0)])
+
+
 def combined(combine: str, signals: Iterable[tuple[float, float]]) -> float:
     """Signals and centres of one neuron as one number, taken in the order of the connections.
 
@@ -224,26 +236,27 @@ def combined(combine: str, signals: Iterable[tuple[float, float]]) -> float:
 
 
 def with_let(known: dict[str, float], let: tuple[tuple[str, Tree], ...]) -> dict[str, float]:
-    """The names known and the intermediate values, computed in order."""
-    known = dict(known)
+    """The names known, and beside them now the intermediate values, computed in order."""
     for name, tree in let:
         known[name] = evaluate(tree, known)
     return known
 
 
 def changed(
-    old: Mapping[str, float],
-    trees: Mapping[str, Tree | None],
+    old: dict[str, float],
+    trees: Iterable[tuple[str, Tree | None]],
     known: dict[str, float],
     bounds: Mapping[str, Bounded],
     functions: Mapping[str, Callable[..., float]] = _NONE,
 ) -> dict[str, float]:
     """New values, all from ``known``, within their bounds; what has no expression stays."""
-    new = {name: evaluate(tree, known, functions) for name, tree in trees.items() if tree is not None}
-    within = {
-        name: min(max(value, bounds[name].low), bounds[name].high) for name, value in new.items() if name in bounds
-    }
-    return {**old, **new, **within}
+    new = dict(old)
+    for name, tree in trees:
+        if tree is not None:
+            new[name] = evaluate(tree, known, functions)
+            if name in bounds:
+                new[name] = min(max(new[name], bounds[name].low), bounds[name].high)
+    return new
 
 
 @singledispatch
