@@ -8,7 +8,7 @@ import pytest
 from networks_by_hand import cpg_rbf
 
 from neurovis_spec.compiler.canonical import SCHEMA, content_hash
-from neurovis_spec.compiler.digest import TREES, content, digest
+from neurovis_spec.compiler.digest import TREES, Content, content, digest
 from neurovis_spec.compiler.network import Neurons
 from neurovis_spec.language.expressions.parser import parse
 
@@ -28,7 +28,7 @@ class New:
 
 
 def test_a_field_more_and_another_name_change_no_hash() -> None:
-    schema = {Old: content("Old", "name"), New: content("Old", "")._replace(fields={"name": "called"})}
+    schema = {Old: content("Old", "name"), New: Content("Old", {"name": "called"})}
     assert digest(New(0.5, "x"), schema=schema) == digest(Old("x"), schema=schema)
     assert digest(New(0.5, "y"), schema=schema) != digest(Old("x"), schema=schema)
 

@@ -11,7 +11,7 @@ import hashlib
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -29,13 +29,20 @@ class Record:
     fields: Mapping[str, object]
 
 
-class Content(NamedTuple):
+@dataclass(frozen=True)
+class Content:
     """What of a type is content: what it is called, and its fields, each with the attribute that it is. ``beside`` are
     the attributes that are none: what is only shown, where it stood, how something follows parameters."""
 
     kind: str
     fields: Mapping[str, str]
-    beside: frozenset[str]
+    beside: frozenset[str] = frozenset()
+
+    @cached_property
+    def pieces(self) -> tuple[bytes, tuple[tuple[bytes, str], ...]]:
+        """How it begins, and each of its fields with the attribute."""
+        fields = tuple((_piece("text", name.encode()), attribute) for name, attribute in self.fields.items())
+        return _piece("record", self.kind.encode()), fields
 
 
 def content(kind: str, fields: str, beside: str = "") -> Content:
@@ -71,14 +78,7 @@ class _Writer:
     def __init__(self, schema: Mapping[type, Content]) -> None:
         self.hash = hashlib.sha256()
         self._pieces: list[bytes] = []
-        #: for each type its beginning, and its fields: how each is called, in the hash and by itself
-        self._records: dict[type, tuple[bytes, tuple[tuple[bytes, str], ...]]] = {
-            kind: (
-                _piece("record", one.kind.encode()),
-                tuple((_piece("text", name.encode()), attribute) for name, attribute in one.fields.items()),
-            )
-            for kind, one in schema.items()
-        }
+        self._schema = schema
 
         #: texts and numbers that come time and again, as pieces
         self._known: dict[tuple[type, object], bytes] = {}
@@ -101,7 +101,7 @@ class _Writer:
             self._add(self._common(kind, value))
         elif isinstance(value, str):
             self.put("text", value.encode())
-        elif kind in self._records:  # there may be many thousands of a kind
+        elif kind in self._schema:  # there may be many thousands of a kind
             self._content(value)
         elif kind is dict and not value:
             self._add(_EMPTY)
@@ -175,7 +175,7 @@ class _Writer:
             self.value(operand)
 
     def _content(self, value: object) -> None:
-        begin, parts = self._records[type(value)]
+        begin, parts = self._schema[type(value)].pieces
         pieces, common = self._pieces, self._known
         pieces.append(begin)
         for piece, attribute in parts:

@@ -129,7 +129,7 @@ class StepCode:
 
     def reads_drive(self, population: Population) -> bool:
         """Whether the model of a population takes what arrives."""
-        return "drive" in population.model.definition.read
+        return population.drive.name in population.model.definition.read
 
     def drive(self, population: Population, place: Place, arrivals: Arrivals, total: str) -> Value:
         """u[t]: what arrives, combined, + bias + input + noise."""
@@ -170,7 +170,7 @@ class StepCode:
         functions = {
             name: partial(activation, formula=tree) for name, tree in population.activation.definition.functions.items()
         }
-        seen = code.parameters(population.model, place) | {"drive": drive}
+        seen = code.parameters(population.model, place) | {population.drive.name: drive}
         stored = self.states(population.model, place)
         new, given = self.change(population.model.definition, seen, stored, functions)
         self.store([(stored[name], value) for name, value in new.items()])

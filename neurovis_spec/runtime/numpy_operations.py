@@ -182,7 +182,7 @@ def _update(operation: Update, step: Step) -> None:
         name: lambda argument, value=value: _called(code, activation, value, argument)
         for name, value in activation.definition.functions.items()
     }
-    seen = code.parameters(model) | {"drive": step.drives[number]}
+    seen = code.parameters(model) | {population.drive.name: step.drives[number]}
     cells = {one.name: cell(one.name) for one in model.definition.state}
     activity = emit_change(code, model.definition, seen, cells, network.episode, functions)["activity"]
     place = code.position(population.members, len(network.neurons))

@@ -130,7 +130,7 @@ class ReferenceStepper:
             name: lambda x, value=value: evaluate(value, shape | {"x": x})
             for name, value in population.activation.definition.functions.items()
         }
-        seen = self.known(population.model, position, state) | {"drive": drive}
+        seen = self.known(population.model, position, state) | {population.drive.name: drive}
         return self.change(population.model, position, seen, state, {}, functions)["activity"]
 
     def change(
