@@ -121,7 +121,7 @@ def _idle(network: Network) -> Mask:
         owners.add(binding.array.owner)
         if binding.array == BIAS:
             quiet[binding.places] = False
-    for population in network.populations:
+    for population in network.populations if owners else ():
         if any(use.owner in owners for use in population.uses):
             quiet[population.members] = False
     idle = _unreached(quiet, connections.sources.whole(), connections.targets.whole())
