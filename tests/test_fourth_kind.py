@@ -1,7 +1,7 @@
 """A kind of definition that the language has not: what it takes to add one, which is what a synapse will take.
 
 Declared, read, settled, checked, put into the program with an operation of its own, stepped by the reference and by
-NumPy, kept in the State and set in a run, all by the seams that activations, models and rules go through.
+NumPy and C, kept in the State and set in a run, all by the seams that activations, models and rules go through.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.values import Choice, ParameterField
 from neurovis_spec.language.yaml.reader import read_text
 from neurovis_spec.language.yaml.source import Scalar
-from neurovis_spec.runtime import numpy_operations, reference
+from neurovis_spec.runtime import c_step, numpy_operations, reference
 from neurovis_spec.runtime.numpy_code import Cell, emit_change
 from neurovis_spec.runtime.simulation import Simulation
 from neurovis_spec.runtime.state import State
@@ -96,6 +96,17 @@ def _emit(operation: Echo, step: numpy_operations.Step) -> None:
     code.line(f"np.add.at(activity, {targets}, {given['echo']})")
 
 
+@c_step.write.register
+def _write(operation: Echo, step: c_step.StepCode) -> None:
+    code, projection = step.code, step.network.projections[operation.projection]
+    (use,) = projection.uses
+    for place, connection in enumerate(projection.members.tolist()):
+        stored = step.states(use, place)
+        new, given = step.change(use.definition, code.parameters(use, place) | step.seen(projection, place), stored)
+        step.store([(stored[name], value) for name, value in new.items()])
+        code.line(f"activity[{step.network.connections.targets[connection]}] += {code.text(given['echo'])};")
+
+
 # ---- what the compiler makes of it -------------------------------------------------------------------------------
 
 
@@ -140,7 +151,7 @@ def network() -> Network:
     return nv.compile_text(SPEC).network
 
 
-@pytest.mark.parametrize("backend", ["reference", "numpy"])
+@pytest.mark.parametrize("backend", ["reference", "numpy", pytest.param("c", marks=pytest.mark.compiler)])
 def test_it_is_stepped_kept_and_set(network: Network, backend: str) -> None:
     simulation = Simulation(with_echo(network, "fade: g"), backend=backend)
     rows = []

@@ -201,6 +201,11 @@ class Projection:
     signals: Mapping[str, IntArray]
 
     @property
+    def read(self) -> frozenset[str]:
+        """All names that its definitions read in a run."""
+        return frozenset().union(*(use.definition.read for use in self.uses))
+
+    @property
     def rule(self) -> Use:
         """The rule by which the weights change."""
         return self.uses[0]

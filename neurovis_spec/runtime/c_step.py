@@ -369,7 +369,7 @@ class StepCode:
         """What a rule may read besides its own: pre, sent, post, the signals."""
         code, connections, members = self.code, self.network.connections, projection.members
         sources, targets = connections.sources[members], connections.targets[members]
-        source, read = code.at(sources, place), projection.rule.definition.read
+        source, read = code.at(sources, place), projection.read
         seen: dict[str, Value] = {
             "sent": f"activity[{source}]",
             "post": f"activity[{code.at(targets, place)}]",

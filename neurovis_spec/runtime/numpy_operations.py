@@ -249,7 +249,7 @@ def _bounded(code: Code, network: Network, projection: Projection, weight: str) 
 def seen_at(step: Step, projection: Projection) -> dict[str, str]:
     """Arrays for pre, sent, post and the signals; only what the definitions read is gathered."""
     code, network, depth = step.code, step.network, step.depth
-    read, members = frozenset[str]().union(*(use.definition.read for use in projection.uses)), projection.members
+    read, members = projection.read, projection.members
     connections, n = network.connections, len(network.neurons)
     sources, targets = connections.sources[members], connections.targets[members]
     made: dict[str, Callable[[], str]] = {

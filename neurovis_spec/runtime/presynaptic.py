@@ -30,4 +30,4 @@ def remembering(network: Network) -> npt.NDArray[np.bool_]:
 
 
 def _readers_of_pre(network: Network) -> list[Projection]:
-    return [entry for entry in network.projections if any("pre" in use.definition.read for use in entry.uses)]
+    return [entry for entry in network.projections if "pre" in entry.read]
