@@ -107,32 +107,38 @@ def _write(operation: Echo, step: c_step.StepCode) -> None:
         code.line(f"activity[{step.network.connections.targets[connection]}] += {code.text(given['echo'])};")
 
 
-# ---- what the compiler makes of it -------------------------------------------------------------------------------
+def with_echo(network: Network, settings: str) -> Network:
+    """The network, whose connections from A to B echo with these settings."""
+    model, choice, constants = written(settings)
+    reading = Reading(ECHO, formula_at(EchoModel, "echo"))
+    known = Definitions({ECHO: Names({"low_pass": definition_of(reading, "low_pass", model, constants.findings)})})
+    used = sure(settled_of(choice, ECHO, known, constants, Each("connection", {}), 3))
+    constants.findings.check()
+    use = Use(Owner("echo", 0), used.definition, used.parameters)
+    found = [Found(Key(use.owner, part.name), part.within(3), part) for part in used.parts]
+    projections = (Projection(np.arange(3, 6), (use,), {}),)
+    network = replace(network, projections=projections, program=(*network.program, Echo(0)))
+    return with_checks(replace(network, settable=make_settable(network, tuple(constants.slots), found)))
+
+
+# ---- what an author has written, and what comes of it ---------------------------------------------------------------
+
+
+def written(settings: str) -> tuple[EchoModel, Choice, Constants]:
+    """The definition, the settings where it is used, and the parameters of the spec."""
+    findings = Findings()
+    spec = sure(read_spec(sure(read_text(SPEC, "spec", findings)), findings))
+    model = sure(read_shape(sure(read_text(LOW_PASS, "echo", findings)), EchoModel, findings))
+    constants = Constants(names_of(spec, "parameters", {}), 1.0, findings)
+    make_parameters(spec, constants, {})
+    node = sure(read_text(settings, "settings", findings)).root
+    return model, Choice(Located("low_pass", Scalar("low_pass", node.span)), node), constants
 
 
 def sure(value: T | Unknown | None) -> T:
     assert value is not None
     assert value is not UNKNOWN
     return value
-
-
-def with_echo(network: Network, settings: str) -> Network:
-    """The network, whose connections from A to B echo; the settings are those that an author would write."""
-    findings = Findings()
-    spec = sure(read_spec(sure(read_text(SPEC, "spec", findings)), findings))
-    model = sure(read_shape(sure(read_text(LOW_PASS, "echo", findings)), EchoModel, findings))
-    reading = Reading(ECHO, formula_at(EchoModel, "echo"))
-    known = Definitions({ECHO: Names({"low_pass": definition_of(reading, "low_pass", model, findings)})})
-    constants = Constants(names_of(spec, "parameters", {}), 1.0, findings)
-    make_parameters(spec, constants, {})
-    written = sure(read_text(settings, "settings", findings)).root
-    choice = Choice(Located("low_pass", Scalar("low_pass", written.span)), written)
-    used = sure(settled_of(choice, ECHO, known, constants, Each("connection", {}), 3))
-    findings.check()
-    use, members = Use(Owner("echo", 0), used.definition, used.parameters), np.arange(3, 6)
-    found = [Found(Key(use.owner, part.name), part.within(3), part) for part in used.parts]
-    network = replace(network, projections=(Projection(members, (use,), {}),), program=(*network.program, Echo(0)))
-    return with_checks(replace(network, settable=make_settable(network, tuple(constants.slots), found)))
 
 
 def by_hand(steps: int, fade: list[float]) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
