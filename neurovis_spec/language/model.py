@@ -133,16 +133,17 @@ class Model(BaseModel):
         rules, one_of = cls._rules(), cls.ONE_OF
         if not rules and one_of is None:
             return
-        entries = {entry.name: entry for entry in data.entries}
-        check_rules(rules, entries, unknown, findings)
-        told = data.is_open or not entries.keys() <= cls._fields().keys()
-        if one_of is not None and entries.keys().isdisjoint(one_of.keys) and not told:
+        check_rules(rules, data, unknown, findings)
+        if one_of is None or data.is_open:
+            return
+        keys = {entry.name for entry in data.entries}
+        if keys.isdisjoint(one_of.keys) and keys <= cls._fields().keys():
             findings.error(one_of.code, opening(data), one_of.why, one_of.hint)
 
     @cached_property
     def contradictory(self) -> bool:
         """Whether keys exclude each other, which is reported: which of them is meant is not known."""
-        return contradictory(self._rules(), {entry.name: entry for entry in self.source.entries})
+        return contradictory(self._rules(), self.source)
 
     @classmethod
     @cache
