@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
@@ -24,8 +25,11 @@ from neurovis_spec.scene.called import names_of
 from neurovis_spec.scene.film import film, scene_of_step
 from neurovis_spec.scene.gains import choose_gains
 from neurovis_spec.scene.geometry import sample, samples
+from neurovis_spec.scene.labels import Label
 from neurovis_spec.scene.legend_scales import LegendEntry, nice_weights
-from neurovis_spec.scene.lines import trimmed
+from neurovis_spec.scene.lines import Line, trimmed
+from neurovis_spec.scene.model import Shape
+from neurovis_spec.scene.scaling import _MEASURED
 
 CASE = use_case_1(400)
 GAINS = choose_gains(CASE.network, RenderSettings(), CASE.reached)
@@ -494,3 +498,11 @@ def test_beads_of_lines_that_cross_are_apart() -> None:
     assert len(beads) == 8
     middles = [(bead.corner[0] + bead.width / 2, bead.corner[1] + bead.height / 2) for bead in beads]
     assert all(math.dist(one, other) > beads[0].width for one, other in combinations(middles, 2))
+
+
+@pytest.mark.parametrize("kind", [*get_args(Shape), Line, Label], ids=lambda kind: kind.__name__)
+def test_all_lengths_of_a_shape_are_scaled(kind: type) -> None:
+    """A field that holds numbers is a length or a place, but for directions and shares."""
+    measures = float, Point, tuple[Point, ...], tuple[float, ...]
+    names = {name for name, said in get_type_hints(kind).items() if said in measures}
+    assert names - {"direction", "opacity"} == names & _MEASURED

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from itertools import takewhile
+from operator import attrgetter
 
 import numpy as np
 
@@ -37,45 +38,19 @@ def refuse(problem: LayoutProblem, name: str, can: Capabilities) -> None:
     that contradicts itself."""
     _refuse_size(problem, name, can)
     _refuse_without_place(problem, name, can)
-    asked: Sequence[tuple[str, bool, Callable[[Capabilities], bool], str]] = (
-        ("layout-pins-unsupported", bool(problem.pins), lambda it: it.pins, "keep pinned positions (layout.positions)"),
-        ("layout-arrange-unsupported", bool(problem.arrange), lambda it: it.arrange, "arrange groups (layout.arrange)"),
-        ("layout-boxes-unsupported", bool(problem.boxes), lambda it: it.boxes, "keep the members of a box together"),
-        (
-            "layout-mirror-unsupported",
-            bool(problem.mirrors),
-            lambda it: it.mirrors,
-            "draw mirror images (layout.mirror)",
-        ),
-        (
-            "layout-align-unsupported",
-            bool(problem.align),
-            lambda it: it.align,
-            "put neurons on one line (layout.align)",
-        ),
-        (
-            "layout-plan-unsupported",
-            bool(problem.plan),
-            lambda it: it.plan,
-            "put cells in rows and columns (layout.plan)",
-        ),
-        (
-            "layout-memory-unsupported",
-            problem.memory is not None,
-            lambda it: it.memory,
-            "remember a layout (layout.file)",
-        ),
-        (
-            "layout-direction-unsupported",
-            problem.direction != "down",
-            lambda it: it.direction,
-            "draw in another direction",
-        ),
-    )
-    for code, needed, does, words in asked:
-        if needed and not does(can):
-            hint = they_can(engines_that(does))
-            raise LayoutRefusalError(code, f"the engine '{name}' cannot {words}", hint)
+    for code, ability, needed, words in (
+        ("layout-pins-unsupported", "pins", problem.pins, "keep pinned positions (layout.positions)"),
+        ("layout-arrange-unsupported", "arrange", problem.arrange, "arrange groups (layout.arrange)"),
+        ("layout-boxes-unsupported", "boxes", problem.boxes, "keep the members of a box together"),
+        ("layout-mirror-unsupported", "mirrors", problem.mirrors, "draw mirror images (layout.mirror)"),
+        ("layout-align-unsupported", "align", problem.align, "put neurons on one line (layout.align)"),
+        ("layout-plan-unsupported", "plan", problem.plan, "put cells in rows and columns (layout.plan)"),
+        ("layout-memory-unsupported", "memory", problem.memory is not None, "remember a layout (layout.file)"),
+        ("layout-direction-unsupported", "direction", problem.direction != "down", "draw in another direction"),
+    ):
+        able = attrgetter(ability)
+        if needed and not able(can):
+            raise LayoutRefusalError(code, f"the engine '{name}' cannot {words}", they_can(engines_that(able)))
     _refuse_contradictions(problem)
     _refuse_close_pins(problem)
 

@@ -45,7 +45,7 @@ from neurovis_spec.scene.line_labels import line_labels
 from neurovis_spec.scene.lines import Line, routes_of, trimmed
 from neurovis_spec.scene.model import Arrowhead, Group, Rectangle, Shape, Spline, Text, Theme, head_half_width
 from neurovis_spec.scene.obstacles import Obstacles
-from neurovis_spec.scene.scaling import at, scaled_group, scaled_label, scaled_line, scaled_rectangle, scaled_text
+from neurovis_spec.scene.scaling import scaled, scaled_group
 from neurovis_spec.scene.shown import Shown, shown
 from neurovis_spec.scene.spots import beyond
 from neurovis_spec.scene.teachers import Teacher, dash, dotted, fewer, label_of, room_of, teachers_of
@@ -100,7 +100,7 @@ class Plan:
         """The line under the title, if there is one."""
         if not self.captioned:
             return None
-        return scaled_text(caption_text(words, self.frame.width / self.unit, self.theme), self.unit)
+        return scaled(caption_text(words, self.frame.width / self.unit, self.theme), self.unit)
 
 
 def plan(
@@ -296,10 +296,10 @@ def _in_user_units(made: Plan, unit: float) -> Plan:
         frame=made.frame.times(unit),
         radii=tuple(unit * radius for radius in made.radii),
         rings=tuple(unit * ring for ring in made.rings),
-        centres=tuple(at(centre, unit) for centre in made.centres),
-        lines={index: scaled_line(line, unit) for index, line in made.lines.items()},
-        beads={index: scaled_rectangle(bead, unit) for index, bead in made.beads.items()},
-        labels=tuple(scaled_label(label, unit) for label in made.labels),
+        centres=tuple((unit * x, unit * y) for x, y in made.centres),
+        lines={index: scaled(line, unit) for index, line in made.lines.items()},
+        beads={index: scaled(bead, unit) for index, bead in made.beads.items()},
+        labels=tuple(label and scaled(label, unit) for label in made.labels),
         back=tuple(scaled_group(group, unit) for group in made.back),
         front=tuple(scaled_group(group, unit) for group in made.front),
         unit=unit,

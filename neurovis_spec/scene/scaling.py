@@ -1,62 +1,37 @@
 """Scaling: shapes in other units, the same picture.
 
-In: shapes in page units, how many user units each of these is. Out: the same shapes in user units. Nothing is drawn
-larger for it: a picture has as many pixels fewer for each unit.
+In: shapes, lines or labels in page units, how many user units each of these is. Out: the same in user units. Nothing is
+drawn larger for it: a picture has as many pixels fewer for each unit. What is a length or a place is known by the name
+of its field, as all of these call the same things alike.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
-from neurovis_spec.layout.model import Point
-from neurovis_spec.scene.labels import Label
-from neurovis_spec.scene.lines import Line
-from neurovis_spec.scene.model import Arrowhead, Disc, Group, Image, Polyline, Ramp, Rectangle, Shape, Spline, Text
+from neurovis_spec.scene.model import Group
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
-def scaled(shape: Shape, by: float) -> Shape:
-    """A shape with all its lengths multiplied."""
-    match shape:
-        case Disc():
-            return replace(
-                shape, centre=at(shape.centre, by), radius=by * shape.radius, stroke_width=by * shape.stroke_width
-            )
-        case Spline():
-            points, dash = tuple(at(point, by) for point in shape.points), tuple(by * part for part in shape.dash)
-            return replace(shape, points=points, width=by * shape.width, dash=dash)
-        case Polyline():
-            return replace(shape, points=tuple(at(point, by) for point in shape.points), width=by * shape.width)
-        case Arrowhead():
-            return replace(
-                shape,
-                tip=at(shape.tip, by),
-                length=by * shape.length,
-                half_width=by * shape.half_width,
-                width=by * shape.width,
-            )
-        case Rectangle():
-            return scaled_rectangle(shape, by)
-        case Ramp() | Image():
-            return replace(shape, corner=at(shape.corner, by), width=by * shape.width, height=by * shape.height)
-        case Text():
-            return scaled_text(shape, by)
+Scaled = TypeVar("Scaled", bound="DataclassInstance")
+#: A length, a place, or several of either.
+_Extent: TypeAlias = "float | tuple[_Extent, ...]"
+
+_LENGTHS = {"radius", "width", "height", "length", "half_width", "stroke_width", "size", "head", "dash"}
+_MEASURED = _LENGTHS | {"centre", "corner", "point", "points", "tip"}
 
 
-def scaled_rectangle(shape: Rectangle, by: float) -> Rectangle:
-    """A rectangle with all its lengths multiplied."""
-    return replace(
-        shape,
-        corner=at(shape.corner, by),
-        width=by * shape.width,
-        height=by * shape.height,
-        radius=by * shape.radius,
-        stroke_width=by * shape.stroke_width,
-    )
+def scaled(thing: Scaled, by: float) -> Scaled:
+    """A shape, a line or a label with all its lengths multiplied.
 
-
-def scaled_text(text: Text, by: float) -> Text:
-    """A text with all its lengths multiplied."""
-    return replace(text, point=at(text.point, by), size=by * text.size)
+    >>> from neurovis_spec.scene.model import Disc
+    >>> scaled(Disc((1.0, 2.0), 3.0, "#000000", "#ffffff", 0.5), 2.0)
+    Disc(centre=(2.0, 4.0), radius=6.0, fill='#000000', stroke='#ffffff', stroke_width=1.0)
+    """
+    measured = (field.name for field in fields(thing) if field.name in _MEASURED)
+    return replace(thing, **{name: _times(getattr(thing, name), by) for name in measured})
 
 
 def scaled_group(group: Group, by: float) -> Group:
@@ -64,16 +39,6 @@ def scaled_group(group: Group, by: float) -> Group:
     return replace(group, shapes=tuple(scaled(shape, by) for shape in group.shapes))
 
 
-def scaled_line(line: Line, by: float) -> Line:
-    """A line with all its lengths multiplied."""
-    return Line(tuple(at(point, by) for point in line.points), at(line.tip, by), line.direction, by * line.head)
-
-
-def scaled_label(label: Label | None, by: float) -> Label | None:
-    """A label with all its lengths multiplied."""
-    return None if label is None else replace(label, point=at(label.point, by), size=by * label.size)
-
-
-def at(point: Point, by: float) -> Point:
-    """A point so many times as far from the origin."""
-    return by * point[0], by * point[1]
+def _times(extent: _Extent, by: float) -> _Extent:
+    """A length multiplied, or a place so many times as far from the origin."""
+    return tuple(_times(part, by) for part in extent) if isinstance(extent, tuple) else by * extent

@@ -90,7 +90,7 @@ class Portion:
             Fragments(self.strokes.owners, self.strokes.pixels, widths),
             Fragments(self.heads.owners, self.heads.pixels, wedges),
         ]
-        found = coverage.joined(parts)
+        found = coverage.joined(parts, coverage.NOTHING)
         return found.only(found.shares > LEAST)
 
 

@@ -7,7 +7,8 @@ pixel that the shape covers. Shares are computed from where edges run, never by 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -30,65 +31,52 @@ _CORNER = 0.9
 
 
 @dataclass(frozen=True, slots=True)
-class Fragments:
-    """``owners[k]`` covers ``shares[k]`` of pixel ``pixels[k]`` (numbered row by row)."""
+class Rows:
+    """Columns of one length, of which the k-th elements belong together: arrays (n,) or (n, 2)."""
 
     owners: IntArray
-    pixels: IntArray
-    shares: Numbers
 
     def __len__(self) -> int:
-        return len(self.pixels)
+        return len(self.owners)
 
-    def only(self, chosen: BoolArray | IntArray) -> Fragments:
+    def only(self, chosen: BoolArray | IntArray | slice) -> Self:
         """Some of them."""
-        return Fragments(self.owners[chosen], self.pixels[chosen], self.shares[chosen])
+        return type(self)(*(getattr(self, column.name)[chosen] for column in fields(self)))
+
+
+@dataclass(frozen=True, slots=True)
+class Fragments(Rows):
+    """``owners[k]`` covers ``shares[k]`` of pixel ``pixels[k]`` (numbered row by row)."""
+
+    pixels: IntArray
+    shares: Numbers
 
 
 _NOWHERE: IntArray = np.empty(0, np.int64)
 _NO_NUMBERS: Numbers = np.empty(0, np.float32)
 NOTHING = Fragments(_NOWHERE, _NOWHERE, _NO_NUMBERS)
+SomeRows = TypeVar("SomeRows", bound=Rows)
 
 
-def joined(parts: Sequence[Fragments]) -> Fragments:
-    """All of several."""
+def joined(parts: Sequence[SomeRows], none: SomeRows) -> SomeRows:
+    """All of several; ``none`` where there is nothing."""
     if len(parts) < 2:
-        return parts[0] if parts else NOTHING
-    return Fragments(
-        np.concatenate([part.owners for part in parts]),
-        np.concatenate([part.pixels for part in parts]),
-        np.concatenate([part.shares for part in parts]),
-    )
+        return parts[0] if parts else none
+    return type(none)(*(np.concatenate([getattr(part, column.name) for part in parts]) for column in fields(none)))
 
 
 @dataclass(frozen=True, slots=True)
-class Pieces:
-    """Straight pieces of curves: where each starts and ends (n, 2), the number of its curve, whether it is the first or
+class Pieces(Rows):
+    """Straight pieces of curves: the number of its curve, where each starts and ends (n, 2), whether it is the first or
     the last of it, and how it meets the pieces before and after it."""
 
     starts: FloatArray
     ends: FloatArray
-    owners: IntArray
     first: BoolArray
     last: BoolArray
     #: 0 where the next piece goes on, 1 where it is drawn by rows rather than columns or the other way, 2 at a corner
     before: npt.NDArray[np.int8]
     after: npt.NDArray[np.int8]
-
-    def __len__(self) -> int:
-        return len(self.owners)
-
-    def only(self, chosen: BoolArray | slice) -> Pieces:
-        """Some of them."""
-        return Pieces(
-            self.starts[chosen],
-            self.ends[chosen],
-            self.owners[chosen],
-            self.first[chosen],
-            self.last[chosen],
-            self.before[chosen],
-            self.after[chosen],
-        )
 
 
 def flatten(points: FloatArray, begins: IntArray) -> Pieces:
@@ -142,38 +130,22 @@ def _met(starts: FloatArray, ends: FloatArray, owners: IntArray) -> Pieces:
     first[1:], last[:-1] = ~same, ~same
     before, after = np.zeros(len(owners), np.int8), np.zeros(len(owners), np.int8)
     before[1:], after[:-1] = how, how
-    return Pieces(starts, ends, owners, first, last, before, after)
+    return Pieces(owners, starts, ends, first, last, before, after)
 
 
 @dataclass(frozen=True, slots=True)
-class Strokes:
+class Strokes(Rows):
     """Where strokes run over pixels: the curve, the pixel, how far its centre lies beside the middle of the stroke,
     counted along its column (or row, where the stroke is steep); by the piece: how fast that changes from column to
     column, and how much longer a way across is along the column; what share of the pixel lies before the ends; and how
     far it is from the end of its piece, where it lies beyond and another piece follows."""
 
-    owners: IntArray
     pixels: IntArray
     beside: Numbers
     slopes: Numbers
     secants: Numbers
     within: Numbers
     beyond: Numbers
-
-    def __len__(self) -> int:
-        return len(self.pixels)
-
-    def only(self, chosen: BoolArray | IntArray) -> Strokes:
-        """Some of them."""
-        return Strokes(
-            self.owners[chosen],
-            self.pixels[chosen],
-            self.beside[chosen],
-            self.slopes[chosen],
-            self.secants[chosen],
-            self.within[chosen],
-            self.beyond[chosen],
-        )
 
     def shares(self, halves: Numbers) -> Numbers:
         """What strokes cover of their pixels if they are so wide, (n,) half widths."""
@@ -350,21 +322,13 @@ def _line(away: FloatArray, half: FloatArray | float) -> FloatArray:
 
 
 @dataclass(frozen=True, slots=True)
-class Heads:
+class Heads(Rows):
     """Where heads of lines lie over pixels: the head, the pixel, and how far its centre lies behind the tip and beside
     the middle."""
 
-    owners: IntArray
     pixels: IntArray
     behind: Numbers
     beside: Numbers
-
-    def __len__(self) -> int:
-        return len(self.pixels)
-
-    def only(self, chosen: BoolArray | IntArray) -> Heads:
-        """Some of them."""
-        return Heads(self.owners[chosen], self.pixels[chosen], self.behind[chosen], self.beside[chosen])
 
     def shares(self, lengths: Numbers, halves: Numbers, stems: Numbers) -> Numbers:
         """What heads cover of their pixels if they are so long and so wide, (n,) half widths: arrows, and where
@@ -409,27 +373,8 @@ def heads(tips: FloatArray, ways: FloatArray, lengths: FloatArray, halves: Float
     return Heads(which, pixels, -(x * dx + y * dy).astype(np.float32), np.abs(x * dy - y * dx).astype(np.float32))
 
 
-def all_heads(parts: Sequence[Heads]) -> Heads:
-    """Those of several."""
-    return Heads(
-        np.concatenate([_NOWHERE, *(part.owners for part in parts)]),
-        np.concatenate([_NOWHERE, *(part.pixels for part in parts)]),
-        np.concatenate([_NO_NUMBERS, *(part.behind for part in parts)]),
-        np.concatenate([_NO_NUMBERS, *(part.beside for part in parts)]),
-    )
-
-
-def all_strokes(parts: Sequence[Strokes]) -> Strokes:
-    """Those of several."""
-    return Strokes(
-        np.concatenate([_NOWHERE, *(part.owners for part in parts)]),
-        np.concatenate([_NOWHERE, *(part.pixels for part in parts)]),
-        np.concatenate([_NO_NUMBERS, *(part.beside for part in parts)]),
-        np.concatenate([_NO_NUMBERS, *(part.slopes for part in parts)]),
-        np.concatenate([_NO_NUMBERS, *(part.secants for part in parts)]),
-        np.concatenate([_NO_NUMBERS, *(part.within for part in parts)]),
-        np.concatenate([_NO_NUMBERS, *(part.beyond for part in parts)]),
-    )
+NO_STROKES = Strokes(_NOWHERE, _NOWHERE, *[_NO_NUMBERS] * 5)
+NO_HEADS = Heads(_NOWHERE, _NOWHERE, _NO_NUMBERS, _NO_NUMBERS)
 
 
 def rectangle(corner: Point, extent: Point, radius: float, size: Size) -> Fragments:

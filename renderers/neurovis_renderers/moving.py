@@ -258,15 +258,15 @@ def _gathered(moving: Moving, top: int, size: Size) -> tuple[Fragments, Strokes,
         count += len(still[-1]) + len(strokes[-1]) + len(heads[-1])
         if count > MOST_KEPT:
             raise TooDeepError
-    lines, ends = coverage.all_strokes(strokes), coverage.all_heads(heads)
-    fixed = coverage.joined(still)
+    lines, ends = coverage.joined(strokes, coverage.NO_STROKES), coverage.joined(heads, coverage.NO_HEADS)
+    fixed = coverage.joined(still, coverage.NOTHING)
     wide = [
         Fragments(lines.owners, lines.pixels, widest.stroke_shares(lines)),
         Fragments(ends.owners, ends.pixels, widest.head_shares(ends)),
         fixed,
     ]
     narrow = [narrowest.stroke_shares(lines), narrowest.head_shares(ends), fixed.shares]
-    return coverage.joined(wide), lines, ends, np.concatenate(narrow)
+    return coverage.joined(wide, coverage.NOTHING), lines, ends, np.concatenate(narrow)
 
 
 def _sorted_out(
@@ -448,6 +448,6 @@ class _Painted:
         for end, at in band.slots(numbers[places]):
             parts.append(Fragments(band.owners[at], places[:end], self._shares[at]))
             paints.append(colours[band.owners[at]])
-        stack.add(coverage.joined(parts), np.concatenate(paints), front)
+        stack.add(coverage.joined(parts, coverage.NOTHING), np.concatenate(paints), front)
         result: IntArray = stack.sums + stack.left.astype(np.int64) * band.behind[pixels]
         return result

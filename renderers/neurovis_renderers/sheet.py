@@ -275,7 +275,7 @@ class Sheet:
         for place, end, shape in self._others:
             if place < high and end > low:
                 found += [_owned(part, place + number) for number, part in enumerate(self._other(shape, top, size))]
-        made = coverage.joined(found)
+        made = coverage.joined(found, coverage.NOTHING)
         return made.only((made.owners >= low) & (made.owners < high))
 
     def _other(self, shape: Shape, top: int, size: Size) -> list[Fragments]:

@@ -2,8 +2,9 @@
 
 In: a LayoutProblem. Out: a Layout, or what would be refused. After Sugiyama, Tagawa and Toda (1981), frame by frame
 from the inside out (``hierarchy``); in a frame units and blocks (``units``), what shares a rank (``same_rank``),
-components, ranks, order, places (``component_layout``), pins (``pinning``), routes (``frame_routing``). Every stage is
-deterministic and computes in plain IEEE arithmetic, so the result is the same everywhere.
+components (``components``), their ranks, order and places (``component_layout``), pins (``pinning``), routes
+(``frame_routing``). Every stage is deterministic and computes in plain IEEE arithmetic, so the result is the same
+everywhere.
 """
 
 from __future__ import annotations
