@@ -93,13 +93,13 @@ def extremes() -> list[LayoutProblem]:
     many = members("N", 5000)
     places = {name: (float(i), 0.0) for i, name in enumerate(many)}
     chain = NamedProblem("chain", many, [("N", many)], named(pairwise(many)), places=places).canonical()
-    paths = [".".join(f"a{i}" for i in range(depth + 1)) for depth in range(40)]
+    paths = [".".join(f"a{i}" for i in range(depth + 1)) for depth in range(20)]
     deepest = [f"{path}.X" for path in paths]
     modules = [(path, "m") for path in paths]
     deep = NamedProblem(
         "deep", deepest, [(n, [n]) for n in deepest], named(pairwise(deepest)), modules=modules
     ).canonical()
-    few = members("N", 150)
+    few = members("N", 80)
     loose = NamedProblem("loose", few, places=dict.fromkeys(few, (1.0, 1.0))).canonical()
     pairs = NamedProblem("pairs", few, edges=named(zip(few[::2], few[1::2], strict=True))).canonical()
     star = NamedProblem("star", few, edges=named((few[0], name) for name in few)).canonical()

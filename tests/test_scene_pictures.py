@@ -152,14 +152,14 @@ def test_hard_networks_touch_nothing_they_should_not(name: str) -> None:
     check(hard(name).scene)
 
 
-@settings(max_examples=50)
+@settings(max_examples=15)
 @given(specs())
 def test_any_network_touches_nothing_it_should_not(spec: Spec) -> None:
     check(drawn(nv.compile_text(json.dumps(spec)), step=2).scene)
 
 
 def test_no_line_runs_over_a_foreign_neuron(example: Drawn) -> None:
-    found = example.network.layout().metrics()
+    found = example.network.drawn().metrics()
     assert found["edges_over_neurons"] == 0
     assert found["overlaps"] == 0
 
