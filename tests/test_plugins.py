@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from plugged import call, plugged
 
 from neurovis_spec import plugins
 from neurovis_spec.likeness import nearest
@@ -16,7 +15,7 @@ SPEC = "neurovis: 1\nname: x\nneurons: {A: {}}\n"
 
 
 @pytest.fixture
-def site(tmp_path: Path) -> Path:
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     info = tmp_path / "broken-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n", encoding="utf-8")
@@ -27,36 +26,30 @@ def site(tmp_path: Path) -> Path:
     (info / "entry_points.txt").write_text(points, encoding="utf-8")
     (tmp_path / "broken_plugin.py").write_text("import a_library_that_nobody_has\n", encoding="utf-8")
     (tmp_path / "x.yaml").write_text(SPEC, encoding="utf-8")
-    return tmp_path
-
-
-def call(site: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(site), os.environ.get("PYTHONPATH", "")])}
-    command = [sys.executable, "-m", "neurovis_spec", *arguments]
-    return subprocess.run(command, cwd=site, capture_output=True, text=True, env=environment)
+    with plugged(tmp_path, monkeypatch):
+        yield tmp_path
 
 
 @pytest.mark.parametrize(
     "arguments", [("layout", "x.yaml", "--engine", "a_broken"), ("run", "x.yaml", "--backend", "a_broken")]
 )
 def test_asked_for_it_is_an_error_that_names_it(site: Path, arguments: tuple[str, ...]) -> None:
-    done = call(site, *arguments)
-    assert done.returncode == 1
-    assert "Traceback" not in done.stderr
+    done = call(*arguments)
+    assert done.exit_code == 1
     assert "a_broken" in done.stderr
     assert "a_library_that_nobody_has" in done.stderr
 
 
 @pytest.mark.parametrize("arguments", [("render", "x.yaml", "-o", "x.svg"), ("run", "x.yaml", "-o", "x.npz")])
 def test_not_asked_for_it_is_passed_over(site: Path, arguments: tuple[str, ...]) -> None:
-    done = call(site, *arguments)
-    assert done.returncode == 0
+    done = call(*arguments)
+    assert done.exit_code == 0
     assert (site / arguments[-1]).stat().st_size > 0
 
 
 def test_in_the_list_of_backends_it_is_unavailable(site: Path) -> None:
-    done = call(site, "run", "--backend", "list")
-    assert done.returncode == 0
+    done = call("run", "--backend", "list")
+    assert done.exit_code == 0
     assert "a_broken unavailable: " in done.stdout
     assert "numpy available" in done.stdout
 
