@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 import gallery
-import neurovis_spec as nv
 from neurovis_spec.runtime.backend import DEFAULT
 
 HERE = Path(__file__).parent.parent
@@ -68,7 +67,7 @@ def test_every_network_stands_beside_dots_drawing_of_it() -> None:
 
 @pytest.mark.parametrize(("name", "row"), [(ours, row) for ours, _, row in BESIDE], ids=lambda part: part.split()[0])
 def test_the_measures_on_the_page_are_those_of_the_layout(name: str, row: str) -> None:
-    found = nv.compile(HERE / "specs" / f"{SPECS[name]}.yaml").layout().metrics()
+    found = gallery.compiled(SPECS[name]).drawn().metrics()
     crossings, over, overlaps, flow, area = (float(part.replace(",", "")) for part in row.split("|"))
     assert (crossings, over, overlaps) == (found["crossings"], found["edges_over_neurons"], found["overlaps"])
     assert (over, overlaps) == (0, 0)
@@ -92,7 +91,22 @@ def test_the_words_on_the_page_are_those_of_the_gallery() -> None:
     assert "\n\n".join([*gallery.shown(), ""]) == FIRST
 
 
-@pytest.mark.parametrize("picture", [*gallery.PICTURES, *THEMED], ids=lambda picture: picture.name)
+@pytest.mark.parametrize("picture", THEMED, ids=lambda picture: picture.name)
+def test_in_other_themes_only_colours_are_others(picture: gallery.Picture) -> None:
+    """So these need not be drawn here to know that they are not old, but for some, which show the colours."""
+
+    def told(name: str) -> str:
+        return gallery.untold((PICTURES / f"{name}.svg").read_text(encoding="utf-8"))
+
+    own = [re.sub(r"#[0-9a-f]{6}\b", "#", told(name)) for name in (picture.name, picture.name[7:].rpartition("_")[0])]
+    assert own[0] == own[1]
+
+
+@pytest.mark.parametrize(
+    "picture",
+    [*gallery.PICTURES, *(one for one in THEMED if one.spec in ("cpg_rbf", "hebbian", "mlp"))],
+    ids=lambda picture: picture.name,
+)
 def test_what_is_committed_is_what_is_drawn(
     picture: gallery.Picture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
