@@ -18,15 +18,15 @@ from typing import TypeAlias
 
 import numpy as np
 import pytest
+from examples import EXAMPLES, shipped
 from scenes import file_of, scene_of
 
-import neurovis_spec as nv
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.program import ACTIVATION, MODEL, Definition, Population, Projection
 from neurovis_spec.scene import Scene
 
 HERE = Path(__file__).parent
-SPECS = sorted([*(HERE.parent / "specs").glob("*.yaml"), *(HERE.parent / "specs").glob("*/*.yaml")])
+SPECS = EXAMPLES
 #: specs whose scene is pinned: of the others a change of the layout would change thousands of lines and say no more
 SMALL = [path for path in SPECS if path.stem != "hexapod"]
 #: the step that the scene shows
@@ -148,7 +148,7 @@ def compare(path: Path, value: Plain, update: bool) -> None:
 
 @pytest.fixture(scope="module", params=SPECS, ids=lambda path: path.stem)
 def compiled(request: pytest.FixtureRequest) -> CompiledNetwork:
-    return nv.compile(request.param)
+    return shipped(request.param)
 
 
 def test_every_spec_says_what_to_look_at() -> None:
@@ -162,7 +162,7 @@ def test_network(compiled: CompiledNetwork, update_golden: bool) -> None:
 
 
 def test_layout(compiled: CompiledNetwork, update_golden: bool) -> None:
-    layout = compiled.layout()
+    layout = compiled.drawn()
     value = {"positions": plain(layout.positions), "routes": plain(layout.routes)}
     compare(HERE / "golden" / compiled.name / f"layout.{layout.engine}.json", value, update_golden)
 

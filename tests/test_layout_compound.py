@@ -103,7 +103,7 @@ def attempt(problem: LayoutProblem) -> tuple[Layout | None, str]:
         return None, refusal.code
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(problem=walkers())
 def test_instances_of_one_make_are_one_drawing(problem: LayoutProblem) -> None:
     layout = suite.check(problem, "layered")
@@ -119,7 +119,7 @@ def test_instances_of_one_make_are_one_drawing(problem: LayoutProblem) -> None:
         assert (first, ours) == (second, theirs) or (reflected(first, axis), turned) == (second, theirs)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(problem=walkers(mirrored=True))
 def test_mirror_images_are_exact(problem: LayoutProblem) -> None:
     layout = lay_out_problem(problem, "layered")
@@ -129,7 +129,7 @@ def test_mirror_images_are_exact(problem: LayoutProblem) -> None:
     assert metrics(layout, problem)["symmetry"] == 1
 
 
-@settings(max_examples=70, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(problem=walkers(pinned=True))
 def test_pins_hold_and_everything_else_gives_way(problem: LayoutProblem) -> None:
     layout, refusal = attempt(problem)

@@ -214,7 +214,7 @@ def check_pins(problem: LayoutProblem, layout: Layout) -> None:
     assert all(len(alike) == 1 for alike in shapes.values())
 
 
-@settings(max_examples=80, deadline=None, derandomize=True)
+@settings(max_examples=30, deadline=None, derandomize=True)
 @given(problem=walkers(most=1))
 def test_everything_gives_way_to_one_pin(problem: LayoutProblem) -> None:
     layout = lay_out_problem(problem, "layered")
@@ -223,7 +223,7 @@ def test_everything_gives_way_to_one_pin(problem: LayoutProblem) -> None:
     assert not suite.frames_meet(layout, problem)
 
 
-@settings(max_examples=70, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None, derandomize=True)
 @given(problem=walkers(most=4))
 def test_pins_are_kept_and_what_they_put_on_each_other_is_told(problem: LayoutProblem) -> None:
     layout, refusal = attempt(problem)

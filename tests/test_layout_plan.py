@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import layout_conformance as suite
 import pytest
+from examples import SPECS, shipped
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -226,9 +227,8 @@ def test_a_module_may_plan_the_frame_of_its_instances() -> None:
 
 @pytest.mark.parametrize("network", ["body", "hexapod"])
 def test_the_promises_of_the_engine_hold(network: str) -> None:
-    compiled = body() if network == "body" else nv.compile("specs/hexapod/hexapod.yaml")
-    problem = problem_of(compiled.network)
-    layout = lay_out_problem(problem, "layered")
+    compiled = body() if network == "body" else shipped(SPECS / "hexapod" / "hexapod.yaml")
+    problem, layout = problem_of(compiled.network), compiled.drawn("layered").value
     suite.check_positions(problem, layout)
     suite.check_routes(problem, layout)
     assert not suite.frames_meet(layout, problem)

@@ -9,6 +9,7 @@ from pathlib import Path
 import layout_conformance as suite
 import numpy as np
 import pytest
+from examples import shipped
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from neurovis_layouts.routing import Surroundings, detours, route_all
@@ -74,11 +75,10 @@ def check(layout: Layout, problem: LayoutProblem) -> None:
 
 @pytest.mark.parametrize("path", SPECS, ids=lambda path: path.stem)
 def test_no_route_of_a_shipped_spec_runs_through_a_foreign_frame(path: Path) -> None:
-    problem = problem_of(nv.compile(path).network)
-    check(lay_out_problem(problem, "layered"), problem)
+    check(shipped(path).drawn("layered").value, problem_of(shipped(path).network))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(problem=bodies())
 def test_no_route_runs_through_a_foreign_frame(problem: LayoutProblem) -> None:
     layout = suite.check(problem, "layered")
@@ -86,13 +86,13 @@ def test_no_route_runs_through_a_foreign_frame(problem: LayoutProblem) -> None:
     check(layout, problem)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(problem=bodies(named=True))
 def test_no_route_runs_through_a_disc_beside_a_long_name(problem: LayoutProblem) -> None:
     check(lay_out_problem(problem, "layered"), problem)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(problem=bodies(pinned=True))
 def test_with_pins_only_what_pins_put_into_each_other_is_run_through(problem: LayoutProblem) -> None:
     layout, _ = attempt(problem)

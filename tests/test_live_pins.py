@@ -7,13 +7,13 @@ import shutil
 from pathlib import Path
 
 import pytest
+from examples import SPECS, shipped
 
 import neurovis_spec as nv
 from neurovis_spec.layout.model import LayoutRefusalError
 from neurovis_spec.live.commands import Into
 from neurovis_spec.live.pins import STEP, Compile, Placed, SavingError, placed, saving
 
-SPECS = Path(__file__).parents[1] / "specs"
 MIRRORED = """neurovis: 1
 name: m   # two halves
 neurons:
@@ -63,7 +63,7 @@ def test_a_mirror_image_follows() -> None:
 
 
 def test_what_is_drawn_alike_stays_alike() -> None:
-    begun = placed(nv.compile(SPECS / "hexapod/hexapod.yaml"))
+    begun = placed(shipped(SPECS / "hexapod" / "hexapod.yaml"))
     put = away(begun, "left1.BC", (0.7, 0.2))
     assert moved(begun, put) == {f"{side}{number}.BC" for side in ("left", "right") for number in (1, 2, 3)}
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from examples import EXAMPLES, shipped
 from hypothesis import HealthCheck, given, settings
 from random_specs import Spec, specs
 
@@ -14,11 +15,8 @@ from neurovis_spec.diagnostics import Findings
 from neurovis_spec.layout.file import parse
 from neurovis_spec.scene.probe import probe_steps
 
-FOLDER = Path(__file__).parent.parent / "specs"
-EXAMPLES = sorted([*FOLDER.glob("*.yaml"), *FOLDER.glob("*/*.yaml")])
 
-
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(specs())
 def test_a_layout_file_reads_back_exactly(spec: Spec) -> None:
     layout = nv.compile(spec).layout()
@@ -30,7 +28,7 @@ def test_a_layout_file_reads_back_exactly(spec: Spec) -> None:
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_a_recording_reads_back_exactly(path: Path, tmp_path: Path) -> None:
-    network = nv.compile(path)
+    network = shipped(path)
     recording = network.run(50)
     recording.save(tmp_path / "run.npz")
     again = nv.load(tmp_path / "run.npz")
@@ -46,7 +44,7 @@ def test_a_recording_reads_back_exactly(path: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_a_step_looks_the_same_run_or_recorded(path: Path, tmp_path: Path) -> None:
     """The gains come from the recording, else from the default run: here these are the same."""
-    network = nv.compile(path)
+    network = shipped(path)
     network.run(max(31, probe_steps(network.network))).save(tmp_path / "run.npz")
     network.render(tmp_path / "recorded.svg", step=30, recording=nv.load(tmp_path / "run.npz"))
     network.render(tmp_path / "run.svg", step=30)
@@ -55,7 +53,7 @@ def test_a_step_looks_the_same_run_or_recorded(path: Path, tmp_path: Path) -> No
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_every_example_becomes_every_kind_of_picture(path: Path, tmp_path: Path) -> None:
-    network = nv.compile(path)
+    network = shipped(path)
     for name in ("still.svg", "still.png"):
         network.render(tmp_path / name, step=5)
     network.animate(tmp_path / "film.svg", steps=8)
@@ -67,7 +65,7 @@ def test_every_example_becomes_every_kind_of_picture(path: Path, tmp_path: Path)
 
 
 def test_going_on_from_a_recording_keeps_what_was_learned(tmp_path: Path) -> None:
-    network = nv.compile(EXAMPLES[[path.stem for path in EXAMPLES].index("cpg_rbf")])
+    network = shipped(EXAMPLES[[path.stem for path in EXAMPLES].index("cpg_rbf")])
     first = network.run(6_000)
     first.save(tmp_path / "first.npz")
     second = network.run(1, start=nv.load(tmp_path / "first.npz"))

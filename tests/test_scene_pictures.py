@@ -7,11 +7,11 @@ import json
 import math
 import warnings
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pytest
+from examples import EXAMPLES, shipped
 from hypothesis import given, settings
 from random_specs import Spec, specs
 from scenes import scene_of
@@ -25,8 +25,6 @@ from neurovis_spec.scene.obstacles import Obstacles
 from neurovis_spec.scene.themes import THEMES
 from neurovis_spec.scene.titles import Titled, elsewhere, in_one_place, outline
 
-SPECS = Path(__file__).parent.parent / "specs"
-EXAMPLES = [*sorted(SPECS.glob("*.yaml")), SPECS / "hexapod" / "hexapod.yaml"]
 NETWORKS = {
     "long names": """
 neurons:
@@ -86,7 +84,7 @@ def drawn(network: nv.CompiledNetwork, step: int = 20) -> Drawn:
 
 @pytest.fixture(scope="module", params=EXAMPLES, ids=lambda path: path.stem)
 def example(request: pytest.FixtureRequest) -> Drawn:
-    return drawn(nv.compile(request.param))
+    return drawn(shipped(request.param))
 
 
 def hard(name: str) -> Drawn:

@@ -19,6 +19,8 @@ from neurovis_spec.cli.commands import neurovis
 
 HERE = Path(__file__).parent
 SPECS = sorted((HERE.parent / "specs").glob("**/*.yaml"))
+#: libyaml's reads as PyYAML's own does, ten times as fast; it is in the wheels of PyYAML.
+LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 SCHEMA = api.schema()
 INCLUDED = api.schema(included=True)
 VALIDATOR = Draft202012Validator(SCHEMA)
@@ -34,7 +36,7 @@ ELSEWHERE = ("wrong_type_bool", "no_value", "centre_useless", "empty_reference")
 
 
 def messages(text: str) -> list[str]:
-    return [error.message for error in VALIDATOR.iter_errors(yaml.safe_load(text))]
+    return [error.message for error in VALIDATOR.iter_errors(yaml.load(text, LOADER))]
 
 
 def test_it_is_a_schema() -> None:
@@ -252,7 +254,7 @@ def test_schema_and_compiler_agree(part: int) -> None:
     rich = cast(hostile.Data, yaml.safe_load(hostile.RICH))
     for number, path in enumerate(hostile.paths(rich)):
         for other, (name, wrong) in enumerate(hostile.WRONG.items()):
-            if (number + other) % 60 != 20 * part + 3 or name == "huge":  # PyYAML takes 1e300 for a text
+            if (number + other) % 120 != 40 * part + 3 or name == "huge":  # PyYAML takes 1e300 for a text
                 continue
             text = hostile.replaced(rich, path, wrong)
             refused, codes = bool(messages(text)), errors(text)
