@@ -5,6 +5,7 @@
 #   make test       every check that needs Python alone
 #   make gallery    draws the examples into docs/pictures and writes docs/gallery.md; needs graphviz' dot
 #   make test-all   what needs Chromium, graphviz' dot, gcc and g++, node, or starts a cluster, and test-ros; fails without
+#   make test-browsers, test-compilers   the parts of it that need Chromium and node, and the others but for ROS
 #   make test-ros   the tests with ROS: ROS 1 of Debian, and ROS 2 (Kilted, Jazzy) as wheels, installed into .ros
 #   make test-lowest   every command once, with the oldest packages that pyproject.toml allows, in .pythons/lowest
 #   make test-pythons  every command once with Python 3.13, and the tests of reading with it and /usr/bin/python3
@@ -24,9 +25,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 NPM := npm --no-audit --no-fund --no-package-lock --loglevel=error
-ELSEWHERE := browser or dot or compiler or cluster or node
+BROWSERS := browser or node
+COMPILERS := dot or compiler or cluster
 
-.PHONY: help install demo walk gallery test test-all test-elsewhere test-ros test-lowest test-pythons test-3.13 test-system needs needs-ros fuzz layouts docs page page-check format clean
+# What is compiled once is kept: else each process that a test starts compiles all of it anew.
+unexport PYTHONDONTWRITEBYTECODE
+
+.PHONY: help install demo walk gallery test test-all test-elsewhere test-browsers test-compilers test-ros test-lowest test-pythons test-3.13 test-system needs needs-ros fuzz layouts docs page page-check format clean
 .DELETE_ON_ERROR:
 
 help:
@@ -68,17 +73,26 @@ walk: $(VENV)/simulated
 gallery: $(VENV)/simulated
 	@$(BIN)/python gallery.py
 
+# Types are checked while the tests run, and told after them. Workers take tests that stand beside each other, which share
+# what is made for a file.
 test: $(VENV)/tested
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python -m pytest -n auto -m "not ($(ELSEWHERE) or ros)" $(PYTEST_ARGS)
+	@$(BIN)/mypy >$(VENV)/types 2>&1 & types=$$!; trap 'kill $$types 2>/dev/null; exit 130' INT TERM HUP; failed=0; \
+	echo '$(BIN)/mypy, beside the tests'; \
+	$(BIN)/python -m pytest -n auto --dist worksteal -m "not ($(BROWSERS) or $(COMPILERS) or ros)" $(PYTEST_ARGS) || failed=1; \
+	wait $$types || failed=1; echo '$(BIN)/mypy'; cat $(VENV)/types; exit $$failed
 
 test-all: test-elsewhere test-ros
 
-test-elsewhere: needs $(VENV)/tested page-check
-	$(BIN)/python -m pytest -m "$(ELSEWHERE)" $(PYTEST_ARGS)
+test-elsewhere: test-browsers test-compilers
+
+test-browsers: needs $(VENV)/tested page-check
+	$(BIN)/python -m pytest -m "$(BROWSERS)" $(PYTEST_ARGS)
+
+test-compilers: needs $(VENV)/tested
+	$(BIN)/python -m pytest -m "($(COMPILERS)) and not ($(BROWSERS))" $(PYTEST_ARGS)
 
 # Each ROS is in an environment of its own, in which NeuroVis is used in place.
 test-ros: needs-ros $(VENV)/tested .ros/one/made .ros/kilted/made .ros/jazzy/made
