@@ -8,7 +8,11 @@ there is more. Run it with ``python benchmarks/work.py``, after a change of what
 - *lines compared with frames*: for a way round 400 of them;
 - *routes*: of connections among boxes that others would stand in, each to be made once;
 - *names compared in full*: with thousands of known ones, where one or all of them are misspelt;
-- *names compared at all*: where 500 are misspelt, of which few get a hint.
+- *names compared at all*: where 500 are misspelt, of which few get a hint;
+- *names gone through*: where 300 inputs are warned of, for one of them;
+- *groups made out*, *formulas looked at*: of a hundred groups that are alike but for numbers;
+- *instances counted*: of more than there may be;
+- *calls of a step*: of a run in array code, in which NumPy makes three of its own, and one checks.
 """
 
 from __future__ import annotations
@@ -17,6 +21,7 @@ import random
 import sys
 from collections.abc import Callable, Iterator
 from difflib import SequenceMatcher
+from pathlib import Path
 from types import FrameType, ModuleType
 from typing import TYPE_CHECKING, NamedTuple
 from unittest import mock
@@ -28,7 +33,11 @@ from neurovis_layouts.routing.detours import Detours
 
 import neurovis_spec as nv
 from neurovis_spec import likeness
+from neurovis_spec.compiler.names import size_estimate
+from neurovis_spec.compiler.neurons.groups import Builder
 from neurovis_spec.diagnostics import MOST_HINTS
+from neurovis_spec.language.expressions import undefined
+from neurovis_spec.language.unknown import Names
 from neurovis_spec.likeness import nearest
 
 if TYPE_CHECKING:
@@ -186,6 +195,39 @@ def hints() -> Iterator[Count]:
         yield Count(f"names compared at all, {what}", found, 2 * MOST_HINTS + 50)
 
 
+def each_of_many() -> Iterator[Count]:
+    """What is the same for many groups, inputs and instances, and for many steps."""
+    text = "inputs:\n" + "".join(f"  s{i}: {{size: 1}}\n" for i in range(300)) + "neurons: {A: {bias: 1}}\n"
+    known = calls(
+        lambda: nv.compile_text(HEAD + text), _of(Names.known, lambda frame: len(frame.f_locals["self"].declared))
+    )
+    yield Count("names gone through for an input", known / 300, 20)
+    text = "".join(f"  A{i}: {{bias: 1}}\n  B{i}: {{activation: tanh, bias: {i}}}\n" for i in range(50))
+    text = f"{HEAD}neurons:\n{text}  C: {{activation: {{leaky_relu: {{slope: 0.5}}}}, bias: 1}}\n"
+    yield Count("groups made out, of 101", calls(lambda: nv.compile_text(text), _of(Builder._made)), 3)
+    yield Count("formulas looked at, of 101 groups", calls(lambda: nv.compile_text(text), _of(undefined.hazards)), 20)
+    rows = "".join(f"  i{i}: {{module: m}}\n" for i in range(400))
+    many = f"modules: {{m: {{neurons: {{A: {{bias: 1}}}}}}}}\ninstances:\n{rows}"
+    with mock.patch.object(size_estimate, "MOST_INSTANCES", 100):
+        found = calls(lambda: refused(many), _of(size_estimate._counted))
+    yield Count("instances counted, of 400 where 100 may be", found, 150)
+    network = nv.compile(Path(__file__).resolve().parent.parent / "specs" / "cpg_rbf.yaml")
+    network.run(1, backend="numpy")
+    few, more = (
+        calls(lambda steps=steps: network.run(steps, backend="numpy"), _of(None))  # type: ignore[misc]
+        for steps in (2560, 5120)
+    )
+    yield Count("calls of a step of array code", (more - few) / 2560, 6)
+
+
+def _of(
+    function: Callable[..., object] | None, weight: Callable[[FrameType], int] = lambda _: 1
+) -> Callable[[FrameType, str], int]:
+    """Calls of one function, or of any that is Python, weighed by their frames."""
+    code = None if function is None else function.__code__
+    return lambda frame, event: weight(frame) if event == "call" and code in (None, frame.f_code) else 0
+
+
 def refused(spec: str) -> None:
     """Compile a spec that is defective."""
     try:
@@ -200,7 +242,7 @@ def main() -> int:
     nv.compile_text(HEAD + "neurons: {A: {bias: 1}}\n").layout()  # whatever is imported does not count
     more = 0
     print("| what | found | at most |\n| --- | --- | --- |")
-    for part in (layouts, ways_round, reflections, routes, names, hints):
+    for part in (layouts, ways_round, reflections, routes, names, hints, each_of_many):
         for what, found, most in part():
             print(f"| {what} | {round(found, 2):,} | {most:,} |{'' if found <= most else ' <- more'}", flush=True)
             more += found > most

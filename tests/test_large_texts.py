@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tracemalloc
-from unittest import mock
 
 import pytest
 from hypothesis import given
@@ -11,10 +10,7 @@ from hypothesis import strategies as st
 
 import neurovis_spec as nv
 from neurovis_spec.compiler.names import size_estimate
-from neurovis_spec.compiler.neurons import groups
 from neurovis_spec.diagnostics import Findings
-from neurovis_spec.language.expressions import undefined
-from neurovis_spec.language.unknown import Names
 from neurovis_spec.language.yaml import brackets, refusals
 from neurovis_spec.language.yaml.reader import read_text
 from neurovis_spec.scene.texts import Cut
@@ -152,7 +148,7 @@ def test_too_many_are_refused_before_memory_is_taken(
     assert item.message == message
 
 
-# Memory and work: counted, as no clock says whether something is done anew for each of many
+# Memory; benchmarks/work.py counts what is done for each of many
 
 
 @pytest.mark.parametrize(("body", "most"), [("{}", 2_300), ("{activation: tanh, bias: 0.1}", 3_800)])
@@ -170,31 +166,13 @@ def test_a_group_takes_little_memory(body: str, most: int) -> None:
     assert (peak(6_000) - peak(2_000)) / 4_000 < most
 
 
-def test_too_many_instances_are_counted_few_times(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_many_instances_are_told_at_the_first_that_is(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(size_estimate, "MOST_INSTANCES", 100)
     rows = "".join(f"  i{i}: {{module: m}}\n" for i in range(400))
     text = f"{HEAD}modules: {{m: {{neurons: {{A: {{bias: 1}}}}}}}}\ninstances:\n{rows}"
-    with (
-        mock.patch.object(size_estimate, "_counted", wraps=size_estimate._counted) as counted,
-        pytest.raises(nv.SpecError) as caught,
-    ):
+    with pytest.raises(nv.SpecError) as caught:
         nv.compile_text(text)
     assert [(item.code, item.span.line) for item in caught.value.diagnostics] == [("too-many", 105)]
-    assert counted.call_count < 150
-
-
-def test_groups_that_are_alike_are_made_out_once() -> None:
-    plain = "".join(f"  A{i}: {{bias: 1}}\n  B{i}: {{activation: tanh, bias: {i}}}\n" for i in range(50))
-    other = "  C: {activation: {leaky_relu: {slope: 0.5}}, bias: 1}\n  D: {model: leaky_integrator, bias: 1}\n"
-    checks = "neurovis_spec.compiler.checks.undefined_operations.hazards"
-    with (
-        mock.patch.object(groups.Builder, "_made", autospec=True, side_effect=groups.Builder._made) as made,
-        mock.patch(checks, wraps=undefined.hazards) as found_out,
-    ):
-        network = nv.compile_text(f"{HEAD}neurons:\n{plain}{other}").network
-    assert made.call_count == 4
-    assert found_out.call_count <= 10
-    assert [group.activation for group in network.neurons.groups[-4:]] == ["identity", "tanh", "leaky_relu", "identity"]
 
 
 def test_an_unknown_activation_is_told_in_every_group() -> None:
@@ -203,16 +181,3 @@ def test_an_unknown_activation_is_told_in_every_group() -> None:
         ("unknown-activation", 3, 50),
         ("unknown-activation", 3, 74),
     ]
-
-
-def test_a_table_of_names_is_not_gone_through_for_each() -> None:
-    seen, known = [0], Names.known
-
-    def counted(names: Names[object]) -> dict[str, object]:
-        seen[0] += len(names.declared)
-        return known(names)
-
-    text = HEAD + "inputs:\n" + "".join(f"  s{i}: {{size: 1}}\n" for i in range(300)) + "neurons: {A: {bias: 1}}\n"
-    with mock.patch.object(Names, "known", autospec=True, side_effect=counted):
-        assert len(nv.compile_text(text).warnings) == 300
-    assert seen[0] < 20 * 300

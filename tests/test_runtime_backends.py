@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -353,29 +352,6 @@ def test_names_of_the_author_never_reach_the_code() -> None:
     text = step_code(network, first_conditions(network).structure).text()
     assert not any(word in text for word in ("__import__", "lambda_", "exec", "import os"))
     assert run(network, 2, "numpy").activity.tolist() == [[3.25], [6.25]]
-
-
-def test_a_recorded_step_of_array_code_calls_little_else() -> None:
-    """What stays the same over many steps is looked up and checked once: a step is its array code, in which NumPy makes
-    three calls of its own, and one check."""
-
-    def calls(steps: int) -> int:
-        found = 0
-
-        def count(frame: object, event: str, argument: object) -> None:
-            nonlocal found
-            found += event == "call"
-
-        sys.setprofile(count)
-        try:
-            record(network, Course(steps, backend="numpy"))
-        finally:
-            sys.setprofile(None)
-        return found
-
-    network = cpg_rbf()
-    calls(1)
-    assert calls(5120) - calls(2560) < 6 * 2560
 
 
 @pytest.mark.parametrize("every", [1, 3])
