@@ -358,7 +358,7 @@ class Writer:
 
 
 @given(specs(), st.integers(0, 2**32), st.sampled_from(["\n", "\r\n"]))
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_formatting_keeps_values_hash_and_comments(spec: Spec, seed: int, end: str) -> None:
     writer = Writer(seed)
     text = writer.document(spec).replace("\n", end)
@@ -438,7 +438,7 @@ _TREES = st.recursive(
     st.integers(2, 9),
     st.sampled_from([10, 80]),
 )
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_any_value_survives(
     tree: dict[str, object], flow: bool | None, style: str | None, indent: int, width: int
 ) -> None:
@@ -483,7 +483,7 @@ def _mutated(seed: int) -> str:
 
 
 @given(st.integers(0, 2**32))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=120, deadline=None)
 def test_whatever_the_reader_takes_is_formatted(seed: int) -> None:
     text = _mutated(seed)
     findings = Findings()
@@ -577,7 +577,7 @@ _SOME_LINES = st.lists(st.sampled_from(["a\n", "b\n", "\n", " a\n", *(f"{n}\n" f
 
 
 @given(_SOME_LINES, _SOME_LINES, st.booleans(), st.sampled_from([1, 10, 300]))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_a_difference_says_how_one_text_becomes_the_other(
     old: list[str], new: list[str], bare: bool, copies: int
 ) -> None:

@@ -131,7 +131,7 @@ layout: {{direction: {direction}, arrange: {{A: row, B: column, C: grid, D: ring
     assert over_discs(lay_out_problem(problem_of(nv.compile_text(text).network), "layered")) == []
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(problem=walkers(mirrored=True))
 def test_arcs_between_images_are_never_on_each_other(problem: LayoutProblem) -> None:
     layout, _ = attempt(problem)

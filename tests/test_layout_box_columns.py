@@ -119,7 +119,7 @@ def built(problem: LayoutProblem, rank: list[int], units: list[Unit]) -> tuple[L
     return (levels, order or [], columns)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(cases())
 def test_what_hangs_together_is_on_one_side_of_a_column(case: tuple[LayoutProblem, list[int], list[Unit]]) -> None:
     levels, order, columns = built(*case)
@@ -138,7 +138,7 @@ def test_what_hangs_together_is_on_one_side_of_a_column(case: tuple[LayoutProble
                 assert None in ends or ends[0] == ends[1]
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(cases(), st.lists(st.floats(-20, 20), min_size=60, max_size=60))
 def test_strips_keep_every_distance(case: tuple[LayoutProblem, list[int], list[Unit]], wishes: list[float]) -> None:
     levels, order, columns = built(*case)

@@ -88,7 +88,7 @@ def test_a_new_connection_arrives_where_no_old_one_leaves() -> None:
     assert min(meetings(later.value, problem_of(network.network), 8)) >= (0.12,)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(problem=st.one_of(suite.problems(), walkers(mirrored=True)))
 def test_where_ends_are_few_none_arrives_where_another_leaves(problem: LayoutProblem) -> None:
     layout, _ = attempt(problem)

@@ -64,7 +64,7 @@ def points_of(route: Route) -> list[Point]:
 
 
 @given(st.lists(routes(), min_size=1, max_size=6))
-@settings(deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_lines_are_measured_at_once_as_one_by_one(drawn: list[Route]) -> None:
     lines = polylines(drawn)
     bends, tight = lines.bends()
@@ -96,7 +96,7 @@ def test_lines_are_measured_at_once_as_one_by_one(drawn: list[Route]) -> None:
 
 
 @given(st.lists(routes(), min_size=1, max_size=5), st.lists(routes(), min_size=1, max_size=5))
-@settings(deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_crossings_are_counted_as_metrics_count_them(drawn: list[Route], others: list[Route]) -> None:
     lines, rest = polylines(drawn), polylines(others)
     found = lines.crossed(rest.a, rest.b)
@@ -191,7 +191,7 @@ def test_a_route_through_a_loop_is_led_around_it() -> None:
 
 
 @given(st.lists(routes(), min_size=1, max_size=5), st.lists(point, max_size=6), st.tuples(point, point))
-@settings(deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_what_is_in_the_way_of_lines_is_found(
     drawn: list[Route], centres: list[Point], corner: tuple[Point, Point]
 ) -> None:
@@ -211,7 +211,7 @@ def test_what_is_in_the_way_of_lines_is_found(
 
 
 @given(st.lists(routes(), min_size=2, max_size=5), st.data())
-@settings(deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_some_lines_are_those(drawn: list[Route], data: st.DataObject) -> None:
     chosen = data.draw(st.lists(st.integers(0, len(drawn) - 1), max_size=4))
     some, alone = polylines(drawn).some(np.array(chosen, dtype=np.int64)), polylines([drawn[k] for k in chosen])
@@ -243,7 +243,7 @@ def test_lines_share_cells_with_those_of_their_number() -> None:
 
 
 @given(st.lists(point, min_size=2, max_size=8, unique=True), st.sampled_from([0.2, 1.0, 4.0]))
-@settings(deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_a_smooth_line_stays_beside_its_corners(line: list[Point], cut: float) -> None:
     route = smooth(line, cut)
     assert route[0] == line[0]
@@ -256,7 +256,7 @@ def test_a_smooth_line_stays_beside_its_corners(line: list[Point], cut: float) -
 
 
 @given(routes())
-@settings(deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_corners_are_few_and_on_the_route(route: Route) -> None:
     line = corners(route)
     assert line[0] == route[0]
@@ -490,7 +490,7 @@ def test_in_a_fan_of_many_each_stays_where_it_is() -> None:
 
 
 @given(st.lists(routes(), min_size=2, max_size=5), st.data())
-@settings(deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_a_route_that_is_drawn_anew_is_known_as_if_it_had_been_there(drawn: list[Route], data: st.DataObject) -> None:
     ends = sorted({end for route in drawn for end in (route[0], route[-1])})
     edges = [edge(ends.index(route[0]), ends.index(route[-1])) for route in drawn]
@@ -546,7 +546,7 @@ def test_segments_are_close_whose_rectangles_are(
 @given(
     st.lists(st.tuples(st.lists(point, min_size=2, max_size=6, unique=True), st.sampled_from((4.0, 1.0))), min_size=1)
 )
-@settings(deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_many_lines_are_smoothed_at_once_as_one_by_one(ways: list[tuple[list[Point], float]]) -> None:
     pieces, owner = smoothed(ways)
     for k, way in enumerate(ways):

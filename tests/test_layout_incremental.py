@@ -430,7 +430,7 @@ def _edits(draw: st.DrawFn) -> tuple[LayoutProblem, LayoutProblem]:
 
 
 @given(_edits(), st.sampled_from(ENGINES))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_who_was_there_stays_and_nobody_overlaps(edit: tuple[LayoutProblem, LayoutProblem], engine: str) -> None:
     earlier, later = edit
     before = lay_out_problem(earlier, engine)

@@ -233,7 +233,7 @@ def test_a_sheaf_of_six_is_six_lines(engine: str) -> None:
             assert together(routes[one], routes[other], 0.08) <= 0.2, (one, other)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(problem=st.one_of(suite.problems(), walkers(pinned=True), walkers(mirrored=True), sheaves()))
 def test_connections_that_share_both_ends_are_apart(problem: LayoutProblem) -> None:
     """Up to six; a sheaf of more has no room everywhere, nor has one between discs that pins put close together."""

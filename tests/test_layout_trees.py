@@ -42,7 +42,7 @@ def forests(draw: st.DrawFn) -> Pairs:
     return [(a, b) if draw(st.sampled_from(ways)) else (b, a) for a, b in pairs]
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(forests(), st.sampled_from(["down", "right"]), st.sampled_from([0.2, 1.0, 3.0]))
 def test_trees_have_no_crossing_and_all_runs_along(pairs: Pairs, direction: Direction, spacing: float) -> None:
     check(made(pairs, direction, spacing))

@@ -201,7 +201,7 @@ AFTER = ("weights_after", "set_parameters", "lesioned_neurons", "lesioned_connec
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("name", SAVED)
 @given(data=st.data())
-@settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_what_is_saved_is_the_run_of_the_spec_with_the_events_that_are_copied(
     name: str, data: st.DataObject, tmp_path: Path
 ) -> None:

@@ -33,7 +33,7 @@ connections:
   A -> B: {{weight: {weight}, plasticity: {{hebbian: {{rate: 0.5}}}}}}
   B1 -> B1: {{weight: {weight}}}
   B2 -> A: {{weight: {weight}}}
-render: {{gain: {{{gain}}}}}
+render: {{size: [320, 240], gain: {{{gain}}}}}
 """
 GAINS = (
     "",

@@ -116,7 +116,7 @@ def network_of(counts: list[int], entries: list[tuple[str, str, str, str]]) -> C
     st.lists(ENTRY, min_size=1, max_size=6, unique_by=lambda entry: entry[:2]),
     st.floats(0, 1),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_neurons_and_pathways_keep_their_strongest_and_the_notes_say_the_rest(
     counts: list[int], entries: list[tuple[str, str, str, str]], room: float
 ) -> None:
@@ -151,7 +151,7 @@ def test_neurons_and_pathways_keep_their_strongest_and_the_notes_say_the_rest(
 
 
 @given(st.lists(ENTRY, min_size=2, max_size=4, unique_by=lambda entry: entry[:2]), st.data())
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_the_order_of_a_spec_decides_nothing(entries: list[tuple[str, str, str, str]], data: st.DataObject) -> None:
     orders = [network_of([5, 6, 7, 4], list(one)) for one in permutations(entries)][:6]
     most = data.draw(st.integers(0, len(orders[0].network.connections)))
