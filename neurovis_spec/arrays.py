@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from itertools import groupby
-from typing import Any, Generic, TypeAlias, TypeVar, overload
+from typing import Any, Generic, TypeAlias, TypeVar, cast, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -115,25 +115,38 @@ class Column(Generic[Number]):
     @overload
     def __getitem__(self, index: Indices | BoolArray | slice) -> npt.NDArray[Number]: ...
     def __getitem__(self, index: int | Indices | BoolArray | slice) -> Number | npt.NDArray[Number]:
+        if not isinstance(index, slice | np.ndarray):
+            return self._kind(self.kept[self._at(np.asarray(index))])
         if isinstance(index, slice):
             index = np.arange(*index.indices(len(self)))
-        if isinstance(index, np.ndarray) and index.dtype == np.bool_:
-            index = np.flatnonzero(index)
+        at = np.flatnonzero(index) if index.dtype == np.bool_ else cast("Indices", index)
+        return self.some(at).astype(self._kind)
+
+    def some(self, indices: Indices) -> npt.NDArray[Any]:
+        """Some of them, read-only, in the width in which they are kept; see ``compact``."""
+        if len(self._step) == 1 and not self._step[0]:
+            return np.broadcast_to(self.kept[0], indices.shape)
+        return frozen(self.kept[self._at(indices)])
+
+    def _at(self, indices: Indices) -> Indices:
+        """Where these numbers are kept."""
         if len(self._step) == 1:
-            at = index if self._step[0] else np.zeros_like(index)
-        else:
-            run = np.searchsorted(self._bounds, index, side="right") - 1
-            at = self._first[run] + self._step[run] * (index - self._bounds[run])
-        taken = self.kept[at]
-        return taken.astype(self._kind) if isinstance(index, np.ndarray) else self._kind(taken)
+            return indices if self._step[0] else np.zeros_like(indices)
+        run = np.searchsorted(self._bounds, indices, side="right") - 1
+        return np.asarray(self._first[run] + self._step[run] * (indices - self._bounds[run]))
 
     def whole(self) -> npt.NDArray[Number]:
         """All of them, made anew where they are not kept so: a reader's own, for as long as it needs them."""
         if len(self._step) == 1 and not self._step[0]:
             return np.broadcast_to(self._kind(self.kept[0]), (len(self),))
-        if len(self._step) == 1:
-            return frozen(self.kept.astype(self._kind, copy=False))
-        result = np.empty(len(self), dtype=self._kind)
+        return frozen(self.compact().astype(self._kind, copy=False))
+
+    def compact(self) -> npt.NDArray[Any]:
+        """All of them in the width in which they are kept: to be compared, or to take elements by, not to be computed
+        with."""
+        if len(self._step) == 1 and self._step[0]:
+            return self.kept
+        result = np.empty(len(self), dtype=self.kept.dtype)
         for start, stop, numbers in self.stretches():
             result[start:stop] = numbers
         return frozen(result)

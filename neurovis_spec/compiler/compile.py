@@ -106,8 +106,8 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         _read_events(spec, finder, constants)
         return None
     projections, rules = make_projections(bundles)
-    connections = join(bundles, rules)
-    populations = make_populations(census, connections.sources.whole(), connections.targets.whole(), level)
+    connections = join(made, rules)
+    populations = make_populations(census, made.targets.compact(), level)
     program = make_program(populations, projections)
     slots = tuple(constants.slots)
     network = Network(
@@ -256,8 +256,7 @@ def _report_no_neurons(spec: Spec, census: Census, findings: Findings) -> None:
 def _levels(made: Connected, census: Census, findings: Findings) -> IntArray | None:
     """The level of each neuron; None where neurons wait for each other, which is reported: a cycle of connections that
     are in order is one whatever becomes of the others."""
-    delays = np.concatenate([bundle.delays for bundle in made.bundles] or [np.zeros(0, dtype=np.int64)])
-    level = levels(len(census.neurons), made.sources, made.targets, delays)
+    level = levels(len(census.neurons), made.sources, made.targets, made.delays)
     if not isinstance(level, Cycle):
         return level
     path = [census.neurons.names[neuron] for neuron in level.neurons]

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import IntArray, frozen
+from neurovis_spec.arrays import Indices, IntArray, IntColumn, frozen, narrow, width
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.connections.plasticity import Learning
 from neurovis_spec.compiler.neurons.groups import Built
@@ -40,14 +40,14 @@ class Cycle(NamedTuple):
     connection: int
 
 
-def levels(n: int, sources: IntArray, targets: IntArray, delays: IntArray) -> IntArray | Cycle:
+def levels(n: int, sources: IntColumn, targets: IntColumn, delays: IntColumn) -> IntArray | Cycle:
     """Levels by Kahn's algorithm; a cycle of delay-0 connections of single neurons where there is one."""
-    prompt = np.flatnonzero(delays == 0)
     result = np.zeros(n, dtype=np.int64)
-    if not len(prompt):
+    if not (delays.kept == 0).any():
         return result
+    prompt = np.flatnonzero(delays.compact() == 0)
     order = prompt[np.argsort(sources[prompt], kind="stable")]
-    outgoing = targets[order].tolist()
+    outgoing = targets[order]
     starts = np.searchsorted(sources[order], np.arange(n + 1)).tolist()
     waiting = np.bincount(targets[prompt], minlength=n).tolist()
     ready = [neuron for neuron in range(n) if waiting[neuron] == 0]
@@ -56,7 +56,7 @@ def levels(n: int, sources: IntArray, targets: IntArray, delays: IntArray) -> In
     while done < len(ready):
         neuron = ready[done]
         done += 1
-        for target in outgoing[starts[neuron] : starts[neuron + 1]]:
+        for target in outgoing[starts[neuron] : starts[neuron + 1]].tolist():
             level[target] = max(level[target], level[neuron] + 1)
             waiting[target] -= 1
             if waiting[target] == 0:
@@ -66,7 +66,7 @@ def levels(n: int, sources: IntArray, targets: IntArray, delays: IntArray) -> In
     return _cycle(prompt.tolist(), sources, targets, waiting)
 
 
-def _cycle(prompt: list[int], sources: IntArray, targets: IntArray, waiting: list[int]) -> Cycle:
+def _cycle(prompt: list[int], sources: IntColumn, targets: IntColumn, waiting: list[int]) -> Cycle:
     """Go backwards among the neurons that still wait until one comes up again."""
     into: dict[int, int] = {}
     for connection in prompt:
@@ -85,7 +85,7 @@ def _cycle(prompt: list[int], sources: IntArray, targets: IntArray, waiting: lis
     return Cycle(forward, into[ring[0]])
 
 
-def make_populations(census: Census, sources: IntArray, targets: IntArray, levels: IntArray) -> tuple[Population, ...]:
+def make_populations(census: Census, targets: Indices, levels: IntArray) -> tuple[Population, ...]:
     """Neurons of the same level, activation, model and combination, in the order of the levels."""
     groups = census.groups
     alike: dict[tuple[str, ...], int] = {}
@@ -96,8 +96,8 @@ def make_populations(census: Census, sources: IntArray, targets: IntArray, level
     counts = [one.group.count for one in groups]
     group = np.repeat(np.arange(len(groups)), counts)
     home = _numbered(levels, np.repeat(np.array(own, dtype=np.int64), counts), len(alike))
-    members = _split(home, int(home.max(initial=-1)) + 1)
-    slot = np.zeros(len(home), dtype=np.int64)
+    members = [some.astype(np.int64) for some in _split(home, int(home.max(initial=-1)) + 1)]
+    home, slot = narrow(home), np.zeros(len(home), dtype=width(0, len(home)))
     for some in members:
         slot[some] = np.arange(len(some))
     populations = []
@@ -109,7 +109,7 @@ def make_populations(census: Census, sources: IntArray, targets: IntArray, level
     return tuple(populations)
 
 
-def _numbered(levels: IntArray, alike: IntArray, kinds: int) -> IntArray:
+def _numbered(levels: IntArray, alike: IntArray, kinds: int) -> Indices:
     """The number of each neuron's population, by levels, then by first neurons; ``alike`` has what else they have in
     common, one of so many kinds."""
     _, first, population = np.unique(levels * kinds + alike, return_index=True, return_inverse=True)
@@ -118,11 +118,14 @@ def _numbered(levels: IntArray, alike: IntArray, kinds: int) -> IntArray:
     return np.asarray(number[population], dtype=np.int64)
 
 
-def _split(populations: IntArray, number: int) -> list[IntArray]:
-    """The places of each population, ascending."""
-    order = np.argsort(populations, kind="stable")
-    ends = np.searchsorted(populations[order], np.arange(number + 1)).tolist()
-    return [order[start:end].astype(np.int64) for start, end in pairwise(ends)]
+def _split(populations: Indices, number: int) -> list[Indices]:
+    """The places of each population, ascending, in the least width."""
+    kind = width(0, len(populations))
+    if number == 1:
+        return [np.arange(len(populations), dtype=kind)]
+    order = np.argsort(populations, kind="stable").astype(kind)
+    ends = np.cumsum([0, *np.bincount(populations, minlength=number).tolist()]).tolist()
+    return [order[start:end].copy() for start, end in pairwise(ends)]
 
 
 def _use(number: int, members: IntArray, own: IntArray, groups: Sequence[Built], which: int) -> Use:

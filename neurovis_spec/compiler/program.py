@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, TypeAlias
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, Indices, IntArray
 from neurovis_spec.language.expressions.tree import Call, Number, Tree, names, walk
 from neurovis_spec.language.words import Combine
 
@@ -165,8 +165,8 @@ class Port:
 
     name: str
     combine: Combine
-    incoming: IntArray
-    slots: IntArray
+    incoming: Indices
+    slots: Indices
 
 
 @dataclass(frozen=True, slots=True, eq=False)

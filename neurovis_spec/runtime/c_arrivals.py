@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from neurovis_spec.arrays import IntArray
+from neurovis_spec.arrays import Indices, IntArray, width
 from neurovis_spec.compiler.events.settable import CENTRES
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Population
@@ -40,7 +41,7 @@ class _Lanes:
     rests: IntArray
 
 
-def _in_lanes(ends: IntArray) -> tuple[_Lanes, IntArray]:
+def _in_lanes(ends: IntArray) -> tuple[_Lanes, Indices]:
     """Neurons whose connections lie neuron by neuron, those of the i-th up to ``ends[i + 1]``; and the order in which
     the connections are read then."""
     degrees = np.diff(ends)
@@ -52,13 +53,14 @@ def _in_lanes(ends: IntArray) -> tuple[_Lanes, IntArray]:
     begins = np.zeros(-(-len(neurons) // _LANES) + 1, dtype=np.int64)
     begins[1:] = np.cumsum(np.add.reduceat(shared, np.arange(0, len(neurons), _LANES)))
     rests = begins[-1] + np.concatenate(([0], np.cumsum(degrees[neurons] - shared)))
-    lane = np.arange(len(neurons))
-    owner = np.repeat(lane, degrees[neurons])
-    nth = np.arange(len(owner)) - np.repeat(np.cumsum(degrees[neurons]) - degrees[neurons], degrees[neurons])
-    beside = begins[owner // _LANES] + nth * _LANES + owner % _LANES
-    places = np.where(nth < shared[owner], beside, rests[owner] + nth - shared[owner])
-    order = np.empty(len(owner), dtype=np.int64)
-    order[places] = ends[neurons[owner]] + nth
+    own, kind = degrees[neurons], width(0, _LANES * int(ends[-1]))  # there may be millions of connections
+    owner = np.repeat(np.arange(len(neurons), dtype=kind), own)
+    nth = np.arange(len(owner), dtype=kind) - np.repeat((np.cumsum(own) - own).astype(kind), own)
+    places = begins.astype(kind)[owner // _LANES] + nth * _LANES + owner % _LANES
+    behind = nth >= shared.astype(kind)[owner]
+    places[behind] = (rests[:-1] - shared).astype(kind)[owner[behind]] + nth[behind]
+    order = np.empty(len(owner), dtype=kind)
+    order[places] = ends[neurons].astype(kind)[owner] + nth
     return _Lanes(neurons, begins, rests.astype(np.int64)), order
 
 
@@ -67,7 +69,7 @@ class Incoming:
     """The connections that arrive at the neurons of a population, whatever is made of them: neuron by neuron, each
     neuron's in their order, those of the i-th neuron up to ``ends[i + 1]``."""
 
-    connections: IntArray
+    connections: Indices
     ends: IntArray
     #: the number of connections of each neuron, −1 where they differ
     degree: int
@@ -76,18 +78,16 @@ class Incoming:
     #: whether they are a full matrix, row by row
     full: bool
     #: how sums go on beside each other, and the connections as they are read then; None where neurons have few
-    lanes: tuple[_Lanes, IntArray] | None
+    lanes: tuple[_Lanes, Indices] | None
 
 
 def incoming_of(network: Network, population: Population) -> Incoming:
     """What arrives at a population: worked out once, read by each form of a step."""
     connections, count = network.connections, len(population.members)
-    delays, rules = connections.delays[population.drive.incoming], connections.rules[population.drive.incoming]
-    order = np.argsort(population.drive.slots, kind="stable")
-    own, ends = (
-        population.drive.incoming[order],
-        np.searchsorted(population.drive.slots[order], np.arange(count + 1)).astype(np.int64),
-    )
+    incoming, slots = population.drive.incoming, population.drive.slots
+    delays, rules = connections.delays.some(incoming), connections.rules.some(incoming)
+    order = np.argsort(slots, kind="stable")
+    own, ends = incoming[order], np.searchsorted(slots[order], np.arange(count + 1)).astype(np.int64)
     degrees = np.diff(ends)
     degree = int(degrees[0]) if (degrees == degrees[0]).all() else -1
     full = population.drive.combine == "sum" and degree > 1 and 1 < count <= _BESIDE and len(_different(delays)) == 1
@@ -103,9 +103,10 @@ def incoming_of(network: Network, population: Population) -> Incoming:
     return Incoming(own, ends, degree, fused, full, lanes)
 
 
-def _different(delays: IntArray) -> list[int]:
+def _different(delays: Indices) -> list[int]:
     """The delays that there are, ascending."""
-    return np.flatnonzero(np.bincount(delays)).tolist()
+    found: list[int] = np.unique(delays).tolist()
+    return found
 
 
 class Arrivals:
@@ -127,12 +128,17 @@ class Arrivals:
         self.connections = incoming.connections
         if incoming.lanes is not None and not (form.written_out or self.dense):
             self.lanes, self.connections = incoming.lanes
-        self.sources = network.connections.sources[self.connections]
-        self.delays = network.connections.delays[self.connections]
-        self.offsets = layout.offsets[self.connections]
+        self.sources = network.connections.sources.some(self.connections)
+        self.delays = network.connections.delays.some(self.connections)
+        self._layout = layout
+
+    @cached_property
+    def offsets(self) -> IntArray:
+        """The first slot of each connection."""
+        return self._layout.offsets[self.connections]
 
     @property
-    def packed(self) -> IntArray:
+    def packed(self) -> Indices:
         """The connections whose weights are packed; those of a full matrix lie as they are read."""
         return self.connections if self.can_be_fused and not self.dense else self.connections[:0]
 

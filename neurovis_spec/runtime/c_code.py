@@ -7,6 +7,7 @@ one by one, else the code of a loop's variable.
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -16,7 +17,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, Indices
 from neurovis_spec.compiler.events.settable import Variable
 from neurovis_spec.compiler.program import Key, Owner, Use
 from neurovis_spec.language.expressions.emit_c import Drawn, Emitter, Made, Value
@@ -47,10 +48,10 @@ class Tables:
         self.given: list[Table] = []
         self._taken: dict[str, str] = {}
 
-    def name(self, values: FloatArray | IntArray) -> str:
+    def name(self, values: FloatArray | Indices) -> str:
         """The identifier of an array of numbers or indices."""
         array, kind = self._array(values)
-        key = array.dtype.char, array.tobytes()
+        key = array.dtype.char, hashlib.sha256(array.data).digest()
         if key not in self._names:
             name = self._names[key] = f"t{len(self._names)}"
             if self._longest is not None and len(array) > self._longest:
@@ -60,7 +61,7 @@ class Tables:
                 self._text[name] = f"static const {kind} {name}[{len(array)}] = {{\n{self._items(array)}\n}};"
         return self._names[key]
 
-    def _array(self, values: FloatArray | IntArray) -> tuple[Table, str]:
+    def _array(self, values: FloatArray | Indices) -> tuple[Table, str]:
         """The array as it is kept, indices as narrow as they can be, and the type of its items."""
         if values.dtype.kind == "f":
             return np.ascontiguousarray(values, np.float64), self._real
@@ -165,15 +166,15 @@ class Code:
         """A value as code."""
         return self.emitter.text(value)
 
-    def at(self, indices: IntArray, place: Place) -> Place:
+    def at(self, indices: Indices, place: Place) -> Place:
         """An element of an array of indices, worked out where they are regular."""
         if isinstance(place, int):
             return int(indices[place])
         first = int(indices[0])
         if len(indices) == 1:
             return first
-        stride = int(indices[1]) - first
-        if np.array_equal(indices, first + stride * np.arange(len(indices))):
+        stride, last = int(indices[1]) - first, len(indices) - 1
+        if int(indices[-1]) == first + stride * last and np.array_equal(indices, first + stride * np.arange(last + 1)):
             if stride == 0:
                 return first
             step = place if stride == 1 else f"{stride}*{place}"
@@ -187,7 +188,7 @@ class Code:
         bits = np.ascontiguousarray(values, dtype=np.float64).view(np.int64)
         return float(values[0]) if (bits == bits[0]).all() else f"{self.tables.name(values)}[{place}]"
 
-    def settable(self, array: Key, values: FloatArray, members: IntArray | None, place: Place) -> Value:
+    def settable(self, array: Key, values: FloatArray, members: Indices | None, place: Place) -> Value:
         """An element of an array of the network, of its ``members`` or of all; its current value where it can be
         set in a run."""
         variable = self._variables.get(array)
@@ -195,7 +196,7 @@ class Code:
             return self.number(values if members is None else values[members], place)
         if variable.size == 1:
             return f"x[{variable.start}]"
-        places = np.arange(variable.size, dtype=np.int64) if members is None else members
+        places = np.arange(variable.size) if members is None else members.astype(np.int64)
         return f"x[{self.at(variable.start + places, place)}]"
 
     def is_set(self, array: Key) -> bool:

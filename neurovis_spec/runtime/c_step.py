@@ -13,7 +13,7 @@ from functools import partial, singledispatch
 
 import numpy as np
 
-from neurovis_spec.arrays import IntArray
+from neurovis_spec.arrays import Indices, IntArray
 from neurovis_spec.compiler.events.settable import BIAS, HIGH, LOW
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import (
@@ -274,7 +274,7 @@ class StepCode:
                 with code.block(code.loop("p", len(members))):
                     self.store([self.leaving(members, "p")])
 
-    def leaving(self, members: IntArray, place: Place) -> tuple[str, Value]:
+    def leaving(self, members: Indices, place: Place) -> tuple[str, Value]:
         """The signal of one of some connections, all of one delay: its slot, and what leaves."""
         code, connections = self.code, self.network.connections
         delay = int(connections.delays[members[0]])

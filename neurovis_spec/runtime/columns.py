@@ -172,17 +172,16 @@ def recording_of(
     """A recording with the structure of a network, made by a ``backend`` of this name; ``all_weights`` (m,) gives those
     that stay."""
     connections = network.connections
-    static = np.setdiff1d(np.arange(len(connections)), network.changing, assume_unique=True)
     names, rows = names_of(network), numbers.rows
     return Recording(
         activity=rows.activity,
         neurons=network.neurons.names,
         weights=rows.weights,
-        weights_static=all_weights[static],
+        weights_static=np.delete(all_weights, network.changing),
         plastic=network.changing.copy(),
-        sources=connections.sources.whole().copy(),
-        targets=connections.targets.whole().copy(),
-        delays=connections.delays.whole().copy(),
+        sources=connections.sources.whole(),
+        targets=connections.targets.whole(),
+        delays=connections.delays.whole(),
         dt=network.dt,
         step=numbers.step,
         ranks=_ranks(network),
@@ -212,10 +211,13 @@ def recording_of(
 def _ranks(network: Network) -> IntArray:
     """1 for each connection, 2, 3, … for the further ones that share both ends."""
     connections = network.connections
+    pairs = connections.sources.whole() * len(network.neurons)
+    pairs += connections.targets.compact()
+    pairs.sort()
+    if not (pairs[1:] == pairs[:-1]).any():
+        return np.broadcast_to(np.int64(1), pairs.shape)
     ranks = np.ones(len(connections), dtype=np.int64)
-    pairs = connections.sources.whole() * len(network.neurons) + connections.targets.whole()
-    if len(np.unique(pairs)) < len(pairs):
-        for index, name in enumerate(network.connection_names):
-            if name.endswith(")"):
-                ranks[index] = int(name[name.rindex("(") + 1 : -1])
+    for index, name in enumerate(network.connection_names):
+        if name.endswith(")"):
+            ranks[index] = int(name[name.rindex("(") + 1 : -1])
     return ranks

@@ -13,7 +13,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, Indices, IntArray
 from neurovis_spec.compiler.events.settable import Variable
 from neurovis_spec.compiler.program import Definition, Key, Use
 from neurovis_spec.language.expressions.emit import defined, emit
@@ -80,7 +80,7 @@ class Code:
             self._states[key] = self._views[place] = f"v{len(self._views)}_"
         return self._states[key]
 
-    def numbers(self, array: Key, values: FloatArray, some: IntArray | None = None, share: bool = True) -> str:
+    def numbers(self, array: Key, values: FloatArray, some: Indices | None = None, share: bool = True) -> str:
         """An array of the network, or ``some`` of it: where it can be set as it is by now, else a constant; with
         ``share`` one number where all are the same."""
         variable = self._variables.get(array)
@@ -97,7 +97,7 @@ class Code:
         """Whether an array can be set in a run."""
         return array in self._variables
 
-    def select(self, array: str, indices: IntArray, size: int, broadcast: bool = False) -> str:
+    def select(self, array: str, indices: Indices, size: int, broadcast: bool = False) -> str:
         """Elements of a vector of this size: a slice where they lie in a row, which costs no copy.
 
         With ``broadcast``, equal indices give a single element.
@@ -115,7 +115,7 @@ class Code:
             return f"{array}[{part}]"
         return self._views.setdefault(f"{array}[{part}]", f"{array[0]}{len(self._views)}_")
 
-    def position(self, indices: IntArray, size: int) -> str:
+    def position(self, indices: Indices, size: int) -> str:
         """The subscript that ``select`` reads, for writing."""
         chosen = self.select("", indices, size)
         return chosen or "[:]"

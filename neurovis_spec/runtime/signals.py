@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_spec.arrays import IntArray
+from neurovis_spec.arrays import Indices, IntArray, width
 from neurovis_spec.compiler.network import Network
 
 
@@ -22,9 +22,9 @@ class DelayClass:
 
     delay: int
     start: int
-    connections: IntArray
+    connections: Indices
     #: population of the target of each
-    populations: IntArray
+    populations: Indices
 
     @property
     def stop(self) -> int:
@@ -44,18 +44,19 @@ class SignalLayout:
 def signal_layout(network: Network) -> SignalLayout:
     """Lay the slots out by delay, then by population of the target, then in the order of the connections."""
     connections = network.connections
-    block_of = np.zeros(len(network.neurons), dtype=np.int64)
+    home = np.zeros(len(network.neurons), dtype=width(0, len(network.populations)))
     for number, population in enumerate(network.populations):
-        block_of[population.members] = number
-    populations = block_of[connections.targets.whole()]
+        home[population.members] = number
+    populations = home[connections.targets.compact()]
     offsets = np.full(len(connections), -1, dtype=np.int64)
     classes: list[DelayClass] = []
     size = 0
-    # the counts take no more memory than the slots of one connection with the longest delay
-    for delay in (np.flatnonzero(np.bincount(connections.delays.whole())[1:]) + 1).tolist():
-        members = np.flatnonzero(connections.delays.whole() == delay)
-        members = members[np.argsort(populations[members], kind="stable")]
-        offsets[members] = size + delay * np.arange(len(members))
+    kept, kind = connections.delays.compact(), width(0, len(connections))
+    for delay in np.unique(connections.delays.kept[connections.delays.kept > 0]).tolist():
+        members = np.flatnonzero(kept == delay).astype(kind)
+        if len(network.populations) > 1:
+            members = members[np.argsort(populations[members], kind="stable")]
+        offsets[members] = np.arange(size, size + delay * len(members), delay)
         classes.append(DelayClass(delay, size, members, populations[members]))
         size += delay * len(members)
     return SignalLayout(offsets, size, tuple(classes))

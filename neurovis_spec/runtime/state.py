@@ -101,10 +101,8 @@ def first_conditions(network: Network) -> Conditions:
     """Before anything has changed."""
     n, m = len(network.neurons), len(network.connections)
     settable = network.settable
-    nothing = np.zeros(m, dtype=np.bool_)
-    never = np.zeros(m, dtype=np.int64)
-    lost = np.full(m, NOTHING)
-    nothing.flags.writeable = never.flags.writeable = lost.flags.writeable = False
+    nothing = np.broadcast_to(np.False_, (m,))
+    never, lost = (np.broadcast_to(np.int64(step), (m,)) for step in (0, NOTHING))
     return Conditions(
         parameters=settable.parameters.copy(),
         chosen=np.zeros(len(settable.slots), dtype=np.bool_),

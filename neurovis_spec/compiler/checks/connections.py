@@ -58,7 +58,7 @@ def _twice(entries: list[list[Bundle]], neurons: int) -> Iterator[tuple[int, int
     bundles = [bundle for entry in entries for bundle in entry]
     if len(bundles) < 2:
         return
-    pairs = np.concatenate([bundle.sources * neurons + bundle.targets for bundle in bundles])
+    pairs = np.concatenate([bundle.sources.astype(np.int64) * neurons + bundle.targets for bundle in bundles])
     ordered = np.sort(pairs)
     if not (ordered[1:] == ordered[:-1]).any():
         return

@@ -52,7 +52,7 @@ def check_neurons(compiled: Compiled, findings: Findings) -> None:
     network = compiled.network
     idle = _idle(network)
     driven = np.zeros(len(network.neurons), dtype=np.bool_)
-    driven[network.connections.targets.whole()] = True
+    driven[network.connections.targets.compact()] = True
     if not idle.any():
         return
     origin = {scope.called(name): (scope, name) for scope in compiled.scopes for name in scope.section.neurons}
@@ -124,8 +124,9 @@ def _idle(network: Network) -> Mask:
     for population in network.populations if owners else ():
         if any(use.owner in owners for use in population.uses):
             quiet[population.members] = False
-    idle = _unreached(quiet, connections.sources.whole(), connections.targets.whole())
-    return _first(idle, connections.sources.whole(), connections.targets.whole()) if idle.any() else idle
+    sources, targets = connections.sources.compact(), connections.targets.compact()
+    idle = _unreached(quiet, sources, targets)
+    return _first(idle, sources, targets) if idle.any() else idle
 
 
 def _needed(network: Network) -> Mask:

@@ -6,11 +6,12 @@ matrix or pattern row by row), and for each plastic entry what it learns by.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from neurovis_spec.arrays import Column, IntArray, integers, reals
+from neurovis_spec.arrays import Column, Indices, IntColumn, integers, narrow, reals
 from neurovis_spec.compiler.connections.entries import Bundle, EntryBuilder, EntryContext
 from neurovis_spec.compiler.connections.plasticity import title_of
 from neurovis_spec.compiler.limits import Limits
@@ -24,24 +25,27 @@ from neurovis_spec.language.sections import written
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 
 
-class Connected(NamedTuple):
+@dataclass(frozen=True)
+class Connected:
     """The entries that are not invalid, and whether these are all."""
 
     bundles: tuple[Bundle, ...]
     complete: bool
 
-    @property
-    def sources(self) -> IntArray:
+    @cached_property
+    def sources(self) -> IntColumn:
         """The source of every connection."""
-        return np.concatenate([bundle.sources for bundle in self.bundles] or [_NONE])
+        return integers(*(bundle.sources for bundle in self.bundles))
 
-    @property
-    def targets(self) -> IntArray:
+    @cached_property
+    def targets(self) -> IntColumn:
         """The target of every connection."""
-        return np.concatenate([bundle.targets for bundle in self.bundles] or [_NONE])
+        return integers(*(bundle.targets for bundle in self.bundles))
 
-
-_NONE = np.zeros(0, dtype=np.int64)
+    @cached_property
+    def delays(self) -> IntColumn:
+        """The delay of every connection."""
+        return integers(*(bundle.delays for bundle in self.bundles))
 
 
 def connect(scopes: tuple[Scope, ...], census: Census, limits: Limits, seed: int) -> Connected:
@@ -77,25 +81,26 @@ def connect(scopes: tuple[Scope, ...], census: Census, limits: Limits, seed: int
 
 def _ends(
     key: Located[str], directory: Directory, findings: Findings
-) -> tuple[str, IntArray | Unknown, IntArray | Unknown]:
+) -> tuple[str, Indices | Unknown, Indices | Unknown]:
     """What an entry is called, and the neurons of its ends, UNKNOWN where an end is invalid."""
     arrow = arrow_of(key, findings)
     if arrow is UNKNOWN:
         return key.value, UNKNOWN, UNKNOWN
     ends = [resolve_sum(end, key, directory, findings) for end in (arrow.sources, arrow.targets)]
-    sources, targets = (UNKNOWN if end is UNKNOWN else np.array(end, dtype=np.int64) for end in ends)
+    sources, targets = (UNKNOWN if end is UNKNOWN else narrow(np.array(end, dtype=np.int64)) for end in ends)
     return arrow.normal, sources, targets
 
 
-def join(bundles: tuple[Bundle, ...], rules: list[int]) -> Connections:
+def join(made: Connected, rules: list[int]) -> Connections:
     """All entries as one structure of columns; ``rules`` says, for each entry, which plasticity it has."""
+    bundles = made.bundles
     sizes = np.array([len(bundle.sources) for bundle in bundles], dtype=np.int64)
     return Connections(
-        sources=integers(*(bundle.sources for bundle in bundles)),
-        targets=integers(*(bundle.targets for bundle in bundles)),
+        sources=made.sources,
+        targets=made.targets,
         weights=reals(*(bundle.weights for bundle in bundles)),
         centres=reals(*(bundle.centres for bundle in bundles)),
-        delays=integers(*(bundle.delays for bundle in bundles)),
+        delays=made.delays,
         rules=Column.repeated(np.array(rules, dtype=np.int64), sizes, np.int64),
         entry=Column.repeated(np.arange(len(bundles)), sizes, np.int64),
         low=Column.repeated(np.array([bundle.low for bundle in bundles]), sizes, np.float64),

@@ -10,10 +10,15 @@ from typing import TypeAlias
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, Indices, IntArray, width
 
 #: Positions within the two ends, one pair an index.
-Pairs: TypeAlias = tuple[IntArray, IntArray]
+Pairs: TypeAlias = tuple[Indices, Indices]
+
+
+def counted(n: int) -> Indices:
+    """The positions in an end of n neurons, in the least width."""
+    return np.arange(n, dtype=width(-1, n))
 
 
 def _nowhere() -> FloatArray:
@@ -25,18 +30,18 @@ class Ends:
     """The neurons of both ends, in the order of the reference, and whether a neuron may connect to itself, where the
     author says so. ``source_places`` and ``target_places`` are their positions, (n, 2), NaN where they have none."""
 
-    sources: IntArray
-    targets: IntArray
+    sources: Indices
+    targets: Indices
     loops: bool | None = None
     source_places: FloatArray = field(default_factory=_nowhere)
     target_places: FloatArray = field(default_factory=_nowhere)
 
-    def pairs(self, i: IntArray, j: IntArray, loops: bool = False) -> Pairs:
+    def pairs(self, i: Indices, j: Indices, loops: bool = False) -> Pairs:
         """The pairs, without a neuron's connection to itself unless that is allowed (by ``loops`` where nothing is
         said)."""
         if not (loops if self.loops is None else self.loops):
             keep = self.sources[i] != self.targets[j]
-            i, j = i[keep], j[keep]
+            i, j = (i, j) if keep.all() else (i[keep], j[keep])
         return i, j
 
     def excluded(self) -> IntArray:

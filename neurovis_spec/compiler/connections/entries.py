@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, Indices, IntArray
+from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray, narrow
 from neurovis_spec.compiler.connections.edges import EdgeReader, End
-from neurovis_spec.compiler.connections.ends import Ends
+from neurovis_spec.compiler.connections.ends import Ends, counted
 from neurovis_spec.compiler.connections.patterns import all_to_all, empty_reason, pairs_of
 from neurovis_spec.compiler.connections.plasticity import Learning, Wired, learning_of
 from neurovis_spec.compiler.connections.weight_scale import Scaled, check_scale, scaled
@@ -45,11 +45,11 @@ class Bundle(NamedTuple):
 
     name: str
     key: Span
-    sources: IntArray
-    targets: IntArray
+    sources: Indices
+    targets: Indices
     weights: FloatArray
     centres: FloatArray
-    delays: IntArray
+    delays: Indices
     low: float
     high: float
     learning: Learning | None
@@ -61,14 +61,14 @@ class Bundle(NamedTuple):
     parts: tuple[Part, ...] = ()
     label: str | None = None
     #: of an entry that makes no connection the neurons of its ends
-    empty: tuple[IntArray, IntArray] | None = None
+    empty: tuple[Indices, Indices] | None = None
 
 
 class _Shape(NamedTuple):
     """Which pairs of an entry exist (positions within its ends), and what its shape says of weights and delays."""
 
-    i: IntArray
-    j: IntArray
+    i: Indices
+    j: Indices
     weights: FloatArray | None = None
     delays: Indices | None = None
     #: what of its weights follows parameters
@@ -97,8 +97,8 @@ class EntryBuilder:
     key: Located[str]
     body: ConnectionModel
     name: str
-    sources: IntArray | Unknown
-    targets: IntArray | Unknown
+    sources: Indices | Unknown
+    targets: Indices | Unknown
 
     @property
     def constants(self) -> Constants:
@@ -141,9 +141,6 @@ class EntryBuilder:
             return UNKNOWN
         if not len(shape.i):  # there is nothing that a rule would change
             learning = None
-        delays = np.full(len(shape.i), known(delay, 0), dtype=np.int64)
-        if shape.delays is not None:
-            delays = np.where(shape.delays >= 0, shape.delays, delays)
         return Bundle(
             self.around.scope.called(self.name),
             self.key.span,
@@ -151,7 +148,7 @@ class EntryBuilder:
             self.targets[shape.j],
             weights,
             centres,
-            delays,
+            _delays(shape, known(delay, 0)),
             bounds[0],
             bounds[1],
             learning,
@@ -217,14 +214,12 @@ class EntryBuilder:
             if grid is UNKNOWN or centre is UNKNOWN:
                 return UNKNOWN
             present = grid.present if centre is None else grid.present & centre.present
-            i, j = np.nonzero(present)
-            shape = _Shape(i, j, np.ascontiguousarray(grid.values[i, j]))
+            shape = _cells_of(present, grid.values)
             return shape._replace(parts=self._cells(grid, cells, shape))
         if isinstance(body.centre, (MatrixRows, FileReference)):
             if centre is None or centre is UNKNOWN:
                 return UNKNOWN
-            i, j = np.nonzero(centre.present)
-            return _Shape(i, j)
+            return _cells_of(centre.present, centre.values)._replace(weights=None)
         return pattern if body.pattern is not None else self._all()
 
     def _ends(self) -> Ends | Unknown:
@@ -241,7 +236,7 @@ class EntryBuilder:
         pairs = pairs_of(self.body.pattern, ends, self.constants, self._stream("edges"), self._fits)
         if ends is not UNKNOWN and self.body.pattern.name.value == "nearest":
             self.around.census.go_by_position(np.concatenate((ends.sources, ends.targets)))
-        return UNKNOWN if pairs is UNKNOWN else _Shape(*pairs)
+        return UNKNOWN if pairs is UNKNOWN else _Shape(narrow(pairs[0]), narrow(pairs[1]))
 
     def _all(self) -> _Shape | Unknown:
         """All pairs, where nothing says which."""
@@ -271,7 +266,7 @@ class EntryBuilder:
             edges = reader.read(self.body.edges)
         return UNKNOWN if edges is UNKNOWN else _Shape(edges.i, edges.j, edges.weights, edges.delays, tuple(parts))
 
-    def _named(self, neurons: IntArray | Unknown) -> End:
+    def _named(self, neurons: Indices | Unknown) -> End:
         """The places of an end's neurons by the names that they have in the scope."""
         if neurons is UNKNOWN:
             return End(UNKNOWN, self.around.directory)
@@ -284,15 +279,12 @@ class EntryBuilder:
         if shape is UNKNOWN or self.sources is UNKNOWN or self.targets is UNKNOWN:
             self.constants.value(formula, dict.fromkeys(_WEIGHT.sees, UNKNOWN), UNKNOWN)
             return UNKNOWN
-        extra: dict[str, Value] = {
-            "i": shape.i.astype(np.float64),
-            "j": shape.j.astype(np.float64),
-            "n_from": float(len(self.sources)),
-            "n_to": float(len(self.targets)),
-        }
         tree = self.constants.tree(formula, _WEIGHT)
         if tree is UNKNOWN:
             return UNKNOWN
+        extra: dict[str, Value] = {"n_from": float(len(self.sources)), "n_to": float(len(self.targets))}
+        for name, positions in (("i", shape.i), ("j", shape.j)):  # what nobody reads takes no room
+            extra[name] = positions.astype(np.float64) if name in names(tree) else 0.0
         if "distance" in names(tree):
             position = self.around.census.neurons.position
             ends = position[self.sources[shape.i]], position[self.targets[shape.j]]
@@ -308,14 +300,14 @@ class EntryBuilder:
         with self.constants.following() as parts:
             value = self.constants.value(formula, extra, randomness)
         if "distance" in extra:
-            pairs = self.sources[shape.i], self.targets[shape.j]
+            pairs = self.sources[shape.i].astype(np.int64), self.targets[shape.j].astype(np.int64)
             distance = Distance(self.around.census.moving, *pairs)
             if distance.slots:
                 parts = [Part(self.constants.bound(tree, {**extra, "distance": distance}, randomness))]
         self.constants.follow(parts)
         if value is UNKNOWN:
             return UNKNOWN
-        return np.broadcast_to(np.asarray(value, dtype=np.float64), shape.i.shape).copy()
+        return np.broadcast_to(np.asarray(value, dtype=np.float64), shape.i.shape)
 
     def _misplaced(self) -> bool:
         """Whether what the spec says of a position of these neurons is invalid."""
@@ -345,14 +337,14 @@ class EntryBuilder:
         if shape is UNKNOWN:
             return UNKNOWN
         if shape.weights is None:
-            return np.ones(len(shape.i)) if self._kept("weight") else UNKNOWN
+            return np.broadcast_to(1.0, shape.i.shape) if self._kept("weight") else UNKNOWN
         self.constants.follow(shape.parts)
         return shape.weights
 
     def _centres(self, grid: Grid | Unknown | None, shape: _Shape | Unknown) -> FloatArray | Unknown:
         centre = self.body.centre
         if centre is None:
-            return UNKNOWN if shape is UNKNOWN else np.zeros(len(shape.i))
+            return UNKNOWN if shape is UNKNOWN else np.broadcast_to(0.0, shape.i.shape)
         if not self._measures_distance():
             entry = self.body.source.entry("centre")
             span = self.key.span if entry is None else entry.key.span
@@ -399,7 +391,8 @@ class EntryBuilder:
             return None
         wired: Wired | Unknown = UNKNOWN
         if shape is not UNKNOWN and self.sources is not UNKNOWN and self.targets is not UNKNOWN:
-            wired = Wired(shape.i, shape.j, len(self.sources), len(self.targets))
+            i, j = shape.i.astype(np.int64), shape.j.astype(np.int64)  # formulas compute with them
+            wired = Wired(i, j, len(self.sources), len(self.targets))
         return learning_of(
             self.body.plasticity,
             wired,
@@ -408,6 +401,22 @@ class EntryBuilder:
             self.around.directory,
             len(self.around.census.neurons),
         )
+
+
+def _delays(shape: _Shape, delay: int) -> Indices:
+    """The delay of each connection: that of its edge, where it has one, else that of the entry."""
+    if shape.delays is None or (shape.delays < 0).all():
+        return np.broadcast_to(np.int64(delay), shape.i.shape)
+    return narrow(np.where(shape.delays >= 0, shape.delays, delay))
+
+
+def _cells_of(present: BoolArray, values: FloatArray) -> _Shape:
+    """The cells of a matrix that are there, row by row, and what is in them."""
+    n, m = present.shape
+    if present.all():
+        return _Shape(np.repeat(counted(n), m), np.tile(counted(m), n), np.ascontiguousarray(values).reshape(-1))
+    i, j = map(narrow, np.nonzero(present))
+    return _Shape(i, j, values[i, j])
 
 
 def _present(part: Part, places: IntArray) -> Part:

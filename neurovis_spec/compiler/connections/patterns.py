@@ -11,7 +11,7 @@ from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-from neurovis_spec.compiler.connections.ends import Ends, Pairs
+from neurovis_spec.compiler.connections.ends import Ends, Pairs, counted
 from neurovis_spec.compiler.connections.patterns_drawn import fixed_indegree, fixed_outdegree, small_world
 from neurovis_spec.compiler.connections.patterns_near import band, in_band, nearest
 from neurovis_spec.compiler.limits import plural
@@ -30,7 +30,7 @@ from neurovis_spec.likeness import did_you_mean, meant, suggest
 def all_to_all(ends: Ends) -> Pairs:
     """Every source with every target."""
     n, m = len(ends.sources), len(ends.targets)
-    return ends.pairs(np.repeat(np.arange(n), m), np.tile(np.arange(m), n))
+    return ends.pairs(np.repeat(counted(n), m), np.tile(counted(m), n))
 
 
 def one_to_one(ends: Ends) -> Pairs:

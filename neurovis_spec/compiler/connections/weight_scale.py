@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, Indices
 from neurovis_spec.compiler.events.settable import Assembled
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings
@@ -32,8 +32,8 @@ class Scaled:
 
     weights: Assembled
     model: ScaleModel
-    ends: tuple[IntArray, IntArray]
-    pairs: tuple[IntArray, IntArray]
+    ends: tuple[Indices, Indices]
+    pairs: tuple[Indices, Indices]
     constants: Constants
 
     @property
@@ -56,8 +56,8 @@ class Scaled:
 def scaled(
     model: ScaleModel,
     weights: FloatArray,
-    ends: tuple[IntArray, IntArray],
-    pairs: tuple[IntArray, IntArray],
+    ends: tuple[Indices, Indices],
+    pairs: tuple[Indices, Indices],
     constants: Constants,
 ) -> FloatArray | Unknown:
     """The weights (one a connection), scaled as the author asks; UNKNOWN where that cannot be, which is reported.
@@ -71,7 +71,7 @@ def scaled(
     exponent = _exponent(weights)
     scopes = _times(weights, -exponent)
     if model.norm is not None and wanted is not UNKNOWN:
-        cells = i * len(ends[1]) + j
+        cells = i.astype(np.int64) * len(ends[1]) + j
         _, place = np.unique(cells, return_inverse=True)
         norm = float(np.linalg.norm(np.bincount(place, scopes)))
         return _to(model.norm, wanted, weights, (norm, exponent), "norm", constants)
@@ -134,8 +134,8 @@ def _to(
 def _radius(
     wanted: Formula,
     weights: FloatArray,
-    ends: tuple[IntArray, IntArray],
-    pairs: tuple[IntArray, IntArray],
+    ends: tuple[Indices, Indices],
+    pairs: tuple[Indices, Indices],
     constants: Constants,
 ) -> float | Unknown:
     """The largest magnitude of an eigenvalue of the matrix of the entry, whose ends must be the same neurons."""

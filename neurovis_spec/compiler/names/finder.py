@@ -126,14 +126,13 @@ def finder_of(census: Census, made: Connected, findings: Findings) -> Finder:
     """The Finder of the neurons, connections and states of a spec."""
     rules, start = [], 0
     for bundle in made.bundles:
-        members = np.arange(start, start + len(bundle.sources))
-        start += len(members)
+        first, start = start, start + len(bundle.sources)
         if bundle.learning is not None:
-            rule = bundle.learning.rule
+            rule, members = bundle.learning.rule, np.arange(first, start)
             rules.append(Holder(members, rule.name, tuple(quantity.name for quantity in rule.state)))
     names = tuple(bundle.name for bundle in made.bundles)
     empty = tuple(bundle.empty for bundle in made.bundles if bundle.empty is not None)
-    wiring = Wiring(made.sources, made.targets, names, tuple(rules), made.complete, empty)
+    wiring = Wiring(made.sources.compact(), made.targets.compact(), names, tuple(rules), made.complete, empty)
     return Finder(census.directory, _models(census), wiring, findings)
 
 

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import IntArray
+from neurovis_spec.arrays import Indices, IntArray
 from neurovis_spec.diagnostics import Home, Undeclared, shorten
 from neurovis_spec.language.references import StateName
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
@@ -53,12 +53,12 @@ class Wiring(NamedTuple):
     """The ends of all connections, what the entries are called, and the states of the rules. ``complete``: there are no
     others. ``empty`` are the ends of the entries that make no connection."""
 
-    sources: IntArray
-    targets: IntArray
+    sources: Indices
+    targets: Indices
     names: tuple[str, ...]
     rules: tuple[Holder, ...]
     complete: bool = True
-    empty: tuple[tuple[IntArray, IntArray], ...] = ()
+    empty: tuple[tuple[Indices, Indices], ...] = ()
 
     def nothing_between(self, sources: Sequence[int], targets: Sequence[int]) -> bool:
         """Whether an entry from any of some neurons to any of others makes no connection."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, Indices, IntArray
 from neurovis_spec.compiler.limits import PATIENCE
 from neurovis_spec.compiler.values.constants import Constants, Randomness, Value, check_finite
 from neurovis_spec.compiler.values.draws import Stream
@@ -124,7 +124,7 @@ def _written(node: AnyList, findings: Findings, row: str, named: bool) -> Cells 
 
 
 def seen_by_pairs(
-    i: IntArray | Unknown, j: IntArray | Unknown, sizes: tuple[float | Unknown, float | Unknown], stream: Stream
+    i: Indices | Unknown, j: Indices | Unknown, sizes: tuple[float | Unknown, float | Unknown], stream: Stream
 ) -> tuple[dict[str, Value | Unknown], Randomness | Unknown]:
     """What the formula of a connection sees, and what it draws from: its source ``i``, its target ``j``, the sizes of
     both ends."""

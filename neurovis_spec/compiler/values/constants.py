@@ -17,7 +17,7 @@ from typing import NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, Indices, IntArray
 from neurovis_spec.compiler.events.settable import Dependent, ParameterFormula, Part, Slot, places_of
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Findings, Home, Undeclared, shorten
@@ -177,8 +177,8 @@ class Randomness(NamedTuple):
     of a Randomness: it may draw, and nobody knows what)."""
 
     stream: Stream
-    i: int | IntArray
-    j: int | IntArray = 0
+    i: int | Indices
+    j: int | Indices = 0
 
 
 @dataclass

@@ -21,7 +21,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, Indices, IntArray, width
 from neurovis_spec.compiler.values import box_muller
 
 WordArray: TypeAlias = npt.NDArray[np.uint32]
@@ -93,7 +93,7 @@ def _normal(block: Block) -> FloatArray:
     return box_muller.normal(_fraction(block[0], block[1]), _fraction(block[2], block[3]))
 
 
-def _word(part: IntArray) -> LongArray:
+def _word(part: Indices) -> LongArray:
     """A part of a counter modulo 2^32."""
     return part.astype(np.uint64) & _LOW
 
@@ -136,7 +136,7 @@ class Stream:
     def _numbers(self, parts: tuple[Index, Index, Index, Index], make: Callable[[Block], FloatArray]) -> FloatArray:
         """A number of each counter, so many at a time that what they are made of stays in a processor's cache."""
         shape = np.broadcast_shapes(*(np.shape(part) for part in parts))
-        aligned = [np.asarray(part, dtype=np.int64) for part in parts]
+        aligned = [np.asarray(part) for part in parts]
         aligned = [part.reshape((1,) * (len(shape) - part.ndim) + part.shape) for part in aligned]
         numbers = np.empty(shape)
         for piece in _pieces(shape):
@@ -173,16 +173,15 @@ class Stream:
         """
         return self._connected(np.array([row], dtype=np.int64), n, probability)[1]
 
-    def random_pairs(self, rows: int, n: int, probability: float) -> tuple[IntArray, IntArray]:
-        """The rows and the targets of ``random_targets`` for the rows 0 … rows−1, row by row."""
-        together = max(1, _CHUNK // _batch(n, probability))
-        blocks = [
-            self._connected(np.arange(start, min(start + together, rows), dtype=np.int64), n, probability)
-            for start in range(0, rows, together)
-        ]
-        i, j = zip(*blocks, strict=True) if blocks else ((), ())
-        none = np.empty(0, dtype=np.int64)
-        return np.concatenate((none, *i)), np.concatenate((none, *j))
+    def random_pairs(self, rows: int, n: int, probability: float) -> tuple[Indices, Indices]:
+        """The rows and the targets of ``random_targets`` for the rows 0 … rows−1, row by row, in the least width."""
+        together, kind = max(1, _CHUNK // _batch(n, probability)), width(-1, max(rows, n))
+        i, j = [np.empty(0, dtype=kind)], [np.empty(0, dtype=kind)]
+        for start in range(0, rows, together):
+            some = np.arange(start, min(start + together, rows), dtype=np.int64)
+            for side, found in zip((i, j), self._connected(some, n, probability), strict=True):
+                side.append(found.astype(kind))
+        return np.concatenate(i), np.concatenate(j)
 
     def _connected(self, rows: IntArray, n: int, probability: float) -> tuple[IntArray, IntArray]:
         """The pairs of several rows at once, ordered by row and target."""

@@ -149,6 +149,8 @@ class _Names:
         self._held = np.zeros((_WORDS, _PLACES), dtype=np.uint64)
         #: the number of the name at each place, and 1
         self._number = np.zeros(_PLACES, dtype=np.int32)
+        #: the most words that any name has
+        self._most = 0
 
     def __getitem__(self, written: str) -> int:
         name = written.strip()
@@ -166,7 +168,8 @@ class _Names:
         places = (mixed >> np.uint64(64 - _PLACES.bit_length() + 1)).astype(np.int64)
         numbers = self._number[places] - 1
         other = (numbers < 0) | (cells.ends - cells.begins > 8 * _WORDS)
-        for word, held in itertools.zip_longest(words, self._held):
+        self._most = max(self._most, len(words))
+        for word, held in itertools.zip_longest(words, self._held[: self._most]):
             other |= held[places] != (0 if word is None else word)
         for cell in np.flatnonzero(other).tolist():
             written = cells.text[cells.begins[cell] : cells.ends[cell]].tobytes()
