@@ -116,7 +116,7 @@ class Column(Generic[Number]):
     def __getitem__(self, index: Indices | BoolArray | slice) -> npt.NDArray[Number]: ...
     def __getitem__(self, index: int | Indices | BoolArray | slice) -> Number | npt.NDArray[Number]:
         if not isinstance(index, slice | np.ndarray):
-            return self._kind(self.kept[self._at(np.asarray(index))])
+            return self._kind(self.kept[self._at(np.asarray(range(len(self))[index]))])
         if isinstance(index, slice):
             index = np.arange(*index.indices(len(self)))
         at = np.flatnonzero(index) if index.dtype == np.bool_ else cast("Indices", index)
@@ -132,6 +132,8 @@ class Column(Generic[Number]):
         """Where these numbers are kept."""
         if len(self._step) == 1:
             return indices if self._step[0] else np.zeros_like(indices)
+        if (indices < 0).any():
+            indices = np.where(indices < 0, indices + np.int64(len(self)), indices)
         run = np.searchsorted(self._bounds, indices, side="right") - 1
         return np.asarray(self._first[run] + self._step[run] * (indices - self._bounds[run]))
 

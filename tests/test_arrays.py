@@ -32,7 +32,9 @@ def test_a_column_is_the_array_of_its_parts(parts: list[FloatArray], data: st.Da
     assert bits(column.whole()) == bits(np.array(column.tolist())) == bits(whole)
     assert bits(np.concatenate([*column.pieces(), np.zeros(0)])) == bits(whole)
     assert digest(column) == digest(whole)
-    chosen = np.array(data.draw(st.lists(st.integers(0, len(whole) - 1))) if len(whole) else [], dtype=np.int64)
+    chosen = np.array(
+        data.draw(st.lists(st.integers(-len(whole), len(whole) - 1))) if len(whole) else [], dtype=np.int64
+    )
     assert bits(column[chosen]) == bits(whole[chosen])
     assert bits(column[whole > 0]) == bits(whole[whole > 0])
     assert bits(column[1:-2:3]) == bits(whole[1:-2:3])
