@@ -22,7 +22,7 @@ import numpy as np
 import neurovis_spec as nv
 from neurovis_spec.arrays import Column
 
-_GROUP = "neurovis: 1\nname: large\nneurons:\n  N: {{count: {}, activation: tanh, bias: 0.1}}\nconnections:\n"
+_GROUP = "neurovis: 1\nname: large\nneurons:\n  N: {{count: {}, activation: tanh}}\nconnections:\n"
 #: by case how many neurons and what is connected how
 CASES: Mapping[str, tuple[int, str]] = {
     "small": (2, "  N -> N: {weight: 0.5, pattern: all_to_all}"),
