@@ -139,8 +139,7 @@ class EntryBuilder:
             return UNKNOWN
         if self.sources is UNKNOWN or self.targets is UNKNOWN or not body.sound or findings.errors > before:
             return UNKNOWN
-        if not len(shape.i):  # there is nothing that a rule would change
-            learning = None
+        learning = learning if len(shape.i) else None  # without connections there is nothing that a rule would change
         return Bundle(
             self.around.scope.called(self.name),
             self.key.span,
