@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 from neurovis_spec.body import Body, BodyError, BodyMissingError, Port, load_kind, open_body
 from neurovis_spec.compiler.body_settings import BodySettings, Moved, Sensed
-from neurovis_spec.compiler.events.settable import places_of
+from neurovis_spec.compiler.events.settable import slots_named
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.names.references import key_of, known_inputs
 from neurovis_spec.compiler.names.scope import Surroundings
@@ -293,7 +293,9 @@ def _command(actuator: str, formula: Formula, around: Surroundings, constants: C
         return UNKNOWN
     if not found and is_constant(tree, (*ALWAYS, *constants.parameters)) and constants.value(formula) is UNKNOWN:
         return UNKNOWN
-    parameters = tuple((name, slot) for name, slot in places_of(tree, constants.settable).items() if name not in found)
+    parameters = tuple(
+        (name, slot) for name, slot in slots_named(tree, constants.settable).items() if name not in found
+    )
     return Moved(actuator, tree, tuple(found.values()), parameters, str(formula.value))
 
 

@@ -37,8 +37,8 @@ class ExportError(ValueError):
 def formula(code: Code, dependent: Dependent, place: Place, parameters: str = "parameters") -> Value:
     """The number at a place of what a formula gives. Raises ExportError."""
     match dependent:
-        case ParameterFormula(tree=tree, places=places, known=known, draw=draw):
-            names: dict[str, Value] = {name: f"{parameters}[{slot}]" for name, slot in places.items()}
+        case ParameterFormula(tree=tree, slot_of=slot_of, known=known, draw=draw):
+            names: dict[str, Value] = {name: f"{parameters}[{slot}]" for name, slot in slot_of.items()}
             for name, value in known.items():
                 if isinstance(value, float | np.ndarray):
                     names[name] = _element(code, value, place)

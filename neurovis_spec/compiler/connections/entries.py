@@ -422,5 +422,5 @@ def _present(part: Part, places: IntArray) -> Part:
     """A part whose numbers stand at these places, without those that stand at none (−1)."""
     inside = np.flatnonzero(places >= 0)
     if len(inside) < len(places):
-        part = part.some(inside)
+        part = part.subset(inside)
     return part._replace(places=places[inside])

@@ -73,7 +73,7 @@ def _found(part: Part, members: IntArray, located: Located) -> Iterator[Found]:
         owners = np.unique(numbers).tolist()
         for number in owners:
             inside = np.flatnonzero(numbers == number)
-            own = part if len(owners) == 1 else part.some(inside)
+            own = part if len(owners) == 1 else part.subset(inside)
             yield Found(Key(Owner(part.field, number), part.name), located.positions[members[inside]], own)
     elif part.field not in _ELSEWHERE:
         yield Found(Key(None, part.field), members, part)
@@ -165,7 +165,7 @@ def _merged(found: list[Found]) -> Iterator[Found]:
         formula = one.part.formula
         key: Hashable = (one.array, place)
         if isinstance(formula, ParameterFormula) and formula.plain and one.part.low is None and one.part.high is None:
-            key = (one.array, formula.tree, tuple(formula.places.items()), tuple(formula.known.items()))
+            key = (one.array, formula.tree, tuple(formula.slot_of.items()), tuple(formula.known.items()))
         groups.setdefault(key, []).append(one)
     for parts in groups.values():
         places = np.concatenate([one.places for one in parts])

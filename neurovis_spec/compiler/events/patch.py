@@ -144,7 +144,7 @@ class Patcher:
             place
             for formula in (*formulas, *(binding.formula for binding in plan.bindings))
             if isinstance(formula, ParameterFormula)
-            for place in formula.places.values()
+            for place in formula.slot_of.values()
         }
         lines += [f"    p{place} = p[{place}]" for place in sorted(read.difference(plan.following))]
         for slot, formula in zip(plan.following, formulas, strict=True):
@@ -225,7 +225,7 @@ def _call(name: str, *arguments: str) -> str:
 def _code(formula: object, space: dict[str, object], by: Library) -> str:
     """A formula as code; where it is more than an expression over parameters, a call."""
     if isinstance(formula, ParameterFormula) and formula.draw is None:
-        names = {name: f"p{slot}" for name, slot in formula.places.items()}
+        names = {name: f"p{slot}" for name, slot in formula.slot_of.items()}
         if all(isinstance(value, float | np.ndarray) for value in formula.known.values()):
             for name, value in formula.known.items():
                 names[name] = f"c{len(space)}"

@@ -1,9 +1,19 @@
 """What can be set in a run: parameters, and the numbers of a network that depend on them (§9).
 
-In: formulas and what their names mean. Out: Settable, a part of a Network: a Slot for each parameter, and Bindings,
-each a formula with the numbers that it gives. To set a parameter is to evaluate the bindings that read it and to write
-what they give into arrays; nothing is compiled anew. What depends on a parameter and has no binding (a count, a delay,
-the first weight of a rule) stays as it is.
+In: formulas and what their names mean. Out: Settable, a part of a Network. To set a parameter is to evaluate the
+bindings that read it and to write what they give into arrays; nothing is compiled anew. What depends on a parameter and
+has no binding (a count, a delay, the first weight of a rule) stays as it is.
+
+Three words, by the example ``parameters: {g: 2, w: g/4}`` with ``A -> B: {weight: w + 1}``:
+
+- A **Slot** is a parameter that can be set; slots are known by their index. Here g is slot 0 and w is slot 1. w
+  *follows* g: its slot has the formula g/4, which holds until w is set itself.
+- A **Part** says, while an entry or a group is compiled, which of its own numbers follow a formula: of the entry's
+  ``weights`` all follow w + 1. ``Constants.following`` (``values/constants.py``) collects parts.
+- A **Binding** is what a part becomes when the network is complete (``events/bound.py``): weight 7 of the network
+  follows w + 1.
+
+To set g to 4 is to compute slot 1 (1.0), then the binding (2.0), and to write that into weight 7.
 """
 
 from __future__ import annotations
@@ -28,7 +38,7 @@ BIAS, CENTRES, LOW, HIGH, WEIGHTS, NOISE = (
 
 
 def table_of(number: int) -> Key:
-    """The rows of an input."""
+    """The array of an input's rows; ``number`` is that of the input."""
     return Key(Owner("table", number), "")
 
 
@@ -48,18 +58,20 @@ class Dependent(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ParameterFormula:
-    """An expression over parameters: ``places`` gives the slot of each that can be set, ``known`` what its other names
-    mean; these may follow the parameters, too. ``draw`` gives its random numbers, the same each time."""
+    """An expression over parameters."""
 
     tree: Tree
-    places: Mapping[str, int]
+    #: the slot of each parameter in it that can be set, by name
+    slot_of: Mapping[str, int]
+    #: what its other names mean; these may follow parameters, too
     known: Mapping[str, Value | Dependent] = field(default_factory=dict)
+    #: gives its random numbers, the same each time
     draw: Drawing | None = None
 
     @property
     def slots(self) -> frozenset[int]:
         """The parameters that it reads."""
-        direct = frozenset(self.places.values())
+        direct = frozenset(self.slot_of.values())
         return direct.union(
             *(value.slots for value in self.known.values() if not isinstance(value, float | np.ndarray))
         )
@@ -73,25 +85,28 @@ class ParameterFormula:
         """Its value or values with these parameters."""
         if isinstance(self.tree, Number):
             return self.tree.value
-        given: dict[str, Value] = {name: float(parameters[slot]) for name, slot in self.places.items()}
+        given: dict[str, Value] = {name: float(parameters[slot]) for name, slot in self.slot_of.items()}
         for name, value in self.known.items():
             given[name] = value if isinstance(value, float | np.ndarray) else value.values(parameters, by)
         return evaluate_array(self.tree, given, self.draw, by=by)
 
 
 class Part(NamedTuple):
-    """Some numbers of a group or an entry that follow a formula: those at ``places`` (None: all of them) of the array
-    ``field``, for a setting of a definition that of its parameter ``name``. They must lie from ``low`` to ``high``."""
+    """Some numbers of a group, an entry or an input that follow a formula."""
 
     formula: Dependent
+    #: their indices in the array of the group or entry; None: all of them
     places: IntArray | None = None
+    #: which array, ``weights`` or ``bias``; for a setting of a definition the kind of that, ``model`` or ``rule``
     field: str = ""
+    #: for a setting of a definition the parameter that is set
     name: str = ""
+    #: the bounds within which they must lie
     low: Dependent | None = None
     high: Dependent | None = None
 
-    def some(self, places: IntArray) -> Part:
-        """The part with what its formulas give at some of its places alone."""
+    def subset(self, places: IntArray) -> Part:
+        """The part of which the formulas give only the numbers at these indices of what they give now."""
         if isinstance(self.formula, ParameterFormula) and self.formula.plain and self.low is self.high is None:
             return self
         low, high = (None if bound is None else Subset(bound, places) for bound in (self.low, self.high))
@@ -104,7 +119,7 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Assembled:
-    """An array of which some parts follow parameters, and the others are as in ``base``."""
+    """An array of which some parts follow parameters, and the other numbers are those of ``base``."""
 
     base: FloatArray
     parts: tuple[Part, ...]
@@ -142,7 +157,8 @@ class Subset:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Distance:
-    """How far the neurons of connections are from each other; ``positions`` are x and y of all neurons in turn."""
+    """How far source and target of connections are from each other. ``positions`` are x and y of all neurons in turn:
+    x0, y0, x1, y1, …"""
 
     positions: Assembled
     sources: IntArray
@@ -153,28 +169,32 @@ class Distance:
         """The parameters that it reads."""
         found = np.concatenate((self.sources, self.targets))
         parts = self.positions.parts
+        # number k of the positions is one of neuron k // 2
         return frozenset().union(*(part.formula.slots for part in parts if np.isin(part.within(0) // 2, found).any()))
 
     def values(self, parameters: FloatArray, by: Library = NUMPY) -> FloatArray:
         """The distances with these parameters."""
         place = self.positions.values(parameters, by).reshape(-1, 2)
         apart = place[self.sources] - place[self.targets]
-        # NumPy's is that of the C library
+        # NumPy's hypot is that of the C library, so that compiled code gives the same bits
         return np.hypot(apart[:, 0], apart[:, 1])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Slot:
-    """A parameter: of the spec, or with a dotted name of an instance where it depends on one of the spec. ``formula``
-    is what it follows until it is set itself; ``low`` and ``high`` are its bounds, which may follow others. ``given``:
-    its value does not come from the spec, which says ``own``."""
+    """A parameter that can be set: one of the spec, or one of an instance that follows one of the spec (``leg.g``)."""
 
     name: str
+    #: what it is when a run begins
     value: float
+    #: what it follows until it is set itself
     formula: ParameterFormula | None = None
+    #: its bounds, which may follow other parameters
     low: float | Dependent = -np.inf
     high: float | Dependent = np.inf
+    #: whether its value was given from outside (``--set``)
     given: bool = False
+    #: if so, what the spec says
     own: ParameterFormula | None = None
 
     @property
@@ -185,15 +205,17 @@ class Slot:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Binding:
-    """Numbers that follow a formula: ``indices`` into the vector of all weights (``weights``) or into that of the
-    other numbers that can be set. ``array`` and ``places`` say what they are, whatever the vector looks like. They must
-    lie from ``low`` to ``high``."""
+    """Numbers of a network that follow a formula."""
 
     formula: Dependent
+    #: whether they are weights; the others stand in the vector of Settable's ``variables``
     weights: bool
+    #: where they stand in the vector of all weights, or in that of the variables
     indices: IntArray
+    #: which array of the network they belong to, and their indices there, however the vector is laid out
     array: Key
     places: IntArray
+    #: the bounds within which they must lie
     low: Dependent | None = None
     high: Dependent | None = None
 
@@ -213,18 +235,19 @@ class Variable(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Settable:
-    """All that can be set. ``variables`` are BIAS, CENTRES, LOW, HIGH (one number a neuron or a connection), parameters
-    of definitions in use, and the tables of inputs; ``initial`` is what they begin with."""
+    """All that can be set in a run of a network."""
 
     slots: tuple[Slot, ...] = ()
     bindings: tuple[Binding, ...] = ()
+    #: BIAS, CENTRES, LOW, HIGH (one number a neuron or a connection), parameters of definitions, tables of inputs
     variables: Mapping[Key, Variable] = field(default_factory=dict)
+    #: the vector of all of these when a run begins
     initial: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @cached_property
     def index(self) -> Mapping[str, int]:
-        """The slot of each parameter by name."""
-        return {slot.name: place for place, slot in enumerate(self.slots)}
+        """The index of each slot by the name of its parameter."""
+        return {slot.name: index for index, slot in enumerate(self.slots)}
 
     @cached_property
     def parameters(self) -> FloatArray:
@@ -237,41 +260,42 @@ class Settable:
     def followers(self) -> tuple[tuple[int, ...], ...]:
         """For each slot the slots whose formulas read it, ascending."""
         result: list[list[int]] = [[] for _ in self.slots]
-        for place, slot in enumerate(self.slots):
+        for index, slot in enumerate(self.slots):
             for read in () if slot.formula is None else slot.formula.slots:
-                result[read].append(place)
-        return tuple(tuple(places) for places in result)
+                result[read].append(index)
+        return tuple(map(tuple, result))
 
     @cached_property
     def bounded(self) -> tuple[tuple[int, frozenset[int]], ...]:
         """The slots whose bounds follow parameters, and which they read."""
-        return tuple((place, slot.bounds_read) for place, slot in enumerate(self.slots) if slot.bounds_read)
+        return tuple((index, slot.bounds_read) for index, slot in enumerate(self.slots) if slot.bounds_read)
 
     @cached_property
     def readers(self) -> tuple[tuple[int, ...], ...]:
         """For each slot the bindings that read it, ascending."""
         result: list[list[int]] = [[] for _ in self.slots]
-        for place, binding in enumerate(self.bindings):
+        for index, binding in enumerate(self.bindings):
             for read in binding.slots:
-                result[read].append(place)
-        return tuple(tuple(places) for places in result)
+                result[read].append(index)
+        return tuple(map(tuple, result))
 
-    def reached(self, changed: Sequence[int], own: Sequence[bool]) -> list[int]:
-        """The slots that follow from others that change, ascending; not those that are set themselves (``own``)."""
+    def reached(self, changed: Sequence[int], was_set: Sequence[bool]) -> list[int]:
+        """The slots that follow slots that change, directly or through others, ascending. ``was_set`` says of each slot
+        whether it has been set itself: then it follows nothing any more."""
         found: set[int] = set()
         waiting = list(changed)
         while waiting:
-            for place in self.followers[waiting.pop()]:
-                if place not in found and not own[place]:
-                    found.add(place)
-                    waiting.append(place)
+            for follower in self.followers[waiting.pop()]:
+                if follower not in found and not was_set[follower]:
+                    found.add(follower)
+                    waiting.append(follower)
         return sorted(found.difference(changed))
 
     def bound_to(self, changed: Sequence[int]) -> list[int]:
         """The bindings that read any of these slots, ascending."""
-        return sorted({place for slot in changed for place in self.readers[slot]})
+        return sorted({reader for slot in changed for reader in self.readers[slot]})
 
 
-def places_of(tree: Tree, settable: Mapping[str, int]) -> dict[str, int]:
-    """The slots of the parameters that an expression names."""
+def slots_named(tree: Tree, settable: Mapping[str, int]) -> dict[str, int]:
+    """The slots of the parameters that an expression names, by name. ``settable`` has the slots of all."""
     return {name: settable[name] for name in sorted(names(tree) & settable.keys())}

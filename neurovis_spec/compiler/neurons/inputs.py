@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, frozen
-from neurovis_spec.compiler.events.settable import places_of
+from neurovis_spec.compiler.events.settable import slots_named
 from neurovis_spec.compiler.limits import PATIENCE, amount, plural
 from neurovis_spec.compiler.names.references import Section, key_span
 from neurovis_spec.compiler.network import Input
@@ -49,7 +49,7 @@ def _by_expression(name: str, formula: Formula, start: int, constants: Constants
     return (
         UNKNOWN
         if tree is UNKNOWN
-        else Input(name, start, 1, expression=tree, slots=places_of(tree, constants.settable))
+        else Input(name, start, 1, expression=tree, slots=slots_named(tree, constants.settable))
     )
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from neurovis_spec.arrays import frozen
-from neurovis_spec.compiler.events.settable import ParameterFormula, places_of
+from neurovis_spec.compiler.events.settable import ParameterFormula, slots_named
 from neurovis_spec.compiler.network import Noise
 from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.values.constants import Constants, Value, width_of
@@ -35,7 +35,7 @@ def make_noises(census: Census, inputs: int) -> tuple[Noise, ...]:
             continue
         widths = _check_deviations(tree, formula, group.count, constants)
         members = frozen(np.arange(group.start, group.start + group.count, dtype=np.int64))
-        slots = places_of(tree, constants.settable)
+        slots = slots_named(tree, constants.settable)
         result.append(Noise(group.name, members, start, tree, dict(constants.parameters), slots, widths))
         start += group.count
     return tuple(result)

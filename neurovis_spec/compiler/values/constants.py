@@ -1,7 +1,19 @@
 """Constants: formulas evaluated while a network is compiled.
 
 In: formulas (with their places), parameters, and what else a place makes known (``i``, ``n``, …). Out: floats or
-arrays, or findings at the very character. ``used`` notes on which parameters something of the structure depends.
+arrays, or findings at the very character. ``structural`` holds the parameters on which something of the structure
+depends, so that they cannot be set in a run.
+
+**Following.** Where a formula reads a parameter that can be set, the number that it gives has to *follow* it in a run.
+So who evaluates formulas also collects the formulas themselves, as Parts (``events/settable.py``)::
+
+    with constants.following() as parts:
+        bias = constants.value(formula)                      # 2.0, of "2*g" where g is 1
+    # parts == [Part(ParameterFormula(2*g))]; [] where the formula reads no such parameter
+    constants.follow(part._replace(field="bias") for part in parts)
+
+``follow`` hands parts on to the ``following`` block around this one: what is inside knows the formula, what is around
+it knows which array the number belongs to.
 """
 
 from __future__ import annotations
@@ -18,7 +30,7 @@ from typing import NamedTuple, TypeAlias, TypeVar
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, Indices, IntArray
-from neurovis_spec.compiler.events.settable import Dependent, ParameterFormula, Part, Slot, places_of
+from neurovis_spec.compiler.events.settable import Dependent, ParameterFormula, Part, Slot, slots_named
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Findings, Home, Undeclared, shorten
 from neurovis_spec.language.expressions.evaluate import evaluate_array
@@ -109,11 +121,12 @@ def parse_formula(
     try:
         tree = _parsed(formula.value, random, tuple((functions or {}).items()), subscripts)
     except ExpressionError as error:
-        for one in (error, *error.others):
-            if one.code == "draw-not-allowed" and findings.is_invalid(formula.span):
+        for mistake in (error, *error.others):
+            if mistake.code == "draw-not-allowed" and findings.is_invalid(formula.span):
                 continue  # a comma has cut it: what it was meant to be is not sure
-            findings.error(one.code, formula.node.at(one.start, one.end), one.message, one.hint)
-        used = [one for one in error.used if one[0] not in known]
+            place = formula.node.at(mistake.start, mistake.end)
+            findings.error(mistake.code, place, mistake.message, mistake.hint)
+        used = [use for use in error.used if use[0] not in known]
     else:
         unused = [name for name in names(tree) if name not in known]
         if not unused:
@@ -191,21 +204,24 @@ class Constants:
     findings: Findings
     #: parameter → the parameters that its own formula uses
     uses: dict[str, frozenset[str]] = field(default_factory=dict)
+    #: the parameters on which a count, a delay or anything else of the structure depends
     structural: set[str] = field(default_factory=set)
     #: the parameters that an instance of a module does not see
     outside: Outside = NOTHING_OUTSIDE
     #: names that formulas read, whatever became of these
     read: set[str] = field(default_factory=set)
-    #: the slots of the whole network, and for each parameter that can be set in a run, or follows one, its slot
+    #: the slots of the whole network, one list for the constants of all its instances
     slots: list[Slot] = field(default_factory=list)
+    #: the index of the slot of each parameter that can be set in a run, or follows one
     settable: dict[str, int] = field(default_factory=dict)
-    #: the path of the instance whose parameters these are, and those that it is given as formulas over others
+    #: the path of the instance whose parameters these are; empty for the spec itself
     path: str = ""
     #: where they are declared
     home: Home = PARAMETERS
+    #: the parameters that the instance is given as formulas over those of the scope around it
     settings: Mapping[str, ParameterFormula] = field(default_factory=dict)
-    #: what follows parameters, of all that is evaluated while somebody asks for it
-    _parts: list[Part] | None = None
+    #: the parts of the innermost ``following`` block; None outside of all
+    _collected: list[Part] | None = None
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -228,24 +244,31 @@ class Constants:
         followed = None if tree is UNKNOWN or self.settable.keys().isdisjoint(names(tree)) else self.bound(tree)
         if self.path and name not in self.settings and followed is None:
             return
-        formula = self.settings.get(name, followed)
+        slot = Slot(
+            name=f"{self.path}.{name}" if self.path else name,
+            value=value,
+            formula=self.settings.get(name, followed),
+            low=low,
+            high=high,
+            given=given and not self.path,
+            own=own,
+        )
         self.settable[name] = len(self.slots)
-        called = f"{self.path}.{name}" if self.path else name
-        self.slots.append(Slot(called, value, formula, low, high, given and not self.path, own))
+        self.slots.append(slot)
 
     @contextmanager
     def following(self) -> Iterator[list[Part]]:
-        """Collect what follows parameters, of all that is evaluated within."""
-        outer, self._parts = self._parts, []
+        """Collect a Part for each formula that is evaluated in the block and reads a settable parameter."""
+        outer, self._collected = self._collected, []
         try:
-            yield self._parts
+            yield self._collected
         finally:
-            self._parts = outer
+            self._collected = outer
 
     def follow(self, parts: Iterable[Part]) -> None:
-        """Add to what is being collected."""
-        if self._parts is not None:
-            self._parts.extend(parts)
+        """Add these parts to those of the innermost ``following`` block."""
+        if self._collected is not None:
+            self._collected.extend(parts)
 
     def bound(
         self,
@@ -253,14 +276,14 @@ class Constants:
         extra: Mapping[str, Value | Dependent] | None = None,
         randomness: Randomness | None = None,
     ) -> ParameterFormula:
-        """An expression, all of which is known, with what its names mean: slots of parameters that can be set, and
-        values."""
+        """An expression, all names of which are known, with what they mean: slots of parameters that can be set, and
+        values. ``extra`` goes before the parameters."""
         used = names(tree)
         extra = extra or {}
-        places = {name: slot for name, slot in places_of(tree, self.settable).items() if name not in extra}
-        known = self._known(sorted(used - places.keys()), extra)
+        slot_of = {name: slot for name, slot in slots_named(tree, self.settable).items() if name not in extra}
+        known = self._known(sorted(used - slot_of.keys()), extra)
         draw = None if randomness is None or not draws(tree) else _Drawing(randomness)
-        return ParameterFormula(tree, places, known, draw)
+        return ParameterFormula(tree, slot_of, known, draw)
 
     def tree(
         self, formula: Formula, role: Role = PLAIN, what: str = "known here", later: Collection[str] = ()
@@ -285,7 +308,7 @@ class Constants:
         places: IntArray | None = None,
     ) -> Value | Unknown:
         """The value of a formula, finite or not: a float, or an array where ``extra`` or the draws hold arrays.
-        ``places`` is where it is to stand, for who collects what follows parameters."""
+        ``places`` are the indices of the Part that is collected, where the value follows a parameter."""
         if not isinstance(formula.value, str):
             return UNKNOWN if formula.value is UNKNOWN else float(formula.value)
         tree = self.tree(formula, Role("formula", sees=tuple(extra or ()), draws=randomness is not None))
@@ -294,18 +317,18 @@ class Constants:
         if structural:
             self.depend(names(tree))
         given = {name: value for name, value in (extra or {}).items() if name in names(tree)}
-        around = {name: value for name, value in given.items() if value is not UNKNOWN}
-        if len(around) < len(given) or (randomness is UNKNOWN and draws(tree)):
+        context = {name: value for name, value in given.items() if value is not UNKNOWN}
+        if len(context) < len(given) or (randomness is UNKNOWN and draws(tree)):
             return UNKNOWN
-        values = self._known(names(tree), around)
+        values = self._known(names(tree), context)
         randomness = None if randomness is UNKNOWN else randomness
         drawing = None if randomness is None else _Drawing(randomness)
         result = evaluate_array(tree, values, draw=drawing)
         if drawing is not None and drawing.wrong is not None and np.isnan(result).any():
             self.refuse_draw(formula, *drawing.wrong)
             return UNKNOWN
-        if self._parts is not None and not structural and not self.settable.keys().isdisjoint(names(tree)):
-            self._parts.append(Part(self.bound(tree, around, randomness), places))
+        if self._collected is not None and not structural and not self.settable.keys().isdisjoint(names(tree)):
+            self._collected.append(Part(self.bound(tree, context, randomness), places))
         return float(result) if np.ndim(result) == 0 else np.asarray(result, dtype=np.float64)
 
     def _known(self, used: Iterable[str], extra: Mapping[str, V]) -> dict[str, V | float]:
@@ -370,7 +393,7 @@ class Constants:
         return int(value)
 
     def depend(self, used: Iterable[str]) -> None:
-        """Something of the structure depends on these parameters, and so on those behind them."""
+        """Note that something of the structure depends on these parameters, and so on those that they follow."""
         waiting = list(used)
         while waiting:
             name = waiting.pop()
@@ -380,14 +403,15 @@ class Constants:
 
 
 class _Drawing:
-    """Draws the numbers of one formula, and keeps the first draw of which no number can be drawn, and by how much.
+    """Draws the numbers of one formula, and keeps the first draw that is impossible: its width is negative.
 
-    What is drawn so is NaN, so that it counts only where the formula's value depends on it: a branch that is not taken
-    may have such a draw.
+    Such a number is NaN, so that it counts only where the formula's value depends on it: a branch that is not taken may
+    have such a draw.
     """
 
     def __init__(self, randomness: Randomness) -> None:
         self.randomness = randomness
+        #: the first such draw, and its least width
         self.wrong: tuple[Draw, float] | None = None
 
     def __call__(self, node: Draw, first: Value, second: Value) -> Value:
@@ -395,8 +419,8 @@ class _Drawing:
         wrong = np.less(width, 0)
         if self.wrong is None and wrong.any():
             self.wrong = node, float(np.nanmin(width))
-        at = self.randomness
-        drawn = at.stream.drawn(node.kind, first, second, (at.i, at.j, 0, node.index))
+        stream, i, j = self.randomness
+        drawn = stream.drawn(node.kind, first, second, (i, j, 0, node.index))
         return np.where(wrong, np.nan, drawn) if wrong.any() else drawn
 
 
