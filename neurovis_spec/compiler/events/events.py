@@ -27,14 +27,17 @@ class Event:
     clamped follow the parameters, as these are by then. Each reference is an array of ascending indices."""
 
     at: int
+    #: None: the clamp has no end
     to: int | None = None
+    #: parameters, and what each is set to
     set: Mapping[str, Formula] = field(default_factory=dict)
+    #: neurons, and what they are clamped to
     clamp: tuple[tuple[IntArray, Formula], ...] = ()
-    neurons: tuple[IntArray, ...] = ()
-    connections: tuple[IntArray, ...] = ()
+    lesioned_neurons: tuple[IntArray, ...] = ()
+    lesioned_connections: tuple[IntArray, ...] = ()
     mended_neurons: tuple[IntArray, ...] = ()
     mended_connections: tuple[IntArray, ...] = ()
-    #: connections whose rules are switched on or off
+    #: connections, and whether their rules are switched on or off
     learning: tuple[tuple[IntArray, bool], ...] = ()
     #: where each parameter that is set is named
     keys: Mapping[str, Span] = field(default_factory=dict)
@@ -58,32 +61,45 @@ class EventReader:
         return tuple(event for event in events if event is not UNKNOWN)
 
     def _event(self, model: EventModel) -> Event | Unknown:
-        before = self.findings.errors
+        """One event; UNKNOWN where anything of it is invalid, which is reported."""
+        errors_before = self.findings.errors
         begin = model.at if model.at is not None else model.from_
         at = None if begin is None else self.constants.integer(begin, "the step of an event", 0)
         to = None if model.to is None else self.constants.integer(model.to, "the end of a clamp", 1)
         if isinstance(at, int) and isinstance(to, int) and model.to is not None and to <= at:
             message = f"the clamp ends before it begins: from {at} to {to}, which is exclusive"
             self.findings.error("out-of-range", model.to.span, message)
+        # a name whose value could not be read (UNKNOWN) is checked, too; ``model.set`` is without it
         for name, formula in names_of(model, "set", model.set).items():
             self._check_set(model, name)
             if formula is not UNKNOWN:
                 self.constants.scalar(formula)
         check_keys(model.source, "clamp", model.clamp, self.finder.directory, self.findings)
         clamps = [one for name, formula in model.clamp.items() for one in self._clamp(model, name, formula)]
-        neurons, connections = self._parts(model.lesion)
-        mended, joined = self._parts(model.mend)
+        lesioned_neurons, lesioned_connections = self._neurons_and_connections(model.lesion)
+        mended_neurons, mended_connections = self._neurons_and_connections(model.mend)
         learning = [
             one
             for name, on in model.learning.items()
             for one in self._learning(key_of(model.source, "learning", name), on.value)
         ]
-        if at is None or at is UNKNOWN or to is UNKNOWN or model.contradictory or self.findings.errors > before:
+        if at is None or at is UNKNOWN or to is UNKNOWN or model.contradictory or self.findings.errors > errors_before:
             return UNKNOWN
-        keys = {name: key_of(model.source, "set", name).span for name in model.set}
-        return Event(at, to, model.set, tuple(clamps), neurons, connections, mended, joined, tuple(learning), keys)
+        return Event(
+            at,
+            to,
+            set=model.set,
+            clamp=tuple(clamps),
+            lesioned_neurons=lesioned_neurons,
+            lesioned_connections=lesioned_connections,
+            mended_neurons=mended_neurons,
+            mended_connections=mended_connections,
+            learning=tuple(learning),
+            keys={name: key_of(model.source, "set", name).span for name in model.set},
+        )
 
     def _check_set(self, model: EventModel, name: str) -> None:
+        """Report a name that is no parameter, or one that cannot be set in a run."""
         span = key_of(model.source, "set", name).span
         constants = self.constants
         if name not in constants.names:
@@ -98,27 +114,31 @@ class EventReader:
             self.findings.error("structural-parameter", span, message)
 
     def _clamp(self, model: EventModel, name: str, formula: Formula) -> list[tuple[IntArray, Formula]]:
+        """The neurons that a key of ``clamp`` names, and what they are clamped to; nothing where either is invalid."""
         neurons = self.finder.neurons(key_of(model.source, "clamp", name))
         value = self.constants.scalar(formula)
         return [] if neurons is UNKNOWN or value is UNKNOWN else [(neurons, formula)]
 
-    def _parts(self, texts: Iterable[Located[str]]) -> tuple[tuple[IntArray, ...], tuple[IntArray, ...]]:
-        """The neurons and the connections that are lesioned or mended."""
+    def _neurons_and_connections(
+        self, references: Iterable[Located[str]]
+    ) -> tuple[tuple[IntArray, ...], tuple[IntArray, ...]]:
+        """What the references of a lesion or a mend name: the neurons, and the connections."""
         neurons: list[IntArray] = []
         connections: list[IntArray] = []
-        for text in texts:
-            joined = not isinstance(parse(text.value), Sum)
-            found = self.finder.connections(text) if joined else self.finder.neurons(text)
-            if found is not UNKNOWN:
-                (connections if joined else neurons).append(found)
+        for reference in references:
+            is_connection = not isinstance(parse(reference.value), Sum)
+            members = self.finder.connections(reference) if is_connection else self.finder.neurons(reference)
+            if members is not UNKNOWN:
+                (connections if is_connection else neurons).append(members)
         return tuple(neurons), tuple(connections)
 
     def _learning(self, name: Located[str], on: bool) -> list[tuple[IntArray, bool]]:
-        """The connections whose rules are stopped or started."""
-        found = self.finder.connections(name)
-        if found is UNKNOWN:
+        """The connections of a key of ``learning``, and whether their rules are on from now on; nothing where it is
+        invalid."""
+        members = self.finder.connections(name)
+        if members is UNKNOWN:
             return []
-        if len(found) and not self.finder.learns(found):
+        if len(members) and not self.finder.learns(members):
             message = f"nothing learns at '{shorten(name.value)}'"
             self.findings.error("no-rule", name.span, message, "name a connection that has a 'plasticity'")
-        return [(found, on)]
+        return [(members, on)]

@@ -1,8 +1,9 @@
 """The timeline: from the events of a spec to what changes in a run, and when (§9).
 
-In: a Network, its events. Out: the same network with a Change for each step at which something does, and a hash that
-covers what they make of it; findings, each at its event, where something could not be done. What is set is tried out
-here, one event after the other, on numbers that can be changed: what a run does later cannot fail.
+In: a Network, its events. Out: the same network with a Change for each step at which something changes, and a hash that
+covers what the changes make of it; findings, each at its event, where something cannot be done. The changes are tried
+out here, one after the other, on arrays of a trial run without steps; so a run cannot fail on them. Slots and bindings
+are explained in ``settable``.
 """
 
 from __future__ import annotations
@@ -41,88 +42,100 @@ def with_changes(network: Network, events: tuple[Event, ...], constants: Constan
         else replace(event, set={name: value for name, value in event.set.items() if name in settable})
         for event in events
     )
-    begun, over = defaultdict[int, list[int]](list), defaultdict[int, list[int]](list)
-    for number, event in enumerate(events):
-        begun[event.at].append(number)
+    starting_at, ending_at = defaultdict[int, list[int]](list), defaultdict[int, list[int]](list)
+    for index, event in enumerate(events):
+        starting_at[event.at].append(index)
         if event.clamp and event.to is not None:
-            over[event.to].append(number)
+            ending_at[event.to].append(index)
     changes = tuple(
-        _change(step, [(number, events[number]) for number in begun[step]], over[step], constants)
-        for step in sorted({*begun, *over})
+        _change(step, {index: events[index] for index in starting_at[step]}, ending_at[step], constants)
+        for step in sorted({*starting_at, *ending_at})
     )
-    trial, course = _Trial(network, events, changes, constants), hashlib.sha256()
+    trial, run_hash = _TrialRun(network, events, changes, constants), hashlib.sha256()
     for change in changes:
-        course.update(trial.go_on(change, [events[number] for number in begun[change.at]]))
-    own = digest(network.hash, course.hexdigest())
-    return replace(network, changes=changes, hash=own)
+        run_hash.update(trial.apply(change, [events[index] for index in starting_at[change.at]]))
+    return replace(network, changes=changes, hash=digest(network.hash, run_hash.hexdigest()))
 
 
-def _change(step: int, new: list[tuple[int, Event]], over: list[int], constants: Constants) -> Change:
-    """What several events change at a step; of those that do the same the last one counts."""
+#: More clamps than an event can have: the order of a clamp is the index of its event times this, plus its own index
+#: in the event. So of two clamps of a neuron the one written later has the higher order, and holds.
+_MOST_CLAMPS = 1 << 32
+
+
+def _change(step: int, starting: dict[int, Event], ending: list[int], constants: Constants) -> Change:
+    """What several events change at a step; of those that do the same the last one counts. Events are known by their
+    index."""
     values: dict[int, ParameterFormula] = {}
     clamps: list[Clamp] = []
     learning: list[tuple[IntArray, bool]] = []
-    for number, event in new:
+    for index, event in starting.items():
         for name, formula in event.set.items():
             values[constants.settable[name]] = _formula(formula, constants)
         for place, (neurons, formula) in enumerate(event.clamp):
-            order = number * _MOST_CLAMPS + place
-            clamps.append(Clamp(order, number, neurons, _formula(formula, constants)))
+            order = index * _MOST_CLAMPS + place
+            clamps.append(Clamp(order, event=index, neurons=neurons, value=_formula(formula, constants)))
         learning += event.learning
+    events = starting.values()
     return Change(
         step,
-        tuple(values.items()),
-        tuple(clamps),
-        tuple(over),
-        lesioned_neurons=_indices([one for _, event in new for one in event.neurons]),
-        lesioned_connections=_indices([one for _, event in new for one in event.connections]),
-        mended_neurons=_indices([one for _, event in new for one in event.mended_neurons]),
-        mended_connections=_indices([one for _, event in new for one in event.mended_connections]),
+        parameters=tuple(values.items()),
+        clamps=tuple(clamps),
+        released=tuple(ending),
+        lesioned_neurons=_union([neurons for event in events for neurons in event.lesioned_neurons]),
+        lesioned_connections=_union([members for event in events for members in event.lesioned_connections]),
+        mended_neurons=_union([neurons for event in events for neurons in event.mended_neurons]),
+        mended_connections=_union([members for event in events for members in event.mended_connections]),
         learning=tuple(learning),
     )
 
 
-#: Entries of a clamp that are told apart; more than a file can hold.
-_MOST_CLAMPS = 1 << 32
-
-
-def _indices(found: Sequence[IntArray]) -> IntArray:
-    """All of these indices, ascending; of one array that one."""
-    if len(found) < 2:
-        return found[0] if found else NO_INDICES
-    return frozen(np.unique(np.concatenate(found)))
+def _union(indices: Sequence[IntArray]) -> IntArray:
+    """All of these indices, ascending; of one array that array itself."""
+    if len(indices) < 2:
+        return indices[0] if indices else NO_INDICES
+    return frozen(np.unique(np.concatenate(indices)))
 
 
 def _formula(formula: Formula, constants: Constants) -> ParameterFormula:
-    """A formula of an event over the parameters, whatever these are by then."""
+    """A formula of an event over the parameters, whatever values these have by then."""
     tree = constants.tree(formula)
     return constants.bound(Number(0.0) if tree is UNKNOWN else tree)
 
 
-class _Written(NamedTuple):
-    """An array that a patch writes to: which of its bindings write, and where each of these has its numbers among all.
+class _Setting(NamedTuple):
+    """Where a parameter is set, and to what."""
 
-    ``order`` is that of their places; ``mark`` says what the array is called and what the places are.
-    """
+    key: Span
+    formula: Formula
 
+
+class _WrittenArray(NamedTuple):
+    """An array of the network that some bindings of a patch write to. Their numbers are taken one binding after the
+    other."""
+
+    #: whether it is the weights
     weights: bool
-    parts: tuple[tuple[int, slice], ...]
+    #: the index of each of these bindings, and which of all numbers are its own
+    segments: tuple[tuple[int, slice], ...]
+    #: sorts the numbers by their places in the array
     order: IntArray
-    mark: bytes
+    #: bytes that stand for the name of the array and for the places
+    identity: bytes
 
 
-def _written(called: str, numbers: list[int], bindings: tuple[Binding, ...]) -> _Written:
-    places = np.concatenate([bindings[number].places for number in numbers])
-    ends = [0, *accumulate(len(bindings[number].places) for number in numbers)]
-    parts = tuple((number, slice(first, end)) for number, (first, end) in zip(numbers, pairwise(ends), strict=True))
+def _written_array(name: str, indices: list[int], bindings: tuple[Binding, ...]) -> _WrittenArray:
+    """The array of this name that the bindings with these indices write to."""
+    places = np.concatenate([bindings[index].places for index in indices])
+    ends = [0, *accumulate(len(bindings[index].places) for index in indices)]
+    segments = tuple((index, slice(start, end)) for index, (start, end) in zip(indices, pairwise(ends), strict=True))
     order = np.argsort(places, kind="stable")
-    mark = called.encode() + hashlib.sha256(places[order].tobytes()).digest()
-    return _Written(bindings[numbers[0]].weights, parts, order, mark)
+    identity = name.encode() + hashlib.sha256(places[order].tobytes()).digest()
+    return _WrittenArray(bindings[indices[0]].weights, segments, order, identity)
 
 
 @dataclass
-class _Trial:
-    """A run without steps: what the parameters are by an event, and all that follows them."""
+class _TrialRun:
+    """A run without steps: which values the parameters have by an event, and all numbers that follow them."""
 
     network: Network
     events: tuple[Event, ...]
@@ -133,146 +146,157 @@ class _Trial:
         settable = self.network.settable
         self._patcher = Patcher(settable)
         self._parameters = settable.parameters.copy()
-        self._chosen = np.zeros(len(settable.slots), dtype=np.bool_)
+        self._was_set = np.zeros(len(settable.slots), dtype=np.bool_)
         self._weights = self.network.connections.weights.whole().copy()
         self._variables = settable.initial.copy()
         self._held = Held.none(len(self.network.neurons))
-        self._arrays: dict[tuple[Binding, ...], tuple[_Written, ...]] = {}
-        self._read = self._slots_of_formulas()
-        by_name = sorted((slot.name, place) for place, slot in enumerate(settable.slots) if "." not in slot.name)
-        self._root = np.array([place for _, place in by_name], dtype=np.int64)
+        self._arrays: dict[tuple[Binding, ...], tuple[_WrittenArray, ...]] = {}
+        self._read_in_run = self._slots_read_in_run()
+        # without those of instances, which follow; by name, as the hash depends on no order of the spec
+        by_name = sorted((slot.name, index) for index, slot in enumerate(settable.slots) if "." not in slot.name)
+        self._spec_slots = np.array([index for _, index in by_name], dtype=np.int64)
 
     @property
     def findings(self) -> Findings:
         """Where findings go."""
         return self.constants.findings
 
-    def _slots_of_formulas(self) -> frozenset[int]:
+    def _slots_read_in_run(self) -> frozenset[int]:
         """The slots that inputs, noise and the events themselves read, and those that these follow."""
-        found: set[int] = set()
+        read: set[int] = set()
         for change in self.changes:
-            for formula in (*(one for _, one in change.parameters), *(clamp.value for clamp in change.clamps)):
-                found |= formula.slots
-        for slots in (*(i.slots for i in self.network.inputs), *(noise.slots for noise in self.network.noises)):
-            found.update(slots.values())
-        waiting = list(found)
+            for _, formula in change.parameters:
+                read |= formula.slots
+            for clamp in change.clamps:
+                read |= clamp.value.slots
+        for entry in self.network.inputs:
+            read.update(entry.slots.values())
+        for noise in self.network.noises:
+            read.update(noise.slots.values())
+        waiting = list(read)
         while waiting:
             followed = self.network.settable.slots[waiting.pop()].formula
-            new = frozenset() if followed is None else followed.slots - found
-            found |= new
+            new = frozenset() if followed is None else followed.slots - read
+            read |= new
             waiting += new
-        return frozenset(found)
+        return frozenset(read)
 
-    def go_on(self, change: Change, events: list[Event]) -> bytes:
-        """Apply the changes of a step to the parameters, weights and clamps of this trial run. Gives bytes that
-        identify their effect, for the hash."""
-        keys = self._keys(events)
-        marks = [str(change.at).encode()]
+    def apply(self, change: Change, events: list[Event]) -> bytes:
+        """Apply the changes of a step, which these events make, to the parameters, weights and clamps of this trial
+        run. Gives bytes that identify their effect, for the hash."""
+        settings = self._settings(events)
+        setting_of = {slot: settings[self.network.settable.slots[slot].name] for slot, _ in change.parameters}
+        identities = [str(change.at).encode()]
         values: dict[int, float] = {}
         for slot, formula in change.parameters:
             value = float(formula.values(self._parameters))
-            _, written = keys[self.network.settable.slots[slot].name]
-            if check_finite(value, written, self.findings):
+            if check_finite(value, setting_of[slot].formula, self.findings):
                 values[slot] = value
         changed: frozenset[int] = frozenset()
         if values:
-            spans = {slot: keys[self.network.settable.slots[slot].name][0] for slot in values}
-            mark, changed = self._set(change.at, values, spans)
-            marks.append(mark)
-        marks.append(self._clamp(change, changed))
-        for array in (
-            change.mended_neurons, change.mended_connections, change.lesioned_neurons, change.lesioned_connections,
-        ):  # fmt: skip
-            marks.append(array.tobytes())
-        marks += (members.tobytes() + bytes([on]) for members, on in change.learning)
-        return b"".join(len(mark).to_bytes(8, "little") + mark for mark in marks)
+            identity, changed = self._set(change.at, values, {slot: setting_of[slot].key for slot in values})
+            identities.append(identity)
+        identities.append(self._clamp(change, changed))
+        identities += [
+            change.mended_neurons.tobytes(),
+            change.mended_connections.tobytes(),
+            change.lesioned_neurons.tobytes(),
+            change.lesioned_connections.tobytes(),
+        ]
+        identities += (members.tobytes() + bytes([on]) for members, on in change.learning)
+        return b"".join(len(identity).to_bytes(8, "little") + identity for identity in identities)
 
-    def _keys(self, events: list[Event]) -> dict[str, tuple[Span, Formula]]:
-        """Where each parameter is set at a step, and to what; a warning where one is set twice."""
-        due: dict[str, tuple[Span, Formula]] = {}
+    def _settings(self, events: list[Event]) -> dict[str, _Setting]:
+        """The last setting of each parameter at a step; a warning at one that another replaces."""
+        settings: dict[str, _Setting] = {}
         for event in events:
             for name, formula in event.set.items():
                 key = event.keys[name]
-                if name in due:
-                    first = due[name][0]
-                    where = key.seen_from(first)
+                if name in settings:
+                    earlier = settings[name].key
+                    where = key.seen_from(earlier)
                     message = f"'{name}' is set again at this step ({where}): what is set here is lost"
-                    self.findings.warning("no-effect", first, message, "set it once")
-                due[name] = key, formula
-        return due
+                    self.findings.warning("no-effect", earlier, message, "set it once")
+                settings[name] = _Setting(key, formula)
+        return settings
 
     def _set(self, step: int, values: dict[int, float], keys: dict[int, Span]) -> tuple[bytes, frozenset[int]]:
-        """Set parameters; a finding, at each of them from which it follows, where they cannot have these values."""
+        """Set slots to values. Gives bytes that identify the effect, and the slots that change. Where a number cannot
+        be what it would be then: a finding at every parameter set here that it depends on."""
+        settable = self.network.settable
         try:
-            patch = self._patcher.patch(self._parameters, self._chosen, values)
+            patch = self._patcher.patch(self._parameters, self._was_set, values)
         except PatchError as error:
-            own = [chosen or slot in values for slot, chosen in enumerate(self._chosen.tolist())]
+            was_set = [before or slot in values for slot, before in enumerate(self._was_set.tolist())]
             for slot, key in keys.items():
-                if not error.slots.isdisjoint((slot, *self.network.settable.reached([slot], own))):
+                if not error.slots.isdisjoint((slot, *settable.reached([slot], was_set))):
                     self.findings.error("out-of-range", key, f"from step {step} on {error}")
             return b"", frozenset()
-        self._chosen[list(values)] = True
+        self._was_set[list(values)] = True
         before, self._parameters = self._parameters, patch.parameters
-        mark, effect = self._effect(patch)
+        identity, has_effect = self._identity_and_effect(patch)
         patch.write(self._weights, self._variables)
-        if not effect and self._read.isdisjoint(patch.changed):
+        if not has_effect and self._read_in_run.isdisjoint(patch.changed):
             for slot, key in keys.items():
                 if before[slot] != patch.parameters[slot]:
-                    message = f"setting '{self.network.settable.slots[slot].name}' changes nothing in the run"
+                    message = f"setting '{settable.slots[slot].name}' changes nothing in the run"
                     hint = "what it begins with (an initial, a weight that learns) and how it is drawn stay as they are"
                     self.findings.warning("no-effect", key, message, hint)
-        return mark, patch.changed
+        return identity, patch.changed
 
-    def _effect(self, patch: Patch) -> tuple[bytes, bool]:
+    def _identity_and_effect(self, patch: Patch) -> tuple[bytes, bool]:
         """Bytes that identify the numbers that a patch writes, however its formulas are written (for the hash); and
         whether it changes any of them."""
-        marks = [patch.parameters[self._root].tobytes()]
-        effect = False
-        for array in self._written(patch.bindings):
+        identities = [patch.parameters[self._spec_slots].tobytes()]
+        has_effect = False
+        for array in self._arrays_written_by(patch.bindings):
             now = self._weights if array.weights else self._variables
             values = np.empty(len(array.order))
-            for number, where in array.parts:
-                values[where] = patch.values[number]
-                effect = effect or bool((now[patch.bindings[number].indices] != patch.values[number]).any())
-            same = bool((values == values[0]).all())
-            marks.append(array.mark + values[slice(1) if same else array.order].tobytes())
-        return b"/".join(marks), effect
+            for index, segment in array.segments:
+                values[segment] = patch.values[index]
+                if (now[patch.bindings[index].indices] != patch.values[index]).any():
+                    has_effect = True
+            all_equal = bool((values == values[0]).all())
+            # of equal numbers one is hashed
+            identities.append(array.identity + values[slice(1) if all_equal else array.order].tobytes())
+        return b"/".join(identities), has_effect
 
-    def _written(self, bindings: tuple[Binding, ...]) -> tuple[_Written, ...]:
-        """The arrays that these bindings write to, with the places in them."""
+    def _arrays_written_by(self, bindings: tuple[Binding, ...]) -> tuple[_WrittenArray, ...]:
+        """The arrays that these bindings write to, by name."""
         if bindings not in self._arrays:
-            arrays: dict[Key, list[int]] = defaultdict(list)
-            for number, binding in enumerate(bindings):
+            by_array: dict[Key, list[int]] = defaultdict(list)
+            for index, binding in enumerate(bindings):
                 if len(binding.indices):
-                    arrays[binding.array].append(number)
-            named = sorted((self._called(array), array) for array in arrays)
-            self._arrays[bindings] = tuple(_written(called, arrays[array], bindings) for called, array in named)
+                    by_array[binding.array].append(index)
+            named = sorted((self._name_of(array), array) for array in by_array)
+            self._arrays[bindings] = tuple(_written_array(name, by_array[array], bindings) for name, array in named)
         return self._arrays[bindings]
 
-    def _called(self, array: Key) -> str:
-        """An array by a name in which no order of the spec shows."""
+    def _name_of(self, array: Key) -> str:
+        """A name of an array in which no order of the spec shows: that of an input has the input's name, not its
+        number."""
         owner = array.owner
         if owner is None or array != table_of(owner.number):
             return array.text
         return f"{owner.kind}/{self.network.inputs[owner.number].name}"
 
     def _clamp(self, change: Change, changed: frozenset[int]) -> bytes:
-        """Begin and end clamps; a finding, at what it is clamped to, where that is not finite."""
+        """Begin and end clamps, and let those that go on follow the slots that changed. Gives bytes that identify which
+        neurons are held at what; a finding, at what a neuron is clamped to, where that is not finite."""
         if not (self._held.active or change.clamps):
             return b""
-        before = self._held.order.copy(), self._held.value.copy()
+        before = self._held.copy()
         self._held.follow(changed, self._parameters)
         self._held.end(change.released, self._parameters)
         for clamp in change.clamps:
             self._held.begin(clamp, self._parameters)
-        held = np.flatnonzero(self._held.order >= 0)
-        wrong = held[~np.isfinite(self._held.value[held])]
-        for order in dict.fromkeys(self._held.order[wrong].tolist()):
+        neurons = np.flatnonzero(self._held.order >= 0)
+        values = self._held.value[neurons]
+        for order in dict.fromkeys(self._held.order[neurons[~np.isfinite(values)]].tolist()):
             clamp = self._held.active[order]
             _, formula = self.events[clamp.event].clamp[order % _MOST_CLAMPS]
             check_finite(float(clamp.value.values(self._parameters)), formula, self.findings)
-        if np.array_equal(before[0] >= 0, self._held.order >= 0) and np.array_equal(
-            before[1][held], self._held.value[held]
-        ):
+        # nothing changes where the same neurons are held at the same values, by whichever clamp
+        if np.array_equal(neurons, np.flatnonzero(before.order >= 0)) and np.array_equal(values, before.value[neurons]):
             return b""
-        return held.tobytes() + self._held.value[held].tobytes()
+        return neurons.tobytes() + values.tobytes()
