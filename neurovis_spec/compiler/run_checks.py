@@ -1,17 +1,23 @@
-"""What is checked in a run beside all that shows: operations that are undefined, and hidden by what is around them.
+"""Checks in a run: an undefined operation whose result is swallowed, as in ``clip(1/0, -1, 1)``, would go unnoticed.
 
 In: a Network. Out: the same, but models and rules with such an operation have a Check: a state that is an infinity
 after a step in which one was undefined, so that the watch (``runtime/watch.py``) finds it among the other numbers. It
 is a formula like others, which every backend computes; most networks have none, and then it costs nothing.
 
-``clip(1/drive, -1, 1)`` gets ``∞ if drive == 0 else 0``; ``1/drive`` none, as its value shows; nor ``drive/s`` for a
-setting that is not 0 and that nobody can set in a run.
+``clip(1/drive, -1, 1)`` gets ``∞ if drive == 0 else 0``; ``1/drive`` gets none, as its value shows; nor does
+``drive/s`` for a setting that is not 0 and that nobody can set in a run.
+
+- A *hazard* is an operation that may be undefined, with a formula that is true where it is.
+- *Hidden* says what of a value is swallowed afterwards: NOTHING, INFINITY (a bound swallows that, but no NaN) or ALL.
+- What a definition *gives* is its result: a model's activity, a rule's weight. A result is *lasting* where it is kept
+  from step to step, as all states and the weight are, and *fleeting* where it is computed anew from the new states, as
+  the activity is.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from types import MappingProxyType
@@ -57,8 +63,8 @@ from neurovis_spec.language.expressions.undefined import (
 def with_checks(network: Network) -> Network:
     """The network with the checks that it needs."""
     checks = _Checks(network)
-    populations = tuple(map(checks.of_population, network.populations))
-    projections = tuple(map(checks.of_projection, network.projections))
+    populations = tuple(map(checks.checked_population, network.populations))
+    projections = tuple(map(checks.checked_projection, network.projections))
     if all(new is old for new, old in zip((*populations, *projections), network.holders, strict=True)):
         return network
     return replace(network, populations=populations, projections=projections)
@@ -72,150 +78,163 @@ def without_checks(network: Network) -> Network:
 
 
 def _unchecked(use: Use) -> Use:
-    made = use.definition
-    state = tuple(state for state in made.state if not isinstance(state, Check))
-    return use if len(state) == len(made.state) else replace(use, definition=replace(made, state=state))
+    definition = use.definition
+    state = tuple(state for state in definition.state if not isinstance(state, Check))
+    return use if len(state) == len(definition.state) else replace(use, definition=replace(definition, state=state))
 
 
 class _Checks:
-    """Makes the checks of a network, of whose settings some stay as they are in a run."""
+    """Makes the checks of a network."""
 
     def __init__(self, network: Network) -> None:
         self.network = network
 
-    def known(self, use: Use) -> dict[str, Value]:
-        """The values of the names that do not change."""
-        fixed = {name: values for name, values in use.parameters.items() if not self.is_set(Key(use.owner, name))}
-        return {**CONSTANTS, "dt": self.network.dt, **fixed}
+    def fixed(self, use: Use) -> dict[str, Value]:
+        """The values of the names that do not change in a run: constants, and settings that nobody can set."""
+        settings = {name: values for name, values in use.parameters.items() if not self.is_set(Key(use.owner, name))}
+        return {**CONSTANTS, "dt": self.network.dt, **settings}
 
     def is_set(self, array: Key) -> bool:
         """Whether an array can be set in a run."""
         return array in self.network.settable.variables
 
-    def of_population(self, population: Population) -> Population:
+    def checked_population(self, population: Population) -> Population:
         """The population with the checks of its model and activation."""
         activation = population.activation.definition
-        states, calls = self.of_use(population.model, functions=activation.functions)
+        checks, calls = self.of_use(population.model, functions=activation.functions)
         if calls and activation.given.each_step is not None:
             inside = hazards(activation.given.each_step, max(call.hidden for call in calls)).found
-            inside = list(_open(inside, self.known(population.activation)))
+            inside = _still_possible(inside, self.fixed(population.activation))
             if inside:
+                # The activation gets a second function, true where the first one is undefined; the check of the model
+                # calls it with the arguments with which the model calls the first one.
                 undefined = Quantity(UNDEFINED_F, either(hazard.formula for hazard in inside))
                 activation = replace(activation, gives=(*activation.gives, undefined))
-                found = [Hazard(inside[0].what, Call(UNDEFINED_F, c.call.arguments), c.where) for c in calls]
-                states += _check(f"activation '{activation.name}'", _sized(found), [], {})
-        if not states:
+                at_calls = [Hazard(inside[0].what, Call(UNDEFINED_F, c.call.arguments), c.where) for c in calls]
+                check = _check(f"activation '{activation.name}'", _within_formula_limit(at_calls), [], {})
+                checks += () if check is None else (check,)
+        if not checks:
             return population
-        model = _with_states(population.model, states)
+        model = _with_states(population.model, checks)
         return replace(population, model=model, activation=replace(population.activation, definition=activation))
 
-    def of_projection(self, projection: Projection) -> Projection:
+    def checked_projection(self, projection: Projection) -> Projection:
         """The projection with the checks of its definitions."""
         connections, members = self.network.connections, projection.members
         bounded = any(
             self.is_set(array) or bool(np.isfinite(values[members]).any())
             for array, values in ((LOW, connections.low), (HIGH, connections.high))
         )
-        degree = Hidden.INFINITY if bounded else Hidden.NOTHING
-        states = [self.of_use(use, degree)[0] for use in projection.uses]
-        if not any(states):
+        hidden = Hidden.INFINITY if bounded else Hidden.NOTHING  # bounds make a number of an infinite weight
+        checks = [self.of_use(use, hidden)[0] for use in projection.uses]
+        if not any(checks):
             return projection
-        return replace(projection, uses=tuple(map(_with_states, projection.uses, states)))
+        return replace(projection, uses=tuple(map(_with_states, projection.uses, checks)))
 
     def of_use(
         self, use: Use, hidden: Hidden = Hidden.NOTHING, functions: Mapping[str, Tree] = MappingProxyType({})
     ) -> tuple[list[Check], list[Called]]:
-        """The checks of a definition, of which what it gives is ``hidden`` to this degree, and what it calls of
-        ``functions``. What is computed shows, but for what an episode's end replaces."""
-        made = use.definition
-        steps: list[Hazards] = []
-        ends: list[Hazards] = []
+        """The checks of a definition, none or one, and which of the ``functions`` it calls. ``hidden``: how far its
+        result is swallowed afterwards. A state shows, unless an episode's end replaces it."""
+        definition = use.definition
+        each_step: list[Hazards] = []
+        each_episode: list[Hazards] = []
         calls: list[Called] = []
-        for one in made.fleeting:
-            if one.each_step is not None:
-                steps.append(_with_new(hazards(one.each_step, functions=functions), made))
-                calls += steps[-1].calls
-        for one in (*made.gives, *made.state) if made.kind.lasting else made.state:
-            degree = hidden if one in made.gives else Hidden.NOTHING
-            if one.each_step is not None:
-                replaced = self.network.episode is not None and one.each_episode is not None
-                steps.append(hazards(one.each_step, Hidden.ALL if replaced else degree))
-            if one.each_episode is not None:
-                ends.append(hazards(one.each_episode, degree))
-        found, last = through_let(steps, made.let), through_let(ends, made.let)
-        return list(_check(f"{made.kind.name} '{made.name}'", found, last, self.known(use))), calls
+        for result in definition.fleeting:
+            if result.each_step is not None:
+                each_step.append(_in_terms_of_old_states(hazards(result.each_step, functions=functions), definition))
+                calls += each_step[-1].calls
+        for quantity in (*definition.gives, *definition.state) if definition.kind.lasting else definition.state:
+            degree = hidden if quantity in definition.gives else Hidden.NOTHING
+            if quantity.each_step is not None:
+                is_replaced = self.network.episode is not None and quantity.each_episode is not None
+                each_step.append(hazards(quantity.each_step, Hidden.ALL if is_replaced else degree))
+            if quantity.each_episode is not None:
+                each_episode.append(hazards(quantity.each_episode, degree))
+        check = _check(
+            f"{definition.kind.name} '{definition.name}'",
+            through_let(each_step, definition.let),
+            through_let(each_episode, definition.let),
+            self.fixed(use),
+        )
+        return [] if check is None else [check], calls
 
 
 def _with_states(use: Use, states: list[Check]) -> Use:
+    """The use of a definition that has these states, too."""
     return replace(use, definition=replace(use.definition, state=(*use.definition.state, *states)))
 
 
-def through_let(read: Iterable[Hazards], let: tuple[tuple[str, Tree], ...]) -> list[Hazard]:
-    """The hazards of formulas, and of the intermediate values that they read."""
-    formulas = list(read)
+def through_let(formulas: Iterable[Hazards], let: tuple[tuple[str, Tree], ...]) -> list[Hazard]:
+    """The hazards of formulas, and of the intermediate values (``let``) that they read."""
+    formulas = list(formulas)
     found = [hazard for formula in formulas for hazard in formula.found]
     reads: list[Read] = [read for formula in formulas for read in formula.names]
-    for name, tree in reversed(let):
-        one = together(reads, name)
-        if one is not None:
-            made = hazards(tree, one.hidden, one.where)
-            found += made.found
-            reads += made.names
-    return _sized(found)
+    for name, tree in reversed(let):  # the last first, as later ones read earlier ones
+        as_read = together(reads, name)
+        if as_read is not None:
+            inside = hazards(tree, as_read.hidden, as_read.where)
+            found += inside.found
+            reads += inside.names
+    return _within_formula_limit(found)
 
 
-def _with_new(made: Hazards, model: Definition) -> Hazards:
-    """What is given reads, over the old states: it sees the new ones."""
-    new = {state.name: state.each_step for state in model.state if state.each_step is not None}
+def _in_terms_of_old_states(made: Hazards, definition: Definition) -> Hazards:
+    """The hazards of a fleeting result, which reads the new states, as formulas over the old ones, which a check
+    reads. What becomes too long for a formula is left out."""
+    new = {state.name: state.each_step for state in definition.state if state.each_step is not None}
 
-    def old(tree: Tree) -> Tree:
+    def rewritten(tree: Tree) -> Tree:
         return substitute(tree, new) if new.keys() & names(tree) else tree
 
     def where(tree: Tree | None) -> Tree | None:
-        return None if tree is None else old(tree)
+        return None if tree is None else rewritten(tree)
 
-    found, read, calls = Hazards([], [], [])
+    found, reads, calls = Hazards([], [], [])
     for hazard in made.found:
-        with suppress(ExpressionError):  # too long to be computed beside the rest
-            found.append(hazard._replace(condition=old(hazard.condition), where=where(hazard.where)))
-    for name in made.names:
         with suppress(ExpressionError):
-            read.append(name._replace(where=where(name.where)))
-    for one in made.calls:
+            found.append(hazard._replace(condition=rewritten(hazard.condition), where=where(hazard.where)))
+    for read in made.names:
         with suppress(ExpressionError):
-            arguments = tuple(map(old, one.call.arguments))
-            calls.append(one._replace(call=replace(one.call, arguments=arguments), where=where(one.where)))
-    return Hazards(found, read, calls)
+            reads.append(read._replace(where=where(read.where)))
+    for called in made.calls:
+        with suppress(ExpressionError):
+            call = replace(called.call, arguments=tuple(map(rewritten, called.call.arguments)))
+            calls.append(called._replace(call=call, where=where(called.where)))
+    return Hazards(found, reads, calls)
 
 
-def _sized(found: Iterable[Hazard]) -> list[Hazard]:
-    """The first of them, as many as are together no longer than a formula may be."""
+def _within_formula_limit(candidates: Iterable[Hazard]) -> list[Hazard]:
+    """The first hazards, as many as are together no longer than a formula may be."""
     kept: list[Hazard] = []
-    for hazard in found:
+    for hazard in candidates:
         with suppress(ExpressionError):
             check_extent(either(one.formula for one in (*kept, hazard)))
             kept.append(hazard)
     return kept
 
 
-def _open(found: Iterable[Hazard], known: Mapping[str, Value]) -> Iterator[Hazard]:
-    """Without what is defined with these settings, whatever arrives."""
-    for hazard in found:
-        settled = names(hazard.condition) <= known.keys()
-        if not settled or np.any(evaluate_array(hazard.condition, known)):
-            yield hazard
+def _still_possible(candidates: Iterable[Hazard], fixed: Mapping[str, Value]) -> list[Hazard]:
+    """The hazards that the fixed values do not rule out."""
+    possible: list[Hazard] = []
+    for hazard in candidates:
+        if not names(hazard.condition) <= fixed.keys() or np.any(evaluate_array(hazard.condition, fixed)):
+            possible.append(hazard)
+    return possible
 
 
-def _check(what: str, steps: list[Hazard], ends: list[Hazard], known: Mapping[str, Value]) -> Iterator[Check]:
-    """The check of a definition, if it needs one: of what it computes at each step, and at an episode's end."""
-    at_step, at_end = list(_open(steps, known)), list(_open(ends, known))
+def _check(what: str, each_step: list[Hazard], each_episode: list[Hazard], fixed: Mapping[str, Value]) -> Check | None:
+    """The check of a definition, of what it computes at each step and at an episode's end; None if it needs none."""
+    at_step, at_end = _still_possible(each_step, fixed), _still_possible(each_episode, fixed)
     if not at_step and not at_end:
-        return
+        return None
     kinds = {hazard.what for hazard in (*at_step, *at_end)}
     name = f"the {what} {kinds.pop() if len(kinds) == 1 else 'has an undefined operation'}"
-    step = _infinite(at_step, Number(0.0)) if at_step else Number(0.0)
-    yield Check(name, step, _infinite(at_end, Name(name)) if at_end else None)
+    step = _infinite_if_any(at_step, Number(0.0)) if at_step else Number(0.0)
+    # at an episode's end the state stays what the last step has made it, or becomes infinite
+    return Check(name, step, _infinite_if_any(at_end, Name(name)) if at_end else None)
 
 
-def _infinite(found: list[Hazard], otherwise: Tree) -> Tree:
-    return Conditional(either(hazard.formula for hazard in found), Number(math.inf), otherwise)
+def _infinite_if_any(possible: list[Hazard], otherwise: Tree) -> Tree:
+    """∞ where one of the hazards is computed and undefined."""
+    return Conditional(either(hazard.formula for hazard in possible), Number(math.inf), otherwise)
