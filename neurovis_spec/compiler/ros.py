@@ -24,7 +24,7 @@ from neurovis_spec.compiler.ros_settings import (
 )
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, Home, Undeclared, shorten
-from neurovis_spec.language.located import Formula, said
+from neurovis_spec.language.located import Formula, value_or
 from neurovis_spec.language.model import names_of
 from neurovis_spec.language.ros import PublishModel, RosModel, SubscribeModel
 from neurovis_spec.language.ros_types import Field, all_types, fields_of, misspelt, numbers_of, plain
@@ -49,8 +49,8 @@ def ros_settings(model: RosModel, around: Surroundings, constants: Constants) ->
     settings = RosSettings(
         namespace=namespace,
         rate=1 / constants.dt if rate is None else rate,
-        reliability="reliable" if qos is None else said(qos.reliability, "reliable"),
-        durability="volatile" if qos is None else said(qos.durability, "volatile"),
+        reliability="reliable" if qos is None else value_or(qos.reliability, "reliable"),
+        durability="volatile" if qos is None else value_or(qos.durability, "volatile"),
         depth=depth,
         subscribe=tuple(_subscriptions(model, around, constants)),
         publish=tuple(_publications(model, around, constants)),
@@ -115,10 +115,10 @@ def _subscriptions(model: RosModel, around: Surroundings, constants: Constants) 
                 input=name,
                 topic=entry.topic.value,
                 type=_type(entry, found.size),
-                field=said(entry.field, _DATA),
+                field=value_or(entry.field, _DATA),
                 names=tuple(joint.value for joint in entry.names or ()),
                 timeout=timeout,
-                on_timeout=said(entry.on_timeout, "zero"),
+                on_timeout=value_or(entry.on_timeout, "zero"),
             )
 
 
@@ -132,7 +132,7 @@ def _publications(model: RosModel, around: Surroundings, constants: Constants) -
         size = None if output is None else output.size
         _check_numbers(entry, size, f"the output '{name}' has", constants.findings)
         if output is not None:
-            yield Publication(name, entry.topic.value, _type(entry, output.size), said(entry.field, _DATA), safe)
+            yield Publication(name, entry.topic.value, _type(entry, output.size), value_or(entry.field, _DATA), safe)
 
 
 def _type(entry: SubscribeModel | PublishModel, size: int) -> str:
@@ -167,7 +167,7 @@ def _check_numbers(entry: SubscribeModel | PublishModel, size: int | None, who: 
             hint = suggest(name, all_types(), "types")
             findings.error("unknown-message", entry.type.span, f"there is no message type '{shorten(name)}'", hint)
         return
-    path = said(entry.field, _DATA)
+    path = value_or(entry.field, _DATA)
     span = (entry.field or entry.type or entry.topic).span
     field = fields.get(path)
     if field is None:

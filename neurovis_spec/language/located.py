@@ -79,7 +79,7 @@ class Located(NamedTuple, Generic[T]):
         return self.node.span
 
 
-def said(written: Located[T] | None, otherwise: Default) -> T | Default:
+def value_or(written: Located[T] | None, otherwise: Default) -> T | Default:
     """The value that is written, or another one where none is."""
     return otherwise if written is None else written.value
 

@@ -49,7 +49,7 @@ from neurovis_spec.language.located import (
     findings_of,
     give_up,
     refuse,
-    said,
+    value_or,
 )
 from neurovis_spec.language.model import Model, NamedParameters, Short, opening
 from neurovis_spec.language.yaml.source import AnyList, Entry, Mapping, Node, Scalar, Sequence
@@ -287,7 +287,7 @@ class ParameterModel(Model):
     @property
     def about(self) -> str:
         """What it is, as the author says."""
-        return said(self.description, "")
+        return value_or(self.description, "")
 
 
 ParameterField = Annotated[ParameterModel, Short("value", "a number or an expression")]

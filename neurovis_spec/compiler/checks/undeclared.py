@@ -3,6 +3,10 @@
 In: the findings of a spec that miss a name, the files in which its declaration should stand. Out: one finding for each
 name. Where it is used several times, and another one is declared and never used that can only be a slip of it, the
 declaration is misspelt, and the finding stands there; else it stands at the first use and says where the others are.
+
+A group with ``count: 6`` that is named K declares the neurons K1 … K6: ``K`` is the *stem* of ``K3``. So a use of K3
+may miss a declaration of K3, or, among groups with a count alone (``only_groups``), one of K. Findings are replaced by
+``findings.fold``: one takes the place of several, which are known by their marks.
 """
 
 from __future__ import annotations
@@ -24,7 +28,7 @@ from neurovis_spec.likeness import meant, slips
 #: The most lines, and the most names, that a message lists.
 _SHOWN: Final = 5
 #: How many declarations are looked through for one that is never used.
-_MANY: Final = 10_000
+_MOST_DECLARATIONS: Final = 10_000
 _WORD: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _REST_OF_LINE: Final = re.compile(r"[^\r\n]*")
 _DIGITS: Final = "0123456789"
@@ -40,13 +44,14 @@ class _Use(NamedTuple):
     """A finding that misses a name."""
 
     mark: Mark
-    told: Diagnostic
+    finding: Diagnostic
     name: str
+    #: where it would be declared
     home: Home
 
     @property
     def stem(self) -> str:
-        """The counted declaration that would make a name with a number behind it."""
+        """Of a neuron the name without the number behind it; of anything else the name."""
         return self.name.rstrip(_DIGITS) if "neurons" in self.home.parts else self.name
 
 
@@ -54,60 +59,62 @@ def gather_undeclared(files: Collection[Mapping], findings: Findings) -> None:
     """Make one finding of those that miss the same name in a file; of a name that means something else, say what.
     ``files`` are the spec and those that it includes."""
     declarations = _Declarations(files, findings)
-    uses = [_Use(mark, told, *lost) for mark, (told, lost) in findings.missing().items()]
-    for number, use in enumerate(uses):
-        told = _explained(use, declarations)
-        if told is not use.told:
-            findings.fold([use.mark], told)
-            uses[number] = use._replace(told=told)
-    uses = _without_misspelt(uses, declarations, findings)
+    uses = [_Use(mark, finding, *missed) for mark, (finding, missed) in findings.missing().items()]
+    for index, use in enumerate(uses):
+        hint = _hint_for_other_kind(use, declarations)
+        if hint is not None:
+            finding = replace(use.finding, hint=hint)
+            findings.fold([use.mark], finding)
+            uses[index] = use._replace(finding=finding)
+    uses = _report_misspelt(uses, declarations, findings)
     groups: dict[tuple[str, Home, str], list[_Use]] = {}
     for use in uses:
+        # where K is declared, K7 and K8 are missed each by itself; else both miss K
         name = use.name if use.stem in declarations.stems(use.home) else use.stem
-        groups.setdefault((name, use.home, use.told.span.file), []).append(use)
+        groups.setdefault((name, use.home, use.finding.span.file), []).append(use)
     for group in groups.values():
         if len(group) > 1:
-            findings.fold([use.mark for use in group], _at_first_use(group, declarations.near(group)))
+            findings.fold([use.mark for use in group], _at_first_use(group, declarations.unused_near(group)))
 
 
-def _explained(use: _Use, declarations: _Declarations) -> Diagnostic:
-    """The finding; of a name in a formula that is no parameter, but something else, with what that is."""
-    told, name, within = use.told, use.name, use.home.within
-    is_set = told.code == "unknown-parameter"
-    if told.code not in ("unknown-name", "unknown-parameter") or use.home.parts != ("parameters",):
-        return told
-    if any(declared.value == name for declared in declarations.at(Home(within, ("inputs",)), counted=False)):
-        if is_set:
-            return replace(told, hint=f"'{name}' is an input: let its expression use a parameter, and set that one")
+def _hint_for_other_kind(use: _Use, declarations: _Declarations) -> str | None:
+    """Of a name in the place of a parameter, that is an input, a neuron or an instance: what to do instead."""
+    code, name, within = use.finding.code, use.name, use.home.within
+    if code not in ("unknown-name", "unknown-parameter") or use.home.parts != ("parameters",):
+        return None
+    in_event_or_override = code == "unknown-parameter"
+    if any(declared.value == name for declared in declarations.declared_at(Home(within, ("inputs",)))):
+        if in_event_or_override:
+            return f"'{name}' is an input: let its expression use a parameter, and set that one"
         hint = f"'{name}' is an input, which neurons take in with input: {name}; for a weight that follows it: "
-        return replace(told, hint=f"{hint}a product with a neuron that does (combine: product), or a rule")
-    groups = Home(within, ("neurons", "instances"))
-    if any(declared.value == name for declared in declarations.at(groups, counted=False)):
-        if is_set:
-            return replace(told, hint=f"'{name}' is no parameter: neurons are clamped, with clamp: {{{name}: …}}")
-        return replace(told, hint=f"formulas see no activities: what '{name}' does arrives by a connection")
-    return told
+        return f"{hint}a product with a neuron that does (combine: product), or a rule"
+    if any(declared.value == name for declared in declarations.declared_at(Home(within, ("neurons", "instances")))):
+        if in_event_or_override:
+            return f"'{name}' is no parameter: neurons are clamped, with clamp: {{{name}: …}}"
+        return f"formulas see no activities: what '{name}' does arrives by a connection"
+    return None
 
 
-def _without_misspelt(uses: list[_Use], declarations: _Declarations, findings: Findings) -> list[_Use]:
-    """Report the declarations that are misspelt; the uses of other names."""
-    for counted in (True, False):
+def _report_misspelt(uses: list[_Use], declarations: _Declarations, findings: Findings) -> list[_Use]:
+    """Report the declarations that are misspelt. Returns the uses of other names, in the order of the text."""
+    for only_groups in (True, False):
         groups: dict[tuple[str, tuple[str, ...]], list[_Use]] = {}
         for use in uses:
-            groups.setdefault((use.stem if counted else use.name, use.home.within), []).append(use)
+            groups.setdefault((use.stem if only_groups else use.name, use.home.within), []).append(use)
         uses = []
         for (name, _), group in groups.items():
-            declared = declarations.like(name, group, counted) if len(group) > 1 else None
+            declared = declarations.misspelt_for(name, group, only_groups) if len(group) > 1 else None
             if declared is None:
                 uses += group
             else:
                 findings.fold([use.mark for use in group], _at_declaration(name, declared, group))
-    return sorted(uses, key=lambda use: use.told.span)
+    return sorted(uses, key=lambda use: use.finding.span)
 
 
 def _at_declaration(name: str, declared: Scalar, uses: Sequence[_Use]) -> Diagnostic:
+    """The finding at a misspelt declaration, for all uses of what it should be called."""
     here = declared.span
-    first = min((use.told.span for use in uses), key=lambda span: (span.file != here.file, span))
+    first = min((use.finding.span for use in uses), key=lambda span: (span.file != here.file, span))
     place = first.seen_from(here) if first.file == here.file else f"{first.file}:{first.line}"
     message = (
         f"'{shorten(name)}' is used {len(uses)} times (first in {place}) and nowhere declared; "
@@ -115,29 +122,30 @@ def _at_declaration(name: str, declared: Scalar, uses: Sequence[_Use]) -> Diagno
     )
     hint = f"did you mean '{shorten(name)}'?"
     if len(uses) <= _FEW_USES:
-        spans = (use.told.span for use in uses)
+        spans = (use.finding.span for use in uses)
         lines = [span.seen_from(here) if span.file == here.file else f"{span.file}:{span.line}" for span in spans]
-        hint += f" or is '{shorten(name)}' ({_some(list(dict.fromkeys(lines)))}) meant to be '{declared.value}'?"
+        hint += f" or is '{shorten(name)}' ({_first_of(list(dict.fromkeys(lines)))}) meant to be '{declared.value}'?"
     return Diagnostic("misspelt-declaration", message, declared.span, hint=hint)
 
 
 def _at_first_use(uses: Sequence[_Use], unused: Scalar | None) -> Diagnostic:
     """The finding at the first of the uses, in their order, that says where the others are. ``unused`` is a declaration
     that might be meant."""
-    first, others = uses[0].told, uses[1:]
+    first, others = uses[0].finding, uses[1:]
     names = [f"'{shorten(name)}'" for name in dict.fromkeys(use.name for use in others) if name != uses[0].name]
-    spans = (use.told.span for use in others)
+    spans = (use.finding.span for use in others)
     lines = list(dict.fromkeys(span.seen_from(first.span) for span in spans if span != first.span))
-    message = first.message + (f", nor {_some(names)}" if names else "")
+    message = first.message + (f", nor {_first_of(names)}" if names else "")
     count = "one more use" if len(others) == 1 else f"{len(others)} more uses"
     hint = first.hint
     if unused is not None and f"'{unused.value}'" not in (hint or ""):
         line = unused.span.seen_from(first.span) if unused.span.file == first.span.file else f"in {unused.span.file}"
         hint = f"{hint or ''} '{unused.value}' ({line}) is declared and never used".strip()
-    return replace(first, message=f"{message}; {count}" + (f": {_some(lines)}" if lines else ""), hint=hint)
+    return replace(first, message=f"{message}; {count}" + (f": {_first_of(lines)}" if lines else ""), hint=hint)
 
 
-def _some(words: Sequence[str]) -> str:
+def _first_of(words: Sequence[str]) -> str:
+    """A list of words as a text, cut where it is too long for a message."""
     return ", ".join(words[:_SHOWN]) + (", …" if len(words) > _SHOWN else "")
 
 
@@ -150,47 +158,55 @@ class _Declarations:
 
     def stems(self, home: Home) -> frozenset[str]:
         """The names that are declared at a home, without the numbers behind them."""
-        return frozenset(str(declared.value).rstrip(_DIGITS) for declared in self.at(home, counted=False))
+        return frozenset(str(declared.value).rstrip(_DIGITS) for declared in self.declared_at(home))
 
-    def like(self, name: str, uses: Iterable[_Use], counted: bool) -> Scalar | None:
-        """The declaration that is never used and can only be meant for this name. ``counted``: it makes several."""
+    def misspelt_for(self, name: str, uses: Iterable[_Use], only_groups: bool) -> Scalar | None:
+        """The declaration, of all or of ``only_groups`` with a count, that can only be this name misspelt."""
         homes = dict.fromkeys(use.home for use in uses)
-        declared = dict.fromkeys(one for home in homes for one in self.at(home, counted))
-        alike = {str(one.value): one for one in declared if _may_be_slip(name, str(one.value))}
-        unused = [other for other, one in alike.items() if self._unused(one)]
-        near = [other for other in unused if slips(name, other) < 2]
-        right = near[0] if len(near) == 1 else meant(name, unused) if unused else None
-        if right is None or any(slips(name, other) <= slips(name, right) for other in alike if other != right):
+        declared = dict.fromkeys(scalar for home in homes for scalar in self.declared_at(home, only_groups))
+        alike = {str(scalar.value): scalar for scalar in declared if _may_be_slip(name, str(scalar.value))}
+        # a name that is used is right
+        unused = [other for other, scalar in alike.items() if self._is_unused(scalar)]
+        # a single one that is one slip away, else the one that is surely meant
+        one_slip_away = [other for other in unused if slips(name, other) < 2]
+        misspelt = one_slip_away[0] if len(one_slip_away) == 1 else meant(name, unused) if unused else None
+        # where another declared name is as near, used or not, the uses may be a slip of that one
+        if misspelt is None or any(slips(name, other) <= slips(name, misspelt) for other in alike if other != misspelt):
             return None
-        return alike[right]
+        return alike[misspelt]
 
-    def near(self, uses: Sequence[_Use]) -> Scalar | None:
-        """The first declaration a slip away from a name that is never used."""
+    def unused_near(self, uses: Sequence[_Use]) -> Scalar | None:
+        """The first declaration that is never used, and is a slip away from the name of these uses."""
         name, homes = uses[0].name, dict.fromkeys(use.home for use in uses)
-        declared = (one for home in homes for one in self.at(home, counted=False))
-        close = (one for one in declared if len(name) > 1 and slips(name, str(one.value)) < 2)
-        return next((one for one in close if self._unused(one)), None)
+        declared = (scalar for home in homes for scalar in self.declared_at(home))
+        close = (scalar for scalar in declared if len(name) > 1 and slips(name, str(scalar.value)) < 2)
+        return next((scalar for scalar in close if self._is_unused(scalar)), None)
 
-    def at(self, home: Home, counted: bool) -> Iterator[Scalar]:
-        """What is declared at a home: all, or what makes several with numbers behind."""
+    def declared_at(self, home: Home, only_groups: bool = False) -> Iterator[Scalar]:
+        """What is declared at a home, or of it only the groups with a count."""
         found = (
-            one for file in self.files for part in home.parts for one in _declared(file, home.within, part, counted)
+            scalar
+            for file in self.files
+            for part in home.parts
+            for scalar in _declared(file, home.within, part, only_groups)
         )
-        return islice(found, _MANY)
+        return islice(found, _MOST_DECLARATIONS)
 
-    def _unused(self, declared: Scalar) -> bool:
+    def _is_unused(self, declared: Scalar) -> bool:
         name = str(declared.value)
-        uses = self._words[name] if IDENTIFIER.fullmatch(name) else sum(text.count(name) for text in self._texts)
+        uses = self._words[name] if IDENTIFIER.fullmatch(name) else sum(text.count(name) for text in self._source_texts)
+        # the one occurrence is its own declaration
         return uses == 1 and not self.findings.is_invalid(declared.span)
 
     @cached_property
-    def _texts(self) -> tuple[str, ...]:
+    def _source_texts(self) -> tuple[str, ...]:
+        """The texts of all files without their comments."""
         return tuple(_without_comments(text) for text in self.findings.sources.values())
 
     @cached_property
     def _words(self) -> Counter[str]:
         """How often each name occurs; one with a number behind it is one of its group, too."""
-        words = Counter(word for text in self._texts for word in _WORD.findall(text))
+        words = Counter(word for text in self._source_texts for word in _WORD.findall(text))
         for word, times in list(words.items()):
             stem = word.rstrip(_DIGITS)
             words[stem] += times if stem != word else 0
@@ -212,22 +228,22 @@ def _without_comments(text: str) -> str:
     return "".join([*parts, text[at:]])
 
 
-def _declared(file: Mapping, within: tuple[str, ...], part: str, counted: bool) -> Iterator[Scalar]:
-    """The names that a part of a mapping declares: all, or those that make several with numbers behind."""
+def _declared(file: Mapping, within: tuple[str, ...], part: str, only_groups: bool) -> Iterator[Scalar]:
+    """The names that a part of a mapping declares, or of these only those of groups with a count."""
     node: Node | None = file
     for key in (*within, *part.split(".")):
         node = node.get(key) if isinstance(node, Mapping) else None
-    if not counted and isinstance(node, AnyList):
-        yield from _texts(node)
+    if not only_groups and isinstance(node, AnyList):
+        yield from _string_items(node)
     for entry in node.entries if isinstance(node, Mapping) else ():
         keys = entry.value if isinstance(entry.value, Mapping) else None
-        if not counted or (keys is not None and keys.entry("count") is not None):
+        if not only_groups or (keys is not None and keys.entry("count") is not None):
             yield entry.key
-        if not counted and part == "neurons" and keys is not None:
-            yield from _texts(keys.get("names"))
+        if not only_groups and part == "neurons" and keys is not None:
+            yield from _string_items(keys.get("names"))
 
 
-def _texts(node: Node | None) -> Iterator[Scalar]:
+def _string_items(node: Node | None) -> Iterator[Scalar]:
     for item in node.items if isinstance(node, AnyList) else ():
         if isinstance(item, Scalar) and isinstance(item.value, str):
             yield item

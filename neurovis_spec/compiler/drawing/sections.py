@@ -1,15 +1,15 @@
 """The sections ``layout`` and ``render``: references resolved, values checked.
 
-In: the sections as written, who finds what they name. Out: LayoutSettings, RenderSettings. Of the gains that an author
-states for what references name, a later one goes before an earlier one: where references overlap, the one that names
-the fewest.
+In: the sections as written, who finds what they name. Out: LayoutSettings, RenderSettings. Gains that an author states
+for references are sorted so that the reference naming the fewest is last; where references overlap, a later one
+overrides.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from neurovis_spec import plugins
 from neurovis_spec.compiler.drawing.drawing_settings import (
@@ -30,7 +30,7 @@ from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.drawing import GainValue, LayoutModel, ModuleLayoutModel, Range, RenderModel, ThemeModel
-from neurovis_spec.language.located import Formula, Located, said
+from neurovis_spec.language.located import Formula, Located, value_or
 from neurovis_spec.language.references import Sum, parse
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
 from neurovis_spec.language.values import Reference
@@ -41,8 +41,9 @@ from neurovis_spec.themes import COLOURS
 
 #: The most pixels of a picture: 8K is a little less. Its bytes take some 250 MB of memory.
 _MOST_PIXELS = 1 << 25
-_NOTHING = LayoutModel.model_validate(SourceMapping((), Span("", 1, 1, 1, 1)), context=Findings())
-Sort = Literal["activity", "signal", "thickness", "change"]
+#: The section where a spec has none.
+_EMPTY_LAYOUT = LayoutModel.model_validate(SourceMapping((), Span("", 1, 1, 1, 1)), context=Findings())
+GainKind = Literal["activity", "signal", "thickness", "change"]
 
 
 def layout_settings(
@@ -55,17 +56,17 @@ def layout_settings(
     boxes: list[tuple[str, tuple[int, ...]]] = []
     for scope, directory in zip(scopes, census.directories, strict=True):
         if scope.section.layout is not None:
-            arrange += _arranged(scope.section.layout, directory, findings)
-            boxes += _boxed(scope, scope.section.layout, directory, findings)
+            arrange += _arrangements(scope.section.layout, directory, findings)
+            boxes += _boxes(scope, scope.section.layout, directory, findings)
     if model is None:
-        model = _NOTHING
-    engine = said(model.engine, "auto")
-    direction: Direction = said(model.direction, "down")
+        model = _EMPTY_LAYOUT
+    engine = value_or(model.engine, "auto")
+    direction: Direction = value_or(model.direction, "down")
     if model.engine is not None:
         _check_engine(model.engine, findings)
     mirrors = mirrors_of(scopes, census, findings)
     lines = lines_of(scopes, census, findings)
-    plan = _plans(scopes, census, boxes, mirrors, lines, direction, findings)
+    plan = _plan_cells(scopes, census, boxes, mirrors, lines, direction, findings)
     check_pins(mirrors, lines, pins, direction, census.neurons.names, findings)
     spacing = model.spacing
     neuron = _spacing(None if spacing is None else spacing.neuron, 1.0, scopes[0].constants)
@@ -83,11 +84,11 @@ def layout_settings(
         mirrors=mirrors,
         align=lines,
         plan=plan,
-        file=said(model.file, None),
+        file=value_or(model.file, None),
     )
 
 
-def _plans(
+def _plan_cells(
     scopes: tuple[Scope, ...],
     census: Census,
     boxes: Iterable[tuple[str, tuple[int, ...]]],
@@ -96,24 +97,29 @@ def _plans(
     direction: Direction,
     findings: Findings,
 ) -> tuple[Cell, ...]:
-    """The plans of the page and of instances, whose boxes are known by the titles that they have there."""
-    titled: dict[str, tuple[int, ...]] = {}
-    grouped = [(group.box, tuple(group.indices)) for group in census.neurons.groups if group.box is not None]
-    for title, members in [*boxes, *grouped]:
-        titled[title] = (*titled.get(title, ()), *members)
-    cells: list[Cell] = []
+    """The cells of the plans of the page and of instances. A plan names boxes by the titles that they have in its
+    scope: ``legs`` is the box ``left.legs`` in the plan of the instance ``left``."""
+    members_of_box: dict[str, tuple[int, ...]] = {}
+    boxes_of_groups = [(group.box, tuple(group.indices)) for group in census.neurons.groups if group.box is not None]
+    for title, members in [*boxes, *boxes_of_groups]:
+        members_of_box[title] = (*members_of_box.get(title, ()), *members)
+    result: list[Cell] = []
     for scope, directory in zip(scopes, census.directories, strict=True):
         rows = () if scope.section.layout is None else scope.section.layout.plan
-        start = scope.called("")
-        own = {title.removeprefix(start): found for title, found in titled.items() if title.startswith(start)}
+        prefix = scope.called("")
+        own_boxes = {
+            title.removeprefix(prefix): members for title, members in members_of_box.items() if title.startswith(prefix)
+        }
         plan = WrittenPlan(scope.path, rows, census.neurons.names)
-        found = plan_of(plan, directory, own, findings)
-        check_plan(plan, found, mirrors, lines, direction, findings)
-        cells += found
-    return tuple(cells)
+        cells = plan_of(plan, directory, own_boxes, findings)
+        check_plan(plan, cells, mirrors, lines, direction, findings)
+        result += cells
+    return tuple(result)
 
 
 def _spacing(formula: Formula | None, default: float, constants: Constants) -> float:
+    """A distance of neurons or ranks; the default where none is written, or an invalid one. One out of range is
+    reported, and given all the same: with an error nothing is drawn."""
     value = UNKNOWN if formula is None else constants.scalar(formula)
     if formula is None or value is UNKNOWN:
         return default
@@ -123,9 +129,10 @@ def _spacing(formula: Formula | None, default: float, constants: Constants) -> f
     return value
 
 
-def _arranged(
+def _arrangements(
     model: LayoutModel | ModuleLayoutModel, directory: Directory, findings: Findings
 ) -> Iterator[tuple[tuple[int, ...], str]]:
+    """The neurons of each reference under ``arrange``, and how they are arranged."""
     check_keys(model.source, "arrange", model.arrange, directory, findings)
     for name, how in model.arrange.items():
         members = resolve_end(key_of(model.source, "arrange", name), directory, findings)
@@ -133,11 +140,11 @@ def _arranged(
             yield members, how.value
 
 
-def _boxed(
+def _boxes(
     scope: Scope, model: LayoutModel | ModuleLayoutModel, directory: Directory, findings: Findings
 ) -> Iterator[tuple[str, tuple[int, ...]]]:
-    """The named boxes; a reference in them may name an instance, which stands for all of its neurons. One with an
-    invalid reference is there all the same, with nothing in it."""
+    """The titles and the neurons of the named boxes; a reference in them may name an instance, which stands for all of
+    its neurons. A box with an invalid reference is given, too, with nothing in it."""
     for name, reference in model.boxes.items():
         yield scope.called(name), known(resolve(reference.parts, directory, findings, instances=True), ())
 
@@ -152,17 +159,18 @@ def _check_engine(engine: Located[str], findings: Findings) -> None:
     findings.error("unknown-engine", engine.span, f"there is no layout engine '{shorten(name)}' here", hint)
 
 
-def _collapsed(
+def _collapsed_groups(
     reference: Reference | None, directory: Directory, findings: Findings
 ) -> Iterator[tuple[str, tuple[int, ...]]]:
-    """What is drawn as one glyph each: no neuron is in two."""
+    """The names and the neurons of what is drawn as one glyph each: no neuron is in two."""
     texts = () if reference is None else reference.parts
+    # resolved as a whole, to report what overlaps; then each by itself, for its members
     if resolve(texts, directory, findings, instances=True) is UNKNOWN:
         return
     for text in texts:
-        found = resolve((text,), directory, findings, instances=True)
-        if found is not UNKNOWN and found:
-            yield text.value.strip(), found
+        members = resolve((text,), directory, findings, instances=True)
+        if members is not UNKNOWN and members:
+            yield text.value.strip(), members
 
 
 def render_settings(model: RenderModel | None, finder: Finder, constants: Constants) -> RenderSettings:
@@ -188,21 +196,21 @@ def render_settings(model: RenderModel | None, finder: Finder, constants: Consta
         thickness=() if gain is None else stated_gains(gain.thickness, "thickness", finder, constants),
         change=() if gain is None else stated_gains(gain.change, "change", finder, constants),
         traces=_traces(model, finder, constants),
-        theme="default" if theme is None else said(theme.base, "default"),
-        colours=() if theme is None else _changes(theme),
+        theme="default" if theme is None else value_or(theme.base, "default"),
+        colours=() if theme is None else _theme_changes(theme),
         size=size,
-        labels=said(model.labels, True),
-        legend=said(model.legend, True),
+        labels=value_or(model.labels, True),
+        legend=value_or(model.legend, True),
         title=True if model.title is None else model.title.value,
         window=None if model.window is None else known(constants.integer(model.window, "a window of steps", 1), None),
-        collapse=tuple(_collapsed(model.collapse, finder.directory, constants.findings)),
+        collapse=tuple(_collapsed_groups(model.collapse, finder.directory, constants.findings)),
         min_weight=least,
     )
 
 
 def _traces(model: RenderModel, finder: Finder, constants: Constants) -> tuple[StatedTrace, ...]:
     """The traces that a spec states, those that name the fewest last."""
-    found: list[StatedTrace] = []
+    traces: list[StatedTrace] = []
     for name, formula in model.trace.items():
         seconds, key = constants.scalar(formula), key_of(model.source, "trace", name)
         if not isinstance(parse(name), Sum):
@@ -216,17 +224,17 @@ def _traces(model: RenderModel, finder: Finder, constants: Constants) -> tuple[S
             message = f"a trace lasts for 0 seconds or more, this is {seconds:g}"
             constants.findings.error("out-of-range", formula.span, message)
         elif members is not UNKNOWN:
-            found.append(StatedTrace(seconds, tuple(members.tolist())))
-    return tuple(sorted(found, key=lambda one: -len(one.members)))
+            traces.append(StatedTrace(seconds, tuple(members.tolist())))
+    return tuple(sorted(traces, key=lambda trace: -len(trace.members)))
 
 
-def _changes(theme: ThemeModel) -> tuple[tuple[str, str], ...]:
-    """What a spec changes of a theme."""
+def _theme_changes(theme: ThemeModel) -> tuple[tuple[str, str], ...]:
+    """The names and the values of what a spec changes of a theme."""
     result: list[tuple[str, str]] = []
     for name in (*COLOURS, "ends"):
-        found: Located[str] | None = getattr(theme, name)
-        if found is not None:
-            result.append((name, found.value))
+        colour: Located[str] | None = getattr(theme, name)
+        if colour is not None:
+            result.append((name, colour.value))
     return tuple(result)
 
 
@@ -246,50 +254,57 @@ def _side(formula: Formula, constants: Constants) -> int | Unknown:
     return int(value)
 
 
+class _GainAndCentre(NamedTuple):
+    gain: float
+    #: what is drawn as 0
+    centre: float = 0.0
+
+
 def stated_gains(
-    written: tuple[GainValue, ...], sort: Sort, finder: Finder, constants: Constants
+    written: tuple[GainValue, ...], kind: GainKind, finder: Finder, constants: Constants
 ) -> tuple[StatedGain, ...]:
-    """The gains of one sort; what is invalid in them is reported and left out."""
-    found: list[tuple[StatedGain, Span]] = []
+    """The gains of one kind, those that name the fewest last; what is invalid in them is reported and left out."""
+    stated: list[tuple[StatedGain, Span]] = []
     for one in written:
-        value = _value(one, constants)
-        members = None if one.key is None else _members(one.key, sort, finder)
+        value = _gain_and_centre(one, constants)
+        members = None if one.key is None else _members(one.key, kind, finder)
         if value is UNKNOWN:
             continue
         if one.key is None:
-            found.append((StatedGain(value[0], None, "", value[1]), one.span))
+            stated.append((StatedGain(value.gain, centre=value.centre), one.span))
         elif members is not UNKNOWN:
-            found.append((StatedGain(value[0], members, parse(one.key.value).normal, value[1]), one.key.span))
-    found.sort(key=lambda item: math.inf if item[0].members is None else len(item[0].members))
-    _check_ties(found, constants)
-    return tuple(stated for stated, _ in reversed(found))
+            name = parse(one.key.value).normal
+            stated.append((StatedGain(value.gain, members=members, name=name, centre=value.centre), one.key.span))
+    stated.sort(key=lambda item: math.inf if item[0].members is None else len(item[0].members))
+    _check_ties(stated, constants)
+    return tuple(gain for gain, _ in reversed(stated))
 
 
-def _value(one: GainValue, constants: Constants) -> tuple[float, float] | Unknown:
-    """The gain, and what is drawn as 0."""
+def _gain_and_centre(written: GainValue, constants: Constants) -> _GainAndCentre | Unknown:
+    """A gain as a number, or of a range ``[low, high]``; UNKNOWN where it is invalid, which is reported."""
     findings = constants.findings
-    if isinstance(one.value, Range):
-        low, high = (constants.scalar(end) for end in (one.value.low, one.value.high))
+    if isinstance(written.value, Range):
+        low, high = (constants.scalar(end) for end in (written.value.low, written.value.high))
         if low is UNKNOWN or high is UNKNOWN:
             return UNKNOWN
         gain = 2 / (high - low) if high > low else math.inf
         if not math.isfinite(gain):
             message = f"a range goes from low to high, this one from {low:g} to {high:g}"
-            findings.error("out-of-range", one.span, message, "write [low, high]")
+            findings.error("out-of-range", written.span, message, "write [low, high]")
             return UNKNOWN
-        return gain, low / 2 + high / 2
-    value = UNKNOWN if one.value is None else constants.scalar(one.value)
+        return _GainAndCentre(gain, centre=low / 2 + high / 2)  # halved first: the sum may overflow
+    value = UNKNOWN if written.value is None else constants.scalar(written.value)
     if value is UNKNOWN:
         return UNKNOWN
     if value < 0:
-        findings.error("out-of-range", one.span, f"a gain is not negative, this is {value:g}")
+        findings.error("out-of-range", written.span, f"a gain is not negative, this is {value:g}")
         return UNKNOWN
-    return value, 0.0
+    return _GainAndCentre(value)
 
 
-def _members(key: Located[str], sort: Sort, finder: Finder) -> tuple[int, ...] | Unknown:
-    """What a reference names: neurons, or connections."""
-    if sort == "activity":
+def _members(key: Located[str], kind: GainKind, finder: Finder) -> tuple[int, ...] | Unknown:
+    """The indices of what a reference names: of neurons for ``activity``, else of connections."""
+    if kind == "activity":
         if not isinstance(parse(key.value), Sum):
             message = f"'{shorten(key.value)}' is a connection; 'activity' is the colour of neurons"
             finder.findings.error("wrong-type", key.span, message, "the colour of connections is 'signal'")
@@ -300,17 +315,17 @@ def _members(key: Located[str], sort: Sort, finder: Finder) -> tuple[int, ...] |
     return UNKNOWN if found is UNKNOWN else tuple(found.tolist())
 
 
-def _check_ties(found: list[tuple[StatedGain, Span]], constants: Constants) -> None:
-    """Of two references that name as many, neither goes before the other where they overlap. ``found`` begins with
-    those that name the fewest."""
-    held: dict[int, StatedGain] = {}
-    for one, span in found:
-        members = one.members or ()
+def _check_ties(stated: list[tuple[StatedGain, Span]], constants: Constants) -> None:
+    """Report two references that name as many, overlap, and state different gains: neither goes before the other.
+    ``stated`` begins with those that name the fewest."""
+    gain_of: dict[int, StatedGain] = {}
+    for gain, span in stated:
+        members = gain.members or ()
         for member in members:
-            other = held.setdefault(member, one)
-            if len(other.members or ()) == len(members) and (other.gain, other.centre) != (one.gain, one.centre):
-                what = "connections" if "->" in one.name else "neurons"
-                message = f"'{shorten(one.name)}' and '{shorten(other.name)}' name the same {what}, and as many"
+            other = gain_of.setdefault(member, gain)
+            if len(other.members or ()) == len(members) and (other.gain, other.centre) != (gain.gain, gain.centre):
+                what = "connections" if "->" in gain.name else "neurons"
+                message = f"'{shorten(gain.name)}' and '{shorten(other.name)}' name the same {what}, and as many"
                 hint = "where references overlap, the one that names the fewest holds"
                 constants.findings.error("repeated-reference", span, message, hint)
                 break

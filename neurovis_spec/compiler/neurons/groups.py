@@ -28,7 +28,16 @@ from neurovis_spec.compiler.values.definitions import Definitions
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import shorten
 from neurovis_spec.language.expressions.tree import Tree, draws
-from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, name_hint, said, too_long
+from neurovis_spec.language.located import (
+    IDENTIFIER,
+    NAME_RULE,
+    Formula,
+    Located,
+    bad_name,
+    name_hint,
+    too_long,
+    value_or,
+)
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown, known
@@ -143,13 +152,13 @@ class Builder:
             count=n,
             activation=kind.activation.definition.name,
             model=kind.model.definition.name,
-            combine=said(model.combine, "sum"),
+            combine=value_or(model.combine, "sum"),
             activation_parameters=_numbers(kind.activation.parameters),
             model_parameters=_numbers(kind.model.parameters),
             input=self._fed(model),
             box=None if model.box is None else self.scope.called(model.box.value),
             role=None if model.role is None else model.role.value,
-            description=said(model.description, None),
+            description=value_or(model.description, None),
             module=self.scope.module,
             spikes=_spikes(kind),
         )
