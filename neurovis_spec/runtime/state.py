@@ -17,7 +17,7 @@ import numpy.typing as npt
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.changes import Held
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.neurons.initial_states import starts_of
+from neurovis_spec.compiler.neurons.initial_states import initial_states
 from neurovis_spec.compiler.program import Owner
 from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import signal_layout
@@ -182,7 +182,7 @@ def initial_state(network: Network) -> State:
         signals=np.zeros(signal_layout(network).size),
         history=np.zeros((history_depth(network), n)),
         cells={
-            use.owner: starts_of(use, holder.members, network.dt, said[use.definition.kind.each])
+            use.owner: initial_states(use, holder.members, network.dt, said[use.definition.kind.each])
             for holder, use in network.uses
         },
         conditions=first_conditions(network),

@@ -1,4 +1,4 @@
-"""Connections that are surely not meant: made twice, beyond the run, or told what makes no difference to them.
+"""Connections that are surely not meant: made twice, with a delay beyond the run, or with keys that have no effect.
 
 In: what a spec without errors became. Out: warnings at the entries as they are written.
 """
@@ -6,6 +6,7 @@ In: what a spec without errors became. Out: warnings at the entries as they are 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,18 +19,18 @@ from neurovis_spec.language.yaml.source import Mapping, one_or_more
 
 
 def check_connections(compiled: Compiled, findings: Findings) -> None:
-    """Warn of entries, and of what is said in them."""
+    """Warn of doubled connections, of delays beyond the run, and of keys without effect."""
     for section, _ in compiled.sections:
         for mapping in _mappings(section):
             _check_doubled(mapping, compiled, findings)
-    _check_beyond(compiled, findings)
+    _check_beyond_run(compiled, findings)
     for entry in compiled.entries.values():
-        _check_vain(entry, findings)
+        _check_no_effect(entry, findings)
 
 
 def _mappings(section: Section) -> Iterator[Mapping]:
-    """The mappings of a section's connections that have several entries. Parallel connections are written as a list of
-    mappings; so entries of two mappings, and equal edges of one entry, are let be."""
+    """The mappings of a section's connections that have several entries. A list of mappings means parallel connections
+    on purpose, so only entries of one mapping are compared with each other, and no edges of one entry."""
     for part in one_or_more(section.source.get("connections")):
         if isinstance(part, Mapping) and len(part.entries) > 1:
             yield part
@@ -40,38 +41,49 @@ def _check_doubled(mapping: Mapping, compiled: Compiled, findings: Findings) -> 
     ``A -> K2``."""
     names = compiled.network.neurons.names
     entries = [compiled.entries[entry.key.span] for entry in mapping.entries if entry.key.span in compiled.entries]
-    told: set[int] = set()
-    for first, again, source, target in _twice([entry.bundles for entry in entries], len(names)):
-        if again not in told:
-            told.add(again)
-            one, other = entries[again].key, entries[first].key
+    reported: set[int] = set()
+    for doubled in _doubled_pairs([entry.bundles for entry in entries], len(names)):
+        if doubled.later not in reported:
+            reported.add(doubled.later)
+            later, first = entries[doubled.later].key, entries[doubled.first].key
             message = (
-                f"'{names[source]} -> {names[target]}' is there twice: in '{shorten(one.value)}' and in "
-                f"'{shorten(other.value)}' ({other.span.seen_from(one.span)})"
+                f"'{names[doubled.source]} -> {names[doubled.target]}' is there twice: in '{shorten(later.value)}' and "
+                f"in '{shorten(first.value)}' ({first.span.seen_from(later.span)})"
             )
             hint = "leave one out; connections that are parallel on purpose are written as a list of mappings"
-            findings.warning("made-twice", one.span, message, hint)
+            findings.warning("made-twice", later.span, message, hint)
 
 
-def _twice(entries: list[list[Bundle]], neurons: int) -> Iterator[tuple[int, int, int, int]]:
-    """Connections that two entries make: the numbers of the first and a later entry, the source and the target."""
+class _DoubledPair(NamedTuple):
+    """A connection that two entries make, known by their indices."""
+
+    first: int
+    later: int
+    source: int
+    target: int
+
+
+def _doubled_pairs(entries: list[list[Bundle]], neurons: int) -> Iterator[_DoubledPair]:
+    """The connections that several entries make, each with the first of these and a later one."""
     bundles = [bundle for entry in entries for bundle in entry]
     if len(bundles) < 2:
         return
+    # a pair (source, target) as one number
     pairs = np.concatenate([bundle.sources.astype(np.int64) * neurons + bundle.targets for bundle in bundles])
     ordered = np.sort(pairs)
     if not (ordered[1:] == ordered[:-1]).any():
         return
-    numbers = [number for number, entry in enumerate(entries) for _ in entry]
-    owner = np.repeat(np.array(numbers), [len(bundle.sources) for bundle in bundles])
-    order = np.argsort(pairs, kind="stable")
-    same = (pairs[order][1:] == pairs[order][:-1]) & (owner[order][1:] != owner[order][:-1])
-    for place in np.sort(order[1:][same]).tolist():
-        first = int(order[np.searchsorted(ordered, pairs[place])])
-        yield int(owner[first]), int(owner[place]), *divmod(int(pairs[place]), neurons)
+    entry_of_bundle = [index for index, entry in enumerate(entries) for _ in entry]
+    entry_of = np.repeat(np.array(entry_of_bundle), [len(bundle.sources) for bundle in bundles])
+    order = np.argsort(pairs, kind="stable")  # so that the first of equal pairs is of the earliest entry
+    same = (pairs[order][1:] == pairs[order][:-1]) & (entry_of[order][1:] != entry_of[order][:-1])
+    for position in np.sort(order[1:][same]).tolist():
+        first = int(order[np.searchsorted(ordered, pairs[position])])
+        source, target = divmod(int(pairs[position]), neurons)
+        yield _DoubledPair(int(entry_of[first]), int(entry_of[position]), source, target)
 
 
-def _check_beyond(compiled: Compiled, findings: Findings) -> None:
+def _check_beyond_run(compiled: Compiled, findings: Findings) -> None:
     """Delays and episodes that are too long for a run of the spec's own length."""
     time, steps = compiled.spec.time, compiled.network.steps
     if time is None or time.steps is None:
@@ -84,15 +96,16 @@ def _check_beyond(compiled: Compiled, findings: Findings) -> None:
     for key, body, bundles in compiled.entries.values():
         longest = max((int(bundle.delays.max(initial=0)) for bundle in bundles), default=0)
         if longest >= steps:
+            # where there are edges, these may have delays of their own: the finding stands at the key
             span = key.span if body.delay is None or body.edges is not None else body.delay.span
             message = f"after a delay of {plural(longest, 'step')} nothing arrives in a run of {steps} ('steps')"
             findings.warning("beyond-steps", span, message, hint.format(longest + 1))
 
 
-def _check_vain(entry: WrittenEntry, findings: Findings) -> None:
-    """What an entry says and what makes no difference to it, or all weights 0."""
+def _check_no_effect(entry: WrittenEntry, findings: Findings) -> None:
+    """Warn of keys of an entry that change nothing, and of a scale that makes all weights 0."""
     _, body, bundles = entry
-    if body.self is not None and body.self.value and bundles and all(bundle.apart for bundle in bundles):
+    if body.self is not None and body.self.value and bundles and all(bundle.ends_disjoint for bundle in bundles):
         message = "'self: true' changes nothing: no neuron is in both ends of this connection"
         findings.warning("no-effect", body.self.span, message, "remove it")
     scale = body.scale

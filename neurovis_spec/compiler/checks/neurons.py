@@ -20,7 +20,7 @@ from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.events.settable import BIAS
 from neurovis_spec.compiler.names.references import key_span
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.neurons.initial_states import starts_of
+from neurovis_spec.compiler.neurons.initial_states import initial_states
 from neurovis_spec.compiler.program import Definition, Population
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
@@ -224,7 +224,7 @@ def _stays_at_zero(population: Population, network: Network) -> Mask:
         return np.zeros(count, dtype=np.bool_)
     result = np.ones(count, dtype=np.bool_)
     values: dict[str, Value] = {**CONSTANTS, "dt": network.dt, **population.model.parameters, "drive": 0.0}
-    states = starts_of(population.model, population.members, network.dt, network.neurons.starts)
+    states = initial_states(population.model, population.members, network.dt, network.neurons.starts)
     values |= states
     for name, tree in model.let:
         values[name] = evaluate_array(tree, values)

@@ -55,7 +55,7 @@ class Bundle(NamedTuple):
     learning: Learning | None
     description: str | None
     #: whether no neuron is in both ends of an entry that says what holds of these
-    apart: bool
+    ends_disjoint: bool
     #: what of it follows parameters: ``weights``, ``first`` of an entry that learns (its first weights, which nothing
     #: that is set in a run changes), ``centres``, ``low``, ``high``, ``rule``
     parts: tuple[Part, ...] = ()

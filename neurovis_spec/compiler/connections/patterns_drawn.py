@@ -2,6 +2,11 @@
 
 In: the Ends and a Stream. Out: pairs, row by row. No row knows of another, and no number depends on how many rows are
 made at once, so that the pairs depend on nothing but seed, names and sizes (§4, Randomness).
+
+Both patterns draw from a row of *slots*, which change as they are drawn from. Writing a fresh row of slots for each
+source would take as long as connecting it with all targets. So there is one table, a line of slots for each of some
+rows, that is used again and again: who changes a cell puts it back, and a few draws among a million slots cost a few
+steps.
 """
 
 from __future__ import annotations
@@ -14,7 +19,7 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.connections.ends import Ends, Pairs
 from neurovis_spec.compiler.values.draws import Stream
 
-#: Cells of the table of slots, which bounds the memory; the result does not depend on it.
+#: Most cells of the table of slots; bounds the memory. The result does not depend on it.
 _CELLS = 1 << 24
 
 
@@ -25,13 +30,13 @@ def fixed_outdegree(ends: Ends, count: int, stream: Stream) -> Pairs:
     slot s + ⌊u·(m − s)⌋ is taken and what lay in slot s is put there. u is the uniform number of the counter
     (i, 0, 0, s).
     """
-    return _chosen(ends, count, lambda rows, rounds: stream.uniform(rows, 0, 0, rounds))
+    return _chosen_targets(ends, count, lambda sources, rounds: stream.uniform(sources, 0, 0, rounds))
 
 
 def fixed_indegree(ends: Ends, count: int, stream: Stream) -> Pairs:
     """Every target j with ``count`` sources; as ``fixed_outdegree``, u is of the counter (0, j, 0, s)."""
-    j, i = _chosen(ends.reversed(), count, lambda rows, rounds: stream.uniform(0, rows, 0, rounds))
-    order = np.lexsort((j, i))
+    j, i = _chosen_targets(ends.reversed(), count, lambda targets, rounds: stream.uniform(0, targets, 0, rounds))
+    order = np.lexsort((j, i))  # by i, then by j
     return i[order], j[order]
 
 
@@ -47,61 +52,67 @@ def small_world(ends: Ends, degree: int, rewire: float, stream: Stream) -> Pairs
     n, half = len(ends.sources), degree // 2
     ahead = np.arange(1, half + 1, dtype=np.int64)
     offsets = np.stack((ahead, -ahead), axis=1).ravel()
-    # Slots hold what is to be added to i, so that they begin alike for every source.
+    # Slots hold offsets, what is to be added to i, so that they begin alike for every source.
     slots = np.arange(half + 1, n - half, dtype=np.int64)
     if ends.loops or not (ends.sources == ends.targets).any():
         slots = np.append(slots, 0)
     if not len(slots):
         rewire = 0.0
-    found: list[IntArray] = []
-    for rows, table in _tables(n, slots):
-        reached = np.tile(offsets, (len(rows), 1))
-        first = (rows[:, None] + offsets) % n
-        moved = stream.uniform(rows[:, None], first, 0, 0) < rewire
-        places = _slot(stream.uniform(rows[:, None], first, 0, 1), len(slots)) if rewire else first
-        for number in range(degree):
-            row = np.flatnonzero(moved[:, number])
-            place = places[row, number]
-            reached[row, number] = table[row, place]
-            table[row, place] = offsets[number]
-        changed = places[moved]
-        table[np.nonzero(moved)[0], changed] = slots[changed]
-        found.append(np.sort((rows[:, None] + reached) % n, axis=1))
-    targets = np.concatenate(found).ravel()
+    batches: list[IntArray] = []
+    for sources, table in _row_tables(n, slots):
+        reached_offsets = np.tile(offsets, (len(sources), 1))
+        neighbours = (sources[:, None] + offsets) % n
+        rewired = stream.uniform(sources[:, None], neighbours, 0, 0) < rewire
+        drawn_slots = np.zeros_like(neighbours)
+        if rewire:
+            drawn_slots = _slot(stream.uniform(sources[:, None], neighbours, 0, 1), len(slots))
+        for neighbour in range(degree):
+            lines = np.flatnonzero(rewired[:, neighbour])
+            drawn = drawn_slots[lines, neighbour]
+            reached_offsets[lines, neighbour] = table[lines, drawn]
+            table[lines, drawn] = offsets[neighbour]
+        # put the table back
+        changed = drawn_slots[rewired]
+        table[np.nonzero(rewired)[0], changed] = slots[changed]
+        batches.append(np.sort((sources[:, None] + reached_offsets) % n, axis=1))
+    targets = np.concatenate(batches).ravel()
     return ends.pairs(np.repeat(np.arange(n, dtype=np.int64), degree), targets)
 
 
-def _chosen(ends: Ends, count: int, draw: Callable[[IntArray, IntArray], FloatArray]) -> Pairs:
-    """For every source ``count`` different targets, ascending; there are as many."""
+def _chosen_targets(ends: Ends, count: int, draw: Callable[[IntArray, IntArray], FloatArray]) -> Pairs:
+    """For every source ``count`` different targets, ascending; there are as many. ``draw`` gives the uniform numbers
+    for sources and rounds."""
     n, slots = len(ends.sources), np.arange(len(ends.targets), dtype=np.int64)
     excluded = ends.excluded()
-    found: list[IntArray] = []
-    for rows, table in _tables(n, slots):
-        out = excluded[rows]
-        room = len(slots) - (out >= 0)
-        numbers = draw(rows[:, None], np.arange(count, dtype=np.int64))
-        chosen = np.empty((len(rows), count), dtype=np.int64)
-        places = np.empty_like(chosen)
-        row = np.arange(len(rows))
-        for number in range(count):
-            place = places[:, number] = number + _slot(numbers[:, number], room - number)
-            chosen[:, number] = table[row, place]
-            table[row, place] = table[:, number]
-        table[row[:, None], places] = places
-        chosen += (out >= 0)[:, None] & (chosen >= out[:, None])  # those behind the one left out
-        found.append(np.sort(chosen, axis=1))
-    return np.repeat(np.arange(n, dtype=np.int64), count), np.concatenate(found).ravel()
+    batches: list[IntArray] = []
+    for sources, table in _row_tables(n, slots):
+        excluded_target = excluded[sources]  # −1: none
+        allowed = len(slots) - (excluded_target >= 0)
+        uniform = draw(sources[:, None], np.arange(count, dtype=np.int64))
+        chosen = np.empty((len(sources), count), dtype=np.int64)
+        drawn_slots = np.empty_like(chosen)
+        lines = np.arange(len(sources))
+        for draw_round in range(count):
+            drawn = drawn_slots[:, draw_round] = draw_round + _slot(uniform[:, draw_round], allowed - draw_round)
+            chosen[:, draw_round] = table[lines, drawn]
+            table[lines, drawn] = table[:, draw_round]
+        # put the table back
+        table[lines[:, None], drawn_slots] = drawn_slots
+        # slots skip the excluded target, so those at or behind it are one too low
+        chosen += (excluded_target >= 0)[:, None] & (chosen >= excluded_target[:, None])
+        batches.append(np.sort(chosen, axis=1))
+    return np.repeat(np.arange(n, dtype=np.int64), count), np.concatenate(batches).ravel()
 
 
-def _slot(number: FloatArray, slots: int | IntArray) -> IntArray:
-    """⌊number · slots⌋, and below ``slots`` whatever rounding does."""
-    place: IntArray = np.minimum(np.floor(number * slots).astype(np.int64), np.asarray(slots) - 1)
-    return place
+def _slot(uniform: FloatArray, slots: int | IntArray) -> IntArray:
+    """⌊uniform · slots⌋, and below ``slots`` whatever rounding does."""
+    slot: IntArray = np.minimum(np.floor(uniform * slots).astype(np.int64), np.asarray(slots) - 1)
+    return slot
 
 
-def _tables(n: int, slots: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
-    """Stretches of the rows 0 … n − 1, each with a table of one line of ``slots`` for every row. It is always the same
-    memory: who changes a cell puts it back. So a few draws among a million cost no million steps a row."""
+def _row_tables(n: int, slots: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
+    """The rows 0 … n − 1, some at a time, each time with the table: a line of ``slots`` for each of these rows. It is
+    always the same memory, so who changes a cell puts it back."""
     together = max(1, min(n, _CELLS // max(1, len(slots))))
     table = np.tile(slots, (together, 1))
     for start in range(0, n, together):

@@ -13,7 +13,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.connections.ends import Ends, Pairs
 
-#: Distances held at once.
+#: Most distances computed at once; bounds the memory.
 _CELLS = 1 << 22
 #: The fewest neurons in a leaf: the work on a leaf outweighs the call.
 _LEAF = 32
@@ -29,29 +29,30 @@ def nearest(ends: Ends, count: int) -> Pairs:
 
 
 def _by_index(ends: Ends, count: int) -> IntArray:
-    """The nearest by |i − j| lie in a window around i, or at the end of the shorter end."""
+    """The nearest by |i − j| lie in a window around i, or at the last targets where there are fewer targets than
+    sources."""
     n, m = len(ends.sources), len(ends.targets)
     excluded = ends.excluded()
-    width = min(m, 2 * count + 3)
-    found: list[IntArray] = []
+    width = min(m, 2 * count + 3)  # i itself, and count + 1 on each side, as one may be excluded
+    batches: list[IntArray] = []
     together = max(1, _CELLS // width)
     for start in range(0, n, together):
         rows = np.arange(start, min(start + together, n), dtype=np.int64)
         columns = np.clip(rows - count - 1, 0, m - width)[:, None] + np.arange(width)
-        apart = np.abs(rows[:, None] - columns).astype(np.float64)
-        apart[columns == excluded[rows, None]] = np.inf
-        found.append(columns[_least(apart, count)])
-    return np.concatenate(found)
+        distances = np.abs(rows[:, None] - columns).astype(np.float64)
+        distances[columns == excluded[rows, None]] = np.inf
+        batches.append(columns[_is_among_least(distances, count)])
+    return np.concatenate(batches)
 
 
 def _by_position(ends: Ends, count: int) -> IntArray:
-    """Sources and targets are split into leaves of neighbours. For a leaf of sources the closest leaves of targets say
-    how far the nearest can be; then only leaves whose boxes are within that reach are compared.
+    """Sources and targets are split into the leaves of a k-d tree. For a leaf of sources the closest leaves of targets
+    say how far the nearest can be; then only leaves whose boxes are within that reach are compared.
 
     A box is never further away than a neuron in it, also as computed: differences, squares and their sum are rounded
     in the same order, and rounding keeps an order. So the result is that of comparing all pairs.
     """
-    sources, targets = _comparable(ends)
+    sources, targets = _scaled_against_overflow(ends)
     excluded, m = ends.excluded(), len(targets)
     size = max(_LEAF, 2 * count, math.isqrt(m) // 16)
     leaves = _leaves(targets, size)
@@ -60,42 +61,46 @@ def _by_position(ends: Ends, count: int) -> IntArray:
     result = np.empty((len(sources), count), dtype=np.int64)
     for rows in _leaves(sources, size):
         places = sources[rows]
+        # per axis the gap between the box of these sources and the box of each leaf of targets
         gaps = np.maximum(0.0, np.maximum(low - places.max(axis=0), places.min(axis=0) - high))
-        bound = _squared(gaps)
-        order = np.argsort(bound, kind="stable")
+        box_distances = _squared(gaps)
+        order = np.argsort(box_distances, kind="stable")
+        # the closest leaves with count + 1 targets, as one may be the excluded own neuron
         enough = int(np.searchsorted(np.cumsum(lengths[order]), min(count + 1, m))) + 1
-        first = np.concatenate([leaves[leaf] for leaf in order[:enough]])
+        candidates = np.concatenate([leaves[leaf] for leaf in order[:enough]])
         reach = max(
-            float(np.partition(apart, count - 1, axis=1)[:, count - 1].max())
-            for _, apart in _apart(places, rows, targets, first, excluded)
+            float(np.partition(squared, count - 1, axis=1)[:, count - 1].max())
+            for _, squared in _squared_distances(places, rows, targets, candidates, excluded)
         )
-        columns = np.sort(np.concatenate([leaves[leaf] for leaf in np.flatnonzero(bound <= reach)]))
-        for some, apart in _apart(places, rows, targets, columns, excluded):
-            taken = np.broadcast_to(columns, apart.shape)[_least(apart, count)]
-            result[some] = taken.reshape(len(some), count)
+        columns = np.sort(np.concatenate([leaves[leaf] for leaf in np.flatnonzero(box_distances <= reach)]))
+        for batch, squared in _squared_distances(places, rows, targets, columns, excluded):
+            taken = np.broadcast_to(columns, squared.shape)[_is_among_least(squared, count)]
+            result[batch] = taken.reshape(len(batch), count)
     return result.reshape(-1)
 
 
-def _apart(
+def _squared_distances(
     places: FloatArray, rows: IntArray, targets: FloatArray, columns: IntArray, excluded: IntArray
 ) -> Iterator[tuple[IntArray, FloatArray]]:
-    """Some of the rows at a time, and their squared distances to the columns; ∞ for what is excluded."""
+    """Some of the rows at a time, and the squared distances from their places to the columns; ∞ for what is
+    excluded."""
     together = max(1, _CELLS // len(columns))
     for start in range(0, len(rows), together):
-        some = rows[start : start + together]
-        apart = _squared(places[start : start + together, None] - targets[columns])
-        apart[columns == excluded[some, None]] = np.inf
-        yield some, apart
+        batch = rows[start : start + together]
+        squared = _squared(places[start : start + together, None] - targets[columns])
+        squared[columns == excluded[batch, None]] = np.inf
+        yield batch, squared
 
 
 def _squared(differences: FloatArray) -> FloatArray:
-    """Squares and a sum are the same everywhere; a root need not be."""
+    """Squared lengths. Squares and a sum are the same on every machine; a root need not be."""
     result: FloatArray = differences[..., 0] ** 2 + differences[..., 1] ** 2
     return result
 
 
 def _leaves(places: FloatArray, size: int) -> list[IntArray]:
-    """The indices of places, split at the median of the wider axis until there are at most ``size``."""
+    """The leaves of a k-d tree: the indices of places, split at the median of the wider axis until there are at most
+    ``size``."""
     result: list[IntArray] = []
     waiting = [np.arange(len(places), dtype=np.int64)]
     while waiting:
@@ -117,10 +122,10 @@ def _boxes(places: FloatArray, leaves: list[IntArray]) -> tuple[FloatArray, Floa
     return low, np.array([places[leaf].max(axis=0) for leaf in leaves])
 
 
-def _least(apart: FloatArray, count: int) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-    """Which are the ``count`` least numbers of every row; of equal ones the first."""
-    limit = np.partition(apart, count - 1, axis=1)[:, count - 1, None]
-    less, equal = apart < limit, apart == limit
+def _is_among_least(distances: FloatArray, count: int) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    """Whether each number is among the ``count`` least of its row; of equal ones the first are."""
+    limit = np.partition(distances, count - 1, axis=1)[:, count - 1, None]
+    less, equal = distances < limit, distances == limit
     wanted = count - np.count_nonzero(less, axis=1)
     taken: np.ndarray[tuple[int, ...], np.dtype[np.bool_]] = less | (
         equal & (np.cumsum(equal, axis=1) <= wanted[:, None])
@@ -128,8 +133,8 @@ def _least(apart: FloatArray, count: int) -> np.ndarray[tuple[int, ...], np.dtyp
     return taken
 
 
-def _comparable(ends: Ends) -> tuple[FloatArray, FloatArray]:
-    """The positions, brought by a power of two to a size whose squares are numbers."""
+def _scaled_against_overflow(ends: Ends) -> tuple[FloatArray, FloatArray]:
+    """The positions, divided by a power of two (which rounds nothing) so that their squares are finite."""
     most = max(float(np.abs(ends.source_places).max()), float(np.abs(ends.target_places).max()))
     power = -int(np.frexp(most)[1])
     return np.ldexp(ends.source_places, power), np.ldexp(ends.target_places, power)
@@ -148,5 +153,6 @@ def band(ends: Ends, width: int) -> Pairs:
     first = np.maximum(0, i - width)
     sizes = np.maximum(0, np.minimum(m, i + width + 1) - first)
     rows = np.repeat(i, sizes)
+    # for each row first, first + 1, …: the index of a pair, less that of the first pair of its row
     columns = np.arange(len(rows)) - np.repeat(np.cumsum(sizes) - sizes, sizes) + np.repeat(first, sizes)
     return ends.pairs(rows, columns)

@@ -1,4 +1,4 @@
-"""Starts: the values with which the states of definitions in use begin.
+"""Initial states: the values with which the states of definitions in use begin.
 
 In: a definition in use at neurons or connections. Out: the value of each state before step 0, one a member: what the
 group says (``initial: {v: …}``), else what the definition says.
@@ -17,19 +17,19 @@ from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS, PLAIN
 
 
-def starts_of(
-    use: Use, members: IntArray, dt: float, said: Mapping[str, FloatArray] = MappingProxyType({})
+def initial_states(
+    use: Use, members: IntArray, dt: float, given: Mapping[str, FloatArray] = MappingProxyType({})
 ) -> dict[str, FloatArray]:
-    """By names of states, arrays of their own, as long as the members. ``said`` are those that neurons begin with, by
-    states, NaN where the definition says it."""
+    """The initial values of each state by its name, one per member, in new arrays. ``given`` has for each state the
+    value of every neuron of the network, NaN where its group gives none; then it is the definition's."""
     known: dict[str, Value] = {**CONSTANTS, "dt": dt, **use.parameters}
     result: dict[str, FloatArray] = {}
     for state in use.definition.state:
         # by the functions of the C library, whatever computes the steps: all begin in the same state
         initial = evaluate_array(state.initial, known, by=PLAIN)
         values = np.array(np.broadcast_to(initial, members.shape), dtype=np.float64)
-        if state.name in said:
-            given = said[state.name][members]
-            values = np.where(np.isnan(given), values, given)
+        if state.name in given:
+            of_members = given[state.name][members]
+            values = np.where(np.isnan(of_members), values, of_members)
         result[state.name] = values
     return result

@@ -19,33 +19,37 @@ from neurovis_spec.language.values import ParameterModel
 
 
 def make_parameters(
-    section: Section, constants: Constants, given: Mapping[str, float], places: Mapping[str, Span] | None = None
+    section: Section, constants: Constants, given: Mapping[str, float], given_at: Mapping[str, Span] | None = None
 ) -> None:
-    """The parameters in the order written; what is given replaces the value, within its bounds. ``places`` say where
-    it is given."""
+    """Declare the parameters in the order written; a value that is given from outside replaces the written one, within
+    its bounds. ``given_at`` says where it is given."""
     later = dict.fromkeys(section.parameters)
     for name, parameter in section.parameters.items():
         del later[name]
-        span = key_span(section, "parameters", name)
-        _parameter(name, parameter, (span, (places or {}).get(name, span)), constants, given, later)
+        name_span = key_span(section, "parameters", name)
+        given_span = (given_at or {}).get(name, name_span)
+        _parameter(name, parameter, name_span, given_span, constants=constants, given=given, later=later)
 
 
 def _parameter(
     name: str,
     parameter: ParameterModel,
-    spans: tuple[Span, Span],
+    name_span: Span,
+    given_span: Span,
+    *,
     constants: Constants,
     given: Mapping[str, float],
     later: Collection[str],
 ) -> None:
-    """One parameter; ``spans`` are where it is declared and where its value is given, ``later`` those behind."""
-    (span, place), findings = spans, constants.findings
+    """Declare one parameter. ``later`` are the names declared below, for the message where its formula uses one."""
+    findings = constants.findings
     if name in RESERVED:
         message = f"a parameter may not be called '{name}': the language gives this name a meaning of its own"
         hint = f"'{name}' is {meaning(name)}; take another name, such as '{name}_0'"
-        findings.error("reserved-name", span, message, hint)
-    invalid = constants.names.declared.get(name) is UNKNOWN  # what is set
+        findings.error("reserved-name", name_span, message, hint)
+    invalid = constants.names.declared.get(name) is UNKNOWN  # the value set from outside was found invalid before
     tree = constants.tree(parameter.value, what="parameters before this one, and constants", later=later)
+    # a parameter whose value is given does not depend on those of its formula
     constants.uses[name] = frozenset() if tree is UNKNOWN or name in given else names(tree)
     value = UNKNOWN if tree is UNKNOWN else constants.scalar(parameter.value)
     with constants.following() as lower:
@@ -55,21 +59,23 @@ def _parameter(
     if name in given:
         value = float(given[name])
         if not math.isfinite(value):
-            findings.error("not-finite", place, f"the parameter '{name}' is set to {value}")
+            findings.error("not-finite", given_span, f"the parameter '{name}' is set to {value}")
             value = UNKNOWN
     if value is UNKNOWN or invalid:
         constants.names.declared[name] = UNKNOWN
         return
     constants.names.declared[name] = value
-    least, most = lower[0].formula if lower else low, upper[0].formula if upper else high
-    constants.declare(name, tree, value, least, most, name in given)
+    # a bound that follows parameters is kept as a formula
+    low_bound = lower[0].formula if lower else low
+    high_bound = upper[0].formula if upper else high
+    constants.declare(name, tree, value, low_bound, high_bound, given=name in given)
     if low > high and parameter.minimum is not None:
         message = f"the least value of '{name}', {low:g}, is above the greatest, {high:g}"
         findings.error("out-of-range", parameter.minimum.span, message, "swap min and max")
         return
     if not low <= value <= high:
         bounds = f"{low:g} to {high:g}".replace("inf", "∞")
-        where = place if name in given else parameter.value.span
+        where = given_span if name in given else parameter.value.span
         findings.error("out-of-range", where, f"'{name}' is {value:g}; its bounds are {bounds}")
 
 
