@@ -204,7 +204,7 @@ def each_of_many() -> Iterator[Count]:
     yield Count("names gone through for an input", known / 300, 20)
     text = "".join(f"  A{i}: {{bias: 1}}\n  B{i}: {{activation: tanh, bias: {i}}}\n" for i in range(50))
     text = f"{HEAD}neurons:\n{text}  C: {{activation: {{leaky_relu: {{slope: 0.5}}}}, bias: 1}}\n"
-    yield Count("groups made out, of 101", calls(lambda: nv.compile_text(text), _of(Builder._made)), 3)
+    yield Count("groups made out, of 101", calls(lambda: nv.compile_text(text), _of(Builder._neuron_type)), 3)
     yield Count("formulas looked at, of 101 groups", calls(lambda: nv.compile_text(text), _of(undefined.hazards)), 20)
     rows = "".join(f"  i{i}: {{module: m}}\n" for i in range(400))
     many = f"modules: {{m: {{neurons: {{A: {{bias: 1}}}}}}}}\ninstances:\n{rows}"

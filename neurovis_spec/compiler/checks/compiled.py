@@ -16,7 +16,7 @@ from neurovis_spec.compiler.names.modules import Library
 from neurovis_spec.compiler.names.references import Section
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.neurons.groups import Chosen
+from neurovis_spec.compiler.neurons.groups import NeuronType
 from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.library import Library as Definitions
@@ -72,7 +72,7 @@ class Compiled:
         }
 
     @property
-    def models(self) -> Iterator[tuple[Chosen, GroupModel]]:
+    def models(self) -> Iterator[tuple[NeuronType, GroupModel]]:
         """Every group of every scope: what its neurons are, and how it is written."""
         return ((one.kind, one.model) for one in self.census.groups)
 

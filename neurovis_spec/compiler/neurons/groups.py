@@ -49,7 +49,7 @@ from neurovis_spec.likeness import meant, nearest
 _NOISE = formula_at(GroupModel, "noise")
 
 
-class Chosen(NamedTuple):
+class NeuronType(NamedTuple):
     """What the neurons of a group are: definitions with parameters, one value a neuron."""
 
     activation: Settled
@@ -57,35 +57,41 @@ class Chosen(NamedTuple):
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """The parameters that follow those of a run."""
+        """Which of their parameters follow parameters of a run."""
         return *self.activation.parts, *self.model.parts
 
 
 class Built(NamedTuple):
-    """One group, before its values are joined with those of the others. ``name`` and ``names`` are those that it and
-    its neurons have in their scope."""
+    """One group, before its values are joined with those of the others."""
 
+    #: its name in its scope
     name: str
     group: Group
-    kind: Chosen
+    kind: NeuronType
+    #: what is written of it
     model: GroupModel
+    #: the names of its neurons in their scope, and what stands at them in pictures
     names: tuple[str, ...]
     labels: tuple[str, ...]
     bias: FloatArray
+    #: the activities at step 0, NaN where none is given
     initial: FloatArray
+    #: the places of the neurons' inputs in the vector of all inputs, −1 without one
     input: IntArray
+    #: x and y, NaN where none is given
     position: FloatArray | Unknown
+    #: of a counted group the number of the first neuron
     first: int | None
     #: what its expressions may use
     constants: Constants
     #: what states of its model begin with
     starts: Mapping[str, FloatArray]
     noise: Tree | Unknown
-    #: what of it follows parameters: ``bias``, ``position`` (x, then y), and those of its kind
+    #: which of its numbers follow parameters: of ``bias``, of ``position`` (x, then y), of those of its kind
     parts: tuple[Part, ...] = ()
 
 
-class _Unsaid(NamedTuple):
+class _Defaults(NamedTuple):
     """The default values of n neurons, for keys that are not written."""
 
     bias: FloatArray
@@ -95,16 +101,16 @@ class _Unsaid(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def _unsaid(n: int) -> _Unsaid:
+def _defaults(n: int) -> _Defaults:
     """The default arrays, read-only and shared by all groups of a size: instances make many of these."""
     nothing = np.full((n, 2), np.nan)
-    return _Unsaid(
+    return _Defaults(
         frozen(np.zeros(n)), frozen(np.full(n, np.nan)), frozen(np.full(n, -1, dtype=np.int64)), frozen(nothing)
     )
 
 
-#: What groups are that are the same in all instances of a module, by the module, the group and its count.
-Kinds: TypeAlias = dict[tuple[str | None, str, int], Chosen]
+#: Types of neurons that are the same in all instances of a module, by the module, the group and its count.
+Kinds: TypeAlias = dict[tuple[str | None, str, int], NeuronType]
 
 
 @dataclass(frozen=True)
@@ -133,15 +139,15 @@ class Builder:
             first = key_span(self.scope.section, "inputs", name)
             message = f"'{name}' is an input already (line {first.line}); groups and inputs share their names"
             findings.error("duplicate-name", key_span(self.scope.section, "neurons", name), message)
-        names, first_number = (UNKNOWN, None) if _unsure(model) else self._names(name, model, start)
+        names, first_number = (UNKNOWN, None) if _may_lack_names(model) else self._names(name, model, start)
         n = UNKNOWN if names is UNKNOWN else len(names)
         kind = self._kind(name, model, n)
-        bias, biased = self._bias(model, n, name)
+        bias, bias_parts = self._bias(model, n, name)
         given = model.initial or _NO_INITIAL
         initial = UNKNOWN if given.activity is None else self._drawn(given.activity, n, "initial", name)
         starts = self._starts(given, n, name, kind, model) if given.states else _NO_STARTS
         input_index = self._input(model, n)
-        position, placed = self._position(model, n)
+        position, position_parts = self._position(model, n)
         noise = UNKNOWN if model.noise is None else _noise_of(model.noise, self.constants)
         if names is UNKNOWN or n is UNKNOWN:
             return UNKNOWN
@@ -155,7 +161,7 @@ class Builder:
             combine=value_or(model.combine, "sum"),
             activation_parameters=_numbers(kind.activation.parameters),
             model_parameters=_numbers(kind.model.parameters),
-            input=self._fed(model),
+            input=self._input_name(model),
             box=None if model.box is None else self.scope.called(model.box.value),
             role=None if model.role is None else model.role.value,
             description=value_or(model.description, None),
@@ -169,15 +175,15 @@ class Builder:
             model=model,
             names=names,
             labels=known(labels, names),
-            bias=_unsaid(n).bias if bias is UNKNOWN else bias,
-            initial=_unsaid(n).initial if initial is UNKNOWN else initial,
-            input=_unsaid(n).input if input_index is UNKNOWN else input_index,
+            bias=_defaults(n).bias if bias is UNKNOWN else bias,
+            initial=_defaults(n).initial if initial is UNKNOWN else initial,
+            input=_defaults(n).input if input_index is UNKNOWN else input_index,
             position=position,
             first=first_number,
             constants=self.constants,
             starts=starts,
             noise=noise,
-            parts=(*kind.parts, *biased, *placed),
+            parts=(*kind.parts, *bias_parts, *position_parts),
         )
 
     def _bias(self, model: GroupModel, n: int | Unknown, name: str) -> tuple[FloatArray | Unknown, list[Part]]:
@@ -191,21 +197,21 @@ class Builder:
     def _position(self, model: GroupModel, n: int | Unknown) -> tuple[FloatArray | Unknown, list[Part]]:
         """The positions, NaN without any, and what of them follows parameters."""
         if model.position is None:
-            return UNKNOWN if n is UNKNOWN else _unsaid(n).position, []
+            return UNKNOWN if n is UNKNOWN else _defaults(n).position, []
         with self.constants.following() as parts:
             position = positions_of(model.position, n, self.constants, self.scope.files)
         return position, [part._replace(field="position") for part in parts]
 
     def _starts(
-        self, given: Initial, n: int | Unknown, name: str, kind: Chosen, model: GroupModel
+        self, given: Initial, n: int | Unknown, name: str, kind: NeuronType, model: GroupModel
     ) -> dict[str, FloatArray]:
-        """What states of the model begin with."""
+        """What states of the model begin with, as far as that is given."""
         result: dict[str, FloatArray] = {}
         neuron = kind.model.definition
-        sure = model.model is None or neuron.name == model.model.name.value  # else it is invalid, and said so
+        model_known = model.model is None or neuron.name == model.model.name.value  # else it is invalid, and reported
         states = tuple(state.name for state in neuron.state)
         for state, formulas in given.states:
-            if sure and state.value not in states:
+            if model_known and state.value not in states:
                 found = no_state("model", neuron.name, f"of '{name}'", state.value, states)
                 findings = self.constants.findings
                 findings.error("unknown-state", state.span, found.message, found.hint, undeclared=found.undeclared)
@@ -214,7 +220,7 @@ class Builder:
                 result[state.value] = values
         return result
 
-    def _fed(self, model: GroupModel) -> str | None:
+    def _input_name(self, model: GroupModel) -> str | None:
         """The network's name of the input of a group."""
         if model.input is None:
             return None
@@ -234,7 +240,7 @@ class Builder:
             findings.error("too-many", span, message, "raise it with --limit")
             return UNKNOWN, None
         if model.names is not None:
-            return self._listed(model, count), None
+            return self._written_names(model, count), None
         if count is None:
             return (name,), None
         first = 1 if model.first is None else self.constants.integer(model.first, "'first'", 0)
@@ -246,7 +252,8 @@ class Builder:
             return UNKNOWN, None
         return names, first
 
-    def _listed(self, model: GroupModel, count: int | None) -> tuple[str, ...] | Unknown:
+    def _written_names(self, model: GroupModel, count: int | None) -> tuple[str, ...] | Unknown:
+        """The names listed under ``names``; UNKNOWN where it is not known how many neurons these are."""
         findings = self.constants.findings
         assert model.names is not None
         seen: dict[str, Located[str]] = {}
@@ -270,24 +277,24 @@ class Builder:
             return UNKNOWN
         return tuple(seen)
 
-    def _kind(self, name: str, model: GroupModel, n: int | Unknown) -> Chosen:
+    def _kind(self, name: str, model: GroupModel, n: int | Unknown) -> NeuronType:
         """The activation and the model of the neurons; ``identity`` and ``static`` where these are invalid."""
         if n is UNKNOWN or not (_fixed(model.activation) and _fixed(model.model)):
-            return self._made(model, n)
+            return self._neuron_type(model, n)
         if self._plain(model.activation, ACTIVATION) and self._plain(model.model, MODEL):
             # what says no more than names is the same in every group: there may be very many of these
-            name = f"{_called(model.activation)} {_called(model.model)}"
+            name = f"{_name_of(model.activation)} {_name_of(model.model)}"
         key = self.scope.module, name, n
         if key not in self.kinds:
-            self.kinds[key] = self._made(model, n)
+            self.kinds[key] = self._neuron_type(model, n)
         return self.kinds[key]
 
-    def _made(self, model: GroupModel, n: int | Unknown) -> Chosen:
+    def _neuron_type(self, model: GroupModel, n: int | Unknown) -> NeuronType:
         activation = self._settled(model.activation or _default("identity", model), ACTIVATION, n)
         choice = model.model or _default("static", model)
         neuron = self._settled(choice, MODEL, n)
         check_initials(neuron, choice, self.constants)
-        return Chosen(activation, neuron)
+        return NeuronType(activation, neuron)
 
     def _settled(self, choice: Choice, kind: Kind, n: int | Unknown) -> Settled:
         """The definition that a group names, with its settings; where it is invalid that of groups that name none."""
@@ -346,7 +353,7 @@ class Builder:
         return UNKNOWN
 
 
-#: the parameters of what has none
+#: The parameters of what has none.
 _NO_PARAMETERS: Mapping[str, tuple[float, ...]] = {}
 _NO_INITIAL = Initial(None)
 _NO_STARTS: Mapping[str, FloatArray] = {}
@@ -357,7 +364,7 @@ def _numbers(parameters: Mapping[str, FloatArray]) -> Mapping[str, tuple[float, 
     return {name: tuple(values.tolist()) for name, values in parameters.items()} if parameters else _NO_PARAMETERS
 
 
-def _spikes(kind: Chosen) -> bool:
+def _spikes(kind: NeuronType) -> bool:
     """Whether neurons spike: their model does, and what its activity is of is no graded activation."""
     model = kind.model.definition
     return model.spikes and (kind.activation.definition.name == "step" or not model.reads_activation)
@@ -374,7 +381,7 @@ def _fixed(choice: Choice | None) -> bool:
     )
 
 
-def _called(choice: Choice | None) -> str:
+def _name_of(choice: Choice | None) -> str:
     return "" if choice is None else choice.name.value
 
 
@@ -382,7 +389,7 @@ def _called(choice: Choice | None) -> str:
 _NAMING = frozenset({"count", "first", "names"})
 
 
-def _unsure(model: GroupModel) -> bool:
+def _may_lack_names(model: GroupModel) -> bool:
     """Whether what could not be read of a group may have said which neurons there are."""
     if model.sound:
         return False

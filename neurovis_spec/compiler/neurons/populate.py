@@ -78,27 +78,29 @@ class Census:
         return self.directories[0]
 
 
-class _Settled(NamedTuple):
-    """A scope with its groups: the neurons from ``start`` on, and what may be the name of others."""
+class _ScopeGroups(NamedTuple):
+    """A scope with its groups."""
 
     scope: Scope
     built: tuple[Built, ...]
+    #: the index of its first neuron
     start: int
+    #: names that may mean neurons of an invalid declaration
     invalid: Names[Group]
 
 
 def populate(scopes: tuple[Scope, ...], limits: Limits, seed: int) -> Census:
     """Make every neuron, scope by scope. A group that is invalid is made as far as its names are known, so that what
     refers to it can be checked."""
-    settled: list[_Settled] = []
+    all_groups: list[_ScopeGroups] = []
     kinds: Kinds = {}
     start = 0
     for scope in scopes:
-        made = _settle(scope, start, limits, seed, kinds)
-        settled.append(made)
-        start += sum(item.group.count for item in made.built)
-        _owners(scope, made.built)
-    return _join(settled)
+        groups = _scope_groups(scope, start, limits, seed, kinds)
+        all_groups.append(groups)
+        start += sum(item.group.count for item in groups.built)
+        _check_owners(scope, groups.built)
+    return _join(all_groups)
 
 
 def without_neurons(census: Census) -> Census:
@@ -108,16 +110,17 @@ def without_neurons(census: Census) -> Census:
     return replace(census, directories=(replace(first, invalid=first.invalid.opened()), *others))
 
 
-def _settle(scope: Scope, start: int, limits: Limits, seed: int, kinds: Kinds) -> _Settled:
+def _scope_groups(scope: Scope, start: int, limits: Limits, seed: int, kinds: Kinds) -> _ScopeGroups:
+    """The groups of a scope, whose first neuron is ``start``."""
     builder = Builder(scope, limits, seed, kinds)
     built: list[Built] = []
     invalid: dict[str, Group | Unknown] = {
         name: UNKNOWN for name, places in scope.children.items() if places is UNKNOWN
     }
     is_open = scope.children.is_open
-    at = start
+    next_neuron = start
     for name, model in scope.section.neurons.items():
-        group = builder.group(name, model, at)
+        group = builder.group(name, model, next_neuron)
         if group is UNKNOWN:
             invalid.update({name: UNKNOWN, **unread_neurons(model)})
             is_open = is_open or unread_neurons(model).is_open
@@ -125,19 +128,19 @@ def _settle(scope: Scope, start: int, limits: Limits, seed: int, kinds: Kinds) -
         built.append(group)
         for neuron in group.names if model.names is not None or not IDENTIFIER.fullmatch(name) else ():
             if not IDENTIFIER.fullmatch(neuron):
-                invalid.update(dict.fromkeys(_mended(neuron), UNKNOWN))
-        at += group.group.count
+                invalid.update(dict.fromkeys(_repaired(neuron), UNKNOWN))
+        next_neuron += group.group.count
     names: Names[Group] = names_of(scope.section, "neurons", invalid).opened(is_open)
-    return _Settled(scope, tuple(built), start, names)
+    return _ScopeGroups(scope, tuple(built), start, names)
 
 
-def _mended(name: str) -> tuple[str, str]:
-    """What a name that is none may be called elsewhere, where its author had it right."""
+def _repaired(name: str) -> tuple[str, str]:
+    """How an invalid name may be written elsewhere, where its author had it right."""
     return _NO_LETTERS.sub("", name), _NO_LETTERS.sub("_", name)
 
 
-def _owners(scope: Scope, built: tuple[Built, ...]) -> None:
-    """Two declarations of one name are a finding: of two groups, a neuron and an input, an instance and others."""
+def _check_owners(scope: Scope, built: tuple[Built, ...]) -> None:
+    """Report two declarations of one name: of two groups, a neuron and an input, an instance and others."""
     section, findings = scope.section, scope.constants.findings
     owners: dict[str, str] = {}
     for item in built:
@@ -160,11 +163,11 @@ def _owners(scope: Scope, built: tuple[Built, ...]) -> None:
                 message = f"the neuron '{neuron}' of '{name}' is called like an input (line {first.line})"
                 findings.error("duplicate-name", key_span(section, "neurons", name), message)
                 break
-    _instances(scope, owners)
+    _check_instances(scope, owners)
 
 
-def _instances(scope: Scope, owners: Mapping[str, str]) -> None:
-    """An instance may be called like nothing else in its scope."""
+def _check_instances(scope: Scope, owners: Mapping[str, str]) -> None:
+    """Report an instance that is called like anything else in its scope. ``owners`` has the group of each name."""
     section, findings = scope.section, scope.constants.findings
     taken: dict[str, str] = {}
     children = scope.children.known()
@@ -187,12 +190,12 @@ def _instances(scope: Scope, owners: Mapping[str, str]) -> None:
                 break
 
 
-def _join(settled: list[_Settled]) -> Census:
-    built = [item for one in settled for item in one.built]
+def _join(all_groups: list[_ScopeGroups]) -> Census:
+    built = [item for groups in all_groups for item in groups.built]
     names: list[str] = []
-    for one in settled:
-        own = chain.from_iterable(item.names for item in one.built)
-        names.extend(map(one.scope.called, own) if one.scope.path else own)
+    for groups in all_groups:
+        own = chain.from_iterable(item.names for item in groups.built)
+        names.extend(map(groups.scope.called, own) if groups.scope.path else own)
     empty = np.zeros(0)
     neurons = Neurons(
         names=tuple(names),
@@ -201,10 +204,10 @@ def _join(settled: list[_Settled]) -> Census:
         bias=frozen(np.concatenate([item.bias for item in built] or [empty])),
         initial=frozen(np.concatenate([item.initial for item in built] or [empty])),
         input=frozen(np.concatenate([item.input for item in built] or [empty.astype(np.int64)])),
-        position=frozen(np.concatenate([_placed(item) for item in built] or [np.zeros((0, 2))])),
+        position=frozen(np.concatenate([_positions(item) for item in built] or [np.zeros((0, 2))])),
         starts=_starts(built, len(names)),
     )
-    return Census(neurons, tuple(built), _directories(settled, len(names)))
+    return Census(neurons, tuple(built), _directories(all_groups, len(names)))
 
 
 def _starts(built: list[Built], total: int) -> dict[str, FloatArray]:
@@ -217,30 +220,36 @@ def _starts(built: list[Built], total: int) -> dict[str, FloatArray]:
     return {state: frozen(array) for state, array in result.items()}
 
 
-def _placed(item: Built) -> FloatArray:
+def _positions(item: Built) -> FloatArray:
     """The positions of a group's neurons, NaN where there is none."""
     return np.full((item.group.count, 2), np.nan) if item.position is UNKNOWN else item.position
 
 
-def _directories(settled: list[_Settled], total: int) -> tuple[Directory, ...]:
-    """The Directory of each scope; those of the instances within a scope are made before its own."""
+def _directories(all_groups: list[_ScopeGroups], total: int) -> tuple[Directory, ...]:
+    """The Directory of each scope. A scope stands before the instances within it, so the last is made first."""
     made: dict[int, Directory] = {}
-    ends: dict[int, int] = {}
-    for index in range(len(settled) - 1, -1, -1):
-        one = settled[index]
-        after = max([index + 1, *(ends[place] for places in one.scope.children.known().values() for place in places)])
-        ends[index] = after
-        stop = settled[after].start if after < len(settled) else total
+    #: by scope the first scope behind it and all instances within it
+    scope_after: dict[int, int] = {}
+    for index in range(len(all_groups) - 1, -1, -1):
+        groups = all_groups[index]
+        children = groups.scope.children.known()
+        after = max([index + 1, *(scope_after[child] for places in children.values() for child in places)])
+        scope_after[index] = after
+        stop = all_groups[after].start if after < len(all_groups) else total
         made[index] = Directory(
-            {item.name: item.group for item in one.built},
-            dict(chain.from_iterable(zip(item.names, item.group.indices, strict=True) for item in one.built)),
-            {item.name: item.first for item in one.built if item.first is not None},
-            one.invalid,
-            {name: tuple(made[place] for place in places) for name, places in one.scope.children.known().items()},
-            range(one.start, stop),
-            one.scope.section.inputs,
-            index,
-            one.scope.module,
-            {item.name: tuple(state.name for state in item.kind.model.definition.state) for item in one.built},
+            groups={item.name: item.group for item in groups.built},
+            neurons=dict(
+                chain.from_iterable(zip(item.names, item.group.indices, strict=True) for item in groups.built)
+            ),
+            first={item.name: item.first for item in groups.built if item.first is not None},
+            invalid=groups.invalid,
+            instances={name: tuple(made[child] for child in places) for name, places in children.items()},
+            members=range(groups.start, stop),
+            inputs=groups.scope.section.inputs,
+            scope=index,
+            module=groups.scope.module,
+            states={
+                item.name: tuple(state.name for state in item.kind.model.definition.state) for item in groups.built
+            },
         )
-    return tuple(made[index] for index in range(len(settled)))
+    return tuple(made[index] for index in range(len(all_groups)))
