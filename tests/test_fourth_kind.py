@@ -15,7 +15,7 @@ from pydantic import Field
 
 import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.compiler.events.bound import Found, make_settable
+from neurovis_spec.compiler.events.bound import LocatedPart, make_settable
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Check, Key, Kind, Operation, Owner, Projection, Use
 from neurovis_spec.compiler.run_checks import with_checks
@@ -115,7 +115,7 @@ def with_echo(network: Network, settings: str) -> Network:
     used = sure(settled_of(choice, ECHO, known, constants, Each("connection", {}), 3))
     constants.findings.check()
     use = Use(Owner("echo", 0), used.definition, used.parameters)
-    found = [Found(Key(use.owner, part.name), part.within(3), part) for part in used.parts]
+    found = [LocatedPart(Key(use.owner, part.name), part.within(3), part) for part in used.parts]
     projections = (Projection(np.arange(3, 6), (use,), {}),)
     network = replace(network, projections=projections, program=(*network.program, Echo(0)))
     return with_checks(replace(network, settable=make_settable(network, tuple(constants.slots), found)))

@@ -83,9 +83,10 @@ class EdgeReader:
             self.constants.findings.error("wrong-size", edges.node.span, "there is no edge in this list")
             return UNKNOWN
         cells = cells_of(edges.node, self.constants.findings, _AN_EDGE, named=True)
-        return UNKNOWN if cells is UNKNOWN else self._written(cells)
+        return UNKNOWN if cells is UNKNOWN else self._from_cells(cells)
 
-    def _written(self, cells: Cells) -> EdgeList | Unknown:
+    def _from_cells(self, cells: Cells) -> EdgeList | Unknown:
+        """The edges of a list in the spec, a row of cells each."""
         findings = self.constants.findings
         widths = cells.widths
         right = (widths >= 2) & (widths <= 4)
@@ -96,18 +97,22 @@ class EdgeReader:
         first = cells.starts[:-1]
         i = self._ends(cells, first[right], self.sources, "source")
         j = self._ends(cells, first[right] + 1, self.targets, "target")
+        # the indices of the edges that have a weight, and of those that have a delay
         weighted, delayed = np.flatnonzero(right & (widths >= 3)), np.flatnonzero(right & (widths == 4))
         ends = UNKNOWN if i is UNKNOWN or j is UNKNOWN or len(wrong) else (i[weighted], j[weighted])
         with self.constants.following() as parts:
-            given = self._given(cells, first[weighted] + 2, ends)
+            given_weights = self._given_weights(cells, first[weighted] + 2, ends)
+        # the indices of a part count the edges that have a weight; from here on they count all edges
         self.constants.follow(part._replace(places=weighted[part.within(len(weighted))]) for part in parts)
-        later = self._delays(cells, first[delayed] + 3)
-        if i is UNKNOWN or j is UNKNOWN or given is UNKNOWN or later is UNKNOWN or len(wrong) or cells.failed:
+        given_delays = self._given_delays(cells, first[delayed] + 3)
+        if i is UNKNOWN or j is UNKNOWN or given_weights is UNKNOWN or given_delays is UNKNOWN:
+            return UNKNOWN
+        if len(wrong) or cells.failed:
             return UNKNOWN
         weights = np.ones(len(widths))
-        weights[weighted] = given
+        weights[weighted] = given_weights
         delays = np.full(len(widths), -1, dtype=np.int64)
-        delays[delayed] = later
+        delays[delayed] = given_delays
         return EdgeList(i, j, weights, delays)
 
     def _ends(self, cells: Cells, which: IntArray, end: End, what: str) -> IntArray | Unknown:
@@ -132,17 +137,19 @@ class EdgeReader:
         unknown = np.flatnonzero(positions < 0)
         _, once = np.unique(which[unknown], return_index=True)
         for edge in unknown[np.sort(once)].tolist()[:PATIENCE]:
-            self._outside(names[int(which[edge])], end, what, *where(edge))
+            self._report_outside(names[int(which[edge])], end, what, *where(edge))
         return UNKNOWN if len(unknown) or end.positions is UNKNOWN else positions
 
-    def _given(self, cells: Cells, which: IntArray, ends: tuple[IntArray, IntArray] | Unknown) -> FloatArray | Unknown:
+    def _given_weights(
+        self, cells: Cells, which: IntArray, ends: tuple[IntArray, IntArray] | Unknown
+    ) -> FloatArray | Unknown:
         """The weights in these cells, 1 for a null; they are checked even if their ends are invalid."""
         i, j = known(ends, (UNKNOWN, UNKNOWN))
         seen = seen_by_pairs(i, j, (self.sources.size, self.targets.size), self.stream)
         values = values_of(cells, which, self.constants, *seen)
         return UNKNOWN if values is UNKNOWN else np.where(cells.kinds[which] == NULL, 1.0, values)
 
-    def _delays(self, cells: Cells, which: IntArray) -> IntArray | Unknown:
+    def _given_delays(self, cells: Cells, which: IntArray) -> IntArray | Unknown:
         """The delays in these cells: few distinct ones, each evaluated once."""
         found: dict[tuple[int, float], int | Unknown] = {}
         result = np.zeros(len(which), dtype=np.int64)
@@ -156,7 +163,8 @@ class EdgeReader:
             result[place] = known(found[key], 0)
         return UNKNOWN if UNKNOWN in found.values() else result
 
-    def _outside(self, name: str, end: End, what: str, span: Span, where: str) -> None:
+    def _report_outside(self, name: str, end: End, what: str, span: Span, where: str) -> None:
+        """Report a neuron that does not belong to an end, which is ``what``: a source or a target."""
         if not name.strip():
             message = f"the {what} of an edge is the name of a neuron, this is empty"
             self.constants.findings.error("wrong-type", span, message)

@@ -84,27 +84,27 @@ def learning_of(
     rule = used.definition
     signals: dict[str, IntArray] = {}
     failed = not used.sound
-    told = constants.findings.is_invalid(choice.name.span)
+    is_reported = constants.findings.is_invalid(choice.name.span)
     for signal in rule.signals:
         entry = used.entries.get(signal)
         if entry is None or entry is UNKNOWN:
             failed = True
-            if entry is None and not told:
+            if entry is None and not is_reported:
                 message = f"the rule '{rule.name}' needs the signal '{signal}'"
                 hint = f"write {{{rule.name}: {{{signal}: NEURON_OR_INPUT}}}}"
                 constants.findings.error("missing-signal", choice.name.span, message, hint, key=signal)
             continue
-        where = _signal(entry, targets, target_count, scope, directory, neurons)
-        if where is UNKNOWN:
+        indices = _signal_indices(entry, targets, target_count, scope, directory, neurons)
+        if indices is UNKNOWN:
             failed = True
         else:
-            signals[signal] = where
+            signals[signal] = indices
     if failed or not check_initials(used, choice, constants):
         return UNKNOWN
     return Learning(used, signals, {name: _text(used.entries.known()[name].value) for name in rule.signals})
 
 
-def _signal(
+def _signal_indices(
     entry: Entry,
     targets: IntArray | Unknown,
     target_count: int | Unknown,
@@ -112,35 +112,37 @@ def _signal(
     directory: Directory,
     neurons: int,
 ) -> IntArray | Unknown:
-    """Where a signal comes from, for each connection; one name, or a list of names that are taken together."""
+    """Where a signal comes from, for each connection: an index into all activities followed by all inputs. It is one
+    name, or a list of names that are taken together, with one component in all or one for each target."""
     node, before = entry.value, scope.constants.findings.errors
     items = one_or_more(node)
     parts: list[IntArray | Unknown] = []
     for item in items:
-        parts.append(_place(entry.name, item, scope, directory, neurons))
+        parts.append(_source_indices(entry.name, item, scope, directory, neurons))
         if scope.constants.findings.errors - before >= PATIENCE:
             return UNKNOWN
     if not parts:
         message = f"the signal '{entry.name}' names no neuron, group or input"
         scope.constants.findings.error("wrong-type", node.span, message)
-    found = [part for part in parts if part is not UNKNOWN]
-    if not found or len(found) < len(parts):
+    known_parts = [part for part in parts if part is not UNKNOWN]
+    if not known_parts or len(known_parts) < len(parts):
         return UNKNOWN
-    where = np.concatenate(found)
-    if len(where) == 1 and targets is not UNKNOWN:
-        return np.repeat(where, len(targets))
-    if len(where) == target_count and targets is not UNKNOWN:
-        return where[targets]
-    if target_count is UNKNOWN or len(where) in (1, target_count):
+    components = np.concatenate(known_parts)
+    count = len(components)
+    if count == 1 and targets is not UNKNOWN:
+        return np.repeat(components, len(targets))
+    if count == target_count and targets is not UNKNOWN:
+        return components[targets]
+    if target_count is UNKNOWN or count in (1, target_count):
         return UNKNOWN
-    called = f"'{_text(node)}'" if isinstance(node, Scalar) else f"'{entry.name}'"
-    message = f"the signal {called} has {len(where)} components; 1 or {target_count}, one for each target, are wanted"
+    title = f"'{_text(node)}'" if isinstance(node, Scalar) else f"'{entry.name}'"
+    message = f"the signal {title} has {count} components; 1 or {target_count}, one for each target, are wanted"
     scope.constants.findings.error("wrong-size", node.span, message)
     return UNKNOWN
 
 
-def _place(signal: str, node: Node, scope: Scope, directory: Directory, neurons: int) -> IntArray | Unknown:
-    """Where a name of a signal is found, in all activities followed by all inputs."""
+def _source_indices(signal: str, node: Node, scope: Scope, directory: Directory, neurons: int) -> IntArray | Unknown:
+    """What a name of a signal means: indices into all activities followed by all inputs."""
     findings = scope.constants.findings
     if not isinstance(node, Scalar) or not isinstance(node.value, str):
         message = f"the signal '{signal}' is the name of a neuron, a group or an input, or a list of these"

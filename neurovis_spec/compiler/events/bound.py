@@ -1,7 +1,7 @@
 """What follows parameters, from all parts of a network, as bindings of its arrays (§9).
 
-In: the slots, the parts of groups, entries and inputs that follow formulas, the network that was made of these. Out:
-Settable.
+In: the slots, the parts of groups, entries and inputs, the network that was made of these. Out: Settable. A Part says
+which numbers of a group follow a formula, a Binding which numbers of an array of the network do (``settable``).
 """
 
 from __future__ import annotations
@@ -39,16 +39,16 @@ from neurovis_spec.language.expressions.tree import Number
 _ELSEWHERE = ("first", "position")
 
 
-class Found(NamedTuple):
-    """A formula for some numbers of an array."""
+class LocatedPart(NamedTuple):
+    """A part, with the array of the network that its numbers stand in, and their indices there."""
 
     array: Key
     places: IntArray
     part: Part
 
 
-def found_in(network: Network, census: Census, bundles: tuple[Bundle, ...]) -> Iterator[Found]:
-    """What follows parameters in all of a network: of neurons, connections, and tables of inputs."""
+def found_in(network: Network, census: Census, bundles: tuple[Bundle, ...]) -> Iterator[LocatedPart]:
+    """The parts of all of a network: of neurons, connections, and tables of inputs."""
     neurons, connections = network.located("neuron"), network.located("connection")
     for one in census.groups:
         for part in one.parts:
@@ -62,10 +62,10 @@ def found_in(network: Network, census: Census, bundles: tuple[Bundle, ...]) -> I
     for number, entry in enumerate(network.inputs):
         for part in entry.parts:
             assert entry.table is not None
-            yield Found(table_of(number), part.within(entry.table.size), part)
+            yield LocatedPart(table_of(number), part.within(entry.table.size), part)
 
 
-def _found(part: Part, members: IntArray, located: Located) -> Iterator[Found]:
+def _found(part: Part, members: IntArray, located: Located) -> Iterator[LocatedPart]:
     """A part of some neurons or connections: of a definition, which may be in use at several populations, or of what
     the network has one of."""
     if part.name:
@@ -73,32 +73,36 @@ def _found(part: Part, members: IntArray, located: Located) -> Iterator[Found]:
         owners = np.unique(numbers).tolist()
         for number in owners:
             inside = np.flatnonzero(numbers == number)
-            own = part if len(owners) == 1 else part.subset(inside)
-            yield Found(Key(Owner(part.field, number), part.name), located.positions[members[inside]], own)
+            array = Key(Owner(part.field, number), part.name)
+            of_owner = part if len(owners) == 1 else part.subset(inside)
+            yield LocatedPart(array, located.positions[members[inside]], of_owner)
     elif part.field not in _ELSEWHERE:
-        yield Found(Key(None, part.field), members, part)
+        yield LocatedPart(Key(None, part.field), members, part)
 
 
-def make_settable(network: Network, slots: tuple[Slot, ...], found: Iterable[Found]) -> Settable:
-    """The bindings of a network, those of the same formula as one, and the arrays that they write to."""
+def make_settable(network: Network, slots: tuple[Slot, ...], found: Iterable[LocatedPart]) -> Settable:
+    """The slots and bindings of a network, and the arrays that the bindings write to. Parts with the same formula
+    become one binding; an array of which all numbers follow one number takes one place among the variables."""
     if not slots:  # nothing can be set
         return Settable()
     arrays = _arrays(network)
-    merged = list(_merged([one for one in found if len(one.places)]))  # a cell may be of no connection
-    by_array: dict[Key, list[Found]] = {}
-    for one in merged:
-        by_array.setdefault(one.array, []).append(one)
+    merged = list(_merged([located for located in found if len(located.places)]))  # a cell may be of no connection
+    by_array: dict[Key, list[LocatedPart]] = {}
+    for located in merged:
+        by_array.setdefault(located.array, []).append(located)
     variables: dict[Key, Variable] = {}
     initial: list[FloatArray] = [np.zeros(0)]
     start = 0
     for array in sorted(by_array.keys() - {WEIGHTS}, key=lambda key: key.text):  # the order in checkpoints
-        whole, own = arrays[array], by_array[array]
-        if len(own) == 1 and _is_one_number(own[0].part.formula) and len(own[0].places) == len(whole) > 0:
+        whole, parts = arrays[array], by_array[array]
+        if len(parts) == 1 and _is_one_number(parts[0].part.formula) and len(parts[0].places) == len(whole) > 0:
             whole = whole[:1]
         variables[array] = Variable(start, len(whole))
         initial.append(np.asarray(whole, dtype=np.float64))
         start += len(whole)
-    bindings = [_binding(one, variables.get(one.array), len(arrays.get(one.array, ()))) for one in merged]
+    bindings = [
+        _binding(located, variables.get(located.array), len(arrays.get(located.array, ()))) for located in merged
+    ]
     bindings += [binding for noise in network.noises for binding in _of_noise(noise)]
     return Settable(slots, tuple(bindings), variables, frozen(np.concatenate(initial)))
 
@@ -120,19 +124,29 @@ def _arrays(network: Network) -> Mapping[Key, FloatArray]:
     return arrays
 
 
-def _binding(one: Found, variable: Variable | None, size: int) -> Binding:
-    """Some numbers of an array of this size that follow a formula; of the weights where it is no variable."""
-    indices, part = one.places, one.part
+def _binding(located: LocatedPart, variable: Variable | None, size: int) -> Binding:
+    """The binding of a part, whose array has this size; it is the weights where it is no variable."""
+    array, places, part = located
+    indices = places
     if variable is not None:
-        indices = variable.start + (one.places if variable.size == size else one.places[:1])
-    weights = variable is None
-    return Binding(part.formula, weights, frozen(indices), one.array, frozen(one.places), part.low, part.high)
+        indices = variable.start + (places if variable.size == size else places[:1])
+    return Binding(
+        formula=part.formula,
+        weights=variable is None,
+        indices=frozen(indices),
+        array=array,
+        places=frozen(places),
+        low=part.low,
+        high=part.high,
+    )
 
 
 def _of_noise(noise: Noise) -> Iterator[Binding]:
-    """The spreads of a noise, which nothing is written to, and none of which may become negative."""
+    """The spreads of a noise, none of which may become negative. They are computed in a run, so that their bindings
+    write nothing and only check."""
+    zero = ParameterFormula(Number(0.0), {})
     for width in noise.widths:
-        yield Binding(width, False, NO_INDICES, NOISE, NO_INDICES, ParameterFormula(Number(0.0), {}))
+        yield Binding(width, weights=False, indices=NO_INDICES, array=NOISE, places=NO_INDICES, low=zero)
 
 
 def own_weights(slots: tuple[Slot, ...], bundles: tuple[Bundle, ...], weights: FloatArray) -> FloatArray | None:
@@ -140,9 +154,9 @@ def own_weights(slots: tuple[Slot, ...], bundles: tuple[Bundle, ...], weights: F
     if not any(slot.given for slot in slots):
         return None
     own = np.zeros(len(slots))
-    for place, slot in enumerate(slots):
+    for index, slot in enumerate(slots):  # a formula reads only slots before its own
         formula = slot.own if slot.given else slot.formula
-        own[place] = slot.value if formula is None else formula.values(own)
+        own[index] = slot.value if formula is None else formula.values(own)
     result = weights.copy()
     start = 0
     for bundle in bundles:
@@ -158,15 +172,14 @@ def _is_one_number(formula: Dependent) -> bool:
     return isinstance(formula, ParameterFormula) and formula.plain
 
 
-def _merged(found: list[Found]) -> Iterator[Found]:
-    """Numbers of an array that follow the same formula, which gives one number, as one."""
-    groups: dict[Hashable, list[Found]] = {}
-    for place, one in enumerate(found):
-        formula = one.part.formula
-        key: Hashable = (one.array, place)
-        if isinstance(formula, ParameterFormula) and formula.plain and one.part.low is None and one.part.high is None:
-            key = (one.array, formula.tree, tuple(formula.slot_of.items()), tuple(formula.known.items()))
-        groups.setdefault(key, []).append(one)
-    for parts in groups.values():
-        places = np.concatenate([one.places for one in parts])
-        yield parts[0]._replace(places=places)
+def _merged(found: list[LocatedPart]) -> Iterator[LocatedPart]:
+    """The parts, those of an array with the same formula, which gives one number, as one part."""
+    groups: dict[Hashable, list[LocatedPart]] = {}
+    for index, (array, _, part) in enumerate(found):
+        formula = part.formula
+        key: Hashable = (array, index)  # of this part alone
+        if isinstance(formula, ParameterFormula) and formula.plain and part.low is None and part.high is None:
+            key = (array, formula.tree, tuple(formula.slot_of.items()), tuple(formula.known.items()))
+        groups.setdefault(key, []).append(found[index])
+    for group in groups.values():
+        yield group[0]._replace(places=np.concatenate([located.places for located in group]))

@@ -69,12 +69,14 @@ def neurons(n: int | Unknown) -> Each:
 
 
 class Settled(NamedTuple):
-    """A definition where it is used: the values of its parameters, what of these follows parameters of the run, and
-    what is written for each of its parameters and signals."""
+    """A definition where it is used, as ``leaky_integrator: {leak: 2}`` of a group."""
 
     definition: Definition
+    #: the values of its parameters, one for each neuron or connection
     parameters: Mapping[str, FloatArray]
+    #: which of these follow parameters of the run (``events/settable.py``)
     parts: tuple[Part, ...]
+    #: what is written for each of its parameters and signals
     entries: Names[Entry]
     #: whether its parameters are known
     sound: bool = True
@@ -84,22 +86,22 @@ def settled_of(
     choice: Choice, kind: Kind, definitions: Definitions, constants: Constants, each: Each, n: int | Unknown
 ) -> Settled | Unknown:
     """The definition that a choice names, with its settings for ``each`` of n; UNKNOWN where there is none."""
-    found = _chosen(choice, definitions.of(kind), kind, constants.findings)
-    if found is UNKNOWN:
+    defined = _named_definition(choice, definitions.of(kind), kind, constants.findings)
+    if defined is UNKNOWN:
         check_settings(choice, constants, each.names)
         return UNKNOWN
-    made = found.definition
-    known = (*made.parameters, *made.signals)
-    home = Home((kind.section, made.name), ("parameters", "signals"))
+    definition = defined.definition
+    known = (*definition.parameters, *definition.signals)
+    home = Home((kind.section, definition.name), ("parameters", "signals"))
     entries = settings_of(choice.settings, known, "parameter", "it has no parameters", constants.findings, home)
     with constants.following() as parts:
-        values = _parameters(choice, found.defaults, n, constants, entries, each)
+        values = _parameters(choice, defined.defaults, n, constants, entries, each)
     if values is UNKNOWN:
-        return Settled(made, {}, (), entries, sound=False)
-    return Settled(made, values, tuple(part._replace(field=kind.name) for part in parts), entries)
+        return Settled(definition, {}, (), entries, sound=False)
+    return Settled(definition, values, tuple(part._replace(field=kind.name) for part in parts), entries)
 
 
-def _chosen(choice: Choice, known: Names[Defined], kind: Kind, findings: Findings) -> Defined | Unknown:
+def _named_definition(choice: Choice, known: Names[Defined], kind: Kind, findings: Findings) -> Defined | Unknown:
     """The definition that a choice names; an unknown name is answered with the nearest ones, and taken for the one that
     it can only be meant for."""
     name, what = choice.name, kind.name
@@ -141,7 +143,7 @@ def spread(
     """
     each = each or neurons(n)
     if isinstance(formulas, FormulaList):
-        return _listed(formulas, n, constants, what, stream, each)
+        return _value_of_each(formulas, n, constants, what, stream, each)
     randomness: Randomness | Unknown | None = None
     if stream is not None:
         randomness = UNKNOWN if n is UNKNOWN else Randomness(stream, np.arange(n, dtype=np.int64))
@@ -151,9 +153,10 @@ def spread(
     return np.broadcast_to(np.asarray(value, dtype=np.float64), (1 if n is UNKNOWN else n,)).copy()
 
 
-def _listed(
+def _value_of_each(
     formulas: FormulaList, n: int | Unknown, constants: Constants, what: str, stream: Stream | None, each: Each
 ) -> FloatArray | Unknown:
+    """The values of a list of n formulas, each for one; UNKNOWN where one is invalid, or they are not n."""
     if n is UNKNOWN:
         for item in formulas.items[:_MOST_CHECKED]:
             constants.value(item, each.extra(), None if stream is None else UNKNOWN)
@@ -179,6 +182,7 @@ def _listed(
 
 
 def _formulas(entry: Entry, constants: Constants) -> Formula | FormulaList | Unknown:
+    """What is written for a parameter: a formula, or a list of formulas; UNKNOWN where one is invalid."""
     node = entry.value
     if not isinstance(node, AnyList):
         return formula_of(node, constants.findings)
@@ -196,7 +200,9 @@ def _formulas(entry: Entry, constants: Constants) -> Formula | FormulaList | Unk
 def _parameters(
     choice: Choice, defaults: Defaults, n: int | Unknown, constants: Constants, entries: Names[Entry], each: Each
 ) -> dict[str, FloatArray] | Unknown:
-    """The value of every parameter of a definition with these settings, for ``each`` of n; UNKNOWN where one is."""
+    """The value of every parameter of a definition with these settings, for ``each`` of n; UNKNOWN where one is. A
+    parameter may follow parameters of the run by its setting, by its default (which may use parameters before it that
+    do), or by its bounds alone; in the last case its value stays, and is checked again when the bounds change."""
     findings = constants.findings
     values: dict[str, Value | Unknown] = {**CONSTANTS, "dt": constants.dt}
     result: dict[str, FloatArray] = {}
@@ -219,10 +225,10 @@ def _parameters(
             for bound in (default.low, default.high)
         )
         if any(bound is not None and bound.slots for bound in (low, high)):
-            parts = _all_of(default.name, value, parts)  # what stays must lie within bounds that do not
+            parts = _covering_all(default.name, value, parts)  # what stays must lie within bounds that do not
         if parts:
             following[default.name] = parts
-            constants.follow(_between(part, low, high)._replace(name=default.name) for part in parts)
+            constants.follow(_bounded(part, low, high)._replace(name=default.name) for part in parts)
         span = choice.name.span if entry is None or entry is UNKNOWN else entry.value.span
         # A default that lies outside by itself is a finding of the definition.
         if not entries or check_bounds(value, default, values, span, findings):
@@ -233,6 +239,7 @@ def _parameters(
 def _setting(
     entry: Entry | Unknown, name: str, n: int | Unknown, constants: Constants, each: Each
 ) -> FloatArray | Unknown:
+    """The value of a parameter that is set."""
     formulas = UNKNOWN if entry is UNKNOWN else _formulas(entry, constants)
     return UNKNOWN if formulas is UNKNOWN else spread(formulas, n, constants, f"'{name}'", each=each)
 
@@ -245,8 +252,9 @@ def _default(default: Default, n: int | Unknown, values: Mapping[str, Value | Un
     return np.broadcast_to(np.asarray(value, dtype=np.float64), (1 if n is UNKNOWN else n,)).copy()
 
 
-def _all_of(name: str, value: FloatArray, parts: list[Part]) -> list[Part]:
-    """Parts that cover all numbers of a parameter: those that follow no parameter of the run are as they are."""
+def _covering_all(name: str, value: FloatArray, parts: list[Part]) -> list[Part]:
+    """Parts that cover all numbers of a parameter: these, and one for the numbers that follow no parameter of the run,
+    whose formula gives them as they are."""
     if any(part.places is None for part in parts):
         return parts
     rest = np.ones(len(value), dtype=np.bool_)
@@ -258,12 +266,12 @@ def _all_of(name: str, value: FloatArray, parts: list[Part]) -> list[Part]:
     return [*parts, Part(ParameterFormula(Name(name), {}, {name: value[places]}), places)] if len(places) else parts
 
 
-def _between(part: Part, low: Dependent | None, high: Dependent | None) -> Part:
+def _bounded(part: Part, low: Dependent | None, high: Dependent | None) -> Part:
     """A part that must lie within bounds, which are one for all or one for each."""
     if part.places is None:
         return part._replace(low=low, high=high)
-    own = [None if bound is None else Subset(bound, part.places) for bound in (low, high)]
-    return part._replace(low=own[0], high=own[1])
+    low, high = (None if bound is None else Subset(bound, part.places) for bound in (low, high))
+    return part._replace(low=low, high=high)
 
 
 def _assembled(
