@@ -78,8 +78,8 @@ def body_settings(
             time = around.spec.time
             clock = Clock(constants.dt, substeps, model.substeps, time is None or time.dt is None)
         path, body = find_body(kind, given, place, clock, findings)
-    sensed = tuple(_sensed(model, around, None if body is None else body.sensors, findings))
-    moved = tuple(_moved(model, around, None if body is None else body.actuators, constants))
+    sensed = tuple(_sensed_inputs(model, around, None if body is None else body.sensors, findings))
+    moved = tuple(_commands(model, around, None if body is None else body.actuators, constants))
     each_episode = model.reset is not None and model.reset.value == "each_episode"
     if given is None or substeps is UNKNOWN:
         return None
@@ -91,11 +91,11 @@ def find_body(
 ) -> tuple[Path | None, Body | None]:
     """The file that a body is made of, where its kind takes one, and the body; None where it cannot be opened, or the
     clock is not known."""
-    path, ready = _found(kind, given, place, findings)
-    return path, _opened(kind, given, path, clock, findings) if ready and clock is not None else None
+    path, ready = _find_file(kind, given, place, findings)
+    return path, _open(kind, given, path, clock, findings) if ready and clock is not None else None
 
 
-def _found(kind: str, given: Located[str], place: Place, findings: Findings) -> tuple[Path | None, bool]:
+def _find_file(kind: str, given: Located[str], place: Place, findings: Findings) -> tuple[Path | None, bool]:
     """The file that a body is made of, None where its kind takes none, and whether all is there that it needs."""
     try:
         loaded = load_kind(kind)
@@ -144,7 +144,9 @@ def _warn_unchecked(error: BodyMissingError, given: Located[str], findings: Find
     findings.warning("body-unchecked", given.span, f"{error}: the names in 'body' are not checked", error.hint)
 
 
-def _opened(kind: str, given: Located[str], path: Path | None, clock: Clock, findings: Findings) -> Body | None:
+def _open(kind: str, given: Located[str], path: Path | None, clock: Clock, findings: Findings) -> Body | None:
+    """The body; None where it cannot be opened, or where something that it needs is missing, which is a warning. Where
+    the clock does not fit, the body is opened with one that does, to check the names all the same."""
     try:
         return open_body(kind, given.value, path, clock.dt, clock.substeps)
     except BodyMissingError as error:
@@ -159,12 +161,13 @@ def _opened(kind: str, given: Located[str], path: Path | None, clock: Clock, fin
         findings.error("bad-body", at.span, str(error), hint)
         if error.fitting is None:
             return None
-        return _opened(kind, given, path, Clock(*error.fitting), Findings())  # its names are what they are
+        return _open(kind, given, path, Clock(*error.fitting), Findings())  # its names are what they are
 
 
-def _sensed(
+def _sensed_inputs(
     model: BodyModel, around: Surroundings, ports: Sequence[Port] | None, findings: Findings
 ) -> Iterator[Sensed]:
+    """The inputs that sensors are put into; what is invalid is reported and left out."""
     indices = {entry.name: index for index, entry in enumerate(around.inputs)}
     for name, sensors in model.sensors.items():
         index = indices.get(name)
@@ -185,10 +188,11 @@ def _sensed(
                 hint = f"take one of them, as in {shorten(sensors[0].value)}[0], or {hint}"
             findings.error("wrong-size", span, message, hint)
             continue
-        yield Sensed(index, tuple(_called(sensor.value, ports) for sensor in sensors))
+        yield Sensed(index, tuple(_name_in_run(sensor.value, ports) for sensor in sensors))
 
 
 def _report_input(name: str, span: Span, around: Surroundings, findings: Findings) -> None:
+    """Report a name that is no input of the network: an input of an instance that is bound to one, or none."""
     found = around.scope.input(name)
     if found is UNKNOWN:
         return
@@ -227,7 +231,7 @@ def _size(name: Located[str], ports: Sequence[Port] | None, what: str, findings:
     return UNKNOWN
 
 
-def _called(name: str, ports: Sequence[Port] | None) -> str:
+def _name_in_run(name: str, ports: Sequence[Port] | None) -> str:
     """A sensor or an actuator as runs name it: one number of several as ``name[i]``, a single one by its name alone."""
     sizes = {port.name: port.size for port in ports or ()}
     one = None if name in sizes else _ONE.fullmatch(name)
@@ -236,9 +240,10 @@ def _called(name: str, ports: Sequence[Port] | None) -> str:
     return one[1] if sizes.get(one[1]) == 1 else f"{one[1]}[{int(one[2])}]"
 
 
-def _moved(
+def _commands(
     model: BodyModel, around: Surroundings, ports: Sequence[Port] | None, constants: Constants
 ) -> Iterator[Moved]:
+    """The commands of the actuators; what is invalid is reported and left out."""
     findings = constants.findings
     told: dict[str, str] = {}
     for name, formula in model.actuators.items():
@@ -247,7 +252,7 @@ def _moved(
         if size is not UNKNOWN and size > 1:
             message = f"the actuator '{shorten(name)}' takes {size} numbers, and a command is one"
             findings.error("wrong-size", key.span, message, f"command each of them: {shorten(name)}[0], …")
-        called = _called(name, ports)
+        called = _name_in_run(name, ports)
         first = told.setdefault(called, name)
         if first != name:
             message = f"the actuator '{shorten(name)}' is commanded twice: first as '{shorten(first)}'"

@@ -81,6 +81,8 @@ def _arranged(inputs: Sequence[Input]) -> tuple[list[Input], IntArray]:
 
 
 def _population(population: Population) -> Record:
+    """What of a population is content. Its names, here and below, stay as they were first hashed: hashes outlive a
+    version."""
     fields: dict[str, object] = {
         "level": population.level,
         "members": population.members,
@@ -103,6 +105,7 @@ def _projection(one: Projection, moved: IntArray) -> Record:
 
 
 def _definition(made: Definition) -> Record:
+    """What of a definition is content."""
     named = {"name": made.name, "parameters": sorted(made.parameters)}
     if made.kind == ACTIVATION:
         return Record("Activation", {**named, "value": made.given.each_step})

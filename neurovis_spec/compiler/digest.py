@@ -96,6 +96,8 @@ class _Writer:
         self._pieces.clear()
 
     def value(self, value: object) -> None:
+        """Write a value: plain ones (texts, numbers, lists, mappings, arrays), formulas, records, and those of the
+        schema."""
         kind = type(value)
         if kind is str or kind is int or value is None:
             self._add(self._common(kind, value))
@@ -175,6 +177,8 @@ class _Writer:
             self.value(operand)
 
     def _content(self, value: object) -> None:
+        """Write a value of the schema: its kind and its attributes. The commonest attributes are written here rather
+        than by ``value``, as there are very many."""
         begin, parts = self._schema[type(value)].pieces
         pieces, common = self._pieces, self._known
         pieces.append(begin)

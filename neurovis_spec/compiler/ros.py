@@ -82,6 +82,7 @@ def _check_topics(model: RosModel, settings: RosSettings, name: str, findings: F
 
 
 def _above_zero(formula: Formula, what: str, constants: Constants) -> float | None:
+    """The number that a formula gives; None where it is invalid, or not above 0, which is reported."""
     value = known(constants.scalar(formula), None)
     if value is not None and not value > 0:
         constants.findings.error("out-of-range", formula.span, f"{what} and above 0, this is {value:g}")
@@ -90,6 +91,7 @@ def _above_zero(formula: Formula, what: str, constants: Constants) -> float | No
 
 
 def _subscriptions(model: RosModel, around: Surroundings, constants: Constants) -> Iterator[Subscription]:
+    """What arrives at inputs; what is invalid is reported and left out."""
     findings = constants.findings
     inputs = {entry.name: entry for entry in around.inputs}
     for name, entry in model.subscribe.items():
@@ -123,6 +125,7 @@ def _subscriptions(model: RosModel, around: Surroundings, constants: Constants) 
 
 
 def _publications(model: RosModel, around: Surroundings, constants: Constants) -> Iterator[Publication]:
+    """What is sent of outputs; what is invalid is reported and left out."""
     outputs = {output.name: output for output in around.outputs}
     for name, entry in model.publish.items():
         output = outputs.get(name)
@@ -143,6 +146,7 @@ def _type(entry: SubscribeModel | PublishModel, size: int) -> str:
 
 
 def _report_output(name: str, model: RosModel, spec: Spec, findings: Findings) -> None:
+    """Report a name that is no output, unless it is that of an invalid one."""
     declared = names_of(spec, "outputs", spec.outputs)
     if name in declared:
         return

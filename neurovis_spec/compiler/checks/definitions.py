@@ -60,7 +60,7 @@ class _Part(NamedTuple):
     reads: frozenset[str]
 
 
-def _read(*formulas: Formula | None) -> frozenset[str]:
+def _names_read(*formulas: Formula | None) -> frozenset[str]:
     """The names that formulas read."""
     texts = [formula.value for formula in formulas if formula is not None and isinstance(formula.value, str)]
     return frozenset().union(*(names(parse(text, extra_functions={"f": 1})) for text in texts))
@@ -71,11 +71,11 @@ def _parts_of(definition: DefinitionModel) -> dict[str, _Part]:
     reads: dict[tuple[str, str], frozenset[str]] = {}
     parts = definition.parts()
     for name, value in parts.parameters.items():
-        reads["parameters", name] = _read(value.value, value.minimum, value.maximum)
+        reads["parameters", name] = _names_read(value.value, value.minimum, value.maximum)
     for name, formula in parts.let.items():
-        reads["let", name] = _read(formula)
+        reads["let", name] = _names_read(formula)
     for name, state in (parts.state or {}).items():
-        reads["state", name] = _read(state.initial, state.each_step, state.each_episode)
+        reads["state", name] = _names_read(state.initial, state.each_step, state.each_episode)
     found = {
         name: _Part(section, key_of(definition.source, section, name).span, read)
         for (section, name), read in reads.items()
@@ -99,8 +99,8 @@ def _check_parts(definition: DefinitionModel, what: str, findings: Findings) -> 
     """Each part on which neither the activity or the weight depends, nor a state: states can be recorded, by an output
     or whoever runs the network, so all of them count as read. A part that only such parts read is not reported: that
     follows from these."""
-    parts, said = _parts_of(definition), definition.parts()
-    wanted = _read(said.each_step, said.each_episode)
+    parts, written = _parts_of(definition), definition.parts()
+    wanted = _names_read(written.each_step, written.each_episode)
     states = [name for name, part in parts.items() if part.section == "state"]
     used = _reached([*wanted, *states], parts)
     unused = {name: part for name, part in parts.items() if name not in used}
@@ -128,7 +128,7 @@ def _check_replaced(model: DefinitionModel, made: Defined, findings: Findings) -
     ):
         if formula is None or tree is None:
             continue
-        found = _reached(_read(formula), parts)
+        found = _reached(_names_read(formula), parts)
         active = not found.isdisjoint(ACTIVITIES)
         if active and not _lasts(found, parts) and _in_silence(tree, made) == 0:
             message = f"this replaces the weight at {when}: it does not read 'weight'"
@@ -169,7 +169,7 @@ def _check_unused(compiled: Compiled, findings: Findings) -> None:
         RULE.section: {one.rule.definition.name for one in network.projections},
     }
     modules = [library.source.get("modules") for library in compiled.libraries]
-    named = {text for node in modules if node is not None for text in _texts(node)}
+    named = {text for node in modules if node is not None for text in _texts_in(node)}
     for section, own in used.items():
         node = compiled.spec.source.get(section)
         for entry in node.entries if isinstance(node, Mapping) else ():
@@ -178,7 +178,7 @@ def _check_unused(compiled: Compiled, findings: Findings) -> None:
                 findings.warning("unused-definition", entry.key.span, message, "remove it, or use it")
 
 
-def _texts(node: Node) -> Iterator[str]:
+def _texts_in(node: Node) -> Iterator[str]:
     """Every text of a node, keys included."""
     waiting = [node]
     while waiting:

@@ -213,6 +213,7 @@ def _check_overlaps(clamps: list[_Clamp], count: int, findings: Findings) -> Non
 
 
 def _tell(first: _Clamp, second: _Clamp, findings: Findings) -> None:
+    """Warn, at the later one, of two clamps that hold a neuron at the same steps."""
     begin, end = max(first.begin, second.begin), min(first.end, second.end) - 1
     when = f"from step {begin:.0f} on" if math.isinf(end) else f"at the steps {begin:.0f} to {end:.0f}"
     when = f"at step {begin:.0f}" if begin == end else when

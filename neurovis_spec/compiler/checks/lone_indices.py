@@ -45,13 +45,13 @@ def check_lone_indices(compiled: Compiled, findings: Findings) -> None:
 def _instances(section: Section, findings: Findings) -> None:
     for name, model in section.instances.items():
         if model.count is None:
-            for place, index in _found(formulas_of(model, COUNTED), COUNTED):
+            for place, index in _occurrences(formulas_of(model, COUNTED), COUNTED):
                 hint = "'i' and 'n' count the instances of an entry; give it a 'count'"
                 _warn(place, index, f"'{name}' is one instance", hint, findings)
 
 
 def _group(name: str, group: GroupModel, findings: Findings) -> None:
-    for place, index in _found(formulas_of(group, COUNTED), COUNTED):
+    for place, index in _occurrences(formulas_of(group, COUNTED), COUNTED):
         hint = "'i' and 'n' count the neurons of a group; give it a 'count'"
         _warn(place, index, f"'{name}' is one neuron", hint, findings)
 
@@ -60,7 +60,7 @@ def _connection(body: ConnectionModel, alone: dict[str, str], signals: Collectio
     """``i`` and ``j`` in an entry; ``alone`` has those that stand for one neuron, with what that is called. A rule's
     signals are names."""
     formulas = (one for one in formulas_of(body, alone) if one.path[0] != "plasticity" or one.path[-1] not in signals)
-    for place, index in _found(formulas, alone):
+    for place, index in _occurrences(formulas, alone):
         hint = "'i' counts the sources and 'j' the targets, both from 0"
         if len(alone) == 1:
             hint += f"; did you mean '{'j' if index.name == 'i' else 'i'}'?"
@@ -87,7 +87,7 @@ def _is_one(name: str, compiled: Compiled, place: int) -> bool:
     return len(inside) == 1 and not counted and _is_one(rest, compiled, inside[0])
 
 
-def _found(formulas: Iterable[Written], wanted: Collection[str]) -> Iterator[tuple[Scalar, Name]]:
+def _occurrences(formulas: Iterable[Written], wanted: Collection[str]) -> Iterator[tuple[Scalar, Name]]:
     """The places of some names in formulas."""
     for formula in formulas:
         tree = parse(formula.text, random=True)

@@ -87,6 +87,8 @@ def _is_own(bundle: Bundle, signal: str) -> bool:
 
 
 def _check_signal(entry: WrittenEntry, signal: str, network: Network, findings: Findings) -> None:
+    """Warn of a signal that is each connection's own target, where the rule changes nothing then, or where other
+    neurons may be meant."""
     learning, choice = entry.learning, entry.body.plasticity
     assert learning is not None
     assert choice is not None

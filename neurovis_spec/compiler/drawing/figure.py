@@ -74,9 +74,11 @@ class _Reader:
                 span = text.node.at(part.start, part.end)
                 self._refuse(part.text, span, f"the view '{view}' shows connections", "write FROM -> TO")
                 continue
-            yield from self._part(view, part, text)
+            yield from self._curves_of_part(view, part, text)
 
-    def _part(self, view: str, part: Part, text: Located[str]) -> Iterator[Curve]:
+    def _curves_of_part(self, view: str, part: Part, text: Located[str]) -> Iterator[Curve]:
+        """The curves of a part of a reference: a state, neurons, or an output of either; what a view cannot show is
+        reported."""
         name = part.text
         output = self.outputs.get(name)
         known = self.directory.holds(name)

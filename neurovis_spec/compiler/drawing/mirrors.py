@@ -69,6 +69,7 @@ def _mirror(
     paths: Sequence[str],
     findings: Findings,
 ) -> Mirror | Unknown:
+    """The mirror that a reference to two sides means; UNKNOWN, and a finding, where they are not of equal make."""
     left, right = reference.parts
     sides = directory.instance(left.value), directory.instance(right.value)
     if bool(sides[0]) != bool(sides[1]) and directory.holds((right if sides[0] else left).value):
@@ -76,8 +77,8 @@ def _mirror(
         findings.error("bad-mirror", reference.span, message)
         return UNKNOWN
     if sides[0] and sides[1]:
-        return _of_instances(scope, reference, sides, names, paths, findings)
-    pair = _members(left, directory, findings), _members(right, directory, findings)
+        return _mirror_of_instances(scope, reference, sides, names, paths, findings)
+    pair = _neurons_of_side(left, directory, findings), _neurons_of_side(right, directory, findings)
     if pair[0] is UNKNOWN or pair[1] is UNKNOWN:
         return UNKNOWN
     if len(pair[0]) != len(pair[1]):
@@ -89,11 +90,12 @@ def _mirror(
     return Mirror(scope.path, tuple(zip(pair[0], pair[1], strict=True)))
 
 
-def _members(side: Located[str], directory: Directory, findings: Findings) -> tuple[int, ...] | Unknown:
+def _neurons_of_side(side: Located[str], directory: Directory, findings: Findings) -> tuple[int, ...] | Unknown:
+    """The neurons of a side; none where it is an instance."""
     return () if directory.instance(side.value) else resolve_end(side, directory, findings)
 
 
-def _of_instances(
+def _mirror_of_instances(
     scope: Scope,
     reference: Reference,
     sides: tuple[tuple[Directory, ...], tuple[Directory, ...]],
@@ -101,6 +103,7 @@ def _of_instances(
     paths: Sequence[str],
     findings: Findings,
 ) -> Mirror | Unknown:
+    """A mirror of instances, pair by pair: neurons of the same name in both are images of each other."""
     left, right = reference.parts
     if len(sides[0]) != len(sides[1]):
         message = (

@@ -15,7 +15,7 @@ from typing import Final
 
 from neurovis_spec.compiler.events.settable import ParameterFormula
 from neurovis_spec.compiler.limits import DEEPEST, MOST_INSTANCES, Limits
-from neurovis_spec.compiler.names.input_bindings import Binding, bindings_of, check_sizes, shared_out
+from neurovis_spec.compiler.names.input_bindings import InputBinding, bindings_of, check_sizes, shared_out
 from neurovis_spec.compiler.names.modules import Library, Module
 from neurovis_spec.compiler.names.references import Section, home_of, key_of, key_span
 from neurovis_spec.compiler.names.scope import Expansion, Scope
@@ -84,10 +84,10 @@ class Expander:
         try:
             self._unit(section, constants, folder, _Place(path, path, 0, 0, 1), (), module=module)
         except _StoppedError:  # which instances there are is not known then
-            root = self._at(0)
+            root = self._scope(0)
             self.scopes = [replace(root, children=root.children.opened())]
         self.made += len(self.scopes)
-        return Expansion(tuple(map(self._at, range(len(self.scopes)))), tuple(self.inputs))
+        return Expansion(tuple(map(self._scope, range(len(self.scopes)))), tuple(self.inputs))
 
     def files_in(self, folder: Path) -> Files:
         """The data files that are named relative to a folder."""
@@ -102,7 +102,7 @@ class Expander:
         folder: Path,
         place: _Place,
         way: tuple[int, ...],
-        bound: Mapping[str, Binding] | None = None,
+        bound: Mapping[str, InputBinding] | None = None,
         module: str | None = None,
         settings: Mapping[str, frozenset[str]] | None = None,
     ) -> int:
@@ -138,7 +138,7 @@ class Expander:
             f"{name}.{key}": found
             for name, places in children.known().items()
             if len(places) == 1
-            for key, found in self._at(places[0]).inputs.items()
+            for key, found in self._scope(places[0]).inputs.items()
         }
         self.scopes[index] = replace(scope, children=children, inputs=Names({**own, **inner}, own.is_open))
         return index
@@ -155,7 +155,7 @@ class Expander:
             if instances is None or (self.made + instances > MOST_INSTANCES and scope.module is not None):
                 raise _StoppedError
 
-    def _at(self, index: int) -> Scope:
+    def _scope(self, index: int) -> Scope:
         scope = self.scopes[index]
         assert scope is not None
         return scope
@@ -166,7 +166,7 @@ class Expander:
         constants: Constants,
         files: Files,
         place: _Place,
-        bound: Mapping[str, Binding],
+        bound: Mapping[str, InputBinding],
     ) -> Names[Input]:
         """The inputs of a scope by their names in it; those that are not bound are inputs of the network."""
         result: dict[str, Input | Unknown] = {}
@@ -229,6 +229,7 @@ class Expander:
         return result
 
     def _module(self, model: InstanceModel) -> Module | Unknown:
+        """The module that an instance names; UNKNOWN, and a finding, where there is none."""
         name, known = model.module.value, self.library.modules
         found = known.get(name)
         if found is None:

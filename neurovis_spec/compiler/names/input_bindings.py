@@ -1,7 +1,7 @@
 """Bindings: which inputs around an instance are the inputs of its module.
 
-In: the entry of an instance, the scope around it. Out: a Binding for each input of the module, by the name that it has
-there; and, of an input of several values, those that one instance gets.
+In: the entry of an instance, the scope around it. Out: an InputBinding for each input of the module, by the name that it
+has there; and, of an input of several values, those that one instance gets.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _FEW = 3
 
 
 @dataclass(frozen=True)
-class Binding:
+class InputBinding:
     """What an entry of instances says an input of its module is, where, and what it is.
 
     ``wanted`` notes how many components the module's own input has, in each of the instances.
@@ -37,20 +37,21 @@ class Binding:
     wanted: list[int] = field(default_factory=list)
 
 
-def bindings_of(model: InstanceModel, scope: Scope, findings: Findings) -> dict[str, Binding]:
+def bindings_of(model: InstanceModel, scope: Scope, findings: Findings) -> dict[str, InputBinding]:
     """The inputs of the scope around that an instance names."""
-    result: dict[str, Binding] = {}
+    result: dict[str, InputBinding] = {}
     for name, outer in model.inputs.items():
         found = scope.input(outer.value)
         if found is None:
-            _unknown(outer, scope, findings)
-        result[name] = Binding(outer.value, outer.span, UNKNOWN if found is None else found)
+            _report_unknown(outer, scope, findings)
+        result[name] = InputBinding(outer.value, outer.span, UNKNOWN if found is None else found)
     for name, value in unread(model, "inputs").items():
-        result[name] = Binding(name, model.source.span, value)
+        result[name] = InputBinding(name, model.source.span, value)
     return result
 
 
-def _unknown(outer: Located[str], scope: Scope, findings: Findings) -> None:
+def _report_unknown(outer: Located[str], scope: Scope, findings: Findings) -> None:
+    """Report a name that is no input of the scope around: a group of neurons, or nothing."""
     section, lost = scope.section, None
     hint: Hint = "connect it to the neurons of the instance"
     message = f"'{shorten(outer.value)}' is a group of neurons, not an input"
@@ -61,7 +62,7 @@ def _unknown(outer: Located[str], scope: Scope, findings: Findings) -> None:
     findings.error("unknown-input", outer.span, message, hint, undeclared=lost)
 
 
-def shared_out(made: Input, bound: Binding, position: int, count: int) -> Input | Unknown:
+def shared_out(made: Input, bound: InputBinding, position: int, count: int) -> Input | Unknown:
     """What one of ``count`` instances gets of an input around it; sizes that do not fit are found later
     (``check_sizes``)."""
     outer = bound.input
@@ -75,7 +76,7 @@ def shared_out(made: Input, bound: Binding, position: int, count: int) -> Input 
     return UNKNOWN
 
 
-def check_sizes(bound: Binding, called: Sequence[str], findings: Findings) -> None:
+def check_sizes(bound: InputBinding, called: Sequence[str], findings: Findings) -> None:
     """A finding where an input does not fit the instances of an entry, which are ``called`` so: it goes to each of
     them, or is shared out among them in equal parts."""
     outer, count = bound.input, len(called)

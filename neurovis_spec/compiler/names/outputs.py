@@ -39,6 +39,7 @@ class _Reader:
         return self.finder.findings
 
     def outputs(self, spec: Spec) -> Iterator[Output]:
+        """The outputs in the order written; what is invalid is reported and left out."""
         for name, reference in spec.outputs.items():
             written = [(part, text) for text in reference.parts for part in parse_sum(text.value)]
             named = [(part, text, self.finder.name_of_state(part)) for part, text in written]
@@ -56,6 +57,8 @@ class _Reader:
         return Output(name, frozen(np.array(neurons, dtype=np.int64)), len(neurons) == 1)
 
     def _of_states(self, name: str, named: list[tuple[Part, Located[str], StateName | None]]) -> Output | Unknown:
+        """An output of states; UNKNOWN where a part is invalid, is no state, or names states that are named before
+        it."""
         found: list[StateOf] = []
         failed = False
         seen: set[tuple[str, str, int]] = set()

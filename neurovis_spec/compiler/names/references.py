@@ -172,6 +172,7 @@ class Directory:
         return UNKNOWN if isinstance(found, str) and self.find(low) is UNKNOWN else found
 
     def _range(self, low: str, high: str) -> tuple[int, ...] | str:
+        """As ``range``, but that a text also says why not where the declaration is invalid."""
         head, dot, rest = low.partition(".")
         if dot:
             if head not in self.instances:
@@ -267,7 +268,7 @@ def resolve_part(part: Part, text: Located[str], directory: Directory, findings:
     result = directory.find(part.text)
     if result is None:
         right = None if findings.many else directory.meant(part.text)
-        _unknown(part.text, span, directory, findings)
+        _report_unknown(part.text, span, directory, findings)
         result = None if right is None else directory.find(right)
     return UNKNOWN if result is None else result
 
@@ -283,7 +284,8 @@ def _range_help(low: str, high: str, directory: Directory) -> str | None:
     return None
 
 
-def _unknown(name: str, span: Span, directory: Directory, findings: Findings) -> None:
+def _report_unknown(name: str, span: Span, directory: Directory, findings: Findings) -> None:
+    """Report a name that is no neuron or group: it is an instance, an input, a connection, or nothing."""
     inside = directory.instance(name)
     if inside:
         some = next(iter((*inside[0].groups, *inside[0].instances)), None)
@@ -359,6 +361,8 @@ def _as_arrow(text: str) -> str | None:
 def _resolve(
     written: Iterable[tuple[Part, Located[str]]], directory: Directory, findings: Findings, instances: bool = False
 ) -> tuple[int, ...] | Unknown:
+    """The neurons of parts of texts, in the order written; UNKNOWN where one is invalid, or names neurons that are
+    named before it. With ``instances`` the name of an instance stands for all of its neurons."""
     result: list[int] = []
     seen: set[int] = set()
     before = findings.errors

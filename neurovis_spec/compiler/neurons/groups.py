@@ -319,6 +319,8 @@ class Builder:
         return spread(formulas, n, self.constants, f"'{what}'", Stream(self.seed, purpose, called))
 
     def _input(self, model: GroupModel, n: int | Unknown) -> IntArray | Unknown:
+        """The places of the neurons' inputs in the vector of all inputs: one component for all, or one for each;
+        UNKNOWN where it is not known, or none is written."""
         if model.input is None:
             return UNKNOWN
         name = model.input.value
@@ -343,6 +345,7 @@ class Builder:
         return UNKNOWN
 
     def _labels(self, model: GroupModel, names: tuple[str, ...]) -> tuple[str, ...] | Unknown:
+        """What stands at the neurons in pictures; UNKNOWN where that is invalid."""
         if model.label is None:
             return names
         node = model.source.get("label")

@@ -54,19 +54,22 @@ def _by_expression(name: str, formula: Formula, start: int, constants: Constants
 
 
 def _by_file(name: str, path: Located[str], start: int, files: Files) -> Input | Unknown:
+    """An input whose rows are in a file."""
     table = files.table_at(path)
-    return UNKNOWN if table is UNKNOWN else _tabled(name, start, np.array(table.values, dtype=np.float64))
+    return UNKNOWN if table is UNKNOWN else _table_input(name, start, np.array(table.values, dtype=np.float64))
 
 
 def _by_values(name: str, node: AnyList, start: int, constants: Constants) -> Input | Unknown:
+    """An input whose rows are in the spec; they may follow parameters."""
     with constants.following() as parts:
-        values = _inline(node, constants)
+        values = _rows(node, constants)
     if values is UNKNOWN:
         return UNKNOWN
-    return replace(_tabled(name, start, values), parts=tuple(part._replace(field="table") for part in parts))
+    return replace(_table_input(name, start, values), parts=tuple(part._replace(field="table") for part in parts))
 
 
 def _by_size(name: str, model: InputModel, start: int, section: Section, constants: Constants) -> Input | Unknown:
+    """An input that the caller gives, of a size; UNKNOWN where that is invalid."""
     size = 1 if model.size is None else constants.integer(model.size, "'size'", 1)
     if size is UNKNOWN:
         return UNKNOWN
@@ -84,11 +87,11 @@ def _expression(formula: Formula, constants: Constants) -> Tree | Unknown:
     return tree
 
 
-def _tabled(name: str, start: int, table: FloatArray) -> Input:
+def _table_input(name: str, start: int, table: FloatArray) -> Input:
     return Input(name, start, table.shape[1], table=frozen(table))
 
 
-def _inline(node: AnyList, constants: Constants) -> FloatArray | Unknown:
+def _rows(node: AnyList, constants: Constants) -> FloatArray | Unknown:
     """Rows of numbers; a bare number is a row of one."""
     findings = constants.findings
     cells = cells_of(node, findings, "", gaps=False)

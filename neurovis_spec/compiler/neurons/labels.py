@@ -75,9 +75,9 @@ def _values(text: Located[str], hole: Hole, i: FloatArray, n: int, scope: Scope)
         extra["number"] = float(scope.number or 1)
     formula: Formula = Located(text.value[hole.start : hole.end], text.node.part(hole.start, hole.end))
     value = constants.value(formula, extra)
-    return UNKNOWN if value is UNKNOWN else [_written(one) for one in np.broadcast_to(value, i.shape).tolist()]
+    return UNKNOWN if value is UNKNOWN else [_number_text(one) for one in np.broadcast_to(value, i.shape).tolist()]
 
 
-def _written(value: float) -> str:
+def _number_text(value: float) -> str:
     """A number in a label: integers in full, others to six digits."""
     return str(int(value)) if value.is_integer() and abs(value) < 1e15 else f"{value:.6g}"

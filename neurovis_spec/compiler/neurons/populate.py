@@ -191,6 +191,7 @@ def _check_instances(scope: Scope, owners: Mapping[str, str]) -> None:
 
 
 def _join(all_groups: list[_ScopeGroups]) -> Census:
+    """All groups as one structure of arrays."""
     built = [item for groups in all_groups for item in groups.built]
     names: list[str] = []
     for groups in all_groups:

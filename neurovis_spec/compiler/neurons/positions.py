@@ -35,10 +35,11 @@ def positions_of(
     """One position for each of n neurons."""
     if isinstance(node, FileReference):
         return _from_file(node, n, constants.findings, files)
-    return _written(node, n, constants)
+    return _from_rows(node, n, constants)
 
 
 def _from_file(reference: FileReference, n: int | Unknown, findings: Findings, files: Files) -> FloatArray | Unknown:
+    """The positions in a file, a row of x and y for each neuron."""
     table = files.table(reference, None if n is UNKNOWN else (n, 2), full=_TWO)
     if table is UNKNOWN or n is UNKNOWN:
         return UNKNOWN
@@ -50,7 +51,8 @@ def _from_file(reference: FileReference, n: int | Unknown, findings: Findings, f
     return UNKNOWN
 
 
-def _written(node: AnyList, n: int | Unknown, constants: Constants) -> FloatArray | Unknown:
+def _from_rows(node: AnyList, n: int | Unknown, constants: Constants) -> FloatArray | Unknown:
+    """The positions in the spec: a row ``[x, y]`` for each neuron, or one for all."""
     findings = constants.findings
     one = n is not UNKNOWN and _one_for_all(node, n)
     if n is not UNKNOWN and not one and len(node) != n:

@@ -54,7 +54,7 @@ def installed() -> Installed:
     for name in sorted(known, key=lambda name: (name != OURS, name)):
         package = plugins.package(plugins.LIBRARIES, name)
         for file in sorted((f for f in files(package).iterdir() if f.name.endswith(".yaml")), key=lambda f: f.name):
-            library = _read(file.read_text(encoding="utf-8"), f"{name}/{file.name}")
+            library = _library_of_text(file.read_text(encoding="utf-8"), f"{name}/{file.name}")
             result.append(_without_known(library, f"{package}/{file.name}", owners, hidden))
     return Installed(tuple(result), hidden)
 
@@ -81,7 +81,7 @@ def _without_known(
     return library.model_copy(update=kept)
 
 
-def _read(text: str, name: str) -> Library:
+def _library_of_text(text: str, name: str) -> Library:
     findings = Findings()
     document = read_text(text, name, findings)
     library = None if document is None else read_library(document, findings)

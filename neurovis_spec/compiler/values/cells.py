@@ -59,9 +59,9 @@ def cells_of(node: AnyList, findings: Findings, row: str, *, named: bool = False
     that the caller has to say what an empty text is. ``gaps``: a cell may be null.
     """
     if isinstance(node, Packed) and (node.rows is not None or not row):
-        cells: Cells | Unknown = _packed(node)
+        cells: Cells | Unknown = _from_packed(node)
     else:
-        cells = _written(node, findings, row, named)
+        cells = _from_nodes(node, findings, row, named)
     if cells is UNKNOWN:
         return UNKNOWN
     wild = np.flatnonzero(
@@ -72,7 +72,8 @@ def cells_of(node: AnyList, findings: Findings, row: str, *, named: bool = False
     return replace(cells, failed=True) if len(wild) else cells
 
 
-def _packed(node: Packed) -> Cells:
+def _from_packed(node: Packed) -> Cells:
+    """The cells of the reader's packed arrays."""
     starts = np.arange(len(node.kinds) + 1) if node.rows is None else np.array(node.rows, dtype=np.int64)
     kinds = np.array(node.kinds, dtype=np.int8)
     numbers = np.array(node.numbers, dtype=np.float64)
@@ -83,7 +84,8 @@ def _row_span(node: Packed, row: int) -> Span:
     return node.cell(row).span if node.rows is None else node.row(row).span
 
 
-def _written(node: AnyList, findings: Findings, row: str, named: bool) -> Cells | Unknown:
+def _from_nodes(node: AnyList, findings: Findings, row: str, named: bool) -> Cells | Unknown:
+    """The cells of a list of nodes. ``row`` and ``named`` are as for ``cells_of``."""
     before = findings.errors
     nodes: list[Node] = []
     starts = [0]

@@ -197,6 +197,7 @@ class _Checker:
         return tuple(result)
 
     def _default(self, name: str, parameter: ParameterModel, values: Names[Value]) -> Default:
+        """A parameter's default and bounds as formulas; UNKNOWN, or None for a bound, where one is invalid."""
         value = self._finite(parameter.value, values)
         low, high = (
             UNKNOWN if formula is None else self._finite(formula, values)
@@ -210,6 +211,7 @@ class _Checker:
         )
 
     def _finite(self, formula: Formula, values: Names[Value]) -> Tree | Unknown:
+        """The tree of a default or a bound; UNKNOWN where it is invalid, or its value is known and not finite."""
         what = "known in this default"
         sight = Sight(values, what, outside=self.outside, home=self.home)
         tree = parse_formula(formula, sight, self.findings)

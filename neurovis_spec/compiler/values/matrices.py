@@ -58,12 +58,13 @@ def grid_of(
         if table is UNKNOWN:
             return UNKNOWN
         return fit(Grid(table.values, table.present, matrix.path.span), n, m, by_target, constants.findings)
-    return _written(matrix, n, m, by_target, constants, stream)
+    return _grid_of_rows(matrix, n, m, by_target, constants, stream)
 
 
-def _written(
+def _grid_of_rows(
     matrix: MatrixRows, n: int | Unknown, m: int | Unknown, by_target: bool, constants: Constants, stream: Stream
 ) -> Grid | Unknown:
+    """The grid of rows in the spec. What can be checked is checked, also where an end or a row is invalid."""
     findings = constants.findings
     cells = cells_of(matrix.node, findings, "a row of a matrix is a list")
     if cells is UNKNOWN:
