@@ -29,11 +29,13 @@ FARTHEST: Final = 1e6
 
 
 class Pins(NamedTuple):
-    """Places by neuron; for each instance with pins of its module these, relative to its origin, by its path; and the
-    origins that are known."""
+    """Where neurons are put by hand."""
 
+    #: by neuron
     places: Mapping[int, Place]
+    #: by the path of an instance the pins of its module, relative to the instance's origin
     relative: tuple[tuple[str, Mapping[int, Place]], ...]
+    #: by the path of an instance its origin, where that is known
     origins: Mapping[str, Place]
     #: where the place of each neuron was said
     spans: Mapping[int, Span]
@@ -55,77 +57,83 @@ class _Pin(NamedTuple):
         return _Pin(self.x + origin.x, self.y + origin.y, origin.key, origin.span)
 
 
-class _Said(NamedTuple):
-    """What one scope says: places of neurons, and origins of instances by the place of their scope."""
+class _ScopePins(NamedTuple):
+    """The pins that one scope says."""
 
+    #: by neuron
     neurons: dict[int, _Pin]
+    #: the origins of instances, by the place of their scope
     origins: dict[int, _Pin]
 
 
 def pins_of(scopes: tuple[Scope, ...], census: Census, findings: Findings) -> Pins:
     """All pins. Those closer than 0.6 to each other are a finding."""
-    said = [_said(*one, findings) for one in zip(scopes, census.directories, strict=True)]
-    own: dict[int, _Pin] = dict(said[0].neurons)
-    taken = set(own)  # what an outer scope says wins
+    pins_of_scope = [
+        _scope_pins(scope, directory, findings) for scope, directory in zip(scopes, census.directories, strict=True)
+    ]
+    placed: dict[int, _Pin] = dict(pins_of_scope[0].neurons)
+    pinned = set(placed)  # an outer scope wins
     # for each scope the instance whose origin its pins are relative to, and the way there from that origin
     frames: list[tuple[int, Place]] = [(0, (0.0, 0.0))]
-    groups: dict[int, dict[int, _Pin]] = {}
+    #: the pins relative to the origin of an instance, by the place of its scope
+    relative: dict[int, dict[int, _Pin]] = {}
     for index in range(1, len(scopes)):
-        frames.append(_frame(index, scopes, said, frames))
+        frames.append(_frame(index, scopes, pins_of_scope, frames))
         base, shift = frames[index]
-        for neuron, pin in said[index].neurons.items():
-            if neuron not in taken:
-                groups.setdefault(base, {})[neuron] = pin.moved(shift)
-            taken.add(neuron)
-    _check_placing(said, census, taken, findings)
-    origins = said[0].origins
-    for base, pins in sorted(groups.items()):
+        for neuron, pin in pins_of_scope[index].neurons.items():
+            if neuron not in pinned:
+                relative.setdefault(base, {})[neuron] = pin.moved(shift)
+            pinned.add(neuron)
+    _check_placing(pins_of_scope, census, pinned, findings)
+    origins = pins_of_scope[0].origins
+    for base, pins in sorted(relative.items()):
         if base in origins:
-            own.update({neuron: pin.at(origins[base]) for neuron, pin in pins.items()})
+            placed.update({neuron: pin.at(origins[base]) for neuron, pin in pins.items()})
         else:
-            _check_apart(pins, census.neurons.names, len(scopes[base].called("")), findings)
-    _check_apart(own, census.neurons.names, 0, findings)
+            _check_distances(pins, census.neurons.names, len(scopes[base].called("")), findings)
+    _check_distances(placed, census.neurons.names, 0, findings)
     return Pins(
-        {neuron: (pin.x, pin.y) for neuron, pin in own.items()},
+        {neuron: (pin.x, pin.y) for neuron, pin in placed.items()},
         tuple(
             (scopes[base].path, {neuron: (pin.x, pin.y) for neuron, pin in pins.items()})
-            for base, pins in sorted(groups.items())
+            for base, pins in sorted(relative.items())
         ),
         {scopes[index].path: (pin.x, pin.y) for index, pin in origins.items()},
-        {neuron: pin.span for pins in (own, *groups.values()) for neuron, pin in pins.items()},
+        {neuron: pin.span for pins in (placed, *relative.values()) for neuron, pin in pins.items()},
     )
 
 
-def _check_placing(said: list[_Said], census: Census, taken: set[int], findings: Findings) -> None:
+def _check_placing(pins_of_scope: list[_ScopePins], census: Census, pinned: set[int], findings: Findings) -> None:
     """A module that pins an instance within it needs pins in that one: they are what is placed."""
-    for scope in said[1:]:
-        for index, pin in scope.origins.items():
-            if taken.isdisjoint(census.directories[index].members):
+    for pins in pins_of_scope[1:]:
+        for index, pin in pins.origins.items():
+            if pinned.isdisjoint(census.directories[index].members):
                 message = f"'{pin.key.value}' has no pins of its own that this could place"
                 hint = "give its module 'layout: {positions: …}', or leave this pin out"
                 findings.error("bad-pin", pin.key.span, message, hint)
 
 
 def _frame(
-    index: int, scopes: tuple[Scope, ...], said: list[_Said], frames: list[tuple[int, Place]]
+    index: int, scopes: tuple[Scope, ...], pins_of_scope: list[_ScopePins], frames: list[tuple[int, Place]]
 ) -> tuple[int, Place]:
     """What the pins of an instance are relative to: its own origin, unless a module around it says where that is, the
     outermost first."""
     found: tuple[int, _Pin] | None = None
     outer = scopes[index].parent
     while outer > 0:
-        pin = said[outer].origins.get(index)
+        pin = pins_of_scope[outer].origins.get(index)
         if pin is not None:
             found = outer, pin
         outer = scopes[outer].parent
-    if found is None or index in said[0].origins:
+    if found is None or index in pins_of_scope[0].origins:
         return index, (0.0, 0.0)
     base, (x, y) = frames[found[0]]
     return base, (x + found[1].x, y + found[1].y)
 
 
-def _said(scope: Scope, directory: Directory, findings: Findings) -> _Said:
-    result = _Said({}, {})
+def _scope_pins(scope: Scope, directory: Directory, findings: Findings) -> _ScopePins:
+    """The pins of a scope; what is invalid is reported and left out."""
+    result = _ScopePins({}, {})
     model = scope.section.layout
     if model is None:
         return result
@@ -163,6 +171,7 @@ def _points(model: LayoutModel | ModuleLayoutModel) -> Iterator[tuple[Located[st
 
 
 def _neuron(key: Located[str], directory: Directory, findings: Findings) -> int | Unknown:
+    """The one neuron that a key names; UNKNOWN, and a finding, where it names none or several."""
     members = resolve_end(key, directory, findings)
     if members is not UNKNOWN and len(members) != 1:
         message = f"'{shorten(key.value)}' is {len(members)} neurons; a pin names one"
@@ -171,17 +180,17 @@ def _neuron(key: Located[str], directory: Directory, findings: Findings) -> int 
     return UNKNOWN if members is UNKNOWN else members[0]
 
 
-def _check_apart(pins: Mapping[int, _Pin], names: tuple[str, ...], skip: int, findings: Findings) -> None:
-    """Pins that are closer than discs are wide, a finding for each that was said. Each is compared with those in the
+def _check_distances(pins: Mapping[int, _Pin], names: tuple[str, ...], skip: int, findings: Findings) -> None:
+    """Report pins that are closer than discs are wide, each once as it is written. Each is compared with those in the
     cells next to its own. ``skip``: so many characters of the names are those of the instance that they are in."""
     cells: dict[tuple[int, int], list[tuple[int, _Pin]]] = {}
-    told: set[Span] = set()
+    reported: set[Span] = set()
     for neuron, pin in pins.items():
         column, row = math.floor(pin.x / DIAMETER), math.floor(pin.y / DIAMETER)
         near = (other for i in (-1, 0, 1) for j in (-1, 0, 1) for other in cells.get((column + i, row + j), ()))
         for partner, other in near:
-            if math.dist((other.x, other.y), (pin.x, pin.y)) < DIAMETER - 1e-9 and pin.span not in told:
-                told.add(pin.span)
+            if math.dist((other.x, other.y), (pin.x, pin.y)) < DIAMETER - 1e-9 and pin.span not in reported:
+                reported.add(pin.span)
                 shown_pair = f"'{names[neuron][skip:]}' and '{names[partner][skip:]}' (line {other.key.span.line})"
                 findings.error("pins-overlap", pin.span, f"the pins of {shown_pair} are closer than {DIAMETER}")
                 break

@@ -1,7 +1,7 @@
 """Bindings: which inputs around an instance are the inputs of its module.
 
-In: the entry of an instance, the scope around it. Out: an InputBinding for each input of the module, by the name that it
-has there; and, of an input of several values, those that one instance gets.
+In: the entry of an instance, the scope around it. Out: an InputBinding for each input of the module, by the name that
+it has there; and, of an input of several values, those that one instance gets.
 """
 
 from __future__ import annotations
