@@ -2,6 +2,11 @@
 
 In: the neurons of both ends, where these are known, and the body. Out: a Bundle, or UNKNOWN: of an entry that is
 invalid every part is still checked, whatever is wrong with the others.
+
+A number that is made from a parameter which can be set *follows* it in a run: ``with constants.following() as parts``
+collects a Part, a formula and where its numbers stand, for each such number, and ``constants.follow(parts)`` hands
+parts on to the block around it (``values/constants.py``). Where the parts do not say all, they are replaced by one that
+does: weights that are scaled together are one Scaled, what depends on positions has a Distance in its formula.
 """
 
 from __future__ import annotations
@@ -41,9 +46,10 @@ _WEIGHT = formula_at(ConnectionModel, "weight")
 
 
 class Bundle(NamedTuple):
-    """The connections of one entry: neuron indices and values, and the rule, if any."""
+    """The connections of one entry: neuron indices and values, one a connection, and the rule, if any."""
 
     name: str
+    #: where the entry is named
     key: Span
     sources: Indices
     targets: Indices
@@ -56,8 +62,8 @@ class Bundle(NamedTuple):
     description: str | None
     #: whether no neuron is in both ends of an entry that says what holds of these
     ends_disjoint: bool
-    #: what of it follows parameters: ``weights``, ``first`` of an entry that learns (its first weights, which nothing
-    #: that is set in a run changes), ``centres``, ``low``, ``high``, ``rule``
+    #: which of its numbers follow parameters: of ``weights``, of ``first`` where it learns (its initial weights, which
+    #: nothing that is set in a run changes), of ``centres``, ``low``, ``high`` and ``rule``
     parts: tuple[Part, ...] = ()
     label: str | None = None
     #: of an entry that makes no connection the neurons of its ends
@@ -71,7 +77,7 @@ class _Shape(NamedTuple):
     j: Indices
     weights: FloatArray | None = None
     delays: Indices | None = None
-    #: what of its weights follows parameters
+    #: which of its weights follow parameters
     parts: tuple[Part, ...] = ()
 
 
@@ -93,7 +99,7 @@ class EntryBuilder:
     ``name`` is what it is called in its scope.
     """
 
-    around: EntryContext
+    context: EntryContext
     key: Located[str]
     body: ConnectionModel
     name: str
@@ -103,64 +109,69 @@ class EntryBuilder:
     @property
     def constants(self) -> Constants:
         """What evaluates the formulas of the scope."""
-        return self.around.scope.constants
+        return self.context.scope.constants
 
     def _stream(self, purpose: str) -> Stream:
-        return Stream(self.around.seed, purpose, self.around.scope.declares(self.name))
+        return Stream(self.context.seed, purpose, self.context.scope.declares(self.name))
 
-    def _kept(self, *keys: str) -> bool:
-        """Whether nothing was lost that these keys may have said."""
+    def _is_sound(self, *keys: str) -> bool:
+        """Whether these keys could be read; False where one was invalid, and dropped while reading."""
         return self.body.unknown.isdisjoint(keys)
 
     def build(self) -> Bundle | Unknown:
         """The connections; UNKNOWN where anything of the entry is invalid, which is reported."""
         body, findings = self.body, self.constants.findings
-        before = findings.errors
+        errors_before_entry = findings.errors
         if body.label is not None:
             check_length(body.label, findings)
         delay = 1 if body.delay is None else self.constants.integer(body.delay, "a delay", 0, LONGEST_DELAY)
-        sound = findings.errors
-        with self.constants.following() as centre_cells:
+        errors_before_shape = findings.errors
+        with self.constants.following() as centre_cell_parts:
             centre = self._grid(body.centre, "centre") if isinstance(body.centre, (MatrixRows, FileReference)) else None
         shape = self._shape(centre)
-        if shape is not UNKNOWN and findings.errors == sound and not len(shape.i):
+        if shape is not UNKNOWN and findings.errors == errors_before_shape and not len(shape.i):
             self._report_empty()
-        if findings.errors > sound or (shape is not UNKNOWN and not self._fits(len(shape.i))):
+        if findings.errors > errors_before_shape or (shape is not UNKNOWN and not self._fits(len(shape.i))):
             shape = UNKNOWN
-        with self.constants.following() as weighted:
+        with self.constants.following() as weight_parts:
             weights = self._weights(shape)
-        with self.constants.following() as centred:
+        with self.constants.following() as centre_parts:
             centres = self._centres(centre, shape)
-            self.constants.follow(self._cells(centre, centre_cells, shape))
-        with self.constants.following() as bounding:
+            self.constants.follow(self._parts_per_connection(centre, centre_cell_parts, shape))
+        with self.constants.following() as bound_parts:  # these know their field
             bounds = self._bounds(weights)
         learning = self._learning(shape)
         if shape is UNKNOWN or weights is UNKNOWN or centres is UNKNOWN or bounds is UNKNOWN or learning is UNKNOWN:
             return UNKNOWN
-        if self.sources is UNKNOWN or self.targets is UNKNOWN or not body.sound or findings.errors > before:
+        if (
+            self.sources is UNKNOWN
+            or self.targets is UNKNOWN
+            or not body.sound
+            or findings.errors > errors_before_entry
+        ):
             return UNKNOWN
         learning = learning if len(shape.i) else None  # without connections there is nothing that a rule would change
         return Bundle(
-            self.around.scope.called(self.name),
-            self.key.span,
-            self.sources[shape.i],
-            self.targets[shape.j],
-            weights,
-            centres,
-            _delays(shape, known(delay, 0)),
-            bounds[0],
-            bounds[1],
-            learning,
-            None if body.description is None else body.description.value,
-            body.self is not None and not np.isin(self.sources, self.targets).any(),
-            (
-                *(part._replace(field="weights" if learning is None else "first") for part in weighted),
-                *(part._replace(field="centres") for part in centred),
-                *bounding,
+            name=self.context.scope.called(self.name),
+            key=self.key.span,
+            sources=self.sources[shape.i],
+            targets=self.targets[shape.j],
+            weights=weights,
+            centres=centres,
+            delays=_delays(shape, known(delay, 0)),
+            low=bounds[0],
+            high=bounds[1],
+            learning=learning,
+            description=None if body.description is None else body.description.value,
+            ends_disjoint=body.self is not None and not np.isin(self.sources, self.targets).any(),
+            parts=(
+                *(part._replace(field="weights" if learning is None else "first") for part in weight_parts),
+                *(part._replace(field="centres") for part in centre_parts),
+                *bound_parts,
                 *(() if learning is None else learning.used.parts),
             ),
-            None if body.label is None else body.label.value,
-            None if len(shape.i) else (self.sources, self.targets),
+            label=None if body.label is None else body.label.value,
+            empty=None if len(shape.i) else (self.sources, self.targets),
         )
 
     def _report_empty(self) -> None:
@@ -175,7 +186,7 @@ class EntryBuilder:
 
     def _fits(self, count: int) -> bool:
         """Whether there is room for so many connections; a finding where there is not."""
-        room, limit = self.around.room, self.around.limits.connections
+        room, limit = self.context.room, self.context.limits.connections
         if count <= room:
             return True
         message = f"this makes {amount(limit - room + count)} connections; the limit is {limit:,}"
@@ -183,29 +194,32 @@ class EntryBuilder:
         return False
 
     def _grid(self, matrix: MatrixRows | FileReference, purpose: str) -> Grid | Unknown:
+        """A matrix of this entry, sources as rows; UNKNOWN where it is invalid."""
         by_target = self.body.rows is not None and self.body.rows.value == "to"
-        n = UNKNOWN if self.sources is UNKNOWN or not self._kept("rows") else len(self.sources)
-        m = UNKNOWN if self.targets is UNKNOWN or not self._kept("rows") else len(self.targets)
-        return grid_of(matrix, n, m, by_target, self.constants, self.around.scope.files, self._stream(purpose))
+        n = UNKNOWN if self.sources is UNKNOWN or not self._is_sound("rows") else len(self.sources)
+        m = UNKNOWN if self.targets is UNKNOWN or not self._is_sound("rows") else len(self.targets)
+        return grid_of(matrix, n, m, by_target, self.constants, self.context.scope.files, self._stream(purpose))
 
-    def _cells(self, grid: Grid | Unknown | None, parts: list[Part], shape: _Shape | Unknown) -> tuple[Part, ...]:
-        """What of a matrix follows parameters, by connections instead of by cells as they are written."""
+    def _parts_per_connection(
+        self, grid: Grid | Unknown | None, parts: list[Part], shape: _Shape | Unknown
+    ) -> tuple[Part, ...]:
+        """The parts of a matrix, whose places are its cells as they are written, with connections as their places."""
         if grid is None or grid is UNKNOWN or shape is UNKNOWN or not parts:
             return ()
         by_target = self.body.rows is not None and self.body.rows.value == "to"
-        order = np.full(grid.shape, -1, dtype=np.int64)
-        order[shape.i, shape.j] = np.arange(len(shape.i))
-        cells = (order.T if by_target else order).ravel()
-        return tuple(_present(part, cells[part.within(cells.size)]) for part in parts)
+        connection_at = np.full(grid.shape, -1, dtype=np.int64)  # −1: no connection
+        connection_at[shape.i, shape.j] = np.arange(len(shape.i))
+        connection_of_cell = (connection_at.T if by_target else connection_at).ravel()
+        return tuple(_moved_to(part, connection_of_cell[part.within(connection_of_cell.size)]) for part in parts)
 
     def _shape(self, centre: Grid | Unknown | None) -> _Shape | Unknown:
         """The pairs; every key that may say which they are is checked."""
         body = self.body
-        with self.constants.following() as cells:
+        with self.constants.following() as cell_parts:
             grid = UNKNOWN if body.matrix is None else self._grid(body.matrix, "weight")
         edges = UNKNOWN if body.edges is None else self._edges()
         pattern = UNKNOWN if body.pattern is None else self._pattern()
-        if self.sources is UNKNOWN or self.targets is UNKNOWN or not self._kept(*_SHAPING):
+        if self.sources is UNKNOWN or self.targets is UNKNOWN or not self._is_sound(*_SHAPING):
             return UNKNOWN
         if body.edges is not None:
             return edges
@@ -214,7 +228,7 @@ class EntryBuilder:
                 return UNKNOWN
             present = grid.present if centre is None else grid.present & centre.present
             shape = _cells_of(present, grid.values)
-            return shape._replace(parts=self._cells(grid, cells, shape))
+            return shape._replace(parts=self._parts_per_connection(grid, cell_parts, shape))
         if isinstance(body.centre, (MatrixRows, FileReference)):
             if centre is None or centre is UNKNOWN:
                 return UNKNOWN
@@ -222,11 +236,11 @@ class EntryBuilder:
         return pattern if body.pattern is not None else self._all()
 
     def _ends(self) -> Ends | Unknown:
-        if self.sources is UNKNOWN or self.targets is UNKNOWN or not self._kept("self"):
+        if self.sources is UNKNOWN or self.targets is UNKNOWN or not self._is_sound("self"):
             return UNKNOWN
         loops: bool | None = True if len(self.sources) == len(self.targets) == 1 else None
         loops = loops if self.body.self is None else self.body.self.value
-        position = self.around.census.neurons.position
+        position = self.context.census.neurons.position
         return Ends(self.sources, self.targets, loops, position[self.sources], position[self.targets])
 
     def _pattern(self) -> _Shape | Unknown:
@@ -234,7 +248,7 @@ class EntryBuilder:
         ends = UNKNOWN if self._misplaced() else self._ends()
         pairs = pairs_of(self.body.pattern, ends, self.constants, self._stream("edges"), self._fits)
         if ends is not UNKNOWN and self.body.pattern.name.value == "nearest":
-            self.around.census.go_by_position(np.concatenate((ends.sources, ends.targets)))
+            self.context.census.go_by_position(np.concatenate((ends.sources, ends.targets)))
         return UNKNOWN if pairs is UNKNOWN else _Shape(narrow(pairs[0]), narrow(pairs[1]))
 
     def _all(self) -> _Shape | Unknown:
@@ -255,26 +269,26 @@ class EntryBuilder:
     def _may_be_a_matrix(self) -> bool:
         """Whether what is given as the weight, and was refused, may have been meant to say who is connected."""
         weight = self.body.source.get("weight")
-        return not self._kept("weight") and not (isinstance(weight, Scalar) and isinstance(weight.value, str))
+        return not self._is_sound("weight") and not (isinstance(weight, Scalar) and isinstance(weight.value, str))
 
     def _edges(self) -> _Shape | Unknown:
         assert self.body.edges is not None
-        ends = (self._named(self.sources), self._named(self.targets))
-        reader = EdgeReader(*ends, self.constants, self.around.scope.files, self._stream("weight"), self.around.room)
+        ends = (self._end_by_name(self.sources), self._end_by_name(self.targets))
+        reader = EdgeReader(*ends, self.constants, self.context.scope.files, self._stream("weight"), self.context.room)
         with self.constants.following() as parts:
             edges = reader.read(self.body.edges)
         return UNKNOWN if edges is UNKNOWN else _Shape(edges.i, edges.j, edges.weights, edges.delays, tuple(parts))
 
-    def _named(self, neurons: Indices | Unknown) -> End:
-        """The places of an end's neurons by the names that they have in the scope."""
+    def _end_by_name(self, neurons: Indices | Unknown) -> End:
+        """The positions of an end's neurons by the names that they have in the scope."""
         if neurons is UNKNOWN:
-            return End(UNKNOWN, self.around.directory)
-        called, own = self.around.census.neurons.names, len(self.around.scope.called(""))
-        places = {called[neuron][own:]: place for place, neuron in enumerate(neurons.tolist())}
-        return End(places, self.around.directory)
+            return End(UNKNOWN, self.context.directory)
+        names, prefix_length = self.context.census.neurons.names, len(self.context.scope.called(""))
+        positions = {names[neuron][prefix_length:]: position for position, neuron in enumerate(neurons.tolist())}
+        return End(positions, self.context.directory)
 
     def _values(self, formula: Formula, shape: _Shape | Unknown, purpose: str) -> FloatArray | Unknown:
-        """A formula of i, j, n_from, n_to (and distance) for every pair."""
+        """The values of a formula of i, j, n_from, n_to (and distance), one for every pair."""
         if shape is UNKNOWN or self.sources is UNKNOWN or self.targets is UNKNOWN:
             self.constants.value(formula, dict.fromkeys(_WEIGHT.sees, UNKNOWN), UNKNOWN)
             return UNKNOWN
@@ -285,7 +299,7 @@ class EntryBuilder:
         for name, positions in (("i", shape.i), ("j", shape.j)):  # what nobody reads takes no room
             extra[name] = positions.astype(np.float64) if name in names(tree) else 0.0
         if "distance" in names(tree):
-            position = self.around.census.neurons.position
+            position = self.context.census.neurons.position
             ends = position[self.sources[shape.i]], position[self.targets[shape.j]]
             if self._misplaced() or not all(np.isfinite(end).all() for end in ends):
                 if not self._misplaced():
@@ -293,15 +307,15 @@ class EntryBuilder:
                     self.constants.findings.error("no-position", formula.span, message, "give the groups a 'position'")
                 return UNKNOWN
             with np.errstate(over="ignore"):  # what is then infinite is found where it matters
-                apart = ends[0] - ends[1]
-                extra["distance"] = np.hypot(apart[:, 0], apart[:, 1])
+                difference = ends[0] - ends[1]
+                extra["distance"] = np.hypot(difference[:, 0], difference[:, 1])
         randomness = Randomness(self._stream(purpose), shape.i, shape.j)
         with self.constants.following() as parts:
             value = self.constants.value(formula, extra, randomness)
         if "distance" in extra:
             pairs = self.sources[shape.i].astype(np.int64), self.targets[shape.j].astype(np.int64)
-            distance = Distance(self.around.census.moving, *pairs)
-            if distance.slots:
+            distance = Distance(self.context.census.moving, *pairs)
+            if distance.slots:  # the collected parts take the distances as numbers: one that follows them, too, instead
                 parts = [Part(self.constants.bound(tree, {**extra, "distance": distance}, randomness))]
         self.constants.follow(parts)
         if value is UNKNOWN:
@@ -310,13 +324,14 @@ class EntryBuilder:
 
     def _misplaced(self) -> bool:
         """Whether what the spec says of a position of these neurons is invalid."""
-        misplaced = self.around.census.misplaced
+        misplaced = self.context.census.misplaced
         return any(end is not UNKNOWN and bool(misplaced[end].any()) for end in (self.sources, self.targets))
 
     def _weights(self, shape: _Shape | Unknown) -> FloatArray | Unknown:
+        """The weight of every pair, scaled where the entry has a ``scale``."""
         if self.body.scale is None:
             weights = self._plain_weights(shape)
-            return weights if self._kept("scale") else UNKNOWN
+            return weights if self._is_sound("scale") else UNKNOWN
         with self.constants.following() as parts:
             weights = self._plain_weights(shape)
         if weights is UNKNOWN or shape is UNKNOWN or self.sources is UNKNOWN or self.targets is UNKNOWN:
@@ -326,7 +341,7 @@ class EntryBuilder:
         scale = Scaled(Assembled(weights, tuple(parts)), self.body.scale, ends, pairs, self.constants)
         if scale.slots:
             self.constants.follow([Part(scale)])
-        with self.constants.following():  # followed as a whole
+        with self.constants.following():  # dropped: the weights follow as a whole, by ``scale``
             return scaled(self.body.scale, weights, ends, pairs, self.constants)
 
     def _plain_weights(self, shape: _Shape | Unknown) -> FloatArray | Unknown:
@@ -336,11 +351,12 @@ class EntryBuilder:
         if shape is UNKNOWN:
             return UNKNOWN
         if shape.weights is None:
-            return np.broadcast_to(1.0, shape.i.shape) if self._kept("weight") else UNKNOWN
+            return np.broadcast_to(1.0, shape.i.shape) if self._is_sound("weight") else UNKNOWN
         self.constants.follow(shape.parts)
         return shape.weights
 
     def _centres(self, grid: Grid | Unknown | None, shape: _Shape | Unknown) -> FloatArray | Unknown:
+        """The centre of every pair: by a formula, from the ``grid`` where it is a matrix, else 0."""
         centre = self.body.centre
         if centre is None:
             return UNKNOWN if shape is UNKNOWN else np.broadcast_to(0.0, shape.i.shape)
@@ -357,9 +373,11 @@ class EntryBuilder:
 
     def _measures_distance(self) -> bool:
         """Whether any of the targets combines by distance, or may, where what it says of that is invalid."""
-        return self.targets is UNKNOWN or bool(self.around.census.by_distance[self.targets].any())
+        return self.targets is UNKNOWN or bool(self.context.census.by_distance[self.targets].any())
 
     def _bounds(self, weights: FloatArray | Unknown) -> tuple[float, float] | Unknown:
+        """The bounds of the weights. A bound that follows parameters is followed together with the other one, so that
+        low ≤ high can be checked when either is set."""
         bounds = self.body.bounds
         if bounds is None:
             return (-np.inf, np.inf)
@@ -370,10 +388,10 @@ class EntryBuilder:
             high = self.constants.scalar(bounds.second)
         if low is UNKNOWN or high is UNKNOWN:
             return UNKNOWN
-        if lower or upper:  # what is below the other one must stay there
-            above = Assembled(np.array(high), tuple(upper))
-            lower = lower or [Part(Assembled(np.array(low), ()))]
-            self.constants.follow(part._replace(field="low", high=above) for part in lower)
+        if lower or upper:
+            high_bound = Assembled(np.array(high), tuple(upper))
+            lower = lower or [Part(Assembled(np.array(low), ()))]  # a number, to be compared when the other one is set
+            self.constants.follow(part._replace(field="low", high=high_bound) for part in lower)
             self.constants.follow(part._replace(field="high") for part in upper)
         if low > high:
             findings.error("out-of-range", bounds.span, f"the lower bound {low:g} is above the upper one {high:g}")
@@ -386,6 +404,7 @@ class EntryBuilder:
         return (low, high)
 
     def _learning(self, shape: _Shape | Unknown) -> Learning | Unknown | None:
+        """What the entry learns by; None without a rule."""
         if self.body.plasticity is None:
             return None
         wired: Wired | Unknown = UNKNOWN
@@ -395,10 +414,10 @@ class EntryBuilder:
         return learning_of(
             self.body.plasticity,
             wired,
-            UNKNOWN if self.targets is UNKNOWN else len(self.targets),
-            self.around.scope,
-            self.around.directory,
-            len(self.around.census.neurons),
+            target_count=UNKNOWN if self.targets is UNKNOWN else len(self.targets),
+            scope=self.context.scope,
+            directory=self.context.directory,
+            neurons=len(self.context.census.neurons),
         )
 
 
@@ -418,8 +437,8 @@ def _cells_of(present: BoolArray, values: FloatArray) -> _Shape:
     return _Shape(i, j, values[i, j])
 
 
-def _present(part: Part, places: IntArray) -> Part:
-    """A part whose numbers stand at these places, without those that stand at none (−1)."""
+def _moved_to(part: Part, places: IntArray) -> Part:
+    """The part with its numbers at these places, without those that stand at none (−1)."""
     inside = np.flatnonzero(places >= 0)
     if len(inside) < len(places):
         part = part.subset(inside)
