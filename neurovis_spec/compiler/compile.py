@@ -24,7 +24,7 @@ from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.drawing.sections import layout_settings, render_settings
 from neurovis_spec.compiler.events.bound import found_in, make_settable, own_weights
 from neurovis_spec.compiler.limits import MOST_SIGNALS, Limits, amount
-from neurovis_spec.compiler.lower import Cycle, levels, make_populations, make_program, make_projections
+from neurovis_spec.compiler.lower import Cycle, assign_levels, make_populations, make_program, make_projections
 from neurovis_spec.compiler.names.expand import Expander, constants_of
 from neurovis_spec.compiler.names.finder import Finder, finder_of
 from neurovis_spec.compiler.names.modules import library_of
@@ -256,7 +256,7 @@ def _report_no_neurons(spec: Spec, census: Census, findings: Findings) -> None:
 def _levels(made: Connected, census: Census, findings: Findings) -> IntArray | None:
     """The level of each neuron; None where neurons wait for each other, which is reported: a cycle of connections that
     are in order is one whatever becomes of the others."""
-    level = levels(len(census.neurons), made.sources, made.targets, made.delays)
+    level = assign_levels(len(census.neurons), made.sources, made.targets, made.delays)
     if not isinstance(level, Cycle):
         return level
     path = [census.neurons.names[neuron] for neuron in level.neurons]

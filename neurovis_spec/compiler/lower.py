@@ -33,6 +33,16 @@ from neurovis_spec.compiler.program import (
 )
 
 
+def make_program(populations: tuple[Population, ...], projections: tuple[Projection, ...]) -> tuple[Operation, ...]:
+    """What a step does, in order (§5): inputs, neurons along delay 0, signals that leave, rules."""
+    program: list[Operation] = [ReadInputs()]
+    for population in range(len(populations)):
+        program += [Gather(population), Update(population)]
+    program.append(Send())
+    program += [Learn(projection) for projection in range(len(projections))]
+    return tuple(program)
+
+
 class Cycle(NamedTuple):
     """Neurons that wait for each other: the first is named again at the end; ``connection`` closes the cycle."""
 
@@ -40,22 +50,24 @@ class Cycle(NamedTuple):
     connection: int
 
 
-def levels(n: int, sources: IntColumn, targets: IntColumn, delays: IntColumn) -> IntArray | Cycle:
-    """Levels by Kahn's algorithm; a cycle of delay-0 connections of single neurons where there is one."""
+def assign_levels(n: int, sources: IntColumn, targets: IntColumn, delays: IntColumn) -> IntArray | Cycle:
+    """The level of each of n neurons, by Kahn's algorithm: one more than the highest of those that reach it without
+    delay; a cycle of such connections where there is one."""
     result = np.zeros(n, dtype=np.int64)
     if not (delays.kept == 0).any():
         return result
-    prompt = np.flatnonzero(delays.compact() == 0)
-    order = prompt[np.argsort(sources[prompt], kind="stable")]
+    undelayed = np.flatnonzero(delays.compact() == 0)
+    # the targets of each neuron: outgoing[starts[neuron] : starts[neuron + 1]]
+    order = undelayed[np.argsort(sources[undelayed], kind="stable")]
     outgoing = targets[order]
     starts = np.searchsorted(sources[order], np.arange(n + 1)).tolist()
-    waiting = np.bincount(targets[prompt], minlength=n).tolist()
+    waiting = np.bincount(targets[undelayed], minlength=n).tolist()
     ready = [neuron for neuron in range(n) if waiting[neuron] == 0]
     level = result.tolist()
-    done = 0
-    while done < len(ready):
-        neuron = ready[done]
-        done += 1
+    finished = 0
+    while finished < len(ready):
+        neuron = ready[finished]
+        finished += 1
         for target in outgoing[starts[neuron] : starts[neuron + 1]].tolist():
             level[target] = max(level[target], level[neuron] + 1)
             waiting[target] -= 1
@@ -63,82 +75,92 @@ def levels(n: int, sources: IntColumn, targets: IntColumn, delays: IntColumn) ->
                 ready.append(target)
     if len(ready) == n:
         return np.array(level, dtype=np.int64)
-    return _cycle(prompt.tolist(), sources, targets, waiting)
+    return _cycle(undelayed.tolist(), sources, targets, waiting)
 
 
-def _cycle(prompt: list[int], sources: IntColumn, targets: IntColumn, waiting: list[int]) -> Cycle:
-    """Go backwards among the neurons that still wait until one comes up again."""
-    into: dict[int, int] = {}
-    for connection in prompt:
+def _cycle(undelayed: list[int], sources: IntColumn, targets: IntColumn, waiting: list[int]) -> Cycle:
+    """Go backwards among the neurons that still wait until one comes up again: each of them has a source that waits,
+    as there is a cycle."""
+    connection_into: dict[int, int] = {}
+    for connection in undelayed:
         source, target = int(sources[connection]), int(targets[connection])
         if waiting[source] and waiting[target]:
-            into.setdefault(target, connection)
-    neuron = min(into)
+            connection_into.setdefault(target, connection)
+    neuron = min(connection_into)  # any of them; the same each time
     path: list[int] = []
-    place: dict[int, int] = {}
-    while neuron not in place:
-        place[neuron] = len(path)
+    place_in_path: dict[int, int] = {}
+    while neuron not in place_in_path:
+        place_in_path[neuron] = len(path)
         path.append(neuron)
-        neuron = int(sources[into[neuron]])
-    ring = path[place[neuron] :]
+        neuron = int(sources[connection_into[neuron]])
+    ring = path[place_in_path[neuron] :]
     forward = (ring[0], *reversed(ring))
-    return Cycle(forward, into[ring[0]])
+    return Cycle(forward, connection_into[ring[0]])
 
 
 def make_populations(census: Census, targets: Indices, levels: IntArray) -> tuple[Population, ...]:
     """Neurons of the same level, activation, model and combination, in the order of the levels."""
     groups = census.groups
-    alike: dict[tuple[str, ...], int] = {}
-    own = [
-        alike.setdefault((*(used.definition.name for used in one.kind), one.group.combine), len(alike))
-        for one in groups
+    kind_numbers: dict[tuple[str, ...], int] = {}
+    kind_of_group = [
+        kind_numbers.setdefault(
+            (*(used.definition.name for used in built.kind), built.group.combine), len(kind_numbers)
+        )
+        for built in groups
     ]
-    counts = [one.group.count for one in groups]
-    group = np.repeat(np.arange(len(groups)), counts)
-    home = _numbered(levels, np.repeat(np.array(own, dtype=np.int64), counts), len(alike))
-    members = [some.astype(np.int64) for some in _split(home, int(home.max(initial=-1)) + 1)]
-    home, slot = narrow(home), np.zeros(len(home), dtype=width(0, len(home)))
-    for some in members:
-        slot[some] = np.arange(len(some))
+    counts = [built.group.count for built in groups]
+    group_of = np.repeat(np.arange(len(groups)), counts)
+    population_of = _population_of(
+        levels, np.repeat(np.array(kind_of_group, dtype=np.int64), counts), len(kind_numbers)
+    )
+    members_of = [members.astype(np.int64) for members in _split(population_of, int(population_of.max(initial=-1)) + 1)]
+    population_of = narrow(population_of)
+    place_in_population = np.zeros(len(population_of), dtype=width(0, len(population_of)))
+    for members in members_of:
+        place_in_population[members] = np.arange(len(members))
     populations = []
-    for number, (some, incoming) in enumerate(zip(members, _split(home[targets], len(members)), strict=True)):
-        first = groups[group[some[0]]]
-        activation, model = (_use(number, some, group[some], groups, which) for which in (0, 1))
-        drive = Port("drive", first.group.combine, frozen(incoming), frozen(slot[targets[incoming]]))
-        populations.append(Population(int(levels[some[0]]), frozen(some), activation, model, (drive,)))
+    for population, (members, incoming) in enumerate(
+        zip(members_of, _split(population_of[targets], len(members_of)), strict=True)
+    ):
+        first = groups[group_of[members[0]]]
+        activation, model = (_use(population, members, group_of[members], groups, which) for which in (0, 1))
+        drive = Port("drive", first.group.combine, frozen(incoming), frozen(place_in_population[targets[incoming]]))
+        populations.append(Population(int(levels[members[0]]), frozen(members), activation, model, (drive,)))
     return tuple(populations)
 
 
-def _numbered(levels: IntArray, alike: IntArray, kinds: int) -> Indices:
-    """The number of each neuron's population, by levels, then by first neurons; ``alike`` has what else they have in
-    common, one of so many kinds."""
-    _, first, population = np.unique(levels * kinds + alike, return_index=True, return_inverse=True)
+def _population_of(levels: IntArray, kind_of: IntArray, kinds: int) -> Indices:
+    """The number of each neuron's population, by levels, then by first neurons. ``kind_of`` is what else they have in
+    common: the number of one of so many kinds."""
+    _, first, population = np.unique(levels * kinds + kind_of, return_index=True, return_inverse=True)
     number = np.empty_like(first)
     number[np.lexsort((first, levels[first]))] = np.arange(len(first))
     return np.asarray(number[population], dtype=np.int64)
 
 
-def _split(populations: Indices, number: int) -> list[Indices]:
-    """The places of each population, ascending, in the least width."""
+def _split(populations: Indices, count: int) -> list[Indices]:
+    """The members of each population, ascending, in the least width. ``populations`` has the population of each."""
     kind = width(0, len(populations))
-    if number == 1:
+    if count == 1:
         return [np.arange(len(populations), dtype=kind)]
     order = np.argsort(populations, kind="stable").astype(kind)
-    ends = np.cumsum([0, *np.bincount(populations, minlength=number).tolist()]).tolist()
+    ends = np.cumsum([0, *np.bincount(populations, minlength=count).tolist()]).tolist()
     return [order[start:end].copy() for start, end in pairwise(ends)]
 
 
-def _use(number: int, members: IntArray, own: IntArray, groups: Sequence[Built], which: int) -> Use:
-    """A definition in use at a population: that of ``which`` kind of its groups, the ``own`` of each member."""
-    definition = groups[own[0]].kind[which].definition
-    owner = Owner(definition.kind.name, number)
+def _use(population: int, members: IntArray, group_of: IntArray, groups: Sequence[Built], which: int) -> Use:
+    """A definition in use at a population: the activation (``which`` is 0) or the model (1) of its groups, each of
+    which has settings of its own. ``group_of`` says of each member which group it belongs to."""
+    definition = groups[group_of[0]].kind[which].definition
+    owner = Owner(definition.kind.name, population)
     if not definition.parameters:
         return Use(owner, definition, {})
-    starts = np.flatnonzero(np.diff(own, prepend=-1))
-    ends = pairwise((*starts.tolist(), len(own)))
+    # members are ascending, and so are their groups: each run of equal groups takes the settings of one group
+    starts = np.flatnonzero(np.diff(group_of, prepend=-1))
+    ends = pairwise((*starts.tolist(), len(group_of)))
     parts = [
-        (one.kind[which].parameters, members[start:end] - one.group.start)
-        for one, (start, end) in zip((groups[place] for place in own[starts].tolist()), ends, strict=True)
+        (built.kind[which].parameters, members[start:end] - built.group.start)
+        for built, (start, end) in zip((groups[place] for place in group_of[starts].tolist()), ends, strict=True)
     ]
     parameters = {
         name: frozen(np.concatenate([values[name][rows] for values, rows in parts])) for name in definition.parameters
@@ -147,41 +169,34 @@ def _use(number: int, members: IntArray, own: IntArray, groups: Sequence[Built],
 
 
 def make_projections(bundles: tuple[Bundle, ...]) -> tuple[tuple[Projection, ...], list[int]]:
-    """One Projection a rule, whichever entries learn by it, and for each entry the number of its Projection or −1: what
+    """One Projection a rule, whichever entries learn by it, and for each entry the index of its Projection, or −1: what
     is learned by the same rule is computed together."""
-    numbers: dict[str, int] = {}
-    parts: list[list[tuple[Learning, IntArray]]] = []
+    number_of_rule: dict[str, int] = {}
+    entries: list[list[tuple[Learning, IntArray]]] = []
     rules: list[int] = []
     start = 0
     for bundle in bundles:
-        n, learning = len(bundle.sources), bundle.learning
-        number = -1
+        count, learning = len(bundle.sources), bundle.learning
+        projection = -1
         if learning is not None:
-            number = numbers.setdefault(learning.rule.name, len(parts))
-            if number == len(parts):
-                parts.append([])
-            parts[number].append((learning, np.arange(start, start + n, dtype=np.int64)))
-        rules.append(number)
-        start += n
-    return tuple(_together(number, part) for number, part in enumerate(parts)), rules
+            projection = number_of_rule.setdefault(learning.rule.name, len(entries))
+            if projection == len(entries):
+                entries.append([])
+            entries[projection].append((learning, np.arange(start, start + count, dtype=np.int64)))
+        rules.append(projection)
+        start += count
+    return tuple(_projection(projection, of_projection) for projection, of_projection in enumerate(entries)), rules
 
 
-def _together(number: int, parts: list[tuple[Learning, IntArray]]) -> Projection:
-    """The connections of several entries that learn by one rule."""
-    first = parts[0][0]
-    members = np.concatenate([members for _, members in parts])
-    parameters = {name: np.concatenate([one.parameters[name] for one, _ in parts]) for name in first.parameters}
-    signals = {name: np.concatenate([one.signals[name] for one, _ in parts]) for name in first.signals}
+def _projection(projection: int, entries: list[tuple[Learning, IntArray]]) -> Projection:
+    """The connections of several entries that learn by one rule; of each entry what it learns by, and the indices of
+    its connections."""
+    first = entries[0][0]
+    members = np.concatenate([members for _, members in entries])
+    parameters = {
+        name: np.concatenate([learning.parameters[name] for learning, _ in entries]) for name in first.parameters
+    }
+    signals = {name: np.concatenate([learning.signals[name] for learning, _ in entries]) for name in first.signals}
     for array in (members, *parameters.values(), *signals.values()):
         frozen(array)
-    return Projection(members, (Use(Owner(first.rule.kind.name, number), first.rule, parameters),), signals)
-
-
-def make_program(populations: tuple[Population, ...], projections: tuple[Projection, ...]) -> tuple[Operation, ...]:
-    """What a step does, in order (§5): inputs, neurons along delay 0, signals that leave, rules."""
-    program: list[Operation] = [ReadInputs()]
-    for number in range(len(populations)):
-        program += [Gather(number), Update(number)]
-    program.append(Send())
-    program += [Learn(number) for number in range(len(projections))]
-    return tuple(program)
+    return Projection(members, (Use(Owner(first.rule.kind.name, projection), first.rule, parameters),), signals)
