@@ -28,10 +28,13 @@ _NOTHING = 1e-12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scaled:
-    """Weights that are scaled, where they or what they are scaled to follow parameters of a run."""
+    """Scaled weights that follow parameters of a run, by themselves or by what they are scaled to: the formula of one
+    Part for all weights of an entry, as each depends on all others."""
 
+    #: the weights before they are scaled
     weights: Assembled
     model: ScaleModel
+    #: the neurons of both ends, and the positions in them of each connection's source and target
     ends: tuple[Indices, Indices]
     pairs: tuple[Indices, Indices]
     constants: Constants
@@ -45,9 +48,9 @@ class Scaled:
 
     def values(self, parameters: FloatArray, by: Library = NUMPY) -> FloatArray:
         """The scaled weights with these parameters; NaN where there is nothing to scale."""
-        given = self.constants
-        values = given.parameters | {name: float(parameters[slot]) for name, slot in given.settable.items()}
-        quiet = Constants(Names(values), given.dt, Findings())
+        constants = self.constants
+        values = constants.parameters | {name: float(parameters[slot]) for name, slot in constants.settable.items()}
+        quiet = Constants(Names(values), constants.dt, Findings())
         weights = self.weights.values(parameters, by)
         result = scaled(self.model, weights, self.ends, self.pairs, quiet) if np.isfinite(weights).all() else UNKNOWN
         return np.full(len(weights), np.nan) if result is UNKNOWN else result

@@ -41,10 +41,13 @@ COUNTED = _SETTING.sees
 
 @dataclass(frozen=True)
 class _Place:
-    """Where an instance stands: its names, and how many there are of it."""
+    """Where an instance stands: its names, and how many there are of it. Of ``left: {count: 3}`` the second one is
+    ``left2``, number 2, at position 1 of 3."""
 
     path: str
+    #: the path without the number
     declared: str
+    #: 0 where it is not counted
     number: int
     position: int
     count: int
@@ -62,10 +65,13 @@ class Expander:
     root: Path
     findings: Findings
     dt: float
+    #: the scopes so far; None for one whose inputs are being made
     scopes: list[Scope | None] = field(default_factory=list)
+    #: the inputs of the network so far
     inputs: list[Input] = field(default_factory=list)
     #: one for each folder, so that each file is read once
     files: dict[Path, Files] = field(default_factory=dict)
+    #: the names of the modules that have an instance
     used: set[str] = field(default_factory=set)
     #: how many scopes were made, and whether there would have been too many
     made: int = 0
@@ -106,7 +112,8 @@ class Expander:
         module: str | None = None,
         settings: Mapping[str, frozenset[str]] | None = None,
     ) -> int:
-        """One scope and those within it; ``way`` are the scopes around it. The place of the scope."""
+        """Make one scope and those within it. ``way`` are the indices of the scopes around it, ``bound`` the inputs
+        that are given to it. Returns the index of the scope."""
         index = len(self.scopes)
         self.scopes.append(None)
         files = self.files_in(folder)

@@ -70,24 +70,25 @@ class SizeEstimate:
         entries = tuple(section.instances.items())
         entered = tuple(self._entered((model for _, model in entries), constants, {}, 1))
 
-        def made(some: int) -> tuple[int, int]:
+        def count_of_first(few: int) -> tuple[int, int]:
             """Instances and neurons with so many entries."""
-            instances, neurons = self._count(entered[:some])
+            instances, neurons = self._count(entered[:few])
             return instances, int(own) + neurons
 
-        def excessive(some: int) -> bool:
-            instances, neurons = made(some)
+        def are_too_many(few: int) -> bool:
+            instances, neurons = count_of_first(few)
             return instances > MOST_INSTANCES or neurons > self._most
 
         try:
-            instances, neurons = made(len(entered))
+            instances, neurons = count_of_first(len(entered))
             if instances <= MOST_INSTANCES and neurons <= self._most:
                 return instances
-            few = len(entered) - 1  # where entries are too many by themselves, the last that was counted is the first
-            some = 1 + few if not excessive(few) else 1 + bisect_left(range(1, few), True, key=excessive)
-            name, model = entries[some - 1]
+            # the first entry with which there are too many: mostly the last that was counted, else by bisection
+            few = len(entered) - 1
+            first = 1 + few if not are_too_many(few) else 1 + bisect_left(range(1, few), True, key=are_too_many)
+            name, model = entries[first - 1]
             span = key_span(section, "instances", name) if model.count is None else model.count.span
-            instances, neurons = made(some)
+            instances, neurons = count_of_first(first)
         except _LargeGroupError as error:
             span, instances, neurons = error.count.span, 0, error.neurons
         if instances > MOST_INSTANCES:
