@@ -60,10 +60,10 @@ class Bundle(NamedTuple):
     high: float
     learning: Learning | None
     description: str | None
-    #: whether no neuron is in both ends of an entry that says what holds of these
+    #: whether the entry has a ``self``, and no neuron is in both of its ends
     ends_disjoint: bool
-    #: which of its numbers follow parameters: of ``weights``, of ``first`` where it learns (its initial weights, which
-    #: nothing that is set in a run changes), of ``centres``, ``low``, ``high`` and ``rule``
+    #: which of its numbers follow parameters: of ``weights``, or ``initial_weights`` where it learns (which nothing
+    #: that is set in a run changes), of ``centres``, ``low``, ``high`` and ``rule``
     parts: tuple[Part, ...] = ()
     label: str | None = None
     #: of an entry that makes no connection the neurons of its ends
@@ -165,7 +165,7 @@ class EntryBuilder:
             description=None if body.description is None else body.description.value,
             ends_disjoint=body.self is not None and not np.isin(self.sources, self.targets).any(),
             parts=(
-                *(part._replace(field="weights" if learning is None else "first") for part in weight_parts),
+                *(part._replace(field="weights" if learning is None else "initial_weights") for part in weight_parts),
                 *(part._replace(field="centres") for part in centre_parts),
                 *bound_parts,
                 *(() if learning is None else learning.used.parts),
@@ -283,8 +283,8 @@ class EntryBuilder:
         """The positions of an end's neurons by the names that they have in the scope."""
         if neurons is UNKNOWN:
             return End(UNKNOWN, self.context.directory)
-        names, prefix_length = self.context.census.neurons.names, len(self.context.scope.called(""))
-        positions = {names[neuron][prefix_length:]: position for position, neuron in enumerate(neurons.tolist())}
+        all_names, prefix_length = self.context.census.neurons.names, len(self.context.scope.called(""))
+        positions = {all_names[neuron][prefix_length:]: position for position, neuron in enumerate(neurons.tolist())}
         return End(positions, self.context.directory)
 
     def _values(self, formula: Formula, shape: _Shape | Unknown, purpose: str) -> FloatArray | Unknown:

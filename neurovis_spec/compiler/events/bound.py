@@ -36,7 +36,7 @@ from neurovis_spec.compiler.program import Key, Owner
 from neurovis_spec.language.expressions.tree import Number
 
 #: Fields that are no numbers of a network: the first weights of what learns, and positions.
-_ELSEWHERE = ("first", "position")
+_ELSEWHERE = ("initial_weights", "position")
 
 
 class LocatedPart(NamedTuple):
@@ -162,7 +162,7 @@ def own_weights(slots: tuple[Slot, ...], bundles: tuple[Bundle, ...], weights: F
     for bundle in bundles:
         count = len(bundle.sources)
         for part in bundle.parts:
-            if part.field in ("weights", "first"):
+            if part.field in ("weights", "initial_weights"):
                 result[start + part.within(count)] = part.formula.values(own)
         start += count
     return frozen(result)
