@@ -63,8 +63,8 @@ def _by_position(ends: Ends, count: int) -> IntArray:
         places = sources[rows]
         # per axis the gap between the box of these sources and the box of each leaf of targets
         gaps = np.maximum(0.0, np.maximum(low - places.max(axis=0), places.min(axis=0) - high))
-        box_distances = _squared(gaps)
-        order = np.argsort(box_distances, kind="stable")
+        squared_box_distances = _squared(gaps)
+        order = np.argsort(squared_box_distances, kind="stable")
         # the closest leaves with count + 1 targets, as one may be the excluded own neuron
         enough = int(np.searchsorted(np.cumsum(lengths[order]), min(count + 1, m))) + 1
         candidates = np.concatenate([leaves[leaf] for leaf in order[:enough]])
@@ -72,7 +72,7 @@ def _by_position(ends: Ends, count: int) -> IntArray:
             float(np.partition(squared, count - 1, axis=1)[:, count - 1].max())
             for _, squared in _squared_distances(places, rows, targets, candidates, excluded)
         )
-        columns = np.sort(np.concatenate([leaves[leaf] for leaf in np.flatnonzero(box_distances <= reach)]))
+        columns = np.sort(np.concatenate([leaves[leaf] for leaf in np.flatnonzero(squared_box_distances <= reach)]))
         for batch, squared in _squared_distances(places, rows, targets, columns, excluded):
             taken = np.broadcast_to(columns, squared.shape)[_is_among_least(squared, count)]
             result[batch] = taken.reshape(len(batch), count)
