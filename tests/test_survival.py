@@ -190,14 +190,14 @@ def test_rows_are_written_at_least_every_quarter_of_a_second(tmp_path: Path, mon
         now[0] += 0.04
         return now[0]
 
-    handed = stream._Handed.end
+    handed = stream._BufferedRows.end
 
-    def end(self: stream._Handed, count: int) -> None:
+    def end(self: stream._BufferedRows, count: int) -> None:
         lengths.append(count)
         handed(self, count)
 
     monkeypatch.setattr(stream, "monotonic", clock)
-    monkeypatch.setattr(stream._Handed, "end", end)
+    monkeypatch.setattr(stream._BufferedRows, "end", end)
     network.run_to(tmp_path / "x.npz", 300, backend="reference")
     assert sum(lengths) == 300
     assert max(lengths) * 0.04 <= 0.25

@@ -30,7 +30,7 @@ from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.embodied import embodied
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.named_array import Axis, NamedArray
-from neurovis_spec.runtime.record import InMemory, Last, go
+from neurovis_spec.runtime.record import InMemory, Last, run_steps
 from neurovis_spec.runtime.rows import RowSink, Steps
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
 from neurovis_spec.runtime.state import State, initial_state
@@ -142,7 +142,7 @@ def _go(network: Network, state: State, course: Course, rows: RowSink) -> None:
     """Make the steps. What is no longer finite is seen in the numbers: hundreds of trials need not warn of it each."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
-        go(network, state, course, rows)
+        run_steps(network, state, course, rows)
 
 
 def output_neurons(network: Network) -> IntArray:

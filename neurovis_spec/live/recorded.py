@@ -19,7 +19,7 @@ from neurovis_spec.runtime.columns import columns_of
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.fitting import fitted
-from neurovis_spec.runtime.record import after
+from neurovis_spec.runtime.record import end_values
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.rows import After
 from neurovis_spec.runtime.state import State, initial_state
@@ -103,7 +103,7 @@ class RecordedSource:
         if steps[row + 1] == steps[row] + 1:
             learn = self.network.connections.rules.whole() >= 0
             weights[learn] = recording.all_weights(row + 1)[learn]
-        found = after(self.network, state)
+        found = end_values(self.network, state)
         events = {slot for change in self.network.changes for slot, _ in change.parameters}
         slots = self.network.settable.index
         before = {name: value for name, value in recording.set_parameters.items() if slots.get(name) not in events}

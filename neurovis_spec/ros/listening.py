@@ -25,7 +25,7 @@ from neurovis_spec.ros.video import Video
 from neurovis_spec.runtime.columns import Probe, columns_of
 from neurovis_spec.runtime.npz_file import frame_bytes
 from neurovis_spec.runtime.recording import Recording
-from neurovis_spec.runtime.stream import frame_of
+from neurovis_spec.runtime.stream import empty_recording
 from neurovis_spec.runtime.wire import ENCODINGS, text_message
 from neurovis_spec.version import __version__
 
@@ -56,7 +56,7 @@ def frame(compiled: CompiledNetwork, backend: str = "") -> Recording:
     hash of the network, and the name of the backend, where that runs here."""
     network = compiled.network
     columns = replace(columns_of(network), probe=Probe((), ()), outputs={})
-    return replace(frame_of(network, columns, compiled.simulator("reference").state()), backend=backend)
+    return replace(empty_recording(network, columns, compiled.simulator("reference").state()), backend=backend)
 
 
 class Listening:

@@ -31,7 +31,7 @@ from neurovis_spec.runtime.c_settable import ExportError, fixed, formula, write_
 from neurovis_spec.runtime.c_step import StepCode
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.signals import signal_layout
-from neurovis_spec.runtime.state import NOTHING, Mask, State, by_kind, initial_state, kept_as
+from neurovis_spec.runtime.state import NEVER_LOST, Mask, State, by_kind, initial_state, kept_as
 
 
 @dataclass(frozen=True)
@@ -302,7 +302,7 @@ int {self.name}_set_{own}({self.name}_state *state, {self.real} value);
         for name, masks in (("gone", [phase.gone for phase in phases]), ("still", [phase.still for phase in phases])):
             if any(mask.any() for mask in masks):
                 found[name] = "unsigned char", [mask.astype(np.uint8) for mask in masks]
-        if any((phase.lost > NOTHING).any() for phase in phases):
+        if any((phase.lost > NEVER_LOST).any() for phase in phases):
             first = -int(self.network.connections.delays.kept.max())  # nothing is read of before
             found["lost"] = "int64_t", [np.maximum(phase.lost, first) for phase in phases]
         return found
@@ -488,7 +488,7 @@ int {self.name}_set_{own}({self.name}_state *state, {self.real} value);
         code.line("state->k = 0;")
         if self.network.settable.slots:
             code.line("memset(state->chosen, 0, sizeof state->chosen);")
-            for slot in np.flatnonzero(self.state.conditions.chosen).tolist():
+            for slot in np.flatnonzero(self.state.conditions.was_set).tolist():
                 code.line(f"state->chosen[{slot}] = 1;")
         if len(self.phases) > 1:
             code.line("state->phase = 0;")

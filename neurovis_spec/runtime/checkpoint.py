@@ -120,7 +120,7 @@ def _arrays(state: State) -> dict[str, Array]:
         "history": state.history,
         **{kept: _joined(arrays) for kept, arrays in by_kind(state.cells).items()},
         "parameters": now.parameters,
-        "chosen": now.chosen.astype(np.uint8),
+        "chosen": now.was_set.astype(np.uint8),
         "variables": now.variables,
         "held_order": now.held.order,
         "held_value": now.held.value,
@@ -140,7 +140,7 @@ def _fill(state: State, found: Mapping[str, Array]) -> None:
         for array, values in zip(arrays, np.split(_floats(found[kept]), ends), strict=False):
             array[:] = values
     now.parameters, now.variables = _floats(found["parameters"]), _floats(found["variables"])
-    now.chosen = found["chosen"].astype(np.bool_)
+    now.was_set = found["chosen"].astype(np.bool_)
     now.held.order, now.held.value = found["held_order"].astype(np.int64), _floats(found["held_value"])
     now.lesioned_neurons = found["lesioned_neurons"].astype(np.bool_)
     now.lesioned_connections = found["lesioned_connections"].astype(np.bool_)

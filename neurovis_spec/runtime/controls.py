@@ -60,10 +60,10 @@ class Controls:
 
     def set(self, now: Conditions, weights: FloatArray, values: Mapping[int, float]) -> None:
         """Set slots; all or nothing. Raises PatchError."""
-        patch = self._patcher.patch(now.parameters, now.chosen, values)
+        patch = self._patcher.patch(now.parameters, now.was_set, values)
         now.parameters = patch.parameters
         for slot in values:
-            now.chosen[slot] = True
+            now.was_set[slot] = True
         patch.write(weights, now.variables)
         if now.held.active:
             now.held.follow(patch.changed, now.parameters, self.by)

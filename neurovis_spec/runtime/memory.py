@@ -1,4 +1,4 @@
-"""Memory, and room on a disk: what a recording takes, and a refusal before it is taken.
+"""Memory, and room on a disk: the size of a recording, and a refusal of one that does not fit.
 
 In: numbers of rows and columns. Out: nothing, or RecordingError that says the size and the way out. An operating system
 may promise more memory than there is and end the process much later, so what is free is asked beforehand.
@@ -13,7 +13,7 @@ from pathlib import Path
 from neurovis_spec.real_paths import real_path
 from neurovis_spec.runtime.errors import RecordingError
 
-_MEMORY, _GROUPS, _MOUNT = Path("/proc/meminfo"), Path("/proc/self/cgroup"), Path("/sys/fs/cgroup")
+_MEMORY, _CGROUPS_FILE, _CGROUP_MOUNT = Path("/proc/meminfo"), Path("/proc/self/cgroup"), Path("/sys/fs/cgroup")
 #: a recording of so many bytes is never refused: what is free is an estimate
 SMALL = 64 << 20
 _UNITS = ("bytes", "KiB", "MiB", "GiB", "TiB", "PiB", "EiB")
@@ -31,10 +31,10 @@ class TooLargeError(RecordingError):
 def check_room(steps: int, every: int, columns: int) -> None:
     """Refuse a recording of ``steps`` steps, every ``every``-th kept, with ``columns`` numbers a step, if it takes more
     memory than is free and is not small. Raises TooLargeError."""
-    rows, row = -(-steps // every), (columns + 1) * _NUMBER
+    rows, row_bytes = -(-steps // every), (columns + 1) * _NUMBER  # its columns, and its step
     room = available()
-    if room is not None and rows * row > max(room, SMALL):
-        raise _too_large(steps, every, rows * row, room, "memory")
+    if room is not None and rows * row_bytes > max(room, SMALL):
+        raise _too_large(steps, every, rows * row_bytes, room, "memory")
 
 
 def check_disk(path: Path, steps: int, every: int, size: int) -> None:
@@ -48,6 +48,7 @@ def check_disk(path: Path, steps: int, every: int, size: int) -> None:
 
 
 def _too_large(steps: int, every: int, size: int, room: int, where: str) -> TooLargeError:
+    # what is suggested fills half of what is free
     fewer = _round_up(-(-every * size // max(room // 2, 1)))
     message = f"a recording of {-(-steps // every):,} steps takes {shown(size)} of {where}, and {shown(room)} are free"
     ways = f"neurovis run --every {fewer}, in Python every={fewer}"
@@ -56,11 +57,12 @@ def _too_large(steps: int, every: int, size: int, room: int, where: str) -> TooL
 
 def available() -> int | None:
     """Bytes of memory that are free for this process, as far as the system tells."""
-    found = [room for room in (_free(), _allowed()) if room is not None]
-    return min(found) if found else None
+    rooms = [room for room in (_free(), _allowed()) if room is not None]
+    return min(rooms, default=None)
 
 
 def _free() -> int | None:
+    """What the machine has free, or its whole memory where it does not say that; None where it says neither."""
     try:
         for line in _MEMORY.read_text(encoding="ascii").splitlines():
             if line.startswith("MemAvailable:"):
@@ -74,21 +76,23 @@ def _allowed() -> int | None:
     """What the limits of this process's control groups leave (a container's, a service's), None without any. The page
     cache counts as free: the system gives it up before it refuses memory."""
     try:
-        lines = _GROUPS.read_text(encoding="utf-8").splitlines()
+        lines = _CGROUPS_FILE.read_text(encoding="utf-8").splitlines()
     except (OSError, ValueError):  # another operating system
         return None
-    found: list[int] = []
-    for line in lines:
+    rooms: list[int] = []
+    for line in lines:  # "5:memory:/path" (version 1), or "0::/path" (version 2)
         _, _, rest = line.partition(":")
         controllers, _, path = rest.partition(":")
         if not controllers:
-            found += _left(_MOUNT, path, "memory.max", "memory.current", "")
+            rooms += _left_in_group(_CGROUP_MOUNT, path, "memory.max", "memory.current", "")
         elif "memory" in controllers.split(","):
-            found += _left(_MOUNT / "memory", path, "memory.limit_in_bytes", "memory.usage_in_bytes", "total_")
-    return min(found, default=None)
+            rooms += _left_in_group(
+                _CGROUP_MOUNT / "memory", path, "memory.limit_in_bytes", "memory.usage_in_bytes", "total_"
+            )
+    return min(rooms, default=None)
 
 
-def _left(mount: Path, path: str, limit: str, taken: str, prefix: str) -> list[int]:
+def _left_in_group(mount: Path, path: str, limit: str, taken: str, prefix: str) -> list[int]:
     """What the group at a path and all around it leave; a container sees its own at the mount."""
     own = mount / path.strip("/")
     left = []

@@ -31,7 +31,7 @@ from neurovis_spec.compiler.program import (
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.numpy_code import Cell, Code, any_given, emit_change
 from neurovis_spec.runtime.signals import SignalLayout
-from neurovis_spec.runtime.state import NOTHING, Structure
+from neurovis_spec.runtime.state import NEVER_LOST, Structure
 
 FIRST = "k == 0 and not state.continued"
 
@@ -267,7 +267,7 @@ def seen_at(step: Step, projection: Projection) -> dict[str, str]:
 def _arrived(code: Code, sources: IntArray, delays: IntArray, n: int, depth: int, lost: IntArray) -> str:
     """a_j[t−d] of each connection, 0 where what was sent then is lost."""
     pre = _pre(code, sources, delays, n, depth)
-    if not (lost > NOTHING).any():
+    if not (lost > NEVER_LOST).any():
         return pre
     return f"np.where(k < {code.constant(lost + delays)}, 0.0, {pre})"
 

@@ -1,7 +1,7 @@
 """Running and recording: many steps in one loop, into arrays taken beforehand.
 
-In: a Network and the Course of a run. Out: a Recording of its steps, or of every K-th of them. ``go`` hands the rows on
-while it runs.
+In: a Network and the Course of a run. Out: a Recording of its steps, or of every K-th of them. ``run_steps`` hands the
+rows on to a RowSink while it runs.
 """
 
 from __future__ import annotations
@@ -47,22 +47,22 @@ def record(network: Network, course: Course = AS_IT_IS, progress: Progress | Non
     raised). Warns once (RuntimeWarning) when something is no longer finite. Raises InputError, BackendError,
     RecordingError (also where there is not the memory), BodyError, KeyError for a name that there is not.
     """
-    course, state = begun(network, course)
+    course, state = begin_run(network, course)
     columns = columns_of(network, course.keep, course.body)
     kept, widths = Steps(course.length(network), course.every, state.k), columns.widths(network)
     if not course.keep.last:
         check_room(kept.total, kept.every, sum(widths))
     rows: InMemory | Last = Last(widths) if course.keep.last else InMemory(widths, len(kept))
     if course.checkpoint is None:
-        go(network, state, course, rows, progress)
+        run_steps(network, state, course, rows, progress)
     else:
         with deferred() as rows.asked:
-            go(network, state, course, rows, progress)
+            run_steps(network, state, course, rows, progress)
             keep_state(state, course)
-    return recording_of(network, columns, rows.numbers(kept), state.weights, after(network, state), state.backend)
+    return recording_of(network, columns, rows.numbers(kept), state.weights, end_values(network, state), state.backend)
 
 
-def begun(network: Network, course: Course) -> tuple[Course, State]:
+def begin_run(network: Network, course: Course) -> tuple[Course, State]:
     """The course with its body opened and its backend made ready, and the state that the run begins in: that of a
     checkpoint, if there is one, after a recording, or the first. What goes on goes on with its backend. Raises
     RecordingError, BackendError, BodyError where a checkpoint is wanted and the body cannot be kept."""
@@ -98,20 +98,20 @@ def keep_state(state: State, course: Course) -> None:
         save_state(state, course.checkpoint)
 
 
-def after(network: Network, state: State) -> After:
-    """What is true in a state."""
+def end_values(network: Network, state: State) -> After:
+    """What is true after the last step of a run, as its state says."""
     now, slots = state.conditions, network.settable
-    given = {
+    set_parameters = {
         name: float(now.parameters[slots.index[name]])
         for name in network.parameters
-        if now.chosen[slots.index[name]] or slots.slots[slots.index[name]].given
+        if now.was_set[slots.index[name]] or slots.slots[slots.index[name]].given
     }
     return After(
-        state.weights[network.changing],
-        state.drawn + state.k,
-        given,
-        np.flatnonzero(now.lesioned_neurons),
-        np.flatnonzero(now.lesioned_connections),
+        weights=state.weights[network.changing],
+        reached=state.drawn + state.k,
+        set_parameters=set_parameters,
+        lesioned_neurons=np.flatnonzero(now.lesioned_neurons),
+        lesioned_connections=np.flatnonzero(now.lesioned_connections),
     )
 
 
@@ -179,7 +179,7 @@ class Last:
         return bool(self.asked)
 
 
-def go(network: Network, state: State, course: Course, rows: RowSink, progress: Progress | None = None) -> None:
+def run_steps(network: Network, state: State, course: Course, rows: RowSink, progress: Progress | None = None) -> None:
     """Run a network from a state, and hand on the rows that are kept. Its body (``Course.embodied``) is taken to where
     the state says, and left where the run ends."""
     steps, body = course.length(network), course.body
@@ -350,7 +350,7 @@ def _kept(first: int, stop: int, every: int) -> int:
 def _check_events(controls: Controls, state: State, changes: Sequence[Change]) -> None:
     """Refuse events that could not set what they say, now that a recording has set parameters before them; the compiler
     has tried them from the beginning. Raises RecordingError."""
-    if not state.conditions.chosen.any():
+    if not state.conditions.was_set.any():
         return
     now, weights = state.conditions.copy(), state.weights.copy()
     with np.errstate(all="ignore"):

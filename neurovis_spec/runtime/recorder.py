@@ -27,7 +27,7 @@ from neurovis_spec.runtime.parts import beside
 from neurovis_spec.runtime.recording import Recording, for_path
 from neurovis_spec.runtime.rows import After, Rows, RowWriter, Steps
 from neurovis_spec.runtime.state import State
-from neurovis_spec.runtime.stream import OFTEN, frame_of
+from neurovis_spec.runtime.stream import OFTEN, empty_recording
 
 #: more steps than are ever made
 _ENDLESS = 1 << 53
@@ -60,7 +60,7 @@ class Recorder:
         settle(path, format_)
         target = real_path(path)
         there = set(beside(target, "part"))
-        frame = frame_of(self._network, self._columns, self._last)
+        frame = empty_recording(self._network, self._columns, self._last)
         self._writer = self._open.enter_context(format_.stream(path, frame, self._steps))
         self._part = next(iter(set(beside(target, "part")) - there), None)
 

@@ -36,7 +36,7 @@ from neurovis_spec.runtime.embodied import Embodied, embodied
 from neurovis_spec.runtime.errors import RecordingError, UnknownNameError, unknown
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.names import Names, names_of
-from neurovis_spec.runtime.record import after
+from neurovis_spec.runtime.record import end_values
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.references import find_neurons, find_parts
 from neurovis_spec.runtime.resume import resumed_state
@@ -286,7 +286,7 @@ class Simulation:
     def after(self) -> After:
         """What is true now, after the last step, with what events of the step to come and the caller have changed
         since. Its weights are those of all connections (m,)."""
-        return replace(after(self.network, self._state), weights=self.connection_weights)
+        return replace(end_values(self.network, self._state), weights=self.connection_weights)
 
     def probed(self, probe: Probe) -> FloatArray | None:
         """The states of models and rules that a probe reads, (columns,); None where it reads none."""

@@ -22,13 +22,13 @@ from neurovis_spec.compiler.program import Owner
 from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import signal_layout
 
-#: Under which names states are kept in what outlives a version, by the kinds of their owners.
+#: the names of the arrays of states in saved files and exported C, which may not change, by the kinds of their owners
 _KEPT_AS: Mapping[str, str] = {"model": "cells", "rule": "traces"}
 Mask = npt.NDArray[np.bool_]
 Cells: TypeAlias = Mapping[Owner, Mapping[str, FloatArray]]
 
-#: a step before all others: nothing that was sent is lost
-NOTHING: Final = -(1 << 62)
+#: what ``Structure.lost`` says where nothing is lost: a step before all others
+NEVER_LOST: Final = -(1 << 62)
 
 
 def kept_as(kind: str) -> str:
@@ -38,15 +38,17 @@ def kept_as(kind: str) -> str:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Structure:
-    """Which connections a step leaves out: ``gone`` (m,) those that are lesioned, or one of whose ends is, ``since``
-    (m,) the step from which each of them is, and ``still`` (m,) those whose rule is not carried out. ``lost`` (m,): all
-    that a connection has sent before this step never arrives, so that ``pre`` is 0 in its place; only of those whose
-    rule looks there, else NOTHING. A backend that has made code for one structure makes it anew where that of a State
-    is another object."""
+    """Which connections a step leaves out. A backend that has made code for one structure makes it anew where that of a
+    State is another object."""
 
+    #: (m,) those that are lesioned, or one of whose ends is
     gone: Mask
+    #: (m,) the step from which each of them is gone
     since: IntArray
+    #: (m,) those whose rule is not carried out
     still: Mask
+    #: (m,) what a connection has sent before this step never arrives, so that its rule reads 0 as ``pre``; NEVER_LOST
+    #: where nothing is lost, or no rule reads it
     lost: IntArray
 
     @property
@@ -57,24 +59,31 @@ class Structure:
     @property
     def has_lost(self) -> bool:
         """Whether anything that a rule would read of the past never arrives."""
-        return bool((self.lost > NOTHING).any())
+        return bool((self.lost > NEVER_LOST).any())
 
 
 @dataclass
 class Conditions:
-    """What holds for the step to come: ``parameters`` and ``chosen`` (one a slot: its value, and whether it was set),
-    ``variables`` as in ``Settable``, what is ``held``, ``lesioned_neurons`` (n,), ``lesioned_connections`` (m,) by
-    name, ``paused`` (m,) connections whose rules are stopped. ``holds`` says for each population which neurons are held
-    at what, None where none is; it is None as a whole where nothing is held."""
+    """What holds for the step to come; n neurons, m connections. A *slot* is the index of a parameter in Settable."""
 
+    #: the value of each slot
     parameters: FloatArray
-    chosen: Mask
+    #: whether an event or a caller has set it
+    was_set: Mask
+    #: the numbers that formulas of parameters give, as ``Settable.variables`` lays them out
     variables: FloatArray
+    #: the clamps that hold, and what they hold each neuron at
     held: Held
+    #: (n,) lesioned themselves
     lesioned_neurons: Mask
+    #: (m,) lesioned themselves, and not by an end of theirs
     lesioned_connections: Mask
+    #: (m,) whose rules are stopped
     paused: Mask
+    #: what the step leaves out, as follows from the three masks
     structure: Structure
+    #: per population the neurons that are held, and at what (lesioned ones at 0); None for a population without any,
+    #: and as a whole where nothing is held
     holds: tuple[tuple[IntArray, FloatArray] | None, ...] | None = None
 
     def copy(self) -> Conditions:
@@ -82,7 +91,7 @@ class Conditions:
         return replace(
             self,
             parameters=self.parameters.copy(),
-            chosen=self.chosen.copy(),
+            was_set=self.was_set.copy(),
             variables=self.variables.copy(),
             held=self.held.copy(),
             lesioned_neurons=self.lesioned_neurons.copy(),
@@ -102,16 +111,16 @@ def first_conditions(network: Network) -> Conditions:
     n, m = len(network.neurons), len(network.connections)
     settable = network.settable
     nothing = np.broadcast_to(np.False_, (m,))
-    never, lost = (np.broadcast_to(np.int64(step), (m,)) for step in (0, NOTHING))
+    from_start, lost = (np.broadcast_to(np.int64(step), (m,)) for step in (0, NEVER_LOST))
     return Conditions(
         parameters=settable.parameters.copy(),
-        chosen=np.zeros(len(settable.slots), dtype=np.bool_),
+        was_set=np.zeros(len(settable.slots), dtype=np.bool_),
         variables=settable.initial.copy(),
         held=Held.none(n),
         lesioned_neurons=np.zeros(n, dtype=np.bool_),
         lesioned_connections=np.zeros(m, dtype=np.bool_),
         paused=np.zeros(m, dtype=np.bool_),
-        structure=Structure(nothing, never, nothing, lost),
+        structure=Structure(gone=nothing, since=from_start, still=nothing, lost=lost),
     )
 
 
@@ -145,7 +154,7 @@ class State:
     conditions: Conditions
     continued: bool = False
     drawn: int = 0
-    #: the step whose events have had their effect, −1 before any
+    #: the last step whose events have had their effect, −1 before any
     begun: int = -1
     #: the mark of the network
     network: str = ""
@@ -174,7 +183,7 @@ class State:
 
 def initial_state(network: Network) -> State:
     """The state before step 0: nothing is under way, weights are w[0], states have their initials."""
-    n, said = len(network.neurons), {"neuron": network.neurons.starts, "connection": {}}
+    n, given_states = len(network.neurons), {"neuron": network.neurons.starts, "connection": {}}
     return State(
         k=0,
         activity=np.zeros(n),
@@ -182,7 +191,7 @@ def initial_state(network: Network) -> State:
         signals=np.zeros(signal_layout(network).size),
         history=np.zeros((history_depth(network), n)),
         cells={
-            use.owner: initial_states(use, holder.members, network.dt, said[use.definition.kind.each])
+            use.owner: initial_states(use, holder.members, network.dt, given_states[use.definition.kind.each])
             for holder, use in network.uses
         },
         conditions=first_conditions(network),

@@ -3,7 +3,7 @@
 In: a Network, a path, the Course of a run. Out: a file, which is there when the run has come to its end, or when a
 signal has ended it (Ctrl-C, SIGTERM, SIGHUP, SIGQUIT), with the steps until then. After anything else there is what was
 there before, and a part beside it with what was recorded. A format that writes in streams says so by having ``stream``;
-of the others the whole recording is saved.
+of the others the whole recording is saved. A stream begins with an *empty recording*: all of a recording but its rows.
 """
 
 from __future__ import annotations
@@ -20,17 +20,18 @@ from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.formats import StreamingFormat, settle
 from neurovis_spec.runtime.inputs import STRETCH
 from neurovis_spec.runtime.memory import check_disk
-from neurovis_spec.runtime.record import InMemory, after, begun, go, keep_state, record
+from neurovis_spec.runtime.record import InMemory, begin_run, end_values, keep_state, record, run_steps
 from neurovis_spec.runtime.recording import Recording, for_path
 from neurovis_spec.runtime.rows import After, Rows, RowWriter, Steps, Widths
 from neurovis_spec.runtime.state import State
 
-#: seconds after which rows are handed on, so that so much of a run can be lost and a step
+#: seconds after which rows are handed on: at most this much of a run, and one step, is lost
 OFTEN = 0.1
 
 
 class StoppedError(Ended):
-    """A signal has ended a run; what was recorded by then is in the file. ``rows`` says how many steps these are."""
+    """A signal has ended a run; what was recorded by then is in the file. ``rows`` says how many steps these are. Like
+    every ``Ended`` it is a KeyboardInterrupt: a caller that does not catch it ends."""
 
     def __init__(self, number: int, path: Path, step: int, rows: int, steps: Steps) -> None:
         first, every = steps.at(0), steps.every
@@ -40,10 +41,10 @@ class StoppedError(Ended):
         self.rows = rows
 
 
-def frame_of(network: Network, columns: Columns, state: State) -> Recording:
+def empty_recording(network: Network, columns: Columns, state: State) -> Recording:
     """A recording of a network without a step, which begins in this state."""
-    none = InMemory(columns.widths(network), 0).numbers(Steps(0))
-    return recording_of(network, columns, none, state.weights, after(network, state), state.backend)
+    no_rows = InMemory(columns.widths(network), 0).numbers(Steps(0))
+    return recording_of(network, columns, no_rows, state.weights, end_values(network, state), state.backend)
 
 
 def record_to(network: Network, path: Path, course: Course, progress: Progress | None = None) -> str:
@@ -52,58 +53,63 @@ def record_to(network: Network, path: Path, course: Course, progress: Progress |
     where there are none, and after a second signal, which ends everything at once."""
     format_ = for_path(path)
     if not isinstance(format_, StreamingFormat):
-        made = record(network, course, progress)
-        format_.save(made, path)
-        return made.backend
-    course, state = begun(network, course)
+        recording = record(network, course, progress)
+        format_.save(recording, path)
+        return recording.backend
+    course, state = begin_run(network, course)
     steps = Steps(course.length(network), course.every, state.k)
     columns = columns_of(network, course.keep, course.body)
-    frame = frame_of(network, columns, state)
+    empty = empty_recording(network, columns, state)
     settle(path, format_)
-    check_disk(path, steps.total, steps.every, format_.size(frame, steps))
+    check_disk(path, steps.total, steps.every, format_.size(empty, steps))
     written = False
     try:
-        with deferred() as asked:
-            with format_.stream(path, frame, steps) as writer:
-                rows = _Handed(columns.widths(network), writer, lambda: after(network, state), asked)
-                go(network, state, course, rows, progress)
-                if asked and not rows.handed:
+        with deferred() as signal_asked:  # its end raises KeyboardInterrupt after a signal
+            with format_.stream(path, empty, steps) as writer:
+                rows = _BufferedRows(columns.widths(network), writer, lambda: end_values(network, state), signal_asked)
+                run_steps(network, state, course, rows, progress)
+                if signal_asked and not rows.handed:
                     keep_state(state, course)
-                    raise Ended(asked.number)
+                    raise Ended(signal_asked.number)  # no step was recorded: what was there before stays
                 rows.close()
             written = True
             keep_state(state, course)
     except KeyboardInterrupt:
-        if not written:
+        if not written:  # no step, or a second signal: there is no file to speak of
             raise
-    if asked:
-        raise StoppedError(asked.number, path, state.k, rows.handed, steps)
+    if signal_asked:
+        raise StoppedError(signal_asked.number, path, state.k, rows.handed, steps)
     return state.backend
 
 
-class _Handed:
-    """Rows that are handed on when a stretch is full or some time has passed; the arrays for them are used again."""
+class _BufferedRows:
+    """A RowSink: rows go on to a writer when a stretch is full or some time has passed; their arrays are used again."""
 
-    def __init__(self, widths: Widths, writer: RowWriter, after: Callable[[], After], asked: Asked) -> None:
+    def __init__(self, widths: Widths, writer: RowWriter, after: Callable[[], After], signal_asked: Asked) -> None:
         self._rows = Rows.room(widths, STRETCH)
-        self._writer, self._after, self._asked = writer, after, asked
+        self._writer, self._after, self._signal_asked = writer, after, signal_asked
         self._due = monotonic() + OFTEN
+        #: how many rows the writer has
         self.handed = 0
 
     def begin(self, count: int) -> Rows:
+        """The first rows of the arrays: what they held has been handed on."""
         return self._rows.part(slice(count))
 
     def end(self, count: int) -> None:
+        """Hand so many rows on, with what is true after the last step made."""
         if count:
             self._writer.write(self.begin(count), self._after())
             self.handed += count
         self._due = monotonic() + OFTEN
 
     def due(self) -> bool:
+        """When some time has passed, or the run is to end."""
         return self.over() or monotonic() >= self._due
 
     def over(self) -> bool:
-        return bool(self._asked)
+        """After a signal."""
+        return bool(self._signal_asked)
 
     def close(self) -> None:
         """Hand on what is true after the last step, which may lie behind the last row."""

@@ -23,7 +23,7 @@ from neurovis_spec.runtime.columns import Columns, Keep, columns_of
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.inputs import STRETCH, InputError
 from neurovis_spec.runtime.measures import Measure, Meter, parsed, resolved
-from neurovis_spec.runtime.record import go
+from neurovis_spec.runtime.record import run_steps
 from neurovis_spec.runtime.rows import Rows
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.sweeps.grid import SEED, Point
@@ -120,7 +120,7 @@ def _measured(job: Job, network: Network) -> tuple[float, ...]:
     keep = Keep(states=tuple(dict.fromkeys(name for meter in meters for name in meter.measure.probe.names)))
     course = replace(job.course, keep=keep).embodied(network)
     rows = _Metered(network, state, meters, columns_of(network, keep, course.body))
-    go(network, state, course, rows)
+    run_steps(network, state, course, rows)
     return tuple(rows.last)
 
 
