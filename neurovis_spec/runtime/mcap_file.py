@@ -27,7 +27,7 @@ from neurovis_spec.runtime.arrived import Arrived
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.files import Part, move, part_of, regular_size
 from neurovis_spec.runtime.mcap_records import Channel, DamagedError, Found, Message, Schema, Topic
-from neurovis_spec.runtime.npz_file import frame_bytes, frame_of, recording_errors
+from neurovis_spec.runtime.npz_file import frame_bytes, frame_from_bytes, recording_errors
 from neurovis_spec.runtime.recording import Recording, after_rows, ended
 from neurovis_spec.runtime.rows import KINDS, After, Rows, RowWriter, Steps
 from neurovis_spec.runtime.wire import ARRAY, ENCODINGS, STRING, ArrayForm, Encoding, label_of, text_message, text_of
@@ -251,7 +251,7 @@ class _Reading:
             name = reader.text()
             reader.text()
             if name == FRAME:
-                self._rows = Arrived(frame_of(reader.take(reader.number(8))))
+                self._rows = Arrived(frame_from_bytes(reader.take(reader.number(8))))
         elif found.opcode == records.METADATA:
             reader = records.content_of(self._file, found)
             name = reader.text()

@@ -4,7 +4,8 @@ In: a Recording and a path, or a path. Out: a file, or a Recording. Nothing in a
 before memory is taken, sizes must agree with each other and with the archive, and pickles are never loaded. Beside the
 arrays of §12 ours hold ``about``, a JSON text with what arrays do not say (names of groups and outputs, the network's
 hash, ranks of parallel connections, parameters that were set, the backend); a file without it is read as well. While a
-network runs its rows go into a journal beside the file, of which the archive is made at the end.
+network runs its rows go into a journal beside the file, of which the archive is made at the end. A *frame* is a
+recording without rows: all that is known before the first step; the journal begins with it.
 """
 
 from __future__ import annotations
@@ -69,21 +70,21 @@ OPTIONAL: Mapping[str, tuple[str, int]] = {
 ROOM = 256 * 2**20
 RATIO = 100
 _NUMBER = 8
-#: what the views of ``about`` are of
-_CALLED: Mapping[str, str] = {"views": "neurons", "state_views": "states"}
+#: what the views of ``about`` are of, in messages
+_VIEWED: Mapping[str, str] = {"views": "neurons", "state_views": "states"}
 
 
 def write_npz(recording: Recording, path: Path) -> None:
     """Write a recording; what was there stays until all is written."""
     with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
-        put_arrays(archive, {**_large(recording), **_small(recording)})
+        put_arrays(archive, {**_row_arrays(recording), **_fixed_arrays(recording)})
 
 
 def npz_size(frame: Recording, steps: Steps) -> int:
     """The bytes that a streamed file takes, and the journal of which it is made."""
     width = sum(frame.widths)
-    small = sum(array.nbytes for array in _small(frame).values())
-    return len(steps) * _NUMBER * (2 * width + 1) + 2 * small
+    fixed = sum(array.nbytes for array in _fixed_arrays(frame).values())
+    return len(steps) * _NUMBER * (2 * width + 1) + 2 * fixed  # the step is in the archive alone
 
 
 @contextmanager
@@ -113,12 +114,12 @@ def _archive(file: FileIO, path: Path) -> None:
     journal, frame = _journal(file)
     rows, widths = journal.rows, journal.columns
     with replacing(path) as out, zipfile.ZipFile(out, "w", zipfile.ZIP_STORED) as archive:
-        put_arrays(archive, _small(frame))
-        held = _large(frame)
+        put_arrays(archive, _fixed_arrays(frame))
+        recorded = _row_arrays(frame)
         for place, kind in enumerate(KINDS):
-            if kind in held:
+            if kind in recorded:
                 _put_pieces(archive, kind, "<f8", (rows, widths[place]), journal.pieces(place))
-        steps = (part.astype("<i8").tobytes() for part in journal.steps.parts())
+        steps = (numbers.astype("<i8").tobytes() for numbers in journal.steps.parts())
         _put_pieces(archive, "step", "<i8", (rows,), steps)
 
 
@@ -148,23 +149,23 @@ def recover_npz(part: Path) -> Recording:
 
 
 def _journal(file: FileIO) -> tuple[Journal, Recording]:
-    """A journal, and the recording without its rows."""
+    """A journal, and its frame, with what is true after the last row. Raises RecordingError, OSError."""
+    frames: list[Recording] = []
 
     def columns(frame: bytes) -> tuple[Widths, int]:
-        recording = frame_of(frame)
-        frames.append(recording)
+        recording = frame_from_bytes(frame)
+        frames.append(recording)  # for use below: the journal keeps its bytes alone
         return recording.widths, len(recording.plastic)
 
-    frames: list[Recording] = []
     try:
         journal = read_journal(file, columns)
         frame = frames[0]
         if journal.chunks:
-            told = {name: np.array(journal.after[name], dtype=np.int64)
+            journal_end = {name: np.array(journal.after[name], dtype=np.int64)
                     for name in ("reached", "lesioned_neurons", "lesioned_connections")}  # fmt: skip
-            arrays = {**told, "weights_after": journal.weights}
-            none = after_rows(frame.step, frame.weights, len(frame.plastic))
-            frame = ended(frame, _after(arrays, journal.after, none, len(frame.neurons), len(frame.sources)))
+            arrays = {**journal_end, "weights_after": journal.weights}
+            rows_end = after_rows(frame.step, frame.weights, len(frame.plastic))
+            frame = ended(frame, _after(arrays, journal.after, rows_end, len(frame.neurons), len(frame.sources)))
     except (OSError, RecordingError):
         raise
     except Exception as error:  # as in recording_errors
@@ -172,7 +173,7 @@ def _journal(file: FileIO) -> tuple[Journal, Recording]:
     return journal, frame
 
 
-def frame_of(frame: bytes) -> Recording:
+def frame_from_bytes(frame: bytes) -> Recording:
     """The recording without rows that ``frame_bytes`` made these bytes of. Raises RecordingError, and what zipfile,
     NumPy and json raise for what is malformed."""
     return _recording(_arrays(io.BytesIO(frame), len(frame)))
@@ -182,7 +183,7 @@ def frame_bytes(frame: Recording) -> bytes:
     """All but the rows, as an archive of its own."""
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
-        put_arrays(archive, {**_large(frame.part(slice(0))), **_small(frame)})
+        put_arrays(archive, {**_row_arrays(frame.part(slice(0))), **_fixed_arrays(frame)})
     return file.getvalue()
 
 
@@ -203,19 +204,19 @@ def put_arrays(archive: zipfile.ZipFile, arrays: Mapping[str, Array]) -> None:
             np.lib.format.write_array(member, array, allow_pickle=False)
 
 
-def _large(recording: Recording) -> dict[str, Array]:
+def _row_arrays(recording: Recording) -> dict[str, Array]:
     """The arrays with a row a step."""
-    held: dict[str, Array] = {"activity": recording.activity, "weights": recording.weights, "step": recording.step}
+    arrays: dict[str, Array] = {"activity": recording.activity, "weights": recording.weights, "step": recording.step}
     if recording.state_names:
-        held["states"] = recording.states
+        arrays["states"] = recording.states
     if recording.sensors is not None:
-        held["sensors"] = recording.sensors
+        arrays["sensors"] = recording.sensors
     if recording.pose is not None:
-        held["pose"] = recording.pose
-    return held
+        arrays["pose"] = recording.pose
+    return arrays
 
 
-def _small(recording: Recording) -> dict[str, Array]:
+def _fixed_arrays(recording: Recording) -> dict[str, Array]:
     """The arrays that do not grow with the steps."""
     parallel = np.flatnonzero(recording.ranks > 1)
     about = {
@@ -280,6 +281,7 @@ def recording_errors(path: Path, what: str = "a recording") -> Iterator[None]:
 
 
 def _arrays(archived: IO[bytes], size: int) -> dict[str, Array]:
+    """The arrays of an archive of so many bytes that belong to a recording. Raises RecordingError."""
     room = max(ROOM, RATIO * size)
     arrays: dict[str, Array] = {}
     with zipfile.ZipFile(archived) as archive:
@@ -338,13 +340,15 @@ def _names(arrays: Mapping[str, Array], name: str) -> tuple[str, ...]:
 
 
 def _recording(arrays: Mapping[str, Array]) -> Recording:
+    """The recording of these arrays, once they agree with each other. n neurons, m connections, of which p change.
+    Raises RecordingError."""
     rows, n = arrays["activity"].shape
-    n = len(arrays["neurons"]) if "recorded" in arrays else n
+    n = len(arrays["neurons"]) if "recorded" in arrays else n  # a partial recording has fewer columns than neurons
     m, p = len(arrays["sources"]), len(arrays["plastic"])
     recorded = _integers(arrays, "recorded", 0, n, ascending=True) if "recorded" in arrays else None
     _check_shapes(arrays, n, recorded)
     state_names = _names(arrays, "state_names") if "state_names" in arrays else ()
-    skeleton = _body(arrays, rows)
+    skeleton = _checked_skeleton(arrays, rows)
     neurons = _names(arrays, "neurons")
     dt = float(arrays["dt"].astype(np.float64))
     if not (math.isfinite(dt) and dt > 0):
@@ -386,46 +390,48 @@ def _recording(arrays: Mapping[str, Array]) -> Recording:
     )
 
 
-def _body(arrays: Mapping[str, Array], rows: int) -> Skeleton | None:
-    """How the pose is drawn, once what is said of a body agrees with itself."""
+def _checked_skeleton(arrays: Mapping[str, Array], rows: int) -> Skeleton | None:
+    """How the pose is drawn, None without a pose. Raises RecordingError where the arrays of a body do not agree."""
     for name, beside in (("sensors", "sensor_names"), ("pose", "skeleton")):
         if (name in arrays) != (beside in arrays):
             raise RecordingError(f"of '{name}' and '{beside}' it holds one alone")
     skeleton = None
-    wanted = {}
+    shapes = {}
     if "sensors" in arrays:
-        wanted["sensors"] = rows, len(arrays["sensor_names"])
+        shapes["sensors"] = rows, len(arrays["sensor_names"])
     if "pose" in arrays:
         try:
             skeleton = skeleton_of(str(arrays["skeleton"]))
         except BodyError as error:
             raise RecordingError(f"'skeleton': {error}") from None
-        wanted["pose"] = rows, skeleton.size
-    for name, shape in wanted.items():
+        shapes["pose"] = rows, skeleton.size
+    for name, shape in shapes.items():
         if arrays[name].shape != shape:
             raise RecordingError(f"'{name}' has the shape {arrays[name].shape}, where the others ask for {shape}")
     return skeleton
 
 
-def _after(arrays: Mapping[str, Array], about: Mapping[str, object], rows: After, n: int, m: int) -> After:
-    """What is true after the last step; where the file does not say it, what its rows say."""
-    given = about.get("set_parameters", {})
-    if not isinstance(given, dict) or not all(type(value) in (int, float) for value in given.values()):
+def _after(arrays: Mapping[str, Array], about: Mapping[str, object], by_rows: After, n: int, m: int) -> After:
+    """What is true after the last step; where the file does not say it, what its rows say (``by_rows``)."""
+    parameters = about.get("set_parameters", {})
+    if not isinstance(parameters, dict) or not all(type(value) in (int, float) for value in parameters.values()):
         raise RecordingError("'about' sets no parameters")
-    reached = int(arrays["reached"]) if "reached" in arrays else rows.reached
+    reached = int(arrays["reached"]) if "reached" in arrays else by_rows.reached
     if not 0 <= reached < 2**62:
         raise RecordingError(f"'reached' is {reached}")
-    lost = {name: _integers(arrays, name, 0, high, ascending=True) if name in arrays else np.zeros(0, dtype=np.int64)
-            for name, high in (("lesioned_neurons", n), ("lesioned_connections", m))}  # fmt: skip
+    none = np.zeros(0, dtype=np.int64)
+    lesioned = {name: _integers(arrays, name, 0, high, ascending=True) if name in arrays else none
+                for name, high in (("lesioned_neurons", n), ("lesioned_connections", m))}  # fmt: skip
     return After(
-        weights=arrays["weights_after"].astype(np.float64) if "weights_after" in arrays else rows.weights,
+        weights=arrays["weights_after"].astype(np.float64) if "weights_after" in arrays else by_rows.weights,
         reached=reached,
-        set_parameters={str(name): float(value) for name, value in given.items()},
-        **lost,
+        set_parameters={str(name): float(value) for name, value in parameters.items()},
+        **lesioned,
     )
 
 
 def _integers(arrays: Mapping[str, Array], name: str, low: int, high: int, ascending: bool = False) -> IntArray:
+    """An array of indices from ``low`` to below ``high``. Raises RecordingError for others."""
     values = arrays[name]
     if len(values) and (int(values.min()) < low or int(values.max()) >= high):
         raise RecordingError(f"'{name}' holds a number outside {low} … {high - 1}")
@@ -443,13 +449,14 @@ def _about(arrays: Mapping[str, Array]) -> dict[str, object]:
 
 
 def _views(about: Mapping[str, object], key: str, n: int) -> dict[str, tuple[tuple[int, ...], bool]]:
+    """For each name that ``about`` knows, the indices below n that it stands for, and whether it is a single one."""
     views = about.get(key, {})
     if not isinstance(views, dict):
         raise RecordingError("'about' names no views")
     checked = {}
     for name, (members, single) in views.items():
         if not members or not all(type(index) is int and 0 <= index < n for index in members):
-            raise RecordingError(f"'about': '{name}' names {_CALLED[key]} that are not there")
+            raise RecordingError(f"'about': '{name}' names {_VIEWED[key]} that are not there")
         checked[str(name)] = (tuple(members), bool(single))
     return checked
 
