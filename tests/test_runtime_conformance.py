@@ -294,9 +294,9 @@ def test_a_weight_that_is_not_finite_for_one_step_is_told_in_whole_runs(place: i
 def test_tables_of_indices_are_as_narrow_as_can_be(indices: list[int], kind: str) -> None:
     tables = Tables("double", longest=0)
     name = tables.name(np.array(indices))
-    assert tables.given[0].dtype == kind
-    assert tables.given[0].tolist() == indices
-    assert tables.taken() == {name: f"const {kind}_t *const {name} = (const {kind}_t *)p->given[0];"}
+    assert tables.passed_in[0].dtype == kind
+    assert tables.passed_in[0].tolist() == indices
+    assert tables.pointer_lines() == {name: f"const {kind}_t *const {name} = (const {kind}_t *)p->given[0];"}
 
 
 def test_the_weights_of_a_full_matrix_are_read_where_they_lie() -> None:

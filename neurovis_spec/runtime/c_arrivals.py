@@ -31,13 +31,15 @@ _LANES = 8
 
 @dataclass(frozen=True, slots=True)
 class _Lanes:
-    """How the sums of some neurons go on beside each other. ``neurons``: places in the population, those of like many
-    connections beside each other, eight to a group. First come the connections that all of a group have (those of
-    group g from ``begins[g]`` on, the first of each neuron, then the second of each, …), then the others, neuron by
-    neuron (those of the i-th from ``rests[i]`` on)."""
+    """How the sums of some neurons go on beside each other, in groups of eight neurons of like many connections. First
+    come the connections that all of a group have, then the others, neuron by neuron. Of two neurons a and b with the
+    connections a1, a2 and b1, b2, b3 in a group of two, in this order: a1 b1 a2 b2, then b3."""
 
+    #: places in the population, by the number of connections
     neurons: IntArray
+    #: group g reads from ``begins[g]`` on: the first connection of each neuron, then the second of each, …
     begins: IntArray
+    #: the further connections of the i-th neuron are read from ``rests[i]`` on
     rests: IntArray
 
 
@@ -47,7 +49,7 @@ def _in_lanes(ends: IntArray) -> tuple[_Lanes, Indices]:
     degrees = np.diff(ends)
     neurons = np.argsort(degrees, kind="stable").astype(np.int64)
     count = len(neurons) - len(neurons) % _LANES
-    # neurons have ever more connections: of a group the first has the fewest
+    # per neuron, how many connections all of its group have; the degrees ascend, so the first of a group has the fewest
     shared = np.zeros(len(neurons), dtype=np.int64)
     shared[:count] = np.repeat(degrees[neurons[:count:_LANES]], _LANES)
     begins = np.zeros(-(-len(neurons) // _LANES) + 1, dtype=np.int64)
@@ -167,7 +169,14 @@ class Arrivals:
                 yield place, code.text(self._finished(total))
 
     def matrix(self) -> str:
-        """The sums of a full matrix; the name of their array."""
+        """The sums of a full matrix; the name of their array. It adds source by source:
+
+        for (int32_t q = 0; q < 3; q++) {
+            const double a = activity[q];
+            for (int32_t p = 0; p < 2; p++)
+                u1[p] += weights[0 + 2*q + p]*a;
+        }
+        """
         code, count = self.code, len(self.population.members)
         name = code.name("u")
         code.line(f"{code.real} {name}[{count}];")
@@ -191,20 +200,21 @@ class Arrivals:
         return name
 
     def combined(self, place: Place) -> Value:
-        """All that arrives at one neuron as one number."""
+        """All that arrives at one neuron as one number. In a loop (of neurons with equally many connections) the c-th
+        connection of each is the column ``c::degree``."""
         combine = self.population.drive.combine
         start: Value = 1.0 if combine == "product" else 0.0
         if not len(self.connections):
             return start
         if isinstance(place, int):
             edges: list[Place] = list(range(int(self.ends[place]), int(self.ends[place + 1])))
-            return self._written(start, edges, [slice(None)] * len(edges)) if edges else start
+            return self._terms(start, edges, [slice(None)] * len(edges)) if edges else start
         assert 0 <= self.degree <= _FEW, "others go on in lanes"
         columns = [slice(column, None, self.degree) for column in range(self.degree)]
-        return self._written(start, [place] * self.degree, columns)
+        return self._terms(start, [place] * self.degree, columns)
 
-    def _written(self, start: Value, edges: list[Place], columns: list[slice]) -> Value:
-        """One term after the other."""
+    def _terms(self, start: Value, edges: list[Place], columns: list[slice]) -> Value:
+        """The terms of some connections, one after the other, combined."""
         if not self.form.gone and self.population.drive.combine == "sum":
             terms = [self.term(edge, column) for edge, column in zip(edges, columns, strict=True)]
             return " + ".join([self.code.text(start), *terms])
@@ -214,6 +224,7 @@ class Arrivals:
         return self._finished(total)
 
     def _add(self, total: str, edge: Place, column: slice) -> None:
+        """Lines that add (multiply) one connection's term to a variable, if the connection is not gone."""
         code = self.code
         if self.form.gone:
             code.line(f"if (!gone[{code.at(self.connections[column], edge)}]) {{")
@@ -234,14 +245,17 @@ class Arrivals:
             code.line("}")
 
     def _operand(self, value: Value) -> str:
+        """A value as it may stand behind a minus."""
         text = self.code.text(value)
         return f"({text})" if text.startswith("-") else text
 
     def _finished(self, total: str) -> Value:
+        """What a neuron gets of its sum: the root of a sum of squares, else the sum itself."""
         return f"sqrt{self.code.emitter.suffix}({total})" if self.population.drive.combine == "distance" else total
 
     def term(self, edge: Place, column: slice) -> str:
-        """w[t−d]·a[t−d] of a connection."""
+        """w[t−d]·a[t−d] of a connection: ``weights[3]*activity[1]`` without a delay, ``signals[5 + r2]`` with one of
+        2, and a choice of both in a loop over connections of which some have none."""
         code = self.code
         delays = self.delays[column] if not isinstance(edge, int) else self.delays[column][edge : edge + 1]
         kinds = _different(delays)

@@ -33,7 +33,8 @@ SMALL = 600
 LONGEST = 1024
 #: neurons, connections and steps of one call together: some tens of milliseconds
 _AT_ONCE = 1 << 22
-#: forms of the step
+#: the forms of a step, as ``nv_once`` and ``nv_run`` take them: nothing held, left out or still; any of it; and in
+#: addition neurons that take ``initial``
 _PLAIN, _GENERAL, _FIRST = 0, 1, 2
 _FORMS = tuple(ctypes.c_int32(form) for form in (_PLAIN, _GENERAL, _FIRST))
 
@@ -138,6 +139,7 @@ class Written:
     """The text of a network, and the arrays that it is handed."""
 
     text: str
+    #: the tables that are too long for the text, as ``nv_state.given`` has them
     given: tuple[Table, ...]
     #: how many weights are packed in whole runs
     packed: int
@@ -163,7 +165,7 @@ def _write(network: Network) -> Written:
     emitter, tables = Emitter(), Tables("double", LONGEST)
     small = len(network.neurons) + len(network.connections) <= SMALL
     bodies: list[str] = []
-    taken = _taken(network)
+    pointer_lines = _pointer_lines(network)
     watched = bool(network.projections) and not small
     # a network that is written out is in registers, and nothing is gained
     incoming = [incoming_of(network, population) for population in network.populations]
@@ -187,7 +189,10 @@ def _write(network: Network) -> Written:
             write(StepCode(network, code, form, incoming))
         if name.startswith("double"):
             code.line("return odd;" if form.watched and code.lines else "return 0.0;")
-        bodies += [*function(code, f"static {name}(const nv_state *p{more})", taken | tables.taken()), ""]
+        bodies += [
+            *function(code, f"static {name}(const nv_state *p{more})", pointer_lines | tables.pointer_lines()),
+            "",
+        ]
     counts = {"NEURONS": len(network.neurons), "INPUTS": network.vector_size, "CHANGING": len(network.changing)}
     defined = [f"#define {name} {value}" for name, value in counts.items()]
     neurons, connections = _look(network)
@@ -196,11 +201,11 @@ def _write(network: Network) -> Written:
     used = words_of(bodies)
     parts = [_HEAD, "\n".join(defined), emitter.helpers(used), tables.text(used), "\n".join(bodies)]
     return Written(
-        "\n\n".join(part for part in parts if part) + _TAIL, tuple(tables.given), whole.count if fused else 0
+        "\n\n".join(part for part in parts if part) + _TAIL, tuple(tables.passed_in), whole.count if fused else 0
     )
 
 
-def _taken(network: Network) -> dict[str, str]:
+def _pointer_lines(network: Network) -> dict[str, str]:
     """For each array of the state, and for what is handed over, the line that gives it its name."""
     kinds = (
         ("double", ("activity", "weights", "signals", "history", "packed")),
@@ -208,21 +213,21 @@ def _taken(network: Network) -> dict[str, str]:
         ("const uint8_t", ("held", "gone", "still")),
         ("const int64_t", ("lost",)),
     )
-    taken = {name: f"{kind} *restrict const {name} = p->{name};" for kind, names in kinds for name in names}
+    lines = {name: f"{kind} *restrict const {name} = p->{name};" for kind, names in kinds for name in names}
     names = [state_name(use.owner, i) for _, use in network.uses for i in range(len(use.definition.state))]
-    return taken | {name: f"double *restrict const {name} = p->cells[{at}];" for at, name in enumerate(names)}
+    return lines | {name: f"double *restrict const {name} = p->cells[{at}];" for at, name in enumerate(names)}
 
 
 def _look(network: Network) -> tuple[str, str]:
-    """Whether anything that neurons, and that connections carry is not finite."""
+    """The code of whether anything that neurons carry, and that connections carry, is not finite."""
     tests = {"neuron": [f"nv_odd(p->activity, {len(network.neurons)})"], "connection": list[str]()}
     if network.projections:
         tests["connection"].append(f"nv_odd(p->weights, {len(network.connections)})")
-    number = 0
+    cell = 0
     for holder, use in network.uses:
         for _ in use.definition.state:
-            tests[use.definition.kind.each].append(f"nv_odd(p->cells[{number}], {len(holder.members)})")
-            number += 1
+            tests[use.definition.kind.each].append(f"nv_odd(p->cells[{cell}], {len(holder.members)})")
+            cell += 1
     return " || ".join(tests["neuron"]), " || ".join(tests["connection"]) or "0"
 
 
@@ -233,10 +238,15 @@ _POINTERS: Final = (
 
 
 class _State(ctypes.Structure):
+    """``nv_state``: where the arrays of a State lie, and those of the stepper."""
+
     _fields_ = [(name, ctypes.c_void_p) for name in _POINTERS]
 
 
 class _Course(ctypes.Structure):
+    """``nv_course``: ``steps`` steps from ``k`` on, the first in ``form``, the others in the form ``then``; with
+    ``look`` up to one after which something is not finite; ``beside``: the weights kept lie next to each other."""
+
     _fields_ = [
         *((name, ctypes.c_int64) for name in ("k", "steps", "every", "form", "then", "look", "beside")),
         *((name, ctypes.c_void_p) for name in ("rows", "activity", "weights", "changing")),
@@ -244,7 +254,8 @@ class _Course(ctypes.Structure):
 
 
 class CStepper:
-    """One network, compiled; what it was given last is kept ready."""
+    """One network, compiled. Of the state that it stepped last it keeps where the arrays lie, and looks them up again
+    only where one of them is another object (``_take``)."""
 
     def __init__(self, network: Network) -> None:
         self.network = network
@@ -265,13 +276,14 @@ class CStepper:
         self._beside = count > 0 and bool((np.diff(self._changing) == 1).all())
         self._pointers = _State()
         self._pointers.s = self._vector.ctypes.data
-        self._here = ctypes.addressof(self._pointers)
-        #: arguments that need not be converted anew
-        self._there, self._number = ctypes.c_void_p(self._here), ctypes.c_int64(0)
+        self._address = ctypes.addressof(self._pointers)
+        #: arguments of ``nv_once`` that need not be converted anew: where the struct is, and the step
+        self._struct, self._step_number = ctypes.c_void_p(self._address), ctypes.c_int64(0)
         self._handed = _addresses(self._given)
         self._before, self._packed = np.zeros(len(network.neurons)), np.zeros(made.packed)
         self._pointers.before, self._pointers.packed = self._before.ctypes.data, self._packed.ctypes.data
         self._pointers.given = ctypes.addressof(self._handed)
+        #: the state whose arrays the struct points to, these arrays, and what holds in it
         self._of: State | None = None
         self._activity = self._weights = self._signals = self._history = self._variables = self._vector
         self._holds: object = None
@@ -294,8 +306,8 @@ class CStepper:
             self._take(state)
         k = state.k
         self._vector[:] = inputs
-        self._number.value = k
-        self._step(self._there, self._number, _FORMS[self._form(state) if k == 0 or self._general else _PLAIN])
+        self._step_number.value = k
+        self._step(self._struct, self._step_number, _FORMS[self._form(state) if k == 0 or self._general else _PLAIN])
         state.k = k + 1
 
     def run(
@@ -307,19 +319,19 @@ class CStepper:
         self._take(state)
         rows = np.ascontiguousarray(vectors, dtype=np.float64)
         course = _Course(
-            state.k,
-            len(rows),
-            every,
-            self._form(state),
-            _GENERAL if self._general else _PLAIN,
-            look,
-            self._beside,
-            rows.ctypes.data,
-            activity.ctypes.data,
-            weights.ctypes.data,
-            self._changing.ctypes.data,
+            k=state.k,
+            steps=len(rows),
+            every=every,
+            form=self._form(state),
+            then=_GENERAL if self._general else _PLAIN,
+            look=look,
+            beside=self._beside,
+            rows=rows.ctypes.data,
+            activity=activity.ctypes.data,
+            weights=weights.ctypes.data,
+            changing=self._changing.ctypes.data,
         )
-        made: int = self._run(self._here, ctypes.addressof(course))
+        made: int = self._run(self._address, ctypes.addressof(course))
         state.k += made
         return made
 
@@ -329,6 +341,7 @@ class CStepper:
         return max(1, _AT_ONCE // (len(self.network.neurons) + len(self.network.connections) + 1))
 
     def _form(self, state: State) -> int:
+        """The form of the step to come."""
         if state.k == 0 and not state.continued and self._initial:
             return _FIRST
         return _GENERAL if self._general else _PLAIN
@@ -356,10 +369,11 @@ class CStepper:
         self._holds, self._structure = now.holds, now.structure
         self._general = now.holds is not None or not now.structure.whole
         self._held, self._holding = np.zeros(n, dtype=np.uint8), np.zeros(n)
-        for held in now.holds or ():
-            if held is not None:
-                self._held[held[0]] = 1
-                self._holding[held[0]] = held[1]
+        for hold in now.holds or ():
+            if hold is not None:
+                neurons, values = hold
+                self._held[neurons] = 1
+                self._holding[neurons] = values
         self._gone, self._still = (_bytes(mask) for mask in (now.structure.gone, now.structure.still))
         pointers.held, pointers.holding = self._held.ctypes.data, self._holding.ctypes.data
         self._lost = np.ascontiguousarray(now.structure.lost, dtype=np.int64)

@@ -2,7 +2,12 @@
 
 In: typed trees, arrays, indices that are numbers or code. Out: the body of a function, and tables to stand before it.
 Names of the author never reach the text. A ``Place`` is an index: a number where neurons or connections are written out
-one by one, else the code of a loop's variable.
+one by one, else the code of a loop's variable. So ``3`` gives ``u1 = 0.5*activity[3]``, and ``"p"``
+``u1 = t0[p]*activity[4 + p]`` (t0: a table; 4 + p: indices that are regular).
+
+The lines read these identifiers: ``k`` the step, ``kd`` and ``td`` the step and the time as numbers, ``s`` the inputs
+and noise of the step, ``x`` the numbers that can be set, ``t0``, ``t1``, … tables, ``p`` the struct that the caller
+passes in (in ``p->given`` the tables that are too long for the text), and the arrays of a State by their names.
 """
 
 from __future__ import annotations
@@ -29,7 +34,7 @@ Table: TypeAlias = npt.NDArray[np.float64] | npt.NDArray[np.int32] | npt.NDArray
 
 #: items of a table in a line of the text
 _ROW = 16
-_NONE: Mapping[str, Made] = {}
+_NO_CALLS: Mapping[str, Made] = {}
 
 
 def state_name(owner: Owner, number: int) -> str:
@@ -39,14 +44,14 @@ def state_name(owner: Owner, number: int) -> str:
 
 class Tables:
     """Constant arrays, each once. Those of more than ``longest`` items are not written into the text but passed in at
-    run time: ``given`` holds them in order."""
+    run time: ``passed_in`` holds them in order."""
 
     def __init__(self, real: str, longest: int | None) -> None:
         self._real, self._longest = real, longest
         self._names: dict[tuple[str, bytes], str] = {}
         self._text: dict[str, str] = {}
-        self.given: list[Table] = []
-        self._taken: dict[str, str] = {}
+        self.passed_in: list[Table] = []
+        self._pointer_lines: dict[str, str] = {}
 
     def name(self, values: FloatArray | Indices) -> str:
         """The identifier of an array of numbers or indices."""
@@ -55,8 +60,9 @@ class Tables:
         if key not in self._names:
             name = self._names[key] = f"t{len(self._names)}"
             if self._longest is not None and len(array) > self._longest:
-                self._taken[name] = f"const {kind} *const {name} = (const {kind} *)p->given[{len(self.given)}];"
-                self.given.append(array)
+                item = f"p->given[{len(self.passed_in)}]"
+                self._pointer_lines[name] = f"const {kind} *const {name} = (const {kind} *){item};"
+                self.passed_in.append(array)
             else:
                 self._text[name] = f"static const {kind} {name}[{len(array)}] = {{\n{self._items(array)}\n}};"
         return self._names[key]
@@ -79,28 +85,31 @@ class Tables:
         """The definitions of those that are used."""
         return "\n\n".join(text for name, text in self._text.items() if name in used)
 
-    def taken(self) -> dict[str, str]:
+    def pointer_lines(self) -> dict[str, str]:
         """For each array that is passed in, the line that declares a pointer to it."""
-        return self._taken
+        return self._pointer_lines
 
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """What a step has to handle. ``written_out``: neuron by neuron, without loops. ``first``: neurons with ``initial``
-    take it at step 0, where the argument ``first`` is not 0. ``held``: neurons whose byte of ``held`` is set have the
-    activity ``holding``. ``gone`` and ``still``: connections whose byte is set are left out, do not learn. ``lost``:
-    what a connection has sent before the step in ``lost`` never arrives. ``fused``: what arrives after one step along
-    weights that do not change is summed by the neuron it arrives at, from the activities of the step ``before`` and the
-    weights ``packed`` in its order, instead of being sent. ``watched``: what loops over connections store is checked:
-    the number ``odd`` is NaN after the step where some of it is not finite, else 0."""
+    """What a step has to handle. Arrays in quotes are those of its code."""
 
+    #: neuron by neuron, without loops
     written_out: bool = False
+    #: neurons with ``initial`` take it at step 0, where the argument ``first`` is not 0
     first: bool = False
+    #: neurons whose byte of ``held`` is set have the activity ``holding``
     held: bool = False
+    #: connections whose byte of ``gone`` is set are left out
     gone: bool = False
+    #: connections whose byte of ``still`` is set do not learn
     still: bool = False
+    #: what a connection has sent before its step in ``lost`` never arrives
     lost: bool = False
+    #: what arrives after one step along weights that do not change is not sent: the neuron that it arrives at sums it,
+    #: from the activities of the step ``before`` and the weights ``packed`` in its order
     fused: bool = False
+    #: what loops over connections store is checked: ``odd`` is NaN after a step where some of it is not finite, else 0
     watched: bool = False
 
 
@@ -114,8 +123,9 @@ class Code:
         self._count = 0
         #: identifiers whose values stay
         self._constant: set[str] = set()
-        #: what stands at the head of the function, each once
+        #: lines at the head of the function, by the identifier that each declares; one may read those before it
         self.head: dict[str, str] = {}
+        #: what every expression may name; kd and td are k and t as numbers, declared at the head where they are read
         self.clock: dict[str, Value] = {**constants(dt), "k": "kd", "t": "td"}
         self._dt = dt
 
@@ -167,7 +177,7 @@ class Code:
         return self.emitter.text(value)
 
     def at(self, indices: Indices, place: Place) -> Place:
-        """An element of an array of indices, worked out where they are regular."""
+        """An element of an array of indices: ``first + stride*place`` where they are regular, else one of a table."""
         if isinstance(place, int):
             return int(indices[place])
         first = int(indices[0])
@@ -177,14 +187,15 @@ class Code:
         if int(indices[-1]) == first + stride * last and np.array_equal(indices, first + stride * np.arange(last + 1)):
             if stride == 0:
                 return first
-            step = place if stride == 1 else f"{stride}*{place}"
-            return f"{first} + {step}" if first else step
+            offset = place if stride == 1 else f"{stride}*{place}"
+            return f"{first} + {offset}" if first else offset
         return f"{self.tables.name(indices)}[{place}]"
 
     def number(self, values: FloatArray, place: Place) -> Value:
         """An element of an array of numbers; where all are the same, that one."""
         if isinstance(place, int):
             return float(values[place])
+        # by their bits: 0.0 and −0.0 are two numbers, and NaN is like itself
         bits = np.ascontiguousarray(values, dtype=np.float64).view(np.int64)
         return float(values[0]) if (bits == bits[0]).all() else f"{self.tables.name(values)}[{place}]"
 
@@ -196,8 +207,8 @@ class Code:
             return self.number(values if members is None else values[members], place)
         if variable.size == 1:
             return f"x[{variable.start}]"
-        places = np.arange(variable.size) if members is None else members.astype(np.int64)
-        return f"x[{self.at(variable.start + places, place)}]"
+        indices = np.arange(variable.size) if members is None else members.astype(np.int64)
+        return f"x[{self.at(variable.start + indices, place)}]"
 
     def is_set(self, array: Key) -> bool:
         """Whether an array can be set in a run."""
@@ -210,9 +221,10 @@ class Code:
         }
 
     def value(
-        self, tree: Tree, known: Mapping[str, Value], calls: Mapping[str, Made] = _NONE, drawn: Drawn | None = None
+        self, tree: Tree, known: Mapping[str, Value], calls: Mapping[str, Made] = _NO_CALLS, drawn: Drawn | None = None
     ) -> Value:
-        """An expression as a number or code."""
+        """An expression as a number or code. ``known``: the values of its names; ``calls`` and ``drawn``: what makes
+        the values of the functions of its place (``f`` of a model) and of its draws."""
         read = names(tree) & {"k", "t"}
         if read:
             self.head["kd"] = f"const {self.real} kd = ({self.real})k;"
@@ -234,12 +246,20 @@ def words_of(lines: Iterable[str]) -> set[str]:
     return set(re.findall(r"(?<!->)(?<![\w.])[A-Za-z_]\w*", "\n".join(lines)))
 
 
-def function(code: Code, head: str, taken: Mapping[str, str]) -> list[str]:
-    """A function of the lines of ``code``, with what stands at their head and those of ``taken`` that are used."""
+def function(code: Code, head: str, pointer_lines: Mapping[str, str]) -> list[str]:
+    """A function of the lines of ``code``. Before them stand the lines of ``pointer_lines``, which name the arrays, and
+    those of ``code.head``, as far as they are used."""
     head_lines = dict(code.head)
     used = words_of(code.lines)
-    for name in reversed(list(head_lines)):
+    for name in reversed(list(head_lines)):  # last first: a line at the head may read those before it
         if name in used:
             used |= words_of([head_lines[name]])
     heads = [f"    {line}" for name, line in head_lines.items() if name in used]
-    return [head, "{", *(f"    {line}" for name, line in taken.items() if name in used), *heads, *code.lines, "}"]
+    return [
+        head,
+        "{",
+        *(f"    {line}" for name, line in pointer_lines.items() if name in used),
+        *heads,
+        *code.lines,
+        "}",
+    ]

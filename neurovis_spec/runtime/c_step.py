@@ -3,7 +3,13 @@
 In: a Network. Out: the lines of a function's body, over the arrays of a State by the names ``activity``, ``weights``,
 ``signals``, ``history``, ``cells…``, ``traces…``, the numbers that can be set as ``x``, the vector of the step as
 ``s`` and the step ``k``. Sums go in the order of the connections. A small network is written out neuron by neuron;
-of a larger one, each population is a loop.
+of a larger one, each population is a loop. So K -> O after one step, O with a bias, is
+
+    {
+        const double u1 = 0.0 + signals[0] + 0.5;
+        activity[1] = u1;
+    }
+    signals[0] = weights[0]*activity[0];
 """
 
 from __future__ import annotations
@@ -37,8 +43,8 @@ from neurovis_spec.runtime.signals import SignalLayout, signal_layout
 from neurovis_spec.runtime.state import Mask
 
 _NONE: Mapping[str, Made] = {}
-#: connections that learn beside each other: a compiler makes vectors of them
-_RULES = 4
+#: connections whose rule is written side by side in a loop: a compiler makes vectors of them
+_RULES_SIDE_BY_SIDE = 4
 
 
 class StepCode:
@@ -59,7 +65,9 @@ class StepCode:
         #: projections whose connections send while they learn, in one pass over their weights: those of one delay
         learn = (one.projection for one in network.program if isinstance(one, Learn) and not form.written_out)
         self.sent_with = frozenset(
-            number for number in learn if _alike(network.connections.delays[network.projections[number].members]) > 0
+            number
+            for number in learn
+            if _common_delay(network.connections.delays[network.projections[number].members]) > 0
         )
         for arrivals in self.arrivals:
             if arrivals.can_be_fused:
@@ -105,14 +113,15 @@ class StepCode:
                 self.neuron(number, "p", arrivals)
 
     def neuron(self, number: int, place: Place, arrivals: Arrivals, total: str = "") -> None:
-        """One neuron's step."""
+        """One neuron's step; ``total`` is what arrives at it, where that was summed before."""
         population, code = self.network.populations[number], self.code
         neuron = code.at(population.members, place)
         initial = self.network.neurons.initial[population.members]
         given = ~np.isnan(initial)
-        taken = self.form.first and (given[place] if isinstance(place, int) else given.any())
-        if taken:
+        may_take = self.form.first and (given[place] if isinstance(place, int) else given.any())
+        if may_take:
             value = code.text(code.number(initial, place))
+            # in a loop, ``value == value`` leaves out NaN: neurons without an initial
             condition = "first" if isinstance(place, int) or given.all() else f"first && {value} == {value}"
             code.line(f"if ({condition}) {{")
             code.line(f"    activity[{neuron}] = {value};")
@@ -120,7 +129,7 @@ class StepCode:
             code.indent += 1
         drive = self.drive(population, place, arrivals, total) if self.reads_drive(population) else 0.0
         self.advance(number, place, neuron, drive)
-        if taken:
+        if may_take:
             code.indent -= 1
             code.line("}")
         if self.form.held:
@@ -142,18 +151,19 @@ class StepCode:
             # a sum that begins with 0 is never −0, so adding 0 changes nothing; a product may be
             drive = f"{code.text(drive)} + {code.text(bias)}"
         for fed in (network.neurons.input[population.members], network.noise_index[population.members]):
-            drive = self._fed(drive, fed, place)
+            drive = self._plus_step_value(drive, fed, place)
         return code.let("u", drive)
 
-    def _fed(self, drive: Value, fed: IntArray, place: Place) -> Value:
+    def _plus_step_value(self, drive: Value, index_in_s: IntArray, place: Place) -> Value:
+        """The drive, and the number of ``s`` that ``index_in_s`` points to, −1 for none."""
         code = self.code
         if isinstance(place, int):
-            return f"{code.text(drive)} + s[{int(fed[place])}]" if fed[place] >= 0 else drive
-        if (fed >= 0).all():
-            return f"{code.text(drive)} + s[{code.at(fed, place)}]"
-        if (fed < 0).all():
+            return f"{code.text(drive)} + s[{int(index_in_s[place])}]" if index_in_s[place] >= 0 else drive
+        if (index_in_s >= 0).all():
+            return f"{code.text(drive)} + s[{code.at(index_in_s, place)}]"
+        if (index_in_s < 0).all():
             return drive
-        name, index = code.variable("u", drive), code.at(fed, place)
+        name, index = code.variable("u", drive), code.at(index_in_s, place)
         code.line(f"if ({index} >= 0)")
         code.line(f"    {name} += s[{index}];")
         return name
@@ -263,11 +273,11 @@ class StepCode:
     def leave(self, which: Mask) -> None:
         """The signals of some connections (m,) leave."""
         code = self.code
-        for kind in self.layout.classes:
-            sent = which[kind.connections]
+        for delay_class in self.layout.classes:
+            sent = which[delay_class.connections]
             if not sent.any():
                 continue
-            members = kind.connections[sent]
+            members = delay_class.connections[sent]
             if self.form.written_out:
                 self.store([self.leaving(members, place) for place in range(len(members))])
             else:
@@ -285,23 +295,24 @@ class StepCode:
     # ---- connections -------------------------------------------------------------------------------------------
 
     def learn(self, number: int) -> None:
-        """The rule of a projection."""
+        """The rule of a projection: in a loop several connections side by side, then one by one those that are left.
+        The sums ``o`` are put together behind the loop, so that no addition waits for the one before."""
         code, count = self.code, len(self.network.projections[number].members)
         if self.form.written_out:
             for place in range(count):
                 with code.block(""):
                     self.connections(number, [place])
             return
-        lanes = 1 if self.form.still else _RULES
-        beside = count - count % lanes
-        if lanes > 1 and beside:
+        lanes = 1 if self.form.still else _RULES_SIDE_BY_SIDE
+        in_lanes = count - count % lanes
+        if lanes > 1 and in_lanes:
             sums = [code.variable("o", 0.0) for _ in range(lanes)] if self.form.watched else []
-            with code.block(code.loop("q", beside, step=lanes)):
+            with code.block(code.loop("q", in_lanes, step=lanes)):
                 self.connections(number, ["q", *(f"(q + {lane})" for lane in range(1, lanes))], sums)
             if sums:
                 code.line(f"odd += {' + '.join(sums)};")
-        if beside < count or lanes == 1:
-            with code.block(code.loop("q", count, 0 if lanes == 1 else beside)):
+        if in_lanes < count or lanes == 1:
+            with code.block(code.loop("q", count, 0 if lanes == 1 else in_lanes)):
                 self.connections(number, ["q"], ["odd"] if self.form.watched else [])
 
     def connections(self, number: int, places: Sequence[Place], sums: Sequence[str] = ()) -> None:
@@ -310,13 +321,14 @@ class StepCode:
         code, leaving = self.code, []
         if number in self.sent_with:
             leaving = [self.leaving(self.network.projections[number].members, place) for place in places]
+            # what leaves is read before its weight learns
             leaving = [(slot, code.let("s", signal)) for slot, signal in leaving]
         if self.form.still:
             self.store(leaving)
         stores = [self.connection(number, place) for place in places]
         for name, made in zip(sums, stores, strict=False):
             for _, value in made:
-                if not isinstance(value, float):
+                if not isinstance(value, float):  # x − x is 0, or NaN where x is not finite
                     code.line(f"{name} += {value} - {value};")
         if not self.form.still:
             self.store(leaving)
@@ -416,8 +428,8 @@ class StepCode:
         return f"({index} < {n} ? activity[{index}] : s[{index} - {n}])"
 
 
-def _alike(delays: IntArray) -> int:
-    """The delay of all of some connections, 0 where they differ."""
+def _common_delay(delays: IntArray) -> int:
+    """The delay that all of these connections have; 0 where they differ, and where there are none."""
     return int(delays[0]) if len(delays) and (delays == delays[0]).all() else 0
 
 
