@@ -2,7 +2,15 @@
 
 In: typed trees and index arrays. Out: the text of one Python function and its namespace: a generator, which makes a
 step each time that it is asked. Names of the author never reach the text: every one of them is replaced by an
-identifier made here.
+identifier made here. What the methods of ``Code`` give, with what they add to the text or to the namespace:
+
+    let("u", "a + b")               'u1'                     the line  u1 = a + b
+    constant(array)                 'c2'                     c2 in the namespace
+    numbers(key, values)            'c3', or 'v4_' for what can be set: v4_ = variables[3:9], before the steps
+    select("activity", [2, 3], 9)   'a5_'                    a5_ = activity[2:4], before the steps
+    select("activity", [3, 1], 9)   'activity[c6]'           c6 in the namespace
+    position([2, 3], 9)             '[2:4]'                  to be written to: activity[2:4] = …
+    slot(3)                         'r3'                     r3 = k % 3, at the head of a step
 """
 
 from __future__ import annotations
@@ -26,8 +34,9 @@ Functions: TypeAlias = Mapping[str, Callable[[str], str]]
 Steps: TypeAlias = Callable[[State, Iterable[FloatArray]], Iterator[None]]
 
 
+#: the arrays of a state, by which the text names them
 _PARTS = ("activity", "weights", "signals", "history", "cells")
-#: the numbers that can be set, in the state
+#: the numbers that can be set, in the conditions of the state
 _VARIABLES = "variables"
 
 
@@ -39,7 +48,9 @@ class Code:
         self.namespace: dict[str, object] = {"np": np, "bincount": np.bincount, "multiply": np.multiply}
         self.lines: list[str] = []
         self.indent = 1
+        #: lines at the head of a step, which depend on it alone
         self.used: set[str] = set()
+        #: identifiers of what is looked up once, before the steps, by its code
         self._views: dict[str, str] = {}
         self._states: dict[Key, str] = {}
         self._count = 0
@@ -117,8 +128,7 @@ class Code:
 
     def position(self, indices: Indices, size: int) -> str:
         """The subscript that ``select`` reads, for writing."""
-        chosen = self.select("", indices, size)
-        return chosen or "[:]"
+        return self.select("", indices, size) or "[:]"
 
     def slot(self, delay: int) -> str:
         """k mod delay."""
@@ -143,14 +153,14 @@ class Code:
         """The steps as Python text. What stays the same over all of them is looked up before the first."""
         views = [f"    {name} = {code}" for code, name in self._views.items()]
         body = [*(f"    {text}" for text in sorted(self.used)), *self.lines, "    state.k = k + 1", "    yield"]
-        taken = [f"    {name} = state.{name}" for name in _PARTS if any(name in line for line in [*views, *body])]
-        taken += [
+        lookups = [f"    {name} = state.{name}" for name in _PARTS if any(name in line for line in [*views, *body])]
+        lookups += [
             f"    {name} = state.conditions.{name}"
             for name in (_VARIABLES, "holds")
             if any(name in line for line in [*views, *body])
         ]
         loop = ["    for k, s in enumerate(vectors, state.k):", *(f"    {line}" for line in body), ""]
-        return "\n".join(["def steps(state, vectors):", *taken, *views, *loop])
+        return "\n".join(["def steps(state, vectors):", *lookups, *views, *loop])
 
     def compiled(self) -> Steps:
         """The steps as a function. The text holds our own identifiers only."""
@@ -220,6 +230,7 @@ def _emit_replace(
 
 
 def _may_alias(tree: Tree) -> bool:
+    """Whether the value of an expression is that of a name, and no new array."""
     while isinstance(tree, Unary) and tree.operator == "+":
         tree = tree.operand
     return isinstance(tree, Name)
