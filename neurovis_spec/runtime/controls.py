@@ -1,7 +1,8 @@
 """Controls: how events and callers change the conditions of a run (§9).
 
 In: a State, and Changes or what a caller sets, clamps, lesions, mends, stops. Out: other Conditions in the State.
-Setting and clamping replace numbers; only lesions and stopped rules give the step another ``structure``.
+A *slot* is the index of a parameter in ``Settable``. Setting and clamping replace numbers; only lesions and stopped
+rules give the step another ``structure``.
 """
 
 from __future__ import annotations
@@ -27,10 +28,10 @@ def lose(network: Network, state: State, connections: IntArray) -> None:
     for connection in connections.tolist():
         if delays[connection]:
             state.signals[offsets[connection] : offsets[connection] + delays[connection]] = 0.0
-    looked_for = connections[remembering(network)[connections]]
-    if len(looked_for):
+    read_later = connections[remembering(network)[connections]]  # those whose rules read past activities
+    if len(read_later):
         lost = state.conditions.structure.lost.copy()
-        lost[looked_for] = state.k
+        lost[read_later] = state.k
         state.conditions.structure = replace(state.conditions.structure, lost=lost)
 
 
@@ -59,7 +60,8 @@ class Controls:
         return True
 
     def set(self, now: Conditions, weights: FloatArray, values: Mapping[int, float]) -> None:
-        """Set slots; all or nothing. Raises PatchError."""
+        """Set slots and all that follows them: parameters, weights and variables, clamps; all or nothing. Raises
+        PatchError."""
         patch = self._patcher.patch(now.parameters, now.was_set, values)
         now.parameters = patch.parameters
         for slot in values:
@@ -114,7 +116,7 @@ class Controls:
         self.restructure(state)
 
     def hold(self, now: Conditions) -> None:
-        """Work out what is held in each population."""
+        """Work out what is held in each population, lesioned neurons at 0, and put it into ``now.holds``."""
         holding = (now.held.order >= 0) | now.lesioned_neurons
         if not holding.any():
             now.holds = None
@@ -122,12 +124,13 @@ class Controls:
         values = np.where(now.lesioned_neurons, 0.0, now.held.value)
         holds: list[tuple[IntArray, FloatArray] | None] = []
         for population in self.network.populations:
-            own = population.members[holding[population.members]]
-            holds.append((own, values[own]) if len(own) else None)
+            held = population.members[holding[population.members]]
+            holds.append((held, values[held]) if len(held) else None)
         now.holds = tuple(holds)
 
     def restructure(self, state: State) -> None:
-        """Work out what a step leaves out."""
+        """Work out what a step leaves out, and put it into ``conditions.structure``: another object only where it
+        changes, as backends make their code anew for it."""
         connections, now = self.network.connections, state.conditions
         silent = now.lesioned_neurons
         gone = silent[connections.sources.whole()] | silent[connections.targets.whole()] | now.lesioned_connections

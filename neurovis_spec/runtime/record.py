@@ -49,17 +49,17 @@ def record(network: Network, course: Course = AS_IT_IS, progress: Progress | Non
     """
     course, state = begin_run(network, course)
     columns = columns_of(network, course.keep, course.body)
-    kept, widths = Steps(course.length(network), course.every, state.k), columns.widths(network)
+    steps, widths = Steps(course.length(network), course.every, state.k), columns.widths(network)
     if not course.keep.last:
-        check_room(kept.total, kept.every, sum(widths))
-    rows: InMemory | Last = Last(widths) if course.keep.last else InMemory(widths, len(kept))
+        check_room(steps.total, steps.every, sum(widths))
+    rows: InMemory | Last = Last(widths) if course.keep.last else InMemory(widths, len(steps))
     if course.checkpoint is None:
         run_steps(network, state, course, rows, progress)
     else:
         with deferred() as rows.asked:
             run_steps(network, state, course, rows, progress)
             keep_state(state, course)
-    return recording_of(network, columns, rows.numbers(kept), state.weights, end_values(network, state), state.backend)
+    return recording_of(network, columns, rows.numbers(steps), state.weights, end_values(network, state), state.backend)
 
 
 def begin_run(network: Network, course: Course) -> tuple[Course, State]:
@@ -67,16 +67,17 @@ def begin_run(network: Network, course: Course) -> tuple[Course, State]:
     checkpoint, if there is one, after a recording, or the first. What goes on goes on with its backend. Raises
     RecordingError, BackendError, BodyError where a checkpoint is wanted and the body cannot be kept."""
     course = course.embodied(network)
-    kept = _kept_state(network, course)
-    before = kept or course.start
-    made = ready(network, course.backend, "" if before is None else before.backend)
-    if kept is None:
-        kept = initial_state(network) if course.start is None else resumed_state(network, course.start, made.functions)
-    kept.backend = made.name
-    return replace(course, backend=made), kept
+    state = _checkpoint_state(network, course)
+    before = state or course.start
+    backend = ready(network, course.backend, "" if before is None else before.backend)
+    if state is None and course.start is not None:
+        state = resumed_state(network, course.start, backend.functions)
+    state = state or initial_state(network)
+    state.backend = backend.name
+    return replace(course, backend=backend), state
 
 
-def _kept_state(network: Network, course: Course) -> State | None:
+def _checkpoint_state(network: Network, course: Course) -> State | None:
     """The state in the checkpoint of a course, None where there is none yet. Raises RecordingError, BodyError."""
     checkpoint = course.checkpoint
     if checkpoint is None:
@@ -125,9 +126,9 @@ class InMemory:
 
     def numbers(self, steps: Steps) -> Numbers:
         """All that has come, for the first of these steps."""
-        made = slice(self._filled)
-        kept = np.concatenate([np.zeros(0, dtype=np.int64), *steps.parts()])
-        return Numbers(kept[made], self._rows.part(made))
+        filled = slice(self._filled)
+        numbers = np.concatenate([np.zeros(0, dtype=np.int64), *steps.parts()])
+        return Numbers(numbers[filled], self._rows.part(filled))
 
     def begin(self, count: int) -> Rows:
         """The next rows of the arrays."""
@@ -190,10 +191,11 @@ def run_steps(network: Network, state: State, course: Course, rows: RowSink, pro
     rows = rows if watched is None else watched
     watch = Watch(network)
     columns = columns_of(network, course.keep, body)
-    made = ready(network, course.backend)
-    reader, stepper = InputReader(network, course.inputs, watch.given, made.functions), made.stepper
+    backend = ready(network, course.backend)
+    reader, stepper = InputReader(network, course.inputs, watch.given, backend.functions), backend.stepper
     hands = _Hands(course.every, rows, reader, watch)
     make: _Make = _OneByOne(hands, columns, stepper, body, frozenset(course.inputs or ()))
+    # a runner gives the activities of all neurons and all changing weights, and nothing else
     plain = columns.neurons is None and not columns.probe.names and len(columns.weights) == len(network.changing)
     if (
         isinstance(stepper, Runner)
@@ -202,9 +204,10 @@ def run_steps(network: Network, state: State, course: Course, rows: RowSink, pro
         and (course.until is None or course.until.measure.together)
     ):
         make = _Together(hands, stepper, watched)
-    controls, origin, last = Controls(network, made.functions), state.k, state.k + steps
+    controls, origin, last = Controls(network, backend.functions), state.k, state.k + steps
     changes = [change for change in network.changes if origin <= change.at < last]
     _check_events(controls, state, changes)
+    # events change something between two of these steps, never within
     edges = [origin, *(change.at for change in changes if change.at > origin), last]
     with np.errstate(all="ignore"):
         for begin, end in pairwise(edges):
@@ -248,10 +251,10 @@ class _OneByOne:
     def steps(self, state: State, first: int, stop: int) -> bool:
         every, rows, reader, watch = self.hands
         step, look, due, columns = self.stepper.step, watch.look, rows.due, self.columns
-        changing, chosen = subscript(columns.weights), columns.neurons
+        changing, recorded = subscript(columns.weights), columns.neurons
         probe = columns.probe if columns.probe.names else None
-        wanted = _kept(first, stop, every)
-        activity, weights, states, sensors, poses = rows.begin(wanted)
+        rows_left = _rows_between(first, stop, every)
+        activity, weights, states, sensors, poses = rows.begin(rows_left)
         row, body = 0, self.body
         for k, vector in enumerate(reader.rows(first, stop), first):
             keep = k % every == 0
@@ -265,7 +268,7 @@ class _OneByOne:
             step(state, vector)
             look(state)
             if keep:
-                activity[row] = state.activity if chosen is None else state.activity[chosen]
+                activity[row] = state.activity if recorded is None else state.activity[recorded]
                 if probe is not None:
                     probe.read(state, states[row])
                 row += 1
@@ -279,8 +282,8 @@ class _OneByOne:
                 rows.end(row)
                 if rows.over():
                     return False
-                wanted -= row
-                activity, weights, states, sensors, poses = rows.begin(wanted)
+                rows_left -= row
+                activity, weights, states, sensors, poses = rows.begin(rows_left)
                 row = 0
         rows.end(row)
         return True
@@ -297,8 +300,8 @@ class _Together:
 
     def steps(self, state: State, first: int, stop: int) -> bool:
         every, rows, reader, watch = self.hands
-        wanted, most = _kept(first, stop, every), self.runner.at_once
-        activity, weights, *_ = rows.begin(wanted)
+        rows_left, most = _rows_between(first, stop, every), self.runner.at_once
+        activity, weights, *_ = rows.begin(rows_left)
         row, k = 0, first
         for part in reader.parts(first, stop):
             begin = k
@@ -306,15 +309,15 @@ class _Together:
                 until = watch.until(k, min(k + most, begin + len(part)))
                 vectors = part[k - begin : until - begin]
                 made = self._run(state, vectors, activity[row:], weights[row:], every, not watch.warned)
-                row += _kept(k, k + made, every)
+                row += _rows_between(k, k + made, every)
                 k += made
                 watch.look(state)
                 if rows.due() if self.watched is None else self.watched.asked():
                     rows.end(row)
                     if rows.over():
                         return False
-                    wanted -= row
-                    activity, weights, *_ = rows.begin(wanted)
+                    rows_left -= row
+                    activity, weights, *_ = rows.begin(rows_left)
                     row = 0
         rows.end(row)
         return True
@@ -326,6 +329,7 @@ class _Together:
         if self.watched is None:
             return self.runner.run(state, vectors, activity, weights, every, look)
         before = state.copy()
+        # the measure sees every step, the recording one in ``every``
         if every == 1:
             seen, learned = activity, weights
         else:
@@ -334,15 +338,15 @@ class _Together:
         count = self.watched.made(seen[:made])
         if every > 1:
             kept = slice(-before.k % every, count, every)
-            wanted = _kept(before.k, before.k + count, every)
+            wanted = _rows_between(before.k, before.k + count, every)
             activity[:wanted], weights[:wanted] = seen[kept], learned[kept]
-        if count < made:
+        if count < made:  # too far: back to before, and up to the step that ends the run
             state.become(before)
             self.runner.run(state, vectors[:count], seen, learned, 1, False)
         return count
 
 
-def _kept(first: int, stop: int, every: int) -> int:
+def _rows_between(first: int, stop: int, every: int) -> int:
     """How many of the steps from ``first`` to ``stop`` are recorded."""
     return (stop - 1) // every - (first - 1) // every
 

@@ -34,19 +34,21 @@ _ENDLESS = 1 << 53
 
 
 class Recorder:
-    """Records from a state on what a ``course`` keeps; into a file at ``path``, else in memory. ``told`` says what was
-    true after the last step, with the weights of all connections (m,). Raises KeyError for a name that there is not,
-    RecordingError, OSError."""
+    """Records from a state on what a ``course`` keeps; into a file at ``path``, else in memory. ``end_values`` gives
+    what is true after the last step, with the weights of all connections (m,). Raises KeyError for a name that
+    there is not, RecordingError, OSError."""
 
     def __init__(
-        self, network: Network, state: State, course: Course, path: Path | None, told: Callable[[], After]
+        self, network: Network, state: State, course: Course, path: Path | None, end_values: Callable[[], After]
     ) -> None:
-        self._network, self._body, self._path, self._told = network, course.body, path, told
+        self._network, self._body, self._path, self._end_values = network, course.body, path, end_values
         self._columns = columns_of(network, course.keep, course.body)
         self._steps = Steps(_ENDLESS, course.every, state.k)
         self._changing = subscript(self._columns.weights)
+        #: the state after the last step, and the row that the step going on fills, −1 for none
         self._last, self._row, self._closed = state, -1, False
         self._widths = self._columns.widths(network)
+        #: room for rows and how many of it are filled; full ones, where they stay in memory
         self._room, self._filled, self._before = Rows.room(self._widths, STRETCH), 0, list[Rows]()
         self._writer: RowWriter | None = None
         self._open, self._due = ExitStack(), monotonic() + OFTEN
@@ -57,16 +59,17 @@ class Recorder:
                 self._stream(format_, path)
 
     def _stream(self, format_: StreamingFormat, path: Path) -> None:
+        """Begin the file. Its part, which can be read meanwhile, is what is new beside it."""
         settle(path, format_)
         target = real_path(path)
-        there = set(beside(target, "part"))
+        parts_before = set(beside(target, "part"))
         frame = empty_recording(self._network, self._columns, self._last)
         self._writer = self._open.enter_context(format_.stream(path, frame, self._steps))
-        self._part = next(iter(set(beside(target, "part")) - there), None)
+        self._part = next(iter(set(beside(target, "part")) - parts_before), None)
 
     @property
     def going(self) -> bool:
-        """Whether it records on."""
+        """Whether it is not closed yet."""
         return not self._closed
 
     def begin(self, state: State) -> None:
@@ -86,8 +89,8 @@ class Recorder:
         """After a step."""
         self._last = state
         if self._row >= 0:
-            chosen = self._columns.neurons
-            self._room.activity[self._row] = state.activity if chosen is None else state.activity[chosen]
+            recorded = self._columns.neurons
+            self._room.activity[self._row] = state.activity if recorded is None else state.activity[recorded]
             if self._columns.probe.names:
                 self._columns.probe.read(state, self._room.states[self._row])
             self._filled += 1
@@ -98,7 +101,7 @@ class Recorder:
         """Give the rows to the file, or put them to those before."""
         rows = self._room.part(slice(self._filled))
         if self._writer is not None:
-            self._writer.write(rows, self._after(self._told()))
+            self._writer.write(rows, self._after(self._end_values()))
             self._due = monotonic() + OFTEN
         elif self._filled:
             self._before.append(rows)
@@ -118,16 +121,19 @@ class Recorder:
         return load(self._part)
 
     def _in_memory(self) -> Recording:
+        """The rows so far as a recording."""
         parts = [*self._before, self._room.part(slice(self._filled))]
         rows = Rows(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
         count = len(rows.activity)
         step = np.array([self._steps.at(row) for row in range(count)], dtype=np.int64)
-        told, backend = self._told(), self._last.backend
-        return recording_of(self._network, self._columns, Numbers(step, rows), told.weights, self._after(told), backend)
+        end_values, backend = self._end_values(), self._last.backend
+        return recording_of(
+            self._network, self._columns, Numbers(step, rows), end_values.weights, self._after(end_values), backend
+        )
 
-    def _after(self, told: After) -> After:
-        """With the weights of those connections alone that can change."""
-        return replace(told, weights=told.weights[self._network.changing])
+    def _after(self, end_values: After) -> After:
+        """The same with the weights of those connections alone that can change."""
+        return replace(end_values, weights=end_values.weights[self._network.changing])
 
     def close(self, error: BaseException | None = None) -> None:
         """End the recording, as that of a run that broke off where there is an ``error``, an Exception. Raises what
