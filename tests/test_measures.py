@@ -84,14 +84,14 @@ def test_a_window_does_not_drift_and_forgets_what_was_huge() -> None:
 def test_the_work_of_a_step_does_not_grow_with_the_window(monkeypatch: pytest.MonkeyPatch) -> None:
     """A window keeps one block of numbers, which is put together once in N steps."""
     turns = 0
-    turn = _Last._turn
+    turn = _Last._begin_block
 
     def counted(self: _Last) -> None:
         nonlocal turns
         turns += 1
         turn(self)
 
-    monkeypatch.setattr(_Last, "_turn", counted)
+    monkeypatch.setattr(_Last, "_begin_block", counted)
     window = running("rms", 1000)
     for _ in range(5000):
         window.push(1.0)

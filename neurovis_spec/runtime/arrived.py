@@ -26,10 +26,12 @@ _LISTED = 5
 
 @dataclass
 class _Rows:
-    """The rows of one kind in one run, and when the first and the last came."""
+    """The rows of one kind in one run."""
 
+    #: when the first and the last came
     first: int
     last: int = 0
+    #: the step of each row, ascending
     steps: list[int] = field(default_factory=list)
     rows: list[FloatArray] = field(default_factory=list)
 
@@ -48,12 +50,13 @@ class Arrived:
 
     def take(self, kind: int, time: int, data: bytes, encoding: Encoding) -> None:
         """A message. Raises RecordingError where it is none of this network's arrays, and WireError."""
-        said, numbers = step_of(data, encoding, self._label, self._frame.widths[kind])
+        step, numbers = step_of(data, encoding, self._label, self._frame.widths[kind])
         runs = self._runs[kind]
-        if not runs or (said is not None and said <= runs[-1].steps[-1]):
+        # a step that is not behind the one before begins another run
+        if not runs or (step is not None and step <= runs[-1].steps[-1]):
             runs.append(_Rows(time))
         run = runs[-1]
-        run.steps.append(said if said is not None else run.steps[-1] + 1 if run.steps else 0)
+        run.steps.append(step if step is not None else run.steps[-1] + 1 if run.steps else 0)
         run.rows.append(numbers)
         run.last = time
 
@@ -65,24 +68,24 @@ class Arrived:
             number = max(1, len(runs))
             if len(runs) > 1:
                 others = "render, animate, analyze and live read another by --run N"
-                warnings.warn(f"{path} holds {_told(runs)}: the last is read; {others}", stacklevel=5)
+                warnings.warn(f"{path} holds {_list_of_runs(runs)}: the last is read; {others}", stacklevel=5)
         elif not 1 <= number <= max(1, len(runs)):
-            raise RecordingError(f"there is no run {number}: it holds {_told(runs)}")
-        chosen = runs[number - 1] if runs else _Rows(0)
-        used = [kind for kind, width in enumerate(self._frame.widths) if width or kind == 0]
+            raise RecordingError(f"there is no run {number}: it holds {_list_of_runs(runs)}")
+        run = runs[number - 1] if runs else _Rows(0)
+        kinds = [kind for kind, width in enumerate(self._frame.widths) if width or kind == 0]
         # each topic comes in its own time: the rows of the other kinds are those that came beside these
-        beside = [chosen, *(max(others, key=chosen.shared, default=_Rows(0)) for others in self._runs[1:])]
-        held = {kind: np.array(beside[kind].steps, dtype=np.int64) for kind in used}
-        step = reduce(partial(np.intersect1d, assume_unique=True), held.values())
+        beside = [run, *(max(others, key=run.shared, default=_Rows(0)) for others in self._runs[1:])]
+        steps = {kind: np.array(beside[kind].steps, dtype=np.int64) for kind in kinds}
+        step = reduce(partial(np.intersect1d, assume_unique=True), steps.values())
         rows = Rows(*(
-            np.array([beside[kind].rows[row] for row in np.searchsorted(held[kind], step)] if kind in held else [])
+            np.array([beside[kind].rows[row] for row in np.searchsorted(steps[kind], step)] if kind in steps else [])
             .reshape(len(step), width)
             for kind, width in enumerate(self._frame.widths)
         ))  # fmt: skip
         return self._frame.having(step, rows)
 
 
-def _told(runs: Sequence[_Rows]) -> str:
+def _list_of_runs(runs: Sequence[_Rows]) -> str:
     """Which runs there are, in words."""
     if len(runs) <= 1:
         return "one run"

@@ -6,7 +6,7 @@ then ``sensor NAME`` for each number that a body senses. In the table of a parti
 as K1 need not have a column that tells it from a neuron v in an instance K1. Numbers read back exactly. What stays in a
 run, and the pose of a body, is not in the table, so a recording read from it knows the changing connections alone, with
 delay 1, and of the neurons that were not recorded those that its columns name; nor is what is true after the last step,
-for which the last row stands.
+for which the last row stands. A *frame* is a recording without rows; a *part* is the file while it is written.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ from neurovis_spec.runtime.rows import After, Rows, RowWriter, Steps
 _SENSOR = "sensor "
 #: before the names of states in the table of a partial recording
 _STATE = "state "
-#: the pose, the last kind, is no part of a table
-_KEPT = 4
+#: how many kinds of numbers a table has: all but the pose, the last one
+_KINDS_KEPT = 4
 _CONNECTION = re.compile(r"(?P<source>\S+) -> (?P<target>\S+)(?: \((?P<rank>[0-9]{1,9})\))?")
 
 #: bytes that are read together
@@ -55,7 +55,7 @@ def write_csv(recording: Recording, path: Path) -> None:
 
 def csv_size(frame: Recording, steps: Steps) -> int:
     """About the bytes that a file takes: numbers have up to 24 characters, most of them fewer."""
-    return len(steps) * 10 * (2 + sum(frame.widths[:_KEPT]))
+    return len(steps) * 10 * (2 + sum(frame.widths[:_KINDS_KEPT]))
 
 
 @contextmanager
@@ -103,7 +103,7 @@ class _Table:
 
     def write(self, steps: IntArray, rows: Rows) -> None:
         """Further rows, which are with the system afterwards."""
-        for step, *row in zip(steps.tolist(), *rows[:_KEPT], strict=True):
+        for step, *row in zip(steps.tolist(), *rows[:_KINDS_KEPT], strict=True):
             self._writer.writerow([step, step * self._dt, *(value for part in row for value in part.tolist())])
         self._text.flush()
 
@@ -117,8 +117,9 @@ def held_csv(file: FileIO) -> int | None:
     file.seek(0)
     if not _FIRST.startswith(file.read(len(_FIRST))):
         raise RecordingError("not a recording in progress")
-    end = _whole(file, file.seek(0, io.SEEK_END))
-    begin = _whole(file, end - 1)
+    end = _end_of_last_line(file, file.seek(0, io.SEEK_END))
+    # the last whole line: from behind the line break before it
+    begin = _end_of_last_line(file, end - 1)
     file.seek(begin)
     match = re.match(rb"([0-9]{1,16}),", file.read(20))
     return int(match[1]) if match and begin else None
@@ -126,7 +127,7 @@ def held_csv(file: FileIO) -> int | None:
 
 def finish_csv(file: FileIO, part: Path, path: Path) -> None:
     """Turn the part of a run that broke off into a recording. Raises OSError."""
-    file.truncate(_whole(file, file.seek(0, io.SEEK_END)))
+    file.truncate(_end_of_last_line(file, file.seek(0, io.SEEK_END)))
     move(file, part, path)
 
 
@@ -135,8 +136,8 @@ def recover_csv(part: Path) -> Recording:
     return _read(part, lambda lines: (line for line in lines if line.endswith("\n")))
 
 
-def _whole(file: FileIO, end: int) -> int:
-    """The bytes up to the end of the last whole line before a place."""
+def _end_of_last_line(file: FileIO, end: int) -> int:
+    """Where, up to ``end``, the last whole line ends; 0 where there is none."""
     while end > 0:
         begin = max(0, end - _BLOCK)
         file.seek(begin)
@@ -152,11 +153,12 @@ def read_csv(path: Path) -> Recording:
     return _read(path, lambda lines: lines)
 
 
-def _read(path: Path, chosen: Callable[[Iterator[str]], Iterator[str]]) -> Recording:
+def _read(path: Path, whole_lines: Callable[[Iterator[str]], Iterator[str]]) -> Recording:
+    """Read those lines of a file that ``whole_lines`` lets through. Raises RecordingError."""
     try:
         regular_size(path)
         with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(chosen(file))
+            reader = csv.reader(whole_lines(file))
             header = next(reader, [])
             return _recording(header, _table(reader, len(header)))
     except OSError as error:
@@ -166,6 +168,7 @@ def _read(path: Path, chosen: Callable[[Iterator[str]], Iterator[str]]) -> Recor
 
 
 def _table(reader: Iterator[list[str]], columns: int) -> FloatArray:
+    """The numbers below the header, (rows, columns). Raises RecordingError."""
     rows = []
     for line, row in enumerate(reader, 2):
         if len(row) != columns:
@@ -178,13 +181,14 @@ def _table(reader: Iterator[list[str]], columns: int) -> FloatArray:
 
 
 def _recording(header: list[str], table: FloatArray) -> Recording:
+    """The recording of a table. Raises RecordingError where its header is none of a recording."""
     if header[:2] != ["step", "t"]:
         raise RecordingError("not a recording: its first columns are not 'step' and 't'")
     sensors = [name for name in header if name.startswith(_SENSOR)]
-    first = len(header) - len(sensors)
-    if header[first:] != sensors or len(set(sensors)) != len(sensors):
+    first_sensor = len(header) - len(sensors)
+    if header[first_sensor:] != sensors or len(set(sensors)) != len(sensors):
         raise RecordingError("not a recording: sensors are mixed with others, or one is named twice")
-    columns, connections, states = _columns(header[2:first])
+    columns, connections, states = _columns(header[2:first_sensor])
     if len(set(columns)) != len(columns) or len(set(states)) != len(states):
         raise RecordingError("not a recording: a neuron or a state is named twice")
     pairs = [_ends(name) for name in connections]
@@ -195,14 +199,15 @@ def _recording(header: list[str], table: FloatArray) -> Recording:
         raise RecordingError("a connection stands there twice")
     sources, targets, ranks = (np.array([e[i] for e in ends], dtype=np.int64) for i in range(3))
     steps = table[:, 0]
-    whole = (steps == np.floor(steps)) & (np.abs(steps) < 2.0**53)
-    if not (whole.all() and (np.diff(steps, prepend=-1.0) > 0).all()):
+    are_whole = (steps == np.floor(steps)) & (np.abs(steps) < 2.0**53)
+    if not (are_whole.all() and (np.diff(steps, prepend=-1.0) > 0).all()):
         raise RecordingError("the steps are no ascending whole numbers")
-    n, p = 2 + len(columns), len(connections)
-    weights = table[:, n : n + p].copy()
+    first_weight = 2 + len(columns)
+    first_state, p = first_weight + len(connections), len(connections)
+    weights = table[:, first_weight:first_state].copy()
     after = after_rows(steps.astype(np.int64), weights, p)
     return Recording(
-        activity=table[:, 2:n].copy(),
+        activity=table[:, 2:first_weight].copy(),
         neurons=neurons,
         weights=weights,
         weights_static=np.zeros(0),
@@ -215,10 +220,10 @@ def _recording(header: list[str], table: FloatArray) -> Recording:
         ranks=ranks,
         weights_after=after.weights,
         reached=after.reached,
-        states=table[:, n + p : first].copy(),
+        states=table[:, first_state:first_sensor].copy(),
         state_names=tuple(states),
         recorded=None if len(columns) == len(neurons) else np.arange(len(columns)),
-        sensors=table[:, first:].copy() if sensors else None,
+        sensors=table[:, first_sensor:].copy() if sensors else None,
         sensor_names=tuple(name.removeprefix(_SENSOR) for name in sensors),
     )
 

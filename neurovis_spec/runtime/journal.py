@@ -2,8 +2,13 @@
 
 In: rows as they come, a file. Out: at any time a file that can be read up to its last whole chunk; its rows.
 
-The file begins with a line that says what it is, and a frame: all that does not grow with the steps. A chunk holds
-rows, kind by kind, and what was true after its last step. What breaks off or does not agree ends the file.
+    MAGIC, _FRAME: bytes of the frame, every, first step, checksum
+    frame: all that does not grow with the steps, as its caller writes it (``npz_file.frame_bytes``)
+    a chunk for each ``write``:
+        _CHUNK: "rows", rows, bytes of the text, checksum of the rest
+        the rows, one kind after the other; the changing weights after the last step; a text: what else is true then
+
+What breaks off or does not agree ends the file.
 """
 
 from __future__ import annotations
@@ -25,8 +30,7 @@ from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.rows import KINDS, After, Rows, Steps, Widths
 
 MAGIC: Final = b"neurovis run 2\n"
-#: bytes of the frame, every how many steps, the first step, checksum; of a chunk: a mark, rows, bytes of
-#: the text at its end, checksum
+#: the heads of the frame and of a chunk
 _FRAME, _CHUNK = struct.Struct("<QQQI"), struct.Struct("<4sQQI")
 _MARK = b"rows"
 _NUMBER, _PIECE = 8, 1 << 20
@@ -78,16 +82,20 @@ class _Chunk:
 
 @dataclass(frozen=True)
 class Journal:
-    """What can be read of a journal: the bytes of its frame, ``rows`` rows of every ``every``-th step, and what was
-    true after the last (``after``, the text of its last chunk; ``weights``, the changing ones)."""
+    """What can be read of a journal."""
 
     file: FileIO
     frame: bytes
+    #: one step in so many has a row
     every: int
+    #: the step at which the run began, whether it has a row or not
     first: int
+    #: how many columns a row has of each kind
     columns: Widths
     chunks: tuple[_Chunk, ...]
+    #: what is true after the last step, as the text of the last chunk says; {} without a chunk
     after: dict[str, object]
+    #: (p,) the changing weights after the last step; none without a chunk
     weights: FloatArray
 
     @property
@@ -103,9 +111,11 @@ class Journal:
 
     def pieces(self, place: int) -> Iterator[bytes]:
         """The bytes of all rows of a kind (a place in KINDS), in order, some at a time."""
-        before, width = sum(self.columns[:place]), self.columns[place]
-        for chunk in self.chunks:
-            yield from _pieces(self.file, chunk.offset + chunk.rows * before * _NUMBER, chunk.rows * width * _NUMBER)
+        columns_before, width = sum(self.columns[:place]), self.columns[place]
+        for chunk in self.chunks:  # in which all rows of a kind lie together
+            yield from _pieces(
+                self.file, chunk.offset + chunk.rows * columns_before * _NUMBER, chunk.rows * width * _NUMBER
+            )
 
     @property
     def all_rows(self) -> Rows:
@@ -124,8 +134,8 @@ def is_begun(file: FileIO) -> bool:
 
 
 def read_journal(file: FileIO, columns: Callable[[bytes], tuple[Widths, int]]) -> Journal:
-    """Read a journal as far as it is whole. ``columns`` says from a frame how many columns the
-    rows have, and how many changing weights there are after the last step. Raises RecordingError, OSError."""
+    """Read a journal as far as it is whole. ``columns`` gives, for the bytes of a frame, how many columns the rows have
+    and how many changing weights a chunk ends with. Raises RecordingError, OSError."""
     size = file.seek(0, io.SEEK_END)
     file.seek(0)
     head = file.read(len(MAGIC) + _FRAME.size)
@@ -141,15 +151,15 @@ def read_journal(file: FileIO, columns: Callable[[bytes], tuple[Widths, int]]) -
     offset, text, last = len(head) + length, b"{}", b""
     while offset + _CHUNK.size <= size:
         file.seek(offset)
-        mark, rows, more, checksum = _CHUNK.unpack(file.read(_CHUNK.size))
+        mark, rows, text_length, checksum = _CHUNK.unpack(file.read(_CHUNK.size))
         begin = offset + _CHUNK.size
         numbers = (rows * width + p) * _NUMBER
-        end = begin + numbers + more
-        if mark != _MARK or end > size or _sum(file, begin, end) != checksum:
+        end = begin + numbers + text_length
+        if mark != _MARK or end > size or _checksum(file, begin, end) != checksum:
             break
         chunks.append(_Chunk(begin, rows))
         last = b"".join(_pieces(file, begin + numbers - p * _NUMBER, p * _NUMBER))
-        text = b"".join(_pieces(file, begin + numbers, more))
+        text = b"".join(_pieces(file, begin + numbers, text_length))
         offset = end
     after = json.loads(text)
     if not isinstance(after, dict):
@@ -158,7 +168,7 @@ def read_journal(file: FileIO, columns: Callable[[bytes], tuple[Widths, int]]) -
     return Journal(file, frame, every, first, widths, tuple(chunks), after, weights)
 
 
-def _sum(file: FileIO, begin: int, end: int) -> int:
+def _checksum(file: FileIO, begin: int, end: int) -> int:
     total = 0
     for piece in _pieces(file, begin, end - begin):
         total = crc32(piece, total)

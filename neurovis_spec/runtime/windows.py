@@ -3,6 +3,9 @@
 In: values, one a step. Out: the summary after each. Steps lie in blocks of N: a window is the end of one block and the
 beginning of the next, and of both the sums are known, so that nothing is ever subtracted: rounding does not add up, and
 what was infinite or NaN is forgotten N steps later. Of all steps the sum is kept in two numbers, to about 100 bits.
+
+With N = 3 and the values a b c | d e, the window after e is c d e: the *tail* of the block before from c on, and the
+*head* of this one, d e.
 """
 
 from __future__ import annotations
@@ -16,8 +19,8 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.language.expressions.functions import maximum, minimum
 from neurovis_spec.language.expressions.measures import Summary
 
-#: What is put together with what, and what it begins with; the sum of rms is one of squares.
-_PUT: Final = {"rms": np.add, "mean": np.add, "min": np.minimum, "max": np.maximum}
+#: How two values of a summary become one, and the value of none; the sum of rms is one of squares.
+_COMBINE: Final = {"rms": np.add, "mean": np.add, "min": np.minimum, "max": np.maximum}
 _BEGIN: Final = {"rms": 0.0, "mean": 0.0, "min": math.inf, "max": -math.inf}
 
 
@@ -45,27 +48,28 @@ class _Last:
         self._summary, self._count = summary, count
         self._block = np.empty(count)
         self._filled = 0
-        #: the summary of the block so far; of the end of the block before from each place on, None in the first block
+        #: the summary of the block so far
         self._head = _BEGIN[summary]
+        #: the summaries of the block before from each place to its end, None in the first block
         self._tails: FloatArray | None = None
 
     def push(self, value: float) -> float:
         if self._filled == self._count:
-            self._turn()
+            self._begin_block()
         value = value * value if self._summary == "rms" else value
         self._block[self._filled] = value
         self._filled += 1
-        self._head = _put(self._summary, self._head, value)
+        self._head = _combined(self._summary, self._head, value)
         made = self._filled if self._tails is None else self._count
         total = self._head
         if self._tails is not None and self._filled < self._count:
-            total = _put(self._summary, float(self._tails[self._filled]), total)
+            total = _combined(self._summary, float(self._tails[self._filled]), total)
         return _finished(self._summary, total, made)
 
-    def _turn(self) -> None:
+    def _begin_block(self) -> None:
         """The block is full: another begins."""
         with np.errstate(all="ignore"):
-            self._tails = _PUT[self._summary].accumulate(self._block[::-1])[::-1]
+            self._tails = _COMBINE[self._summary].accumulate(self._block[::-1])[::-1]
         self._filled, self._head = 0, _BEGIN[self._summary]
 
     def extend(self, values: FloatArray) -> FloatArray:
@@ -73,26 +77,26 @@ class _Last:
         first = 0
         while first < len(values):
             if self._filled == self._count:
-                self._turn()
+                self._begin_block()
             begin = self._filled
-            some = values[first : first + self._count - begin]
-            result[first : first + len(some)] = self._within(some, begin)
-            first += len(some)
+            of_block = values[first : first + self._count - begin]
+            result[first : first + len(of_block)] = self._within(of_block, begin)
+            first += len(of_block)
         return result
 
     def _within(self, values: FloatArray, begin: int) -> FloatArray:
         """More values of one block."""
-        put, end = _PUT[self._summary], begin + len(values)
+        combine, end = _COMBINE[self._summary], begin + len(values)
         with np.errstate(all="ignore"):
             values = values * values if self._summary == "rms" else values
             self._block[begin:end] = values
-            heads = put.accumulate(np.concatenate(([self._head], values)))[1:]
+            heads = combine.accumulate(np.concatenate(([self._head], values)))[1:]
             self._head, self._filled = float(heads[-1]), end
             if self._tails is None:
                 totals, made = heads, np.arange(begin + 1.0, end + 1.0)
             else:
                 tails = np.append(self._tails, _BEGIN[self._summary])[begin + 1 : end + 1]
-                totals, made = put(tails, heads), np.full(len(values), float(self._count))
+                totals, made = combine(tails, heads), np.full(len(values), float(self._count))
             return _all_finished(self._summary, totals, made)
 
 
@@ -110,11 +114,11 @@ class _All:
     def extend(self, values: FloatArray) -> FloatArray:
         if not len(values):
             return values
-        put = _PUT[self._summary]
+        combine = _COMBINE[self._summary]
         with np.errstate(all="ignore"):
             values = values * values if self._summary == "rms" else values
-            totals = put.accumulate(np.concatenate(([self._high], values)))[1:]
-            if put is np.add:
+            totals = combine.accumulate(np.concatenate(([self._high], values)))[1:]
+            if combine is np.add:
                 self._add(values)
                 totals[-1] = self._high
             else:
@@ -124,6 +128,7 @@ class _All:
             return _all_finished(self._summary, totals, made)
 
     def _add(self, values: FloatArray) -> None:
+        """Add to the sum: ``_high`` is it rounded, ``_low`` what the rounding has left."""
         rough = self._high + float(np.add.reduce(values))
         if not math.isfinite(rough):
             self._high, self._low = rough, 0.0
@@ -133,13 +138,14 @@ class _All:
         self._low = math.fsum([*parts, -self._high])
 
 
-def _put(summary: Summary, one: float, other: float) -> float:
+def _combined(summary: Summary, one: float, other: float) -> float:
     if summary in ("rms", "mean"):
         return one + other
     return minimum(one, other) if summary == "min" else maximum(one, other)
 
 
 def _finished(summary: Summary, total: float, made: int) -> float:
+    """The summary of so many values that come to ``total``."""
     if summary in ("min", "max"):
         return total + 0.0  # of 0 and −0 NumPy takes either: −0 becomes 0
     mean = total / made
@@ -147,6 +153,7 @@ def _finished(summary: Summary, total: float, made: int) -> float:
 
 
 def _all_finished(summary: Summary, totals: FloatArray, made: FloatArray) -> FloatArray:
+    """The same for many totals at once."""
     if summary in ("min", "max"):
         return totals + 0.0
     return np.asarray(np.sqrt(totals / made) if summary == "rms" else totals / made, dtype=np.float64)
