@@ -36,23 +36,28 @@ from neurovis_spec.runtime.state import NEVER_LOST, Mask, State, by_kind, initia
 
 @dataclass(frozen=True)
 class Phase:
-    """What is held and left out from a step on, by events."""
+    """What is held and left out from a step on, by events; the fields of Structure and Held at that step."""
 
+    #: the step, −1 for what is so before any
     at: int
+    #: of each neuron the order of the clamp that holds it, −1 for none
     order: tuple[int, ...]
     lesioned: Mask
     gone: Mask
     still: Mask
     lost: IntArray
+    #: the clamps that hold, by their order
     clamps: Mapping[int, Clamp]
 
 
 @dataclass(frozen=True)
 class Member:
-    """A member of the struct: an array of numbers, what it begins with and what it is."""
+    """A member of the struct: an array of numbers."""
 
     name: str
+    #: what it begins with
     begin: FloatArray
+    #: what it is, for the comment beside it
     about: str
 
 
@@ -64,41 +69,43 @@ class Exported:
     """The C of one network."""
 
     def __init__(self, network: Network, start: State | None = None, real: str = "double") -> None:
-        settable, kept = fixed(network.settable)
+        settable, kept_slots = fixed(network.settable)
         self.network, self.real = replace(without_checks(network), settable=settable), real
         self.name = prefix(network.name)
         self.macro = self.name.upper()
         self.state = (initial_state(network) if start is None else start).copy()
         self.emitter, self.tables = Emitter(real), Tables(real, None)
+        #: the kinds of draws that noise makes, whose functions the source needs
         self.kinds: set[str] = set()
         self.inputs = [one for one in network.inputs if one.expression is None and one.table is None]
         self.input_names = identifiers(one.name for one in self.inputs)
         self.output_names = identifiers(one.name for one in network.outputs)
         slots = network.settable.index
         free = [name for name in network.parameters if name not in network.structural and name in slots]
-        self.settable = [name for name in free if slots[name] not in kept]
+        self.settable = [name for name in free if slots[name] not in kept_slots]
         #: parameters that keep their values in C, and could be set in a run; what follows each
-        self.fixed: Mapping[str, str] = {name: kept[slots[name]] for name in free if slots[name] in kept}
-        self._check_events(kept)
+        self.fixed: Mapping[str, str] = {name: kept_slots[slots[name]] for name in free if slots[name] in kept_slots}
+        self._check_events(kept_slots)
         self.settable_names = identifiers(self.settable)
         self.phases = self._phases()
+        #: whether any phase holds neurons, and whether any leaves out connections
         self.holding = any(any(order >= 0 for order in phase.order) or phase.lesioned.any() for phase in self.phases)
         self.leaving = any(phase.gone.any() or phase.still.any() for phase in self.phases)
         self.members = self._members()
 
     # ---- what there is -----------------------------------------------------------------------------------------
 
-    def _check_events(self, kept: Mapping[int, str]) -> None:
+    def _check_events(self, kept_slots: Mapping[int, str]) -> None:
         """Refuse events that set what keeps its value. Raises ExportError."""
         for change in self.network.changes:
             for slot, _ in change.parameters:
-                if slot in kept:
+                if slot in kept_slots:
                     name = self.network.settable.slots[slot].name
-                    told = f"an event sets '{name}' at step {change.at}, and C cannot work out what follows it"
-                    raise ExportError(f"{told} ({kept[slot]}): export the network without this event")
+                    problem = f"an event sets '{name}' at step {change.at}, and C cannot work out what follows it"
+                    raise ExportError(f"{problem} ({kept_slots[slot]}): export the network without this event")
 
     def _phases(self) -> list[Phase]:
-        """What is held and left out after the events of each step; which that is depends on no parameter."""
+        """What is held and left out after the events of each step, as in a run; no parameter decides that."""
         network, controls = self.network, Controls(self.network)
         state = self.state.copy()
         phases = [self._phase(-1, state)]
@@ -113,18 +120,22 @@ class Exported:
         return phases
 
     def _phase(self, at: int, state: State) -> Phase:
+        """The phase that begins with a state."""
         now = state.conditions
         order = tuple(now.held.order.tolist())
         structure = now.structure
         lesioned, clamps = now.lesioned_neurons.copy(), dict(now.held.active)
-        return Phase(at, order, lesioned, structure.gone, structure.still, structure.lost, clamps)
+        return Phase(
+            at, order, lesioned, gone=structure.gone, still=structure.still, lost=structure.lost, clamps=clamps
+        )
 
     def _members(self) -> list[Member]:
+        """The arrays of the struct, without those that are empty."""
         network, state = self.network, self.state
         # the state may have checks of a run, which this network has not
         own = {use.owner: use.definition.state for _, use in network.uses}
         cells = {owner: {one.name: state.cells[owner][one.name] for one in states} for owner, states in own.items()}
-        found = [
+        members = [
             Member("activity", state.activity, "a[k - 1] of all neurons"),
             Member("weights", state.weights, "w[k] of all connections"),
             Member("signals", state.signals, "what is under way on delayed connections"),
@@ -138,8 +149,8 @@ class Exported:
             Member("vector", np.zeros(network.vector_size), "the inputs and the noise of a step"),
         ]
         if self.holding:
-            found.append(Member("holding", np.zeros(len(network.neurons)), "what neurons are held at"))
-        return [member for member in found if len(member.begin) or member.name in ("activity", "weights")]
+            members.append(Member("holding", np.zeros(len(network.neurons)), "what neurons are held at"))
+        return [member for member in members if len(member.begin) or member.name in ("activity", "weights")]
 
     @property
     def first(self) -> bool:
@@ -204,22 +215,24 @@ void {name}_step({name}_state *state, const {name}_inputs *in, {name}_outputs *o
         return f"typedef struct {self.name}_{kind} {{\n{within}}} {self.name}_{kind};"
 
     def _state_fields(self) -> list[str]:
-        found = [
+        """The lines of the struct. C has no empty arrays: one that is empty gets a number."""
+        fields = [
             f"{self.real} {member.name}[{len(member.begin)}]; /* {member.about} */"
             if len(member.begin)
             else f"{self.real} {member.name}[1]; /* there are none */"
             for member in self.members
         ]
-        found.append("int64_t k; /* the step to come */")
+        fields.append("int64_t k; /* the step to come */")
         if slots := len(self.network.settable.slots):
-            found.append(f"unsigned char chosen[{slots}]; /* parameters that were set */")
+            fields.append(f"unsigned char chosen[{slots}]; /* parameters that were set */")
         if len(self.phases) > 1:
-            found.append("int32_t phase; /* events that have happened */")
+            fields.append("int32_t phase; /* events that have happened */")
         if self.holding:
-            found.append(f"unsigned char held[{len(self.network.neurons)}]; /* neurons that are held */")
-        return found
+            fields.append(f"unsigned char held[{len(self.network.neurons)}]; /* neurons that are held */")
+        return fields
 
     def _setter(self, parameter: str, own: str) -> str:
+        """The declaration of the function that sets a parameter; ``own`` is its name in C."""
         return f"""
 /* Set the parameter {words(parameter, 40)} from the next step on, and what follows it. Gives 1; or
    0, and nothing has changed, where a number would not be finite or leave its bounds. */
@@ -274,26 +287,26 @@ int {self.name}_set_{own}({self.name}_state *state, {self.real} value);
     def _code(self) -> Code:
         return Code(self.emitter, self.tables, self.network.dt, self.network.settable.variables)
 
-    def _taken(self) -> dict[str, str]:
+    def _pointer_lines(self) -> dict[str, str]:
         """For each array of the state, and its parts, the line that gives it its name."""
         network, real, quick = self.network, self.real, f"{self.macro}_RESTRICT"
-        taken = {
+        pointer_lines = {
             name: f"{real} *{quick} const {name} = state->{name};"
             for name in ("activity", "weights", "signals", "history")
         }
-        taken["x"] = f"{real} *{quick} const x = state->variables;"
-        taken["s"] = f"const {real} *{quick} const s = state->vector;"
-        taken["holding"] = f"const {real} *{quick} const holding = state->holding;"
-        taken["held"] = f"const unsigned char *{quick} const held = state->held;"
-        taken["parameters"] = f"const {real} *const parameters = state->parameters;"
+        pointer_lines["x"] = f"{real} *{quick} const x = state->variables;"
+        pointer_lines["s"] = f"const {real} *{quick} const s = state->vector;"
+        pointer_lines["holding"] = f"const {real} *{quick} const holding = state->holding;"
+        pointer_lines["held"] = f"const unsigned char *{quick} const held = state->held;"
+        pointer_lines["parameters"] = f"const {real} *const parameters = state->parameters;"
         starts: dict[str, int] = {}
         for holder, use in network.uses:
             kept = kept_as(use.owner.kind)
             for i in range(len(use.definition.state)):
                 name, start = state_name(use.owner, i), starts.get(kept, 0)
-                taken[name] = f"{real} *{quick} const {name} = state->{kept} + {start};"
+                pointer_lines[name] = f"{real} *{quick} const {name} = state->{kept} + {start};"
                 starts[kept] = start + len(holder.members)
-        return taken
+        return pointer_lines
 
     def _left_out(self) -> dict[str, tuple[str, list[npt.NDArray[np.integer]]]]:
         """What a step has to look at for what events leave out, where they do: its type, and its numbers in each
@@ -309,25 +322,31 @@ int {self.name}_set_{own}({self.name}_state *state, {self.real} value);
 
     def _compute(self) -> list[str]:
         """The step itself."""
-        network, code, taken = self.network, self._code(), self._taken()
-        small = len(network.neurons) + len(network.connections) <= SMALL
-        left = self._left_out()
-        form = Form(small, self.first, self.holding, *(name in left for name in ("gone", "still", "lost")))
+        network, code, pointer_lines = self.network, self._code(), self._pointer_lines()
+        left_out = self._left_out()
+        form = Form(
+            written_out=len(network.neurons) + len(network.connections) <= SMALL,
+            first=self.first,
+            held=self.holding,
+            gone="gone" in left_out,
+            still="still" in left_out,
+            lost="lost" in left_out,
+        )
         StepCode(network, code, form, [incoming_of(network, population) for population in network.populations]).write()
         before: list[str] = []
-        for name in sorted(left.keys() & words_of(code.lines)):  # what never learns asks for none that is still
-            kind, phases = left[name]
+        for name in sorted(left_out.keys() & words_of(code.lines)):  # what never learns asks for none that is still
+            kind, phases = left_out[name]
             lines, which = _by_phase(name, kind, phases)
             before += lines
-            taken[name] = f"const {kind} *const {name} = {which};"
+            pointer_lines[name] = f"const {kind} *const {name} = {which};"
         if self.first:
             code.head["first"] = "const int first = k == 0;"
-        return [*before, *self._function(code, "What a step computes.", "void nv_compute", taken)]
+        return [*before, *self._function(code, "What a step computes.", "void nv_compute", pointer_lines)]
 
-    def _function(self, code: Code, about: str, own: str, taken: dict[str, str], more: str = "") -> list[str]:
+    def _function(self, code: Code, about: str, own: str, pointer_lines: dict[str, str], more: str = "") -> list[str]:
         """A function of our own over a state."""
         head = f"static {own}({self.name}_state *state{more})"
-        lines = function(code, head, {"k": "const int64_t k = state->k;", **taken})
+        lines = function(code, head, {"k": "const int64_t k = state->k;", **pointer_lines})
         if "state" not in words_of(lines[1:]):
             lines.insert(2, "    (void)state;")
         return [f"/* {about} */", *lines]
@@ -349,9 +368,10 @@ int {self.name}_set_{own}({self.name}_state *state, {self.real} value);
                 if phase.lesioned.any():
                     self._hold_at(code, np.flatnonzero(phase.lesioned), code.text(0.0))
         assert n
-        return self._function(code, "What neurons are held at.", "void nv_hold", self._taken())
+        return self._function(code, "What neurons are held at.", "void nv_hold", self._pointer_lines())
 
     def _hold_at(self, code: Code, neurons: IntArray, value: str) -> None:
+        """The lines that hold some neurons at a value."""
         name = code.variable("n", value)
         with code.block(code.loop("i", len(neurons))):
             neuron = code.at(neurons, "i")
@@ -362,12 +382,13 @@ int {self.name}_set_{own}({self.name}_state *state, {self.real} value);
         """What follows parameters that are set."""
         code = self._code()
         write_follow(code, self.network.settable)
-        taken = {name: line for name, line in self._taken().items() if name != "parameters"}
+        pointer_lines = {name: line for name, line in self._pointer_lines().items() if name != "parameters"}
         more = f", {self.real} *parameters, unsigned char *changed"
         about = "What follows parameters that change: gives 0, and changes nothing, where it cannot be."
-        return self._function(code, about, "int nv_follow", taken, more)
+        return self._function(code, about, "int nv_follow", pointer_lines, more)
 
     def _begin_setting(self, code: Code) -> None:
+        """The lines that copy the parameters, to be set or given up as a whole, and make room for ``changed``."""
         count = len(self.network.settable.slots)
         code.line(f"{self.real} parameters[{count}];")
         code.line(f"unsigned char changed[{count}];")
@@ -437,11 +458,12 @@ int {self.name}_set_{own}({self.name}_state *state, {self.real} value);
             self._noise(code, noise)
         if not self.inputs:
             code.line("(void)in;")
-        taken = {**self._taken(), "v": f"{self.real} *const v = state->vector;"}
+        pointer_lines = {**self._pointer_lines(), "v": f"{self.real} *const v = state->vector;"}
         more = f", const {self.name}_inputs *in"
-        return self._function(code, "The inputs and the noise of a step.", "void nv_sense", taken, more)
+        return self._function(code, "The inputs and the noise of a step.", "void nv_sense", pointer_lines, more)
 
     def _row(self, code: Code, number: int, entry: Input) -> None:
+        """The lines that take an input's row of this step from its table; behind the last row, the last."""
         assert entry.table is not None
         rows, size = len(entry.table), entry.size
         with code.block(""):
@@ -457,6 +479,7 @@ int {self.name}_set_{own}({self.name}_state *state, {self.real} value);
             code.line(f"    v[{entry.start} + i] = {value};")
 
     def _noise(self, code: Code, noise: Noise) -> None:
+        """The lines that draw a noise: each number from the stream's key, the member, the step and the draw."""
         low, high = Stream(self.network.seed, "noise", noise.name).key
         step = f"(uint32_t)(k + {self.state.drawn})" if self.state.drawn else "(uint32_t)k"
 
@@ -532,12 +555,21 @@ int {self.name}_set_{own}({self.name}_state *state, {self.real} value);
 
 
 def _only_sets(change: Change) -> bool:
+    """Whether it sets parameters and does nothing else, so that no phase begins with it."""
     arrays = (change.mended_neurons, change.mended_connections, change.lesioned_neurons, change.lesioned_connections)
     return not (change.clamps or change.released or change.learning or any(len(array) for array in arrays))
 
 
 def _by_phase(name: str, kind: str, arrays: list[npt.NDArray[np.integer]]) -> tuple[list[str], str]:
-    """The numbers of an array in each phase, each different one once, and the code of those of now."""
+    """The numbers of an array in each phase, each different one once, and the code of those of now:
+
+        static const unsigned char nv_gone[2][3] = {
+            {0, 0, 0},
+            {1, 0, 0},
+        };
+        static const int32_t nv_gone_at[3] = {0, 1, 0};
+
+    and ``nv_gone[nv_gone_at[state->phase]]``."""
     unique: dict[tuple[int, ...], int] = {}
     numbers = [tuple(array.tolist()) for array in arrays]
     for own in numbers:

@@ -2,7 +2,24 @@
 
 In: Settable. Out: the lines of a function that takes new values for some parameters, follows all that depends on them,
 and writes what this comes to, or nothing where something would not be finite or leave its bounds. What C cannot work
-out keeps its value, and so do the parameters that it follows.
+out keeps its value, and so do the parameters that it follows. A *slot* is the index of a parameter, a *Binding* the
+cells of arrays that a formula of slots fills. One that is a number of ``x``, and its parameter at least 0, gives
+
+    if (changed[0]) {
+        if (!isfinite(parameters[0]) || parameters[0] < 0.0)
+            return 0;
+    }
+    for (int write = 0; write < 2; write++) {    // checks everything, then writes
+        if (changed[0]) {
+            {
+                const double value = parameters[0];
+                if (!isfinite(value))
+                    return 0;
+                if (write)
+                    x[3] = value;
+            }
+        }
+    }
 """
 
 from __future__ import annotations
@@ -56,7 +73,7 @@ def formula(code: Code, dependent: Dependent, place: Place, parameters: str = "p
             return code.emitter.value(tree, {**code.clock, **names}, {}, drawn)
         case Assembled(base=base, parts=parts):
             index = _number(place) if base.size > 1 else 0  # one number for all
-            for part in reversed(parts):
+            for part in reversed(parts):  # a later part covers an earlier one
                 inside = np.flatnonzero(part.within(base.size) == index)
                 if len(inside):
                     return formula(code, part.formula, int(inside[-1]), parameters)
@@ -74,11 +91,13 @@ def formula(code: Code, dependent: Dependent, place: Place, parameters: str = "p
 
 
 def _element(code: Code, value: ArrayValue, place: Place) -> Value:
+    """The number at a place; a single number is there at every place."""
     array = np.asarray(value, dtype=np.float64).ravel()
     return float(array[0]) if len(array) == 1 else code.number(array, place)
 
 
 def _number(place: Place) -> int:
+    """A place that is no loop's: what is not ``regular`` is written out one by one."""
     assert isinstance(place, int)
     return place
 
@@ -88,11 +107,12 @@ def fixed(settable: Settable) -> tuple[Settable, Mapping[int, str]]:
     reasons: dict[int, str] = {}
     kept = []
     for binding in settable.bindings:
-        why = _hinders(binding, settable)
-        if why is None:
+        obstacle = _obstacle(binding, settable)
+        if obstacle is None:
             kept.append(binding)
         else:
-            reasons.update(dict.fromkeys(binding.slots, why))
+            reasons.update(dict.fromkeys(binding.slots, obstacle))
+    # a slot keeps its value, too, where one that follows it does
     free = [False] * len(settable.slots)
     for slot in range(len(settable.slots)):
         for follower in settable.reached([slot], free):
@@ -101,7 +121,7 @@ def fixed(settable: Settable) -> tuple[Settable, Mapping[int, str]]:
     return replace(settable, bindings=tuple(kept)), reasons
 
 
-def _hinders(binding: Binding, settable: Settable) -> str | None:
+def _obstacle(binding: Binding, settable: Settable) -> str | None:
     """Why C cannot work out what a formula gives; None where it can."""
     bounds = [bound for bound in (binding.low, binding.high) if bound is not None]
     if not all(map(_is_formula, (binding.formula, *bounds))):
@@ -125,6 +145,7 @@ def _is_formula(dependent: Dependent) -> bool:
 
 
 def _count(binding: Binding, settable: Settable) -> int:
+    """How many numbers a binding gives."""
     return len(binding.indices) or int(np.size(binding.formula.values(settable.parameters)))
 
 
@@ -165,6 +186,7 @@ def write_follow(code: Code, settable: Settable) -> None:
 
 
 def _outside(code: Code, value: str, low: float | Dependent, high: float | Dependent) -> str:
+    """The tests, each after ``||``, that are true beyond the bounds; infinite bounds have none."""
     tests = ""
     for bound, beyond in ((low, "<"), (high, ">")):
         if not isinstance(bound, float):
@@ -191,6 +213,7 @@ def _write_binding(code: Code, binding: Binding, settable: Settable) -> None:
 
 
 def _write_number(code: Code, binding: Binding, place: Place, array: str) -> None:
+    """The lines for one number of a binding."""
     value = code.text(formula(code, binding.formula, place))
     code.line(f"const {code.real} value = {value};")
     low = "" if binding.low is None else f" || value < {code.text(formula(code, binding.low, place))}"
