@@ -1,6 +1,7 @@
 """Checkpoints: the whole State of a run in a file, from which it goes on exactly.
 
-In: a State and a path, or a Network and a path. Out: a file, or a State. The file is an archive of arrays as NumPy
+In: a State and a path, or a Network and a path. Out: a file, or a State. The names in the file are fixed (``chosen``:
+the parameters that were set). The file is an archive of arrays as NumPy
 writes them, without pickles; it is believed in nothing: whatever is not of the size that this network asks for is
 refused before it is read, and so is a checkpoint of another network (hash).
 """
@@ -28,8 +29,9 @@ from neurovis_spec.runtime.files import regular_size, replacing
 from neurovis_spec.runtime.npz_file import Array, put_arrays, read_array, recording_errors
 from neurovis_spec.runtime.state import BodyState, State, by_kind, initial_state
 
-#: bytes of the text, of the headers of all arrays, and of the archive's own
+#: bytes that the text may have, and those of all headers together
 _TEXT, _ROOM = 4096, 1 << 20
+#: more steps than are ever made
 _MOST = 2**53
 #: bytes for the clamps of a neuron, of which several may hold: events may cover each other
 _CLAMPS = 1 << 12
@@ -93,8 +95,8 @@ def load_state(network: Network, path: Path) -> State:
                     "a checkpoint of another network, or of other parameters: it goes on with the spec and the "
                     "settings that it was made with"
                 )
-            found = {name: _member(archive, name, array) for name, array in wanted.items()}
-            _fill(state, found)
+            arrays = {name: _member(archive, name, array) for name, array in wanted.items()}
+            _fill(state, arrays)
             state.k, state.drawn = _whole(about, "k"), _whole(about, "drawn")
             state.backend = str(about.get("backend", ""))
             state.begun, state.continued = _whole(about, "begun", -1), about.get("continued") is True
@@ -106,7 +108,7 @@ def load_state(network: Network, path: Path) -> State:
     controls = Controls(network)
     controls.restructure(state)
     now = state.conditions
-    now.structure = replace(now.structure, since=found["gone_since"].astype(np.int64), lost=lost)
+    now.structure = replace(now.structure, since=arrays["gone_since"].astype(np.int64), lost=lost)
     return state
 
 
@@ -131,20 +133,21 @@ def _arrays(state: State) -> dict[str, Array]:
     }
 
 
-def _fill(state: State, found: Mapping[str, Array]) -> None:
+def _fill(state: State, saved: Mapping[str, Array]) -> None:
+    """Have a state the arrays of a file, which are of the right sizes."""
     now = state.conditions
-    state.activity, state.weights = _floats(found["activity"]), _floats(found["weights"])
-    state.signals, state.history = _floats(found["signals"]), _floats(found["history"])
+    state.activity, state.weights = _floats(saved["activity"]), _floats(saved["weights"])
+    state.signals, state.history = _floats(saved["signals"]), _floats(saved["history"])
     for kept, arrays in by_kind(state.cells).items():
         ends = np.cumsum([len(array) for array in arrays])
-        for array, values in zip(arrays, np.split(_floats(found[kept]), ends), strict=False):
+        for array, values in zip(arrays, np.split(_floats(saved[kept]), ends), strict=False):
             array[:] = values
-    now.parameters, now.variables = _floats(found["parameters"]), _floats(found["variables"])
-    now.was_set = found["chosen"].astype(np.bool_)
-    now.held.order, now.held.value = found["held_order"].astype(np.int64), _floats(found["held_value"])
-    now.lesioned_neurons = found["lesioned_neurons"].astype(np.bool_)
-    now.lesioned_connections = found["lesioned_connections"].astype(np.bool_)
-    now.paused = found["paused"].astype(np.bool_)
+    now.parameters, now.variables = _floats(saved["parameters"]), _floats(saved["variables"])
+    now.was_set = saved["chosen"].astype(np.bool_)
+    now.held.order, now.held.value = saved["held_order"].astype(np.int64), _floats(saved["held_value"])
+    now.lesioned_neurons = saved["lesioned_neurons"].astype(np.bool_)
+    now.lesioned_connections = saved["lesioned_connections"].astype(np.bool_)
+    now.paused = saved["paused"].astype(np.bool_)
 
 
 def _clamp_again(network: Network, state: State, archive: zipfile.ZipFile, size: int) -> None:
@@ -158,15 +161,15 @@ def _clamp_again(network: Network, state: State, archive: zipfile.ZipFile, size:
         raise RecordingError("its clamps do not agree")
     if len(neurons) and (neurons.min() < 0 or neurons.max() >= len(network.neurons)):
         raise RecordingError("it clamps neurons that are not there")
-    known = {clamp.order: clamp for change in network.changes for clamp in change.clamps}
+    of_events = {clamp.order: clamp for change in network.changes for clamp in change.clamps}
     held = state.conditions.held
     ends = np.cumsum(counts)
     for (order, event, count), end, value in zip(rows.tolist(), ends.tolist(), values.tolist(), strict=True):
-        own = neurons[end - count : end]
-        if event < 0:
-            held.active[order] = Clamp(order, event, own, ParameterFormula(Number(value), {}))
-        elif order in known and known[order].event == event:
-            held.active[order] = known[order]._replace(neurons=own)
+        clamped = neurons[end - count : end]
+        if event < 0:  # a clamp by hand
+            held.active[order] = Clamp(order, event, clamped, ParameterFormula(Number(value), {}))
+        elif order in of_events and of_events[order].event == event:
+            held.active[order] = of_events[order]._replace(neurons=clamped)
         else:
             raise RecordingError("it holds a clamp that no event of this network begins")
     if not np.isin(held.order, [-1, *held.active]).all():
@@ -174,23 +177,24 @@ def _clamp_again(network: Network, state: State, archive: zipfile.ZipFile, size:
 
 
 def _body(network: Network, about: Mapping[str, object], archive: zipfile.ZipFile, size: int) -> BodyState | None:
-    """Where the body was."""
-    said = about.get("body")
-    if said is None and network.body is not None and _whole(about, "k") > 0:
+    """Where the body was; None without a body. Raises RecordingError where the network and the file do not agree."""
+    saved = about.get("body")
+    if saved is None and network.body is not None and _whole(about, "k") > 0:
         raise RecordingError("a checkpoint of a run without a body: go on without one (--no-body)")
-    if said is not None and network.body is None:
+    if saved is not None and network.body is None:
         raise RecordingError("a checkpoint of a run with a body, which goes on with it alone")
-    if said is None:
+    if saved is None:
         return None
-    if not isinstance(said, dict):
+    if not isinstance(saved, dict):
         raise RecordingError("not a checkpoint")
     carried = None
     if "body.npy" in archive.namelist():
         carried = _floats(_member(archive, "body", np.zeros(0), size))
-    return BodyState(_whole(said, "episode"), said.get("ended_episode") is True, carried)
+    return BodyState(_whole(saved, "episode"), saved.get("ended_episode") is True, carried)
 
 
 def _about(archive: zipfile.ZipFile) -> dict[str, object]:
+    """The text of a checkpoint: all that is no array. Raises RecordingError."""
     member = archive.getinfo("about.npy")
     if member.file_size > _TEXT:
         raise RecordingError("not a checkpoint")
@@ -215,6 +219,7 @@ def _member(archive: zipfile.ZipFile, name: str, like: Array, room: int | None =
 
 
 def _whole(about: Mapping[str, object], name: str, least: int = 0) -> int:
+    """A number of steps, of ``least`` or more. Raises RecordingError."""
     value = about.get(name)
     if type(value) is not int or not least <= value < _MOST:
         raise RecordingError(f"its '{name}' is no number of steps")

@@ -4,7 +4,7 @@ In: a Network with a body, and the State of a run. Out: before a step the sensor
 it the body, moved on. An episode ends with a step k where (k + 1) % ``time.episode`` is 0, and with one at which the
 body says that it has ended. Behind such a step the body is reset in place of being moved, so that what a step senses,
 a reward, too, belongs to the episode of that step. What of the body belongs to a State is a value, BodyState, that is
-taken and put when somebody keeps one.
+taken and put when somebody keeps one. A *port* is a sensor or an actuator, of one number or several.
 """
 
 from __future__ import annotations
@@ -39,22 +39,26 @@ class Embodied:
     def __init__(self, network: Network, body: Body | None = None) -> None:
         assert network.body is not None
         self._network, self._settings = network, network.body
-        own = self._settings
+        settings = self._settings
         if body is None:
-            body = open_body(own.kind, own.given, own.path, network.dt, own.substeps)
+            body = open_body(settings.kind, settings.given, settings.path, network.dt, settings.substeps)
         self.body = body
         #: the names of what is sensed, ``name`` or ``name[i]``, and how the pose is drawn
         self.sensor_names = tuple(_names(self.body.sensors))
         self.skeleton = self.body.skeleton
+        #: for each input that is sensed, its places in the vector of all inputs, and the columns of what is sensed
         self._wired = _wired(network, self._settings, self.body)
         self._places, self._columns = _joined(self._wired.values())
+        #: the inputs that were given otherwise the last time, and the places and columns of the others
         self._given: tuple[frozenset[str], IntArray, IntArray] = frozenset(), self._places, self._columns
+        #: the commands of the spec, by the places of their actuators
         self._moved = {_place(self.body.actuators, one.actuator, "actuator"): one for one in self._settings.moved}
         self._commands, self._probe = _commands(network, self._moved.values())
         self._moves = np.array(list(self._moved), dtype=np.int64)
         self._size = sum(port.size for port in self.body.actuators)
         #: the number of the episode to come or going on; whether the last step ended one
         self.episode, self.ended_episode = 0, False
+        #: how many steps earlier runs had (``State.drawn``); whether the body was reset and not moved since
         self._drawn, self._fresh = 0, True
         #: what was sensed last
         self.sensed: FloatArray = np.zeros(len(self.sensor_names))
@@ -94,9 +98,9 @@ class Embodied:
         self.sensed = sensed = self.body.sense().copy()
         places, columns = self._places, self._columns
         if given:
-            chosen = frozenset(given)
-            if self._given[0] != chosen:
-                self._given = chosen, *_joined(self._wired[name] for name in self._wired if name not in chosen)
+            names = frozenset(given)
+            if self._given[0] != names:
+                self._given = names, *_joined(self._wired[name] for name in self._wired if name not in names)
             _, places, columns = self._given
         vector = vector.copy()
         vector[places] = sensed[columns]
@@ -104,12 +108,12 @@ class Embodied:
 
     def move(self, state: State) -> None:
         """Behind a step: move the body on, or end its episode. Raises BodyError."""
-        over, length = self.body.ended, self._network.episode
-        last = length is not None and state.k % length == 0
-        self.ended_episode = over or last
+        ended_by_body, length = self.body.ended, self._network.episode
+        ended_by_time = length is not None and state.k % length == 0
+        self.ended_episode = ended_by_body or ended_by_time
         if self.ended_episode:
             self.episode += 1
-        if over or (last and self._settings.each_episode):
+        if ended_by_body or (ended_by_time and self._settings.each_episode):
             self._reset()
             return
         try:
@@ -125,7 +129,7 @@ class Embodied:
             values = self._commands(state.activity, state.conditions.parameters, probed)
         result = np.zeros(self._size)
         result[self._moves] = values
-        if not isfinite(result.dot(result)):
+        if not isfinite(result.dot(result)):  # one quick test; huge numbers fail it, too, and pass those below
             for one, value in zip(self._moved.values(), values, strict=True):
                 if not isfinite(value):
                     raise BodyError(f"the command of '{one.actuator}' is {float(value)}")
@@ -172,6 +176,7 @@ def _wired(network: Network, settings: BodySettings, body: Body) -> dict[str, tu
 
 
 def _joined(parts: Iterable[tuple[IntArray, IntArray]]) -> tuple[IntArray, IntArray]:
+    """The places and the columns of several inputs, one behind the other."""
     none = np.zeros(0, dtype=np.int64)
     places, columns = zip((none, none), *parts, strict=True)
     return np.concatenate(places), np.concatenate(columns)
@@ -179,9 +184,16 @@ def _joined(parts: Iterable[tuple[IntArray, IntArray]]) -> tuple[IntArray, IntAr
 
 def _commands(network: Network, moved: Collection[Moved]) -> tuple[_Commands, Probe]:
     """What gives all commands, one after the other, as code made of identifiers of our own (as the steps are), and the
-    probe for the states that it reads."""
+    probe for the states that it reads. Two commands, one with a parameter and one of a state, become
+
+        def commands(a, p, s):
+            return (
+                p[0]*a[4],
+                s[0] - a[2],
+            )
+    """
     states: list[StateOf] = []
-    begins: dict[int, int] = {}
+    begins: dict[int, int] = {}  # of each output that is states, where they begin among all
     for one in moved:
         for _, index, _ in one.outputs:
             output = network.outputs[index]
@@ -201,9 +213,9 @@ def _commands(network: Network, moved: Collection[Moved]) -> tuple[_Commands, Pr
             known[name] = f"s[{begins[index] + number}]" if index in begins else f"a[{int(neurons[number])}]"
         lines.append(f"        {emit(one.command, known)},")
     text = ["def commands(a, p, s):", "    return (", *lines, "    )"]
-    made = defined("commands", text, "commands of a network", namespace)
-    assert callable(made)
-    return made, probe_of(network, states)
+    function = defined("commands", text, "commands of a network", namespace)
+    assert callable(function)
+    return function, probe_of(network, states)
 
 
 def _several(ports: Collection[Port], name: str, what: str) -> range:
@@ -221,7 +233,7 @@ def _several(ports: Collection[Port], name: str, what: str) -> range:
 
 def _place(ports: Collection[Port], name: str, what: str) -> int:
     """Where a single number stands."""
-    found = _several(ports, name, what)
-    if len(found) != 1:
-        raise BodyError(f"the {what} '{name}' is {len(found)} numbers: name one of them, '{name}[0]'")
-    return found[0]
+    places = _several(ports, name, what)
+    if len(places) != 1:
+        raise BodyError(f"the {what} '{name}' is {len(places)} numbers: name one of them, '{name}[0]'")
+    return places[0]

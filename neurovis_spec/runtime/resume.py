@@ -38,23 +38,22 @@ def resumed_state(network: Network, recording: Recording, by: Library = NUMPY) -
     (of_table(recording, network) or recording).check_whole("a run cannot go on from")
     if not len(recording):
         raise RecordingError("the recording holds no step to go on from")
-    order = _matching_neurons(network, recording)
-    learned = _learned(network, recording)
+    column_of = _matching_neurons(network, recording)  # of each neuron
+    columns, learned = _learned(network, recording)
     state = initial_state(network)
     state.continued, state.drawn = True, recording.reached
     controls = Controls(network, by)
     _set_again(network, recording, state, controls)
     _lesion_again(network, recording, state, controls)
     depth = int(network.connections.delays.kept.max(initial=1))
-    columns, places = learned
-    recorded, same = _same_connections(network, recording)
+    theirs, ours = _same_connections(network, recording)
     for ago, row in _last_rows(recording, depth):
         weights = state.weights.copy()
-        weights[same] = recording.all_weights(row)[recorded]
-        _send(network, state, -ago, recording.activity[row][order], weights)
+        weights[ours] = recording.all_weights(row)[theirs]
+        _send(network, state, -ago, recording.activity[row][column_of], weights)
     lose(network, state, np.flatnonzero(state.conditions.structure.gone))
-    state.activity = recording.activity[-1][order]
-    state.weights[places] = recording.weights_after[columns]
+    state.activity = recording.activity[-1][column_of]
+    state.weights[learned] = recording.weights_after[columns]
     return state
 
 
@@ -88,12 +87,11 @@ def _lesion_again(network: Network, recording: Recording, state: State, controls
     names = [recording.connection_names[index] for index in recording.lesioned_connections.tolist()]
     connections = [network.connection_index[name] for name in names if name in network.connection_index]
     if neurons or connections:
-        found = (np.array(places, dtype=np.int64) for places in (neurons, connections))
-        controls.lesion(state, *found)
+        controls.lesion(state, np.array(neurons, dtype=np.int64), np.array(connections, dtype=np.int64))
 
 
 def _last_rows(recording: Recording, depth: int) -> list[tuple[int, int]]:
-    """How many steps ago, and the row: the last consecutive steps, the latest first."""
+    """How many steps ago, and the row: the last consecutive steps, at most ``depth``, the latest first."""
     rows = []
     for ago in range(1, min(depth, len(recording)) + 1):
         if recording.step[-ago] != recording.step[-1] - ago + 1:
@@ -103,6 +101,7 @@ def _last_rows(recording: Recording, depth: int) -> list[tuple[int, int]]:
 
 
 def _send(network: Network, state: State, step: int, activity: FloatArray, weights: FloatArray) -> None:
+    """Send what was sent at a step before 0 and has not arrived by then: −1 was the last step before the run."""
     connections = network.connections
     under_way = np.flatnonzero(connections.delays.whole() >= -step)
     offsets = signal_layout(network).offsets[under_way]
@@ -118,10 +117,10 @@ def _matching_neurons(network: Network, recording: Recording) -> IntArray:
     columns = {name: column for column, name in enumerate(recording.neurons)}
     for name in network.neurons.names:
         if name not in columns:
-            raise RecordingError(_without("neuron", name, "the recording", columns))
+            raise RecordingError(_does_not_fit("neuron", name, "the recording", columns))
     for name in recording.neurons:
         if name not in network.neuron_index:
-            raise RecordingError(_without("neuron", name, f"'{network.name}'", network.neuron_index))
+            raise RecordingError(_does_not_fit("neuron", name, f"'{network.name}'", network.neuron_index))
     return np.array([columns[name] for name in network.neurons.names], dtype=np.int64)
 
 
@@ -135,22 +134,22 @@ def _same_connections(network: Network, recording: Recording) -> tuple[IntArray,
 def _learned(network: Network, recording: Recording) -> tuple[IntArray, IntArray]:
     """The columns of weights that were learned, and their places in the network. Weights that follow parameters are
     what these make of them."""
-    following = np.zeros(len(network.connections), dtype=np.bool_)
+    follows = np.zeros(len(network.connections), dtype=np.bool_)
     for binding in network.settable.bindings:
         if binding.weights:
-            following[binding.indices] = True
+            follows[binding.indices] = True
     columns, places = [], []
     for column, index in enumerate(recording.plastic.tolist()):
         name = recording.connection_names[index]
         place = network.connection_index.get(name)
         if place is None:
-            raise RecordingError(_without("connection", name, f"'{network.name}'", network.connection_index))
-        if not following[place]:
+            raise RecordingError(_does_not_fit("connection", name, f"'{network.name}'", network.connection_index))
+        if not follows[place]:
             columns.append(column)
             places.append(place)
     return np.array(columns, dtype=np.int64), np.array(places, dtype=np.int64)
 
 
-def _without(what: str, name: str, place: str, known: Mapping[str, int]) -> str:
+def _does_not_fit(what: str, name: str, place: str, known: Mapping[str, int]) -> str:
     hint = suggest(name, known)
     return f"the recording does not fit: {place} has no {what} '{name}'" + (f"; {hint}" if hint else "")
