@@ -33,14 +33,17 @@ class Sensing(Protocol):
 
 @dataclass(frozen=True)
 class Keep:
-    """What is recorded: these neurons (references; all without), the changing weights or none, these states
-    (references) besides those that the outputs of the spec name; and the spec itself, as one text, where a format holds
-    it. ``last``: of the steps that would be recorded the last alone."""
+    """What is recorded."""
 
+    #: references to neurons; all where there are none
     neurons: tuple[str, ...] = ()
+    #: whether the changing weights are
     weights: bool = True
+    #: references to states, besides those that the outputs of the spec name
     states: tuple[str, ...] = ()
+    #: the spec itself as one text, where a format holds it
     spec: str = ""
+    #: of the steps that would be recorded the last alone
     last: bool = False
 
 
@@ -49,8 +52,9 @@ ALL = Keep()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Part:
-    """A state of an owner: of ``members``, into ``columns``."""
+class _Read:
+    """What a probe reads at once: a state of an owner, of ``members`` (places in its population or projection), each
+    into its one of ``columns``."""
 
     owner: Owner
     state: str
@@ -63,12 +67,12 @@ class Probe:
     """Reads states, each into its column."""
 
     names: tuple[str, ...]
-    parts: tuple[_Part, ...]
+    reads: tuple[_Read, ...]
 
     def read(self, state: State, row: FloatArray) -> None:
         """The states as they are now, (columns,)."""
-        for part in self.parts:
-            row[part.columns] = state.cells[part.owner][part.state][part.members]
+        for read in self.reads:
+            row[read.columns] = state.cells[read.owner][read.state][read.members]
 
     def now(self, state: State) -> FloatArray:
         """The same as an array of its own."""
@@ -79,12 +83,15 @@ class Probe:
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """What is recorded of a network. ``neurons`` are indices, None for all of them; ``weights`` those of connections;
-    ``outputs`` are the columns of states that outputs name, and whether a single one is meant."""
+    """What is recorded of a network."""
 
+    #: indices of neurons, None for all of them
     neurons: IntArray | None
+    #: indices of connections
     weights: IntArray
+    #: what reads the states
     probe: Probe
+    #: for each output that is states, their columns, and whether a single one is meant
     outputs: dict[str, tuple[tuple[int, ...], bool]]
     spec: str = ""
     #: the names of what the body senses, and how its pose is drawn; None where there is none
@@ -105,27 +112,28 @@ def columns_of(network: Network, keep: Keep = ALL, body: Sensing | None = None) 
     outputs: dict[str, tuple[tuple[int, ...], bool]] = {}
     for output in network.outputs:
         if output.states:
-            own = list(singles(output.states))
-            states.update(dict.fromkeys(own))
-            outputs[output.name] = tuple(list(states).index(one) for one in own), output.scalar
+            of_output = list(singles(output.states))
+            states.update(dict.fromkeys(of_output))
+            outputs[output.name] = tuple(list(states).index(one) for one in of_output), output.scalar
     for reference in keep.states:
         states.update(dict.fromkeys(singles(find_states(network, reference, names))))
     return Columns(
-        _neurons(keep.neurons, names, len(network.neurons)),
-        network.changing if keep.weights else network.changing[:0],
-        _probe(network, list(states)),
-        outputs,
-        keep.spec,
-        None if body is None else body.sensor_names,
-        None if body is None else body.skeleton,
+        neurons=_neurons(keep.neurons, names, len(network.neurons)),
+        weights=network.changing if keep.weights else network.changing[:0],
+        probe=_probe(network, list(states)),
+        outputs=outputs,
+        spec=keep.spec,
+        sensors=None if body is None else body.sensor_names,
+        skeleton=None if body is None else body.skeleton,
     )
 
 
 def _neurons(references: Sequence[str], names: Names | None, count: int) -> IntArray | None:
+    """The indices of these neurons, ascending; None for all ``count``."""
     if not references or names is None:
         return None
-    chosen = np.array(sorted(find_neurons(" + ".join(references), names)), dtype=np.int64)
-    return None if len(chosen) == count else chosen
+    indices = np.array(sorted(find_neurons(" + ".join(references), names)), dtype=np.int64)
+    return None if len(indices) == count else indices
 
 
 def probe_of(network: Network, states: Iterable[StateOf]) -> Probe:
@@ -134,6 +142,7 @@ def probe_of(network: Network, states: Iterable[StateOf]) -> Probe:
 
 
 def _probe(network: Network, wanted: list[tuple[str, str, int]]) -> Probe:
+    """A probe of single states: the name, what has it ("neuron", "connection"), and the index of that."""
     places: dict[tuple[Owner, str], tuple[list[int], list[int]]] = {}
     located: dict[str, Located] = {}
     for column, (state, what, index) in enumerate(wanted):
@@ -145,8 +154,8 @@ def _probe(network: Network, wanted: list[tuple[str, str, int]]) -> Probe:
         members, columns = places.setdefault((owner, state), ([], []))
         members.append(int(positions[index]))
         columns.append(column)
-    parts = tuple(
-        _Part(*key, np.array(members, dtype=np.int64), np.array(columns, dtype=np.int64))
+    reads = tuple(
+        _Read(*key, np.array(members, dtype=np.int64), np.array(columns, dtype=np.int64))
         for key, (members, columns) in places.items()
     )
     none: IntArray = np.zeros(0, dtype=np.int64)
@@ -155,7 +164,7 @@ def _probe(network: Network, wanted: list[tuple[str, str, int]]) -> Probe:
         one = np.array([index], dtype=np.int64)
         neuron = what == "neuron"
         names += network.state_names([StateOf(state, one if neuron else none, none if neuron else one)])
-    return Probe(tuple(names), parts)
+    return Probe(tuple(names), reads)
 
 
 @dataclass(frozen=True, eq=False)

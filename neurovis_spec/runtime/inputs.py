@@ -39,7 +39,7 @@ class InputReader:
     """The inputs of a network, step by step.
 
     ``supplied`` maps names to whole arrays that replace their sources: (steps, size), (steps,) for size 1, or one
-    number or (size,) for all steps; past its end the last row stays. ``made`` is called with rows of inputs as
+    number or (size,) for all steps; past its end the last row stays. ``on_rows`` is called with rows of inputs as
     soon as they are computed: the first step, a row for each step from there on, and which of these numbers hide that
     something is undefined in their formula (None: none does). Functions are computed ``by`` a library. Raises
     InputError.
@@ -49,15 +49,18 @@ class InputReader:
         self,
         network: Network,
         supplied: Mapping[str, npt.ArrayLike] | None = None,
-        made: Callable[[int, FloatArray, BoolArray | None], None] | None = None,
+        on_rows: Callable[[int, FloatArray, BoolArray | None], None] | None = None,
         by: Library = NUMPY,
     ) -> None:
-        self.network, self._told, self._by = network, made, by
+        self.network, self._on_rows, self._by = network, on_rows, by
         self._supplied = {name: _whole(_entry(network, name), value) for name, value in (supplied or {}).items()}
         self._parameters, self._variables, self._drawn_before = network.settable.parameters, network.settable.initial, 0
         read = (*(entry.slots for entry in network.inputs), *(noise.slots for noise in network.noises))
+        #: the slots (indices of parameters) that formulas read
         self._read = sorted({slot for slots in read for slot in slots.values()})
+        #: whether a table follows parameters
         self._tables = any(table_of(number) in network.settable.variables for number in range(len(network.inputs)))
+        #: the rows made last, and the step of the first of them
         self._first = -1
         self._rows: FloatArray = np.zeros((0, network.vector_size))
         together = min(STRETCH, max(1, _MOST_VALUES // max(1, network.vector_size)))
@@ -67,13 +70,13 @@ class InputReader:
         #: where something is undefined, as a formula, by the number of the input or of the noise
         self._undefined: dict[int, Tree] = {}
         self._undefined_noise: dict[int, Tree] = {}
-        if made is not None:
+        if on_rows is not None:
             formulas = (None if entry.name in self._supplied else entry.expression for entry in network.inputs)
             self._undefined = dict(_undefined(formulas))
             self._undefined_noise = dict(_undefined(noise.expression for noise in network.noises))
 
     def use(self, state: State) -> None:
-        """Take parameters as a state has them by now."""
+        """Take parameters as a state has them by now; what depends on those that have changed is made anew."""
         now = state.conditions
         old, self._parameters, self._variables = self._parameters, now.parameters, now.variables
         if (
@@ -109,6 +112,7 @@ class InputReader:
         return row
 
     def _make(self, first: int) -> None:
+        """Make the rows of ``_steps`` steps from ``first`` on."""
         steps = np.arange(first, first + self._steps)
         rows = np.zeros((self._steps, self.network.vector_size))
         for entry in self.network.inputs:
@@ -117,8 +121,8 @@ class InputReader:
             rows[:, noise.start : noise.start + len(noise.members)] = self._drawn(noise, noise.expression, steps)
         rows.flags.writeable = False
         self._first, self._rows = first, rows
-        if self._told is not None:
-            self._told(first, rows, self._hidden(steps))
+        if self._on_rows is not None:
+            self._on_rows(first, rows, self._hidden(steps))
 
     def _hidden(self, steps: npt.NDArray[np.int64]) -> BoolArray | None:
         """Of the numbers of some steps those that hide that something is undefined in their formula."""
@@ -233,6 +237,7 @@ def _numbers(entry: Input, value: npt.ArrayLike) -> FloatArray:
 
 
 def _single(entry: Input, value: npt.ArrayLike) -> FloatArray:
+    """The numbers of an input at a step, (size,). Raises InputError."""
     array = _numbers(entry, value)
     if array.size == entry.size and array.ndim <= 1:
         return array
@@ -240,6 +245,7 @@ def _single(entry: Input, value: npt.ArrayLike) -> FloatArray:
 
 
 def _whole(entry: Input, value: npt.ArrayLike) -> FloatArray:
+    """The numbers of an input at all steps, (steps, size). Raises InputError."""
     array = _numbers(entry, value)
     if array.ndim == 1 and entry.size == 1:
         array = array.reshape(-1, 1)

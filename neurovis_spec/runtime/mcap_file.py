@@ -2,7 +2,8 @@
 
 In: a Recording and a path, or a path. Out: a file that can be read at any moment while it is written, or a Recording.
 Topics are ``NAMESPACE/NETWORK/activity``, ``/weights`` (of the changing connections), ``/states``, ``/sensors`` and
-``/pose`` of a body, and ``/spec``. What does not grow with the steps is an attachment, as an archive like a ``.npz``. A
+``/pose`` of a body, and ``/spec``. What does not grow with the steps, the *frame* (a recording
+without rows), is an attachment, as an archive like a ``.npz``. A
 recording may go on from file to file: ``NAME.mcap``, ``NAME-1.mcap``, ….
 """
 
@@ -54,11 +55,11 @@ def write_mcap(recording: Recording, path: Path) -> None:
     with part_of(path) as part:
         rows = _McapRows(part.file, recording)
         after = After(
-            recording.weights_after,
-            recording.reached,
-            recording.set_parameters,
-            recording.lesioned_neurons,
-            recording.lesioned_connections,
+            weights=recording.weights_after,
+            reached=recording.reached,
+            set_parameters=recording.set_parameters,
+            lesioned_neurons=recording.lesioned_neurons,
+            lesioned_connections=recording.lesioned_connections,
         )
         rows.put(recording.step.tolist(), recording.rows, after)
         rows.close()
@@ -90,12 +91,13 @@ class _McapRows:
         self._file, self._dt, self._part, self._steps = file, frame.dt, part, steps
         self._rows, self._synced, self._after = 0, monotonic(), ""
         base = f"{frame.namespace.rstrip('/')}/{frame.network or 'network'}"
-        held = [name for name, width in zip(KINDS, frame.widths, strict=True) if width or name == "activity"]
-        channels = [Channel(2, f"{base}/spec"), *(Channel(1, f"{base}/{name}") for name in held)]
+        recorded = [name for name, width in zip(KINDS, frame.widths, strict=True) if width or name == "activity"]
+        channels = [Channel(2, f"{base}/spec"), *(Channel(1, f"{base}/{name}") for name in recorded)]
         sizes = dict(zip(KINDS, frame.widths, strict=True))
         label = label_of(frame.hash)
+        #: of each kind that is recorded its place in KINDS, its channel (1 is the spec) and the form of its messages
         self._channels = [
-            (KINDS.index(name), n, ArrayForm.of(label, sizes[name], "cdr")) for n, name in enumerate(held, 2)
+            (KINDS.index(name), n, ArrayForm.of(label, sizes[name], "cdr")) for n, name in enumerate(recorded, 2)
         ]
         about = {"network": frame.network, "hash": frame.hash, "dt": repr(frame.dt), "version": __version__}
         start = records.head("ros2", f"neurovis {__version__}") + records.metadata(_ABOUT, about)
@@ -117,13 +119,13 @@ class _McapRows:
         """Rows of these steps, in chunks."""
         for chunk in records.chunks(self._messages(steps, rows)):
             records.put(self._file, chunk)
-        told = {
+        end = {
             "reached": after.reached,
             "set_parameters": dict(after.set_parameters),
             "lesioned_neurons": after.lesioned_neurons.tolist(),
             "lesioned_connections": after.lesioned_connections.tolist(),
         }
-        self._after, self._weights = json.dumps(told), after.weights.copy()
+        self._after, self._weights = json.dumps(end), after.weights.copy()
         if monotonic() - self._synced >= 1:
             os.fdatasync(self._file.fileno()) if hasattr(os, "fdatasync") else os.fsync(self._file.fileno())
             self._synced = monotonic()
@@ -158,8 +160,8 @@ def _chunks(file: FileIO) -> list[Found]:
 
 def _steps(file: FileIO, found: Found) -> list[int]:
     """The steps of a chunk's arrays."""
-    found_messages = records.messages_of(records.content_of(file, found))
-    return [one.sequence for one in found_messages if isinstance(one, Message) and one.channel > 1]
+    messages = records.messages_of(records.content_of(file, found))
+    return [one.sequence for one in messages if isinstance(one, Message) and one.channel > 1]
 
 
 def finish_mcap(file: FileIO, part: Path, path: Path) -> None:
@@ -245,11 +247,12 @@ class _Reading:
         return ended(recording, self._ended(recording))
 
     def _take(self, found: Found) -> None:
+        """Read a record, if it is one of those that matter. Raises RecordingError, DamagedError."""
         if found.opcode == records.ATTACHMENT and found.length <= _MOST_FRAME and self._rows is None:
             reader = records.content_of(self._file, found)
-            reader.take(16)
+            reader.take(16)  # its two times
             name = reader.text()
-            reader.text()
+            reader.text()  # its type
             if name == FRAME:
                 self._rows = Arrived(frame_from_bytes(reader.take(reader.number(8))))
         elif found.opcode == records.METADATA:
@@ -276,6 +279,7 @@ class _Reading:
                     self._channel(message)
 
     def _channel(self, topic: Topic) -> None:
+        """Note what a channel holds; topics of others are known and passed over."""
         self._known.add(topic.channel)
         kind = topic.topic.rpartition("/")[2]
         encoding = next((one for one in ENCODINGS.values() if one == topic.encoding), None)
@@ -287,6 +291,7 @@ class _Reading:
             self._channels[topic.channel] = KINDS.index(kind), encoding
 
     def _message(self, message: Message) -> None:
+        """Take a spec or a row. Raises RecordingError."""
         if message.channel in self._specs:
             self._spec = text_of(message.data, self._specs[message.channel])
             return
@@ -300,24 +305,25 @@ class _Reading:
         self._rows.take(kind, message.log_time, message.data, encoding)
 
     def _ended(self, recording: Recording) -> After:
+        """What is true after the last step; what the file does not say, as its rows do. Raises RecordingError."""
         changing = len(recording.plastic)
-        rows = after_rows(recording.step, recording.weights, changing)
+        by_rows = after_rows(recording.step, recording.weights, changing)
         if not self._after:
-            return replace(rows, set_parameters=recording.set_parameters)
-        told, weights = json.loads(self._after["after"]), json.loads(self._after["weights"])
+            return replace(by_rows, set_parameters=recording.set_parameters)
+        end, weights = json.loads(self._after["after"]), json.loads(self._after["weights"])
         n, m = len(recording.neurons), len(recording.sources)
-        lost = [
-            np.array(told[name], dtype=np.int64).reshape(-1) for name in ("lesioned_neurons", "lesioned_connections")
+        lesioned = [
+            np.array(end[name], dtype=np.int64).reshape(-1) for name in ("lesioned_neurons", "lesioned_connections")
         ]
-        reached = told["reached"]
+        reached = end["reached"]
         values = np.array(weights, dtype=np.float64).reshape(changing)
-        for indices, high in zip(lost, (n, m), strict=True):
+        for indices, high in zip(lesioned, (n, m), strict=True):
             if len(indices) and (indices.min() < 0 or indices.max() >= high):
                 raise RecordingError("it says that parts are lesioned that are not there")
         if type(reached) is not int or not 0 <= reached < 2**62:
             raise RecordingError(f"'reached' is {reached}")
-        given = {str(name): float(value) for name, value in dict(told["set_parameters"]).items()}
-        return After(values, reached, given, *lost)
+        set_parameters = {str(name): float(value) for name, value in dict(end["set_parameters"]).items()}
+        return After(values, reached, set_parameters, *lesioned)
 
 
 def numbered(path: Path, number: int) -> Path:

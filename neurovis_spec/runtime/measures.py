@@ -44,16 +44,19 @@ LABEL = "<measure>"
 
 @dataclass(frozen=True, eq=False)
 class Measure:
-    """A measure of the runs of a network: ``neurons`` gives the index of each neuron that it names, ``slots`` the slot
-    of each parameter, ``states`` the column of each state that ``probe`` reads. ``label`` says in findings where the
-    text stands."""
+    """A measure of the runs of a network."""
 
     formula: Formula
+    #: for each neuron that it names its index
     neurons: Mapping[str, int]
+    #: for each parameter its slot, the index of its value
     slots: Mapping[str, int]
+    #: for each state its column among those that ``probe`` reads
     states: Mapping[str, int]
     probe: Probe
+    #: seconds a step
     dt: float
+    #: where the text stands, in findings
     label: str
 
     @property
@@ -135,7 +138,7 @@ def resolved(formula: Formula, network: Network, label: str) -> Measure:
 
 
 def measure_of(text: str, network: Network, label: str, *, bounded: bool = False) -> Measure:
-    """Both. Raises SpecError."""
+    """The measure that a text is for the runs of a network: ``parsed`` and ``resolved``. Raises SpecError."""
     return resolved(parsed(text, label, bounded=bounded), network, label)
 
 
@@ -147,7 +150,8 @@ def _named(formula: Formula) -> Iterable[Name]:
 def _resolve_state(
     name: str, span: Span, network: Network, directory: Names, states: dict[str, StateOf], findings: Findings
 ) -> bool:
-    """Whether a name is a state, or an output that is one; what it is, or what is wrong with it, is reported."""
+    """Whether a name is a state, or an output that is one. It is put into ``states`` then, or, where it is several or
+    none of the network, reported."""
     output = next((one for one in network.outputs if one.name == name and one.states), None)
     if output is None:
         (part,) = parse_sum(name)
@@ -157,18 +161,18 @@ def _resolve_state(
         if not isinstance(state.owner, Arrow) and isinstance(directory.find(state.owner.text), str):
             return False
         try:
-            found = find_states(network, name, directory)
+            named = find_states(network, name, directory)
         except UnknownNameError as error:
             findings.error("unknown-name", span, str(error))
             return True
     else:
-        found = output.states
-    first = next(one for one in found if one.size)
-    if sum(one.size for one in found) == 1:
+        named = output.states
+    first = next(one for one in named if one.size)
+    if sum(one.size for one in named) == 1:
         states[name] = first
     else:
         (one,) = network.state_names([StateOf(first.state, first.neurons[:1], first.connections[:1])])
-        message = f"'{shorten(name)}' is {sum(state.size for state in found)} states, and no single one"
+        message = f"'{shorten(name)}' is {sum(state.size for state in named)} states, and no single one"
         findings.error("not-one-number", span, message, f"name one of them, as in '{one}'")
     return True
 
@@ -182,17 +186,18 @@ def _resolve(
     slots: dict[str, int],
     findings: Findings,
 ) -> None:
-    """What a name means that is no state."""
-    own, found = name in _OF_TIME or name in network.parameters, directory.find(name)
+    """What a name means that is no state: put into ``neurons`` or ``slots``, or reported."""
+    # a name is a neuron or a value (a parameter, or of the time), not both; ``found`` is a text where it is no neuron
+    is_value, found = name in _OF_TIME or name in network.parameters, directory.find(name)
     if isinstance(found, str):
-        if not own:
+        if not is_value:
             known = (*network.neuron_index, *directory.views, *network.parameters, *_OF_TIME)
             hint = suggest(name, known, "neurons, outputs and parameters")
             message = f"there is no neuron, output or parameter '{shorten(name)}'"
             findings.error("unknown-name", span, message, hint)
         elif name in network.parameters:
             slots[name] = network.settable.index[name]
-    elif own:
+    elif is_value:
         what = "a parameter" if name in network.parameters else "a constant" if name in ("pi", "e") else "the time"
         what = "the duration of a step" if name == "dt" else what
         hint = "give the neuron an output of another name"

@@ -71,28 +71,32 @@ class Simulation:
         body: Embodied | None = None,
     ) -> None:
         self.network = network
-        self._asked, self._inputs, self._watch = backend, inputs, Watch(network)
+        self._asked_backend, self._inputs, self._watch = backend, inputs, Watch(network)
         self._body = embodied(network) if body is None else body
+        #: the inputs that the caller gives for the whole run; the body does not sense these
         self._given = frozenset(inputs or ())
-        self._made_by("" if start is None else start.backend)
-        self._begin = initial_state(network) if start is None else resumed_state(network, start, self._made.functions)
-        self._begin.backend = self._made.name
+        self._use_backend("" if start is None else start.backend)
+        self._begin = (
+            initial_state(network) if start is None else resumed_state(network, start, self._backend.functions)
+        )
+        self._begin.backend = self._backend.name
         self._apply(self._begin)
         self._recorder: Recorder | None = None
+        #: what was true after the last step, where events of the step to come have changed something (``ended``)
         self._ended: After | None = None
         self.reset()
 
-    def _made_by(self, before: str) -> None:
-        """Have the steps to come made by the backend that is asked for, else by the one that made those before."""
-        self._made = ready(self.network, self._asked, before)
-        self._stepper = self._made.stepper
-        self._reader = InputReader(self.network, self._inputs, self._watch.given, self._made.functions)
-        self._controls = Controls(self.network, self._made.functions)
+    def _use_backend(self, before: str) -> None:
+        """Have the backend that is asked for make the steps to come, else the one that made those ``before``."""
+        self._backend = ready(self.network, self._asked_backend, before)
+        self._stepper = self._backend.stepper
+        self._reader = InputReader(self.network, self._inputs, self._watch.given, self._backend.functions)
+        self._controls = Controls(self.network, self._backend.functions)
 
     @property
     def backend(self) -> str:
         """The name of the backend that makes the steps."""
-        return self._made.name
+        return self._backend.name
 
     def record(self, path: str | os.PathLike[str] | None = None, every: int = 1, keep: Keep = ALL) -> None:
         """Record from the next step on, one step in ``every``: into a file, which is there when the simulation is
@@ -133,7 +137,7 @@ class Simulation:
 
     def __reduce__(self) -> tuple[Callable[..., Simulation], tuple[object, ...]]:
         """A copy, in another process, goes on from here; code that was made for the network is made there anew."""
-        return _resumed, (self.network, self._asked, self._inputs, self._begin, self.state())
+        return _resumed, (self.network, self._asked_backend, self._inputs, self._begin, self.state())
 
     @cached_property
     def _names(self) -> Names:
@@ -314,6 +318,7 @@ class Simulation:
         self._reader.use(state)
 
     def _checked(self, values: Mapping[str, object]) -> dict[int, float]:
+        """The values by slots, the indices of the parameters. Raises ParameterError."""
         slots, result = self.network.settable.index, {}
         for name, value in values.items():
             if name not in self.network.parameters:
@@ -389,9 +394,9 @@ class Simulation:
 
     def _take(self, state: State) -> None:
         """Go on from this state, with its backend unless another is asked for."""
-        if state.backend not in ("", self._made.name):
-            self._made_by(state.backend)
-        state.backend, self._state, self._ended = self._made.name, state, None
+        if state.backend not in ("", self._backend.name):
+            self._use_backend(state.backend)
+        state.backend, self._state, self._ended = self._backend.name, state, None
         self._reader.use(state)
 
     def state(self) -> State:
@@ -430,7 +435,7 @@ class Simulation:
             self._reader.use(self._state)
 
     def _check_recorded(self, state: State) -> None:
-        """A recording holds steps in their order, without a gap."""
+        """Refuse another step while it is recorded: a recording holds steps in their order. Raises RecordingError."""
         if self._recorder is not None and self._recorder.going and state.k != self._state.k:
             raise RecordingError(f"it is recorded, and cannot go to step {state.k} now: close() it before")
 

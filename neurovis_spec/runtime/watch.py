@@ -31,8 +31,8 @@ class Watch:
 
     def __init__(self, network: Network) -> None:
         self._network = network
-        #: the inputs of those steps to come at which something is wrong, and which of them hide it
-        self._odd: dict[int, tuple[FloatArray, BoolArray | None]] = {}
+        #: of those steps to come at which an input is wrong: all inputs, and which of them hide what is undefined
+        self._wrong_inputs: dict[int, tuple[FloatArray, BoolArray | None]] = {}
         self.warned = False
 
     def given(self, first: int, vectors: FloatArray, hidden: BoolArray | None = None) -> None:
@@ -42,36 +42,36 @@ class Watch:
         if hidden is not None:
             wrong |= hidden.any(axis=1)
         rows = np.flatnonzero(wrong).tolist()
-        self._odd = {first + row: (vectors[row], None if hidden is None else hidden[row]) for row in rows}
+        self._wrong_inputs = {first + row: (vectors[row], None if hidden is None else hidden[row]) for row in rows}
 
     def given_at(self, k: int, vector: FloatArray, replaced: Iterable[str]) -> None:
         """Take the inputs of step k alone, where they are known only then: these (``replaced``) do not come from their
         formulas."""
-        _, hidden = self._odd.pop(k, (vector, None))
+        _, hidden = self._wrong_inputs.pop(k, (vector, None))
         if hidden is not None:
             hidden = hidden.copy()
             for entry in map(self._network.input_index.__getitem__, replaced):
                 hidden[entry.start : entry.start + entry.size] = False
         if not all_finite([vector]) or (hidden is not None and hidden.any()):
-            self._odd[k] = vector, hidden
+            self._wrong_inputs[k] = vector, hidden
 
     def until(self, k: int, stop: int) -> int:
         """How far steps from k on may be made, ``stop`` at most, before one must be checked: one behind the first
         whose inputs are not finite."""
-        return stop if self.warned else min((step + 1 for step in self._odd if k <= step < stop), default=stop)
+        return stop if self.warned else min((step + 1 for step in self._wrong_inputs if k <= step < stop), default=stop)
 
     def look(self, state: State) -> None:
         """Warn if something of the step just made is NaN or infinite."""
         if self.warned:
             return
-        if all_finite(carried_by(self._network, state)) and state.k - 1 not in self._odd:
+        if all_finite(carried_by(self._network, state)) and state.k - 1 not in self._wrong_inputs:
             return
-        message = next(self._found(state), None)
+        message = next(self._messages(state), None)
         if message is not None:
             self.warned = True
             warnings.warn(f"{message}, in '{self._network.name}'", RuntimeWarning, stacklevel=callers_level())
 
-    def _found(self, state: State) -> Iterator[str]:
+    def _messages(self, state: State) -> Iterator[str]:
         """What is not finite: what shows it best comes first."""
         step, network, lesioned = state.k - 1, self._network, state.conditions.lesioned_neurons
         names = network.neurons.names
@@ -90,13 +90,13 @@ class Watch:
                         yield f"the state '{quantity.name}' of {name} is {value} {when}"
                     elif not (of_neurons and lesioned[member]):  # what a lesioned neuron computes is for nobody
                         yield f"{quantity.name} for {name} {when}, {_HIDDEN}"
-        vector, hidden = self._odd.get(step, (np.zeros(0), None))
+        vector, hidden = self._wrong_inputs.get(step, (np.zeros(0), None))
         for index in _wrong(vector):
-            yield f"the {self._called(index)} is {vector[index]} at step {step}"
+            yield f"the {self._input_name(index)} is {vector[index]} at step {step}"
         for index in () if hidden is None else np.flatnonzero(hidden).tolist():
-            yield f"the {self._called(index)} has an undefined operation at step {step}, {_HIDDEN}"
+            yield f"the {self._input_name(index)} has an undefined operation at step {step}, {_HIDDEN}"
 
-    def _called(self, index: int) -> str:
+    def _input_name(self, index: int) -> str:
         """What a number of the vector of all inputs is: whose noise, or whose input by its name."""
         network = self._network
         names = network.neurons.names
