@@ -35,19 +35,17 @@ class BackendError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:
-    """What a backend can execute, and how exactly.
-
-    ``largest`` bounds neurons + connections, None without a bound. ``exactness``: its numbers are the reference's to
-    the ``bits``, where the C library is the same, or up to ``rounding``. ``exact_sums`` was asked for once, and may
-    still be given; it means nothing.
-    """
+    """What a backend can execute, and how exactly."""
 
     delays: bool = True
     plasticity: bool = True
     noise: bool = False
     episodes: bool = True
+    #: the most neurons and connections together, None without a bound
     largest: int | None = None
+    #: its numbers are the reference's to the ``bits``, where the C library is the same, or up to ``rounding``
     exactness: Literal["bits", "rounding"] = "rounding"
+    #: was asked for once, and may still be given; it means nothing
     exact_sums: InitVar[bool | None] = None
 
 

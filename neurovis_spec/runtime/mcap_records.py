@@ -22,9 +22,9 @@ HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = ra
 ATTACHMENT, ATTACHMENT_INDEX, STATISTICS, METADATA, METADATA_INDEX, SUMMARY_OFFSET, DATA_END = range(9, 16)
 _HEAD, _MESSAGE, _CHUNK = struct.Struct("<BQ"), struct.Struct("<HIQQ"), struct.Struct("<QQQI")
 _LAST: Final = (1 << 64) - 1
-#: bytes of the messages of a chunk, unless a single one has more
+#: about the bytes of the messages of a chunk, unless a single one has more
 LARGEST_CHUNK: Final = 64 << 10
-#: the records of the end of a file, in their order
+#: the kinds of records at the end of a file (its summary), in their order
 _GROUPS: Final = (SCHEMA, CHANNEL, STATISTICS, CHUNK_INDEX, ATTACHMENT_INDEX, METADATA_INDEX)
 
 
@@ -133,16 +133,17 @@ def chunk(messages: Iterable[Message]) -> bytes:
 
 def chunks(messages: Iterable[Message]) -> Iterator[bytes]:
     """Messages in chunks of at most 64 KiB."""
-    some: list[Message] = []
+    together: list[Message] = []
     size = 0
     for message in messages:
-        if some and size + len(message.data) + 32 > LARGEST_CHUNK:
-            yield chunk(some)
-            some, size = [], 0
-        some.append(message)
-        size += len(message.data) + 32
-    if some:
-        yield chunk(some)
+        length = len(message.data) + 32  # with the head of its record
+        if together and size + length > LARGEST_CHUNK:
+            yield chunk(together)
+            together, size = [], 0
+        together.append(message)
+        size += length
+    if together:
+        yield chunk(together)
 
 
 class Found(NamedTuple):

@@ -2,6 +2,9 @@
 
 In: the names of neurons, groups and outputs, how many there are of counted instances, and a reference. Out: indices of
 neurons, or a text that says why there are none. It goes by names alone, which a file holds.
+
+With an instance ``left: {count: 2}`` of a module with the group K of 3 neurons, ``left.K2`` names left1.K2 and
+left2.K2, ``left.K1..K2`` those and left1.K1, left2.K1.
 """
 
 from __future__ import annotations
@@ -51,6 +54,7 @@ class Names:
         return Found(tuple(result), single)
 
     def _states(self, part: Part) -> Found | str | None:
+        """The same of one part of a sum."""
         text, name = part.text, state_of(part)
         if text in self.state_views:
             return Found(*self.state_views[text])
@@ -65,8 +69,8 @@ class Names:
             owners = self.find(name.owner.text)
             if isinstance(owners, str) or isinstance(self.find(text), Found):
                 return None
-            called = list(self.neurons)
-            columns = [self.states.get(f"{called[index]}.{name.state}") for index in owners.neurons]
+            neuron_names = list(self.neurons)
+            columns = [self.states.get(f"{neuron_names[index]}.{name.state}") for index in owners.neurons]
         there = tuple(column for column in columns if column is not None)
         if not there or len(there) < len(columns):
             return f"the state '{text}' was not recorded" + (
@@ -93,10 +97,10 @@ class Names:
         """The neurons of a reference, in the order written; a text says what is wrong."""
         parts = parse_sum(reference)
         if len(parts) == 1:
-            return self._one(parts[0])
+            return self._of_part(parts[0])
         result: list[int] = []
         for part in parts:
-            found = self._one(part)
+            found = self._of_part(part)
             if isinstance(found, str):
                 return found
             if not set(result).isdisjoint(found.neurons):
@@ -104,31 +108,38 @@ class Names:
             result.extend(found.neurons)
         return Found(tuple(result), False)
 
-    def _one(self, part: Part) -> Found | str:
-        found = self._plain(part.text)
+    def _of_part(self, part: Part) -> Found | str:
+        """The neurons of a part of a sum; a text says what is wrong."""
+        found = self._by_path(part.text)
         if found is None and isinstance(part, NeuronRange) and part.numbers is not None:
             found = self._range(*part.numbers)
         if found is None:
             return unknown_text("neuron, group or output", part.text, [*self.neurons, *self.views])
         return found
 
-    def _plain(self, name: str) -> Found | None:
+    def _by_path(self, name: str) -> Found | None:
+        """What a name names, alone or in several instances (``left.K``); None where it is not there."""
         found = self._known(name)
         if found is None and "." in name:
-            way, _, own = name.rpartition(".")
-            found = _joined([self._known(f"{path}.{own}") for path in self._paths(way)])
+            way, _, own_name = name.rpartition(".")
+            found = _joined([self._known(f"{path}.{own_name}") for path in self._paths(way)])
         return found
 
     def _known(self, name: str) -> Found | None:
+        """What has exactly this name: a neuron, a group or an output."""
         if name in self.neurons:
             return Found((self.neurons[name],), True)
         return Found(*self.views[name]) if name in self.views else None
 
     def _range(self, group: str, numbers: range) -> Found | None:
+        """Neurons of these numbers (``left.K1..K2``: ``left.K`` and 1, 2); None where one is not there."""
         way, dot, stem = group.rpartition(".")
-        return _joined([self._run(f"{path}{dot}{stem}", numbers) for path in (self._paths(way) if dot else [""])])
+        return _joined(
+            [self._consecutive(f"{path}{dot}{stem}", numbers) for path in (self._paths(way) if dot else [""])]
+        )
 
-    def _run(self, stem: str, numbers: range) -> Found | None:
+    def _consecutive(self, stem: str, numbers: range) -> Found | None:
+        """The same of one instance."""
         indices: list[int] = []
         for number in numbers:
             index = self.neurons.get(f"{stem}{number}")
@@ -146,6 +157,7 @@ class Names:
         return paths
 
     def _numbered(self, path: str) -> list[str]:
+        """The instances that a path stands for: ``left1``, ``left2`` for ``left``."""
         number = self.counted.get(path)
         return [path] if number is None else [f"{path}{k + 1}" for k in range(number)]
 
