@@ -11,6 +11,9 @@ Each stage takes a value, gives a new one, and reaches back to none before it.
     Network + Layout + Look + Recording + gains ─figure─▶ Film                   (``film``)
     Film, or one frame of it ─animate, draw─▶ bytes ─▶ file                      (``draw``)
 
+A *Look* says which views a picture has and of which steps; a *gain* is the factor by which an activity or a weight
+becomes a colour.
+
 What is invalid in a text goes into Findings, all at once; ``Findings.check`` raises SpecError. A picture raises what
 its stages raise, before anything is run where that is known. What only one half needs is imported there: a spec is
 validated without all that runs and draws.
@@ -53,7 +56,7 @@ if TYPE_CHECKING:
     Run: TypeAlias = Recording | Course
 
 
-#: Frames of a film that are held at once, and how many numbers they are about.
+#: Frames of a film that are in memory at once: as many as make so many numbers, within these two counts.
 _FEWEST_AT_ONCE, _MOST_AT_ONCE, _NUMBERS_AT_ONCE = 16, 512, 4_000_000
 
 
@@ -98,7 +101,7 @@ def remember(spec: Spec, request: Request, network: Network, findings: Findings)
 
 
 def foresee(spec: Spec, network: Network, findings: Findings) -> None:
-    """What the layout will surely not be as it is meant."""
+    """Warn of what the engine that the spec asks for will surely not lay out as it is meant."""
     if spec.layout is None or spec.layout.engine is None or not network.instances:
         return
     from neurovis_spec.layout.foreseen import foresee_frames
@@ -107,7 +110,7 @@ def foresee(spec: Spec, network: Network, findings: Findings) -> None:
 
 
 def gather(spec: Spec, request: Request, findings: Findings) -> None:
-    """Of the uses of a name that is declared nowhere make one finding, at the declaration where one is misspelt."""
+    """Make one finding of all uses of a name that is declared nowhere; where a declaration is misspelt, at that one."""
     if findings.failed:
         from neurovis_spec.compiler.checks.undeclared import gather_undeclared
 
@@ -132,24 +135,24 @@ def allow(findings: Findings) -> None:
 
 
 def refusal(spec: Spec, request: Request, network: Network, problem: Callable[[], LayoutProblem]) -> Diagnostic | None:
-    """What laying it out would refuse before the engine begins, and where the spec asks for it. The ``problem`` is
-    asked for where the spec says anything of its layout."""
+    """What an engine would refuse before it begins, as an error at the place of the spec that asks for it; None where
+    it refuses nothing. ``problem`` makes what the engine is given, and is called only where the spec has a layout."""
     if network.layout == LayoutSettings():
         return None
     from neurovis_spec.layout.foreseen import foreseen
 
-    found = foreseen(network, problem)
-    if found is None:
+    refused = foreseen(network, problem)
+    if refused is None:
         return None
     from neurovis_spec.layout.where import where
 
-    span = where(found, spec, request, network) or Span(*spec.name.span)
-    return Diagnostic(found.code, str(found), span, "error", found.hint)
+    span = where(refused, spec, request, network) or Span(*spec.name.span)
+    return Diagnostic(refused.code, str(refused), span, "error", refused.hint)
 
 
 def run_of(of: Compilation, look: Look, inputs: Mapping[str, npt.ArrayLike] | None) -> Course:
-    """The run that a picture takes where no recording is given: a still as far as its step, the whole default run where
-    it has views over time, and as far as its gains take, which come of the same run."""
+    """The run that a picture needs where no recording is given. A film needs its frames; a still its step, the whole
+    default run where it has views over time, and the steps of its gains where these come from the same run."""
     from neurovis_spec.runtime.columns import Keep
     from neurovis_spec.runtime.course import Course
     from neurovis_spec.scene.probe import probe_steps
@@ -183,7 +186,7 @@ def draw(of: Compilation, look: Look, run: Run, path: Path, progress: Progress |
 
 
 def filmed(of: Compilation, look: Look, run: Run, progress: Progress | None = None) -> Filmed:
-    """The Film of a network, a Look and a run, as it is with whatever settings: a still is its only frame. Raises
+    """What makes the Film of a network, a Look and a run for given settings; a still is its only frame. Raises
     LayoutRefusalError, RecordingError, and what ``record`` raises."""
     from neurovis_spec.scene.figure import figure
     from neurovis_spec.scene.shots import shots_of
@@ -198,8 +201,8 @@ def filmed(of: Compilation, look: Look, run: Run, progress: Progress | None = No
 
 
 def films_of(of: Compilation, look: Look, run: Run, progress: Progress | None = None) -> Iterator[Film]:
-    """The same film in parts, each made when it is asked for; of the network alone the run is made meanwhile, so that
-    there may be any number of frames."""
+    """The same film in parts, each made when it is asked for. Of a picture of the network alone the run is made
+    meanwhile, so that there may be any number of frames; one with panels is made as a whole."""
     if look.panels:
         return map(filmed(of, look, run, progress), [look.settings])
     from neurovis_spec.runtime.recording import Recording
@@ -214,13 +217,13 @@ def films_of(of: Compilation, look: Look, run: Run, progress: Progress | None = 
         snapshots = shots_of(network, run, look).snapshots(network)
     else:
         snapshots = snapshots_of_run(Simulation(network, inputs=run.inputs), look)
-    wide = len(network.neurons) + 3 * len(network.connections)
-    many = max(_FEWEST_AT_ONCE, min(_MOST_AT_ONCE, _NUMBERS_AT_ONCE // wide))
-    return films(network, layout, in_parts(snapshots, many), gains, look.settings, look.fps or 1.0)
+    numbers = len(network.neurons) + 3 * len(network.connections)  # of a frame, about
+    frames = max(_FEWEST_AT_ONCE, min(_MOST_AT_ONCE, _NUMBERS_AT_ONCE // numbers))
+    return films(network, layout, in_parts(snapshots, frames), gains, look.settings, look.fps or 1.0)
 
 
 def recorded(network: Network, run: Run, progress: Progress | None = None) -> Recording:
-    """A run, made unless it is there."""
+    """The recording of a run: the run itself, or what it records when it is made."""
     from neurovis_spec.runtime.record import record
     from neurovis_spec.runtime.recording import Recording
 
@@ -237,14 +240,15 @@ def with_body_if_any(look: Look, recording: Recording) -> Look:
 
 
 def seen_by(of: Compilation, look: Look) -> Compilation:
-    """The same network, whose gains are those of what is collapsed in a picture."""
+    """The same network, with what the picture collapses as its own setting: gains are of what is collapsed."""
     if look.settings.collapse == of.network.render.collapse:
         return of
     return replace(of, network=replace(of.network, render=look.settings))
 
 
 def page_gains(of: Compilation, look: Look, run: Run, recording: Recording) -> PageGains:
-    """The gains of a picture, where one of its views needs them: what was recorded in part serves the others."""
+    """The gains of each neuron, and those of the picture with what it collapses; None where no view needs any, so that
+    a partial recording, which has none, serves for the other views."""
     from neurovis_spec.runtime.fitting import fitted
     from neurovis_spec.scene.figure import PageGains
     from neurovis_spec.scene.probe import gains_of
@@ -260,8 +264,8 @@ def page_gains(of: Compilation, look: Look, run: Run, recording: Recording) -> P
 
 
 def gains_by(of: Compilation, look: Look, run: Run, made: Recording | None = None) -> Gains:
-    """The gains of what a picture shows: of a recording those of all its steps; of a run that is ``made`` for a still
-    those of this run; of a film those of a run of their own, perhaps with other inputs."""
+    """The gains of what a picture shows. Those of a recording are of all its steps; those of a still of the run that
+    was ``made`` for it; those of a film are of a run of their own, with its inputs."""
     from neurovis_spec.runtime.course import Course
     from neurovis_spec.runtime.record import record
     from neurovis_spec.runtime.recording import Recording
