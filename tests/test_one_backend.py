@@ -42,9 +42,9 @@ def chosen_here(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The default is that of the machine, and what it says once has not been said yet."""
     monkeypatch.delenv(DEFAULT)
     monkeypatch.delenv("CC", raising=False)
-    backends._say.cache_clear()
+    backends._warn_once.cache_clear()
     yield
-    backends._say.cache_clear()
+    backends._warn_once.cache_clear()
 
 
 @pytest.fixture
@@ -270,9 +270,9 @@ def test_a_warning_points_at_the_caller_s_line(network: nv.CompiledNetwork, monk
         network.simulator("numpy", start=before)
         monkeypatch.setenv("CC", "/nonexistent/cc")
         monkeypatch.delenv(DEFAULT)
-        backends._say.cache_clear()
+        backends._warn_once.cache_clear()
         network.run(5)
-    backends._say.cache_clear()
+    backends._warn_once.cache_clear()
     assert len(told) == 3
     assert [one.filename for one in told] == [__file__] * 3
 

@@ -174,7 +174,7 @@ def choose_backend(network: Network) -> tuple[str, str]:
             )
         return named, f"named by {DEFAULT}"
     size = f"{plural(len(network.neurons), 'neuron')}, {plural(len(network.connections), 'connection')}"
-    passed = list[str]()
+    passed_over = list[str]()  # the others, and why
     for name in names():
         if name == _LAST_RESORT:
             continue
@@ -182,8 +182,8 @@ def choose_backend(network: Network) -> tuple[str, str]:
         missing = lacking(network, load(name).capabilities) if found.available else ()
         if found.by_default and not missing:
             return name, f"{found.note} ({size})"
-        passed += missing if found.by_default else [f"{name} on request" if found.available else found.note]
-    return _LAST_RESORT, "; ".join((f"array code made for this network ({size})", *passed))
+        passed_over += missing if found.by_default else [f"{name} on request" if found.available else found.note]
+    return _LAST_RESORT, "; ".join((f"array code made for this network ({size})", *passed_over))
 
 
 def _named() -> str:
@@ -214,13 +214,13 @@ def ready(network: Network, backend: str | Backend | Ready | None = None, before
     if isinstance(backend, Ready):
         return backend
     if backend is None or backend == AUTO:
-        return _going_on(network, before) if before else _default(network)
-    chosen = load(backend) if isinstance(backend, str) else backend
-    made = _made(network, chosen)
-    if before not in ("", made.name) and not (_is_exact(before) and chosen.capabilities.exactness == "bits"):
-        other = f"the backend '{before}' made the steps before, and '{made.name}' makes those to come"
+        return _ready_as_before(network, before) if before else _ready_by_default(network)
+    loaded = load(backend) if isinstance(backend, str) else backend
+    result = _ready_on(network, loaded)
+    if before not in ("", result.name) and not (_is_exact(before) and loaded.capabilities.exactness == "bits"):
+        other = f"the backend '{before}' made the steps before, and '{result.name}' makes those to come"
         warnings.warn(f"{other}: their last bits may differ", stacklevel=callers_level())
-    return made
+    return result
 
 
 def prepare(network: Network, backend: str | Backend | None = None) -> Stepper:
@@ -228,41 +228,43 @@ def prepare(network: Network, backend: str | Backend | None = None) -> Stepper:
     return ready(network, backend).stepper
 
 
-def _going_on(network: Network, before: str) -> Ready:
+def _ready_as_before(network: Network, before: str) -> Ready:
     """By the backend that has made the steps before. Raises BackendError, which says so."""
     try:
-        return _made(network, load(before))
+        return _ready_on(network, load(before))
     except (BackendError, plugins.PluginError) as error:
-        told = f"the steps before were made by the backend '{before}', which makes those to come: {error}"
-        raise BackendError(f"{told}; one that is named (--backend) goes on with other last bits") from None
+        problem = f"the steps before were made by the backend '{before}', which makes those to come: {error}"
+        raise BackendError(f"{problem}; one that is named (--backend) goes on with other last bits") from None
 
 
-def _default(network: Network) -> Ready:
+def _ready_by_default(network: Network) -> Ready:
+    """On the backend that is chosen; where it fails, on NumPy's, unless the environment named the one that fails."""
     name, why = choose_backend(network)
     try:
-        return _made(network, load(name), why)
+        return _ready_on(network, load(name), why)
     except BackendError as error:
         if name == _LAST_RESORT or _named():
             raise
-        _say(f"NumPy computes, as {error}")
-        return _made(network, load(_LAST_RESORT), f"array code made for this network; {error}")
+        _warn_once(f"NumPy computes, as {error}")
+        return _ready_on(network, load(_LAST_RESORT), f"array code made for this network; {error}")
 
 
 @cache
-def _say(message: str) -> None:
+def _warn_once(message: str) -> None:
     """Warn once in a process."""
     warnings.warn(message, RuntimeWarning, stacklevel=callers_level())
 
 
-def _made(network: Network, chosen: Backend, why: str = "") -> Ready:
-    found = chosen.availability()
-    if not found.available:
-        raise BackendError(f"the backend '{chosen.name}' is not available here: {found.note}")
-    missing = lacking(network, chosen.capabilities)
+def _ready_on(network: Network, backend: Backend, why: str = "") -> Ready:
+    """On this backend. Raises BackendError where it is not available or lacks something."""
+    availability = backend.availability()
+    if not availability.available:
+        raise BackendError(f"the backend '{backend.name}' is not available here: {availability.note}")
+    missing = lacking(network, backend.capabilities)
     if missing:
-        raise BackendError(f"the backend '{chosen.name}' cannot run '{network.name}': {'; '.join(missing)}")
-    stepper = chosen.prepare(network)
-    return Ready(chosen.name, stepper, stepper.functions if isinstance(stepper, Computing) else NUMPY, why)
+        raise BackendError(f"the backend '{backend.name}' cannot run '{network.name}': {'; '.join(missing)}")
+    stepper = backend.prepare(network)
+    return Ready(backend.name, stepper, stepper.functions if isinstance(stepper, Computing) else NUMPY, why)
 
 
 def lacking(network: Network, capabilities: Capabilities) -> tuple[str, ...]:

@@ -2,7 +2,18 @@
 
 In: nothing. Out: a Library. What is computed beside the step (inputs that are expressions, clamps, what follows a
 parameter that is set) is computed by it, so that it has the last bits that the step and an exported controller would
-give it; NumPy's functions have others. It is compiled once, for all networks.
+give it; NumPy's functions have others. It is compiled once, for all networks. Of ``exp`` it is
+
+    NV_PUBLIC double nv_one_exp(double a)
+    {
+        return exp(a);
+    }
+
+    NV_PUBLIC void nv_all_exp(int64_t count, const double *a, double *out)
+    {
+        for (int64_t i = 0; i < count; i++)
+            out[i] = nv_one_exp(a[i]);
+    }
 """
 
 from __future__ import annotations
@@ -44,9 +55,9 @@ def library() -> Library:
 def _loaded(place: object, source: str) -> Library:
     """The functions of a library that lies at a place, by this compiler."""
     compiled = c_library.load(source)
-    made = {name: _Function.of(compiled, name, len(names)) for name, names in _parameters().items()}
-    calls = {name: made[name].over_all if FUNCTIONS[name].most is None else made[name] for name in FUNCTIONS}
-    return Library(calls, made[_REMAINDER])
+    functions = {name: _Function.of(compiled, name, len(names)) for name, names in _parameters().items()}
+    calls = {name: functions[name].over_all if FUNCTIONS[name].most is None else functions[name] for name in FUNCTIONS}
+    return Library(calls, functions[_REMAINDER])
 
 
 @cache
@@ -55,13 +66,13 @@ def text() -> str:
     emitter, bodies = Emitter(), list[str]()
     for name, names in _parameters().items():
         value = emitter.text(emitter.value(_tree(name, names), {one: one for one in names}))
-        one = ", ".join(f"double {own}" for own in names)
-        every = "".join(f", const double *{own}" for own in names)
-        taken = ", ".join(f"{own}[i]" for own in names)
+        numbers = ", ".join(f"double {own}" for own in names)
+        arrays = "".join(f", const double *{own}" for own in names)
+        items = ", ".join(f"{own}[i]" for own in names)
         bodies += [
-            f"NV_PUBLIC double nv_one_{name}({one})\n{{\n    return {value};\n}}\n",
-            f"NV_PUBLIC void nv_all_{name}(int64_t count{every}, double *out)\n{{\n"
-            f"    for (int64_t i = 0; i < count; i++)\n        out[i] = nv_one_{name}({taken});\n}}\n",
+            f"NV_PUBLIC double nv_one_{name}({numbers})\n{{\n    return {value};\n}}\n",
+            f"NV_PUBLIC void nv_all_{name}(int64_t count{arrays}, double *out)\n{{\n"
+            f"    for (int64_t i = 0; i < count; i++)\n        out[i] = nv_one_{name}({items});\n}}\n",
         ]
     return "\n".join([_HEAD, emitter.helpers(words_of(bodies)), "", *bodies])
 
@@ -73,6 +84,7 @@ def _parameters() -> dict[str, tuple[str, ...]]:
 
 
 def _tree(name: str, names: tuple[str, ...]) -> Tree:
+    """The call of a function with these arguments."""
     arguments = tuple(Name(own) for own in names)
     return Chain(("%",), arguments) if name == _REMAINDER else Call(name, arguments)
 

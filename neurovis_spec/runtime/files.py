@@ -100,12 +100,14 @@ def regular_size(path: str | os.PathLike[str]) -> int:
 
 @dataclass
 class Part:
-    """A file that is written to without a buffer. ``held`` is the last step that can be read from it, None for none."""
+    """A file that is written to without a buffer, and becomes that of a recording."""
 
     file: FileIO
-    #: None where the recording goes to a device
+    #: None where the recording goes to a device, and once it has taken its place
     path: Path | None
+    #: where the recording will be
     target: Path
+    #: the last step that can be read from it, None for none
     held: int | None = None
 
     def take_place(self) -> None:
@@ -132,6 +134,7 @@ def part_of(path: Path) -> Iterator[Part]:
 
 
 def _open(path: Path, target: Path) -> Iterator[Part]:
+    """A part in a file beside ``target``, which ``path`` leads to."""
     beside, file = open_beside(target, "part")
     part = Part(file, beside, target)
     try:

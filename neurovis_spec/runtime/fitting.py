@@ -23,8 +23,8 @@ def fitted(recording: Recording, network: Network) -> Recording:
     some neurons alone; the others are the network's. Raises RecordingError for a recording of another network: its
     neurons and connections are not the same."""
     sources, targets = network.connections.sources.whole(), network.connections.targets.whole()
-    own = recording.neurons == network.neurons.names
-    if own and np.array_equal(recording.sources, sources) and np.array_equal(recording.targets, targets):
+    same_neurons = recording.neurons == network.neurons.names
+    if same_neurons and np.array_equal(recording.sources, sources) and np.array_equal(recording.targets, targets):
         return recording
     table = of_table(recording, network)
     if table is None:
