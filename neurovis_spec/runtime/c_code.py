@@ -6,8 +6,9 @@ one by one, else the code of a loop's variable. So ``3`` gives ``u1 = 0.5*activi
 ``u1 = t0[p]*activity[4 + p]`` (t0: a table; 4 + p: indices that are regular).
 
 The lines read these identifiers: ``k`` the step, ``kd`` and ``td`` the step and the time as numbers, ``s`` the inputs
-and noise of the step, ``x`` the numbers that can be set, ``t0``, ``t1``, … tables, ``p`` the struct that the caller
-passes in (in ``p->given`` the tables that are too long for the text), and the arrays of a State by their names.
+and noise of the step, ``x`` the numbers that can be set, ``t0``, ``t1``, … tables, and the arrays of a State by their
+names. They come from the struct ``p`` of the caller (tables that are too long for the text from ``p->given``) at the
+head of a function: in a loop whose index is ``p`` it is hidden.
 """
 
 from __future__ import annotations

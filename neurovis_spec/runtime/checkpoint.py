@@ -1,9 +1,9 @@
 """Checkpoints: the whole State of a run in a file, from which it goes on exactly.
 
 In: a State and a path, or a Network and a path. Out: a file, or a State. The names in the file are fixed (``chosen``:
-the parameters that were set). The file is an archive of arrays as NumPy
-writes them, without pickles; it is believed in nothing: whatever is not of the size that this network asks for is
-refused before it is read, and so is a checkpoint of another network (hash).
+the parameters that were set). The file is an archive of arrays as NumPy writes them, without pickles; it is believed in
+nothing: whatever is not of the size that this network asks for is refused before it is read, and so is a checkpoint of
+another network (hash).
 """
 
 from __future__ import annotations

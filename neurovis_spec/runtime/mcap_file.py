@@ -2,9 +2,8 @@
 
 In: a Recording and a path, or a path. Out: a file that can be read at any moment while it is written, or a Recording.
 Topics are ``NAMESPACE/NETWORK/activity``, ``/weights`` (of the changing connections), ``/states``, ``/sensors`` and
-``/pose`` of a body, and ``/spec``. What does not grow with the steps, the *frame* (a recording
-without rows), is an attachment, as an archive like a ``.npz``. A
-recording may go on from file to file: ``NAME.mcap``, ``NAME-1.mcap``, ….
+``/pose`` of a body, and ``/spec``. What does not grow with the steps, the *frame* (a recording without rows), is an
+attachment, as an archive like a ``.npz``. A recording may go on from file to file: ``NAME.mcap``, ``NAME-1.mcap``, ….
 """
 
 from __future__ import annotations
