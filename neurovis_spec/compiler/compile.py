@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -21,17 +21,18 @@ from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.checks.warnings import warn
 from neurovis_spec.compiler.connections.connect import Connected, connect, join
 from neurovis_spec.compiler.connections.entries import Bundle
+from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
 from neurovis_spec.compiler.drawing.sections import layout_settings, render_settings
 from neurovis_spec.compiler.events.bound import found_in, make_settable, own_weights
 from neurovis_spec.compiler.limits import MOST_SIGNALS, Limits, amount
 from neurovis_spec.compiler.lower import Cycle, assign_levels, make_populations, make_program, make_projections
 from neurovis_spec.compiler.names.expand import Expander, constants_of
 from neurovis_spec.compiler.names.finder import Finder, finder_of
-from neurovis_spec.compiler.names.modules import library_of
+from neurovis_spec.compiler.names.modules import Library, library_of
 from neurovis_spec.compiler.names.outputs import make_outputs
 from neurovis_spec.compiler.names.references import other_parameter
 from neurovis_spec.compiler.names.scope import Scope, Surroundings
-from neurovis_spec.compiler.network import Input, Instance, Network, Output
+from neurovis_spec.compiler.network import Input, Instance, Network, Noise, Output
 from neurovis_spec.compiler.neurons.noise import make_noises
 from neurovis_spec.compiler.neurons.populate import Census, populate, without_neurons
 from neurovis_spec.compiler.ros_settings import RosSettings
@@ -55,60 +56,132 @@ if TYPE_CHECKING:
 class Request:
     """How a spec is to be compiled: where its files lie, what is set, how large it may become."""
 
+    #: the folder that its paths are relative to
     base: Path
+    #: the folder that its files may not lie outside of
     root: Path
+    #: values of parameters, by name, in place of those of the spec
     parameters: Mapping[str, float] = field(default_factory=dict)
+    #: in place of that of the spec
     seed: int | None = None
     limits: Limits = field(default_factory=Limits)
-    #: how included files are read, and those that were; the data files by the folder that paths are relative to
+    #: how included files are read, and those that were
     read: ReadBytes = read_bytes
     includes: Includes = field(default_factory=Includes)
+    #: the data files by the folder that paths are relative to
     files: Mapping[Path, Files] = field(default_factory=dict)
     #: whether the network has a body: that of the spec, or that of this file
     body: bool | Path = True
 
 
+class _Sections(NamedTuple):
+    """What the sections of a spec come to. All of them are valid."""
+
+    seed: int
+    steps: int
+    episode: int | None
+    constants: Constants
+    library: Library
+    #: the names of the modules that have an instance
+    modules_used: set[str]
+    scopes: tuple[Scope, ...]
+    census: Census
+    connected: Connected
+    #: the level of each neuron
+    level: IntArray
+    #: resolves what events name
+    finder: Finder
+    inputs: tuple[Input, ...]
+    outputs: tuple[Output, ...]
+    noises: tuple[Noise, ...]
+    layout: LayoutSettings
+    render: RenderSettings
+    ros: RosSettings
+    body: BodySettings | None
+
+
 def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | None:
     """The network of a spec; None where it is invalid (the findings say why)."""
+    sections = _compile_sections(spec, request, findings)
+    if sections is None:
+        return None
+    network = _assemble(spec, sections)
+    eventful = _eventful(spec, network, sections.finder, sections.constants)
+    if eventful is not None and not findings.failed:  # the shape may have been invalid
+        files = tuple(file.model for file in request.includes.files)
+        scopes, library, used = sections.scopes, sections.library, sections.modules_used
+        bundles, census = sections.connected.bundles, sections.census
+        warn(Compiled(spec, scopes, library, used, eventful, bundles, census, files), findings)
+    return None if eventful is None else with_checks(eventful)
+
+
+def _compile_sections(spec: Spec, request: Request, findings: Findings) -> _Sections | None:
+    """Every section but the events; None where anything is invalid. Then the events are only checked."""
     before = findings.errors
-    name = known(spec.name.value, "")
-    seed = request.seed if request.seed is not None else 0 if spec.seed is None else spec.seed.value
+    seed = 0 if spec.seed is None else spec.seed.value
+    seed = seed if request.seed is None else request.seed
     constants = Constants(names_of(spec, "parameters", {}), 1.0, findings)
     dt_known = _step_length(spec, constants)
     library = library_of(spec, request.includes, request.base, constants.dt, findings)
     make_parameters(spec, constants, request.parameters)
-    _check_given(spec, constants, request.parameters)
+    _check_names_set(spec, constants, request.parameters)
     steps, episode = _clock(spec, constants)
     expander = Expander(library, request.root, findings, constants.dt, files={**request.files}, limits=request.limits)
     expansion = expander.expand(spec, constants, request.base)
     scopes, inputs = expansion.scopes, expansion.inputs
     census = populate(scopes, request.limits, seed)
-    _check_unused(expander, request.limits, seed)
+    _check_modules_without_instance(expander, request.limits, seed)
     if not len(census.neurons):
         _report_no_neurons(spec, census, findings)
         census = without_neurons(census)
     layout = layout_settings(spec.layout, scopes, census, findings)
-    made = connect(scopes, census, request.limits, seed)
-    bundles = made.bundles
-    finder = finder_of(census, made, findings)
+    connected = connect(scopes, census, request.limits, seed)
+    finder = finder_of(census, connected, findings)
     render = render_settings(spec.render, finder, constants)
     outputs = make_outputs(spec, finder)
     if spec.render is not None and spec.render.figure:
         from neurovis_spec.compiler.drawing.figure import figure_of
 
         render = replace(render, figure=figure_of(spec, census, outputs, finder))
-    ros = _ros(spec, inputs, outputs, scopes[0], constants)
-    body = _body(spec, request, inputs, outputs, scopes[0], constants, dt_known=dt_known)
+    around = Surroundings(spec, scopes[0], inputs, outputs)
+    ros = _ros(around, constants)
+    body = _body(around, request, constants, dt_known=dt_known)
     noises = make_noises(census, sum(entry.size for entry in inputs))
-    expansion.depend()
-    level = _levels(made, census, findings)
-    if level is None or not made.complete or findings.errors > before or not _under_way(bundles, findings):
-        _read_events(spec, finder, constants)
+    expansion.depend()  # last, as every section may have made parameters of instances structural
+    level = _levels(connected, census, findings)
+    valid = level is not None and connected.complete and findings.errors == before
+    if level is None or not valid or not _signals_fit(connected.bundles, findings):
+        _read_events(spec, finder, constants)  # for its findings alone
         return None
-    projections, rules = make_projections(bundles)
-    connections = join(made, rules)
-    populations = make_populations(census, made.targets.compact(), level)
-    program = make_program(populations, projections)
+    return _Sections(
+        seed=seed,
+        steps=steps,
+        episode=episode,
+        constants=constants,
+        library=library,
+        modules_used=expander.used,
+        scopes=scopes,
+        census=census,
+        connected=connected,
+        level=level,
+        finder=finder,
+        inputs=inputs,
+        outputs=outputs,
+        noises=noises,
+        layout=layout,
+        render=render,
+        ros=ros,
+        body=body,
+    )
+
+
+def _assemble(spec: Spec, sections: _Sections) -> Network:
+    """The network that valid sections make, but for its events."""
+    constants, census, connected = sections.constants, sections.census, sections.connected
+    name = known(spec.name.value, "")
+    projections, rules = make_projections(connected.bundles)
+    connections = join(connected, rules)
+    populations = make_populations(census, connected.targets.compact(), sections.level)
     slots = tuple(constants.slots)
     network = Network(
         name=name,
@@ -116,80 +189,69 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         description="\n".join(text.value for text in spec.description or ()),
         dt=constants.dt,
         dt_given=spec.time is not None and spec.time.dt is not None,
-        steps=steps,
-        episode=episode,
-        seed=seed,
+        steps=sections.steps,
+        episode=sections.episode,
+        seed=sections.seed,
         parameters=dict(constants.parameters),
         structural=frozenset(constants.structural),
         neurons=census.neurons,
         connections=connections,
-        inputs=inputs,
-        outputs=outputs,
+        inputs=sections.inputs,
+        outputs=sections.outputs,
         populations=populations,
         projections=projections,
-        program=program,
-        layout=layout,
-        render=render,
+        program=make_program(populations, projections),
+        layout=sections.layout,
+        render=sections.render,
         hash="",  # of all the rest
-        noises=noises,
-        instances=_instances(scopes, census),
-        numbering=own_weights(slots, bundles, connections.weights.whole()),
-        ros=ros,
-        body=body,
+        noises=sections.noises,
+        instances=_instances(sections.scopes, census),
+        numbering=own_weights(slots, connected.bundles, connections.weights.whole()),
+        ros=sections.ros,
+        body=sections.body,
     )
-    settable = make_settable(network, slots, found_in(network, census, bundles))
-    network = replace(network, hash=content_hash(network), settable=settable)
-    eventful = _eventful(spec, network, finder, constants)
-    if eventful is not None and not findings.failed:  # the shape may have been invalid
-        files = tuple(file.model for file in request.includes.files)
-        warn(Compiled(spec, scopes, library, expander.used, eventful, bundles, census, files), findings)
-    return None if eventful is None else with_checks(eventful)
+    settable = make_settable(network, slots, found_in(network, census, connected.bundles))
+    return replace(network, hash=content_hash(network), settable=settable)
 
 
-def _ros(
-    spec: Spec, inputs: tuple[Input, ...], outputs: tuple[Output, ...], root: Scope, constants: Constants
-) -> RosSettings:
+def _ros(around: Surroundings, constants: Constants) -> RosSettings:
     """The ``ros`` section. Most specs have none: nothing that reads it is imported then."""
-    if spec.ros is None:
+    if around.spec.ros is None:
         return RosSettings(rate=1 / constants.dt)
     from neurovis_spec.compiler.ros import ros_settings
 
-    return ros_settings(spec.ros, Surroundings(spec, root, inputs, outputs), constants)
+    return ros_settings(around.spec.ros, around, constants)
 
 
-def _body(
-    spec: Spec,
-    request: Request,
-    inputs: tuple[Input, ...],
-    outputs: tuple[Output, ...],
-    root: Scope,
-    constants: Constants,
-    *,
-    dt_known: bool,
-) -> BodySettings | None:
+def _body(around: Surroundings, request: Request, constants: Constants, *, dt_known: bool) -> BodySettings | None:
     """The ``body`` section, of the spec or of the file that is asked for. Most specs have none: nothing that reads it
     is imported then."""
-    if spec.body is None and isinstance(request.body, bool):
-        return None
-    from neurovis_spec.compiler.body import Place, body_settings
+    model, body_of_spec = around.spec.body, None
+    if model is not None:  # where it is not wanted it is not opened, but it reads parameters all the same
+        from neurovis_spec.compiler.body import Place, body_settings
 
-    around, made = Surroundings(spec, root, inputs, outputs), None
-    if spec.body is not None:  # where it is not wanted it is not opened, but it reads parameters all the same
         place = Place(request.base, request.root) if request.body is True else None
-        made = body_settings(spec.body, around, constants, place, dt_known=dt_known)
-    if not isinstance(request.body, Path):
-        return made if request.body else None
+        body_of_spec = body_settings(model, around, constants, place, dt_known=dt_known)
+    if isinstance(request.body, Path):
+        return _body_of_file(request.body, around, constants, dt_known=dt_known)
+    return body_of_spec if request.body else None
+
+
+def _body_of_file(path: Path, around: Surroundings, constants: Constants, *, dt_known: bool) -> BodySettings | None:
+    """The ``body`` section of another file, whose paths are relative to its own folder."""
+    from neurovis_spec.compiler.body import Place, body_settings
     from neurovis_spec.language.shape import read_body
 
-    other, folder = read_body(request.body, constants.findings), request.body.parent
-    if other is None:
+    model = read_body(path, constants.findings)
+    if model is None:
         return None
-    return body_settings(other, around, constants, Place(folder, folder), dt_known=dt_known)
+    return body_settings(model, around, constants, Place(path.parent, path.parent), dt_known=dt_known)
 
 
-def _check_unused(expander: Expander, limits: Limits, seed: int) -> None:
+def _check_modules_without_instance(expander: Expander, limits: Limits, seed: int) -> None:
     """Check each module without an instance by compiling it alone, with its own parameters. Modules that occur in
-    others come last, as they are checked with these; all together must keep the limits of one network."""
+    others come last, as they are checked with these. All together have the limits of one network; when these are used
+    up, the others are left unchecked."""
     modules = expander.library.modules.known()
     inner = {instance.module.value for module in modules.values() for instance in module.model.instances.values()}
     neurons, connections = limits.neurons, limits.connections
@@ -201,11 +263,11 @@ def _check_unused(expander: Expander, limits: Limits, seed: int) -> None:
         make_parameters(module.model, constants, {})
         scopes = expander.expand(module.model, constants, module.folder, name).scopes
         census = populate(scopes, limits, seed)
-        made = connect(scopes, census, limits, seed)
-        make_noises(census, 0)
+        connected = connect(scopes, census, limits, seed)
+        make_noises(census, 0)  # this and the layout for their findings alone
         layout_settings(None, scopes, census, expander.findings)
         neurons -= len(census.neurons)
-        connections -= sum(len(bundle.sources) for bundle in made.bundles)
+        connections -= sum(len(bundle.sources) for bundle in connected.bundles)
 
 
 def _instances(scopes: tuple[Scope, ...], census: Census) -> tuple[Instance, ...]:
@@ -226,8 +288,8 @@ def _eventful(spec: Spec, network: Network, finder: Finder, constants: Constants
     events = _read_events(spec, finder, constants)
     if constants.findings.errors > before:
         return None
-    made = with_changes(network, events, constants)
-    return None if constants.findings.errors > before else made
+    changed = with_changes(network, events, constants)
+    return None if constants.findings.errors > before else changed
 
 
 def _read_events(spec: Spec, finder: Finder, constants: Constants) -> tuple[Event, ...]:
@@ -253,22 +315,22 @@ def _report_no_neurons(spec: Spec, census: Census, findings: Findings) -> None:
     findings.error("no-neurons", span, message, hint, key="neurons")  # also where the name is missing there
 
 
-def _levels(made: Connected, census: Census, findings: Findings) -> IntArray | None:
+def _levels(connected: Connected, census: Census, findings: Findings) -> IntArray | None:
     """The level of each neuron; None where neurons wait for each other, which is reported: a cycle of connections that
     are in order is one whatever becomes of the others."""
-    level = assign_levels(len(census.neurons), made.sources, made.targets, made.delays)
+    level = assign_levels(len(census.neurons), connected.sources, connected.targets, connected.delays)
     if not isinstance(level, Cycle):
         return level
     path = [census.neurons.names[neuron] for neuron in level.neurons]
     shown = path if len(path) <= 12 else [*path[:6], "…", *path[-5:]]
     message = f"these neurons wait for each other within one step: {' -> '.join(shown)}"
-    ends = np.cumsum([len(bundle.sources) for bundle in made.bundles])
-    bundle = made.bundles[int(np.searchsorted(ends, level.connection, side="right"))]
+    ends = np.cumsum([len(bundle.sources) for bundle in connected.bundles])
+    bundle = connected.bundles[int(np.searchsorted(ends, level.connection, side="right"))]
     findings.error("delay-0-cycle", bundle.key, message, "give one of these connections a delay of at least 1")
     return None
 
 
-def _under_way(bundles: tuple[Bundle, ...], findings: Findings) -> bool:
+def _signals_fit(bundles: tuple[Bundle, ...], findings: Findings) -> bool:
     """Whether the signals under way fit into memory: delays of all connections together."""
     total = 0
     for bundle in bundles:
@@ -298,9 +360,9 @@ def _step_length(spec: Spec, constants: Constants) -> bool:
     return True
 
 
-def _check_given(spec: Spec, constants: Constants, given: Mapping[str, float]) -> None:
+def _check_names_set(spec: Spec, constants: Constants, values: Mapping[str, float]) -> None:
     """Report names that the caller sets and that are no parameters of the spec."""
-    for name in given:
+    for name in values:
         if name not in spec.parameters:
             node = spec.source.entry("parameters")
             span = opening(spec.source) if node is None else node.key.span
