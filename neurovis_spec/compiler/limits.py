@@ -10,14 +10,18 @@ from typing import NamedTuple
 
 #: Findings in one list of values, after which the rest of the list is not checked.
 PATIENCE = 20
-#: The most instances of modules, and how deep they may be nested.
-MOST_INSTANCES, DEEPEST = 100_000, 64
-#: The longest delay in steps, and the most signals under way (delays of all connections together).
-LONGEST_DELAY, MOST_SIGNALS = 1_000_000, 250_000_000
+#: The most instances of modules.
+MOST_INSTANCES = 100_000
+#: How deep instances may be nested.
+DEEPEST = 64
+#: The longest delay, in steps.
+LONGEST_DELAY = 1_000_000
+#: The most signals under way at once: the delays of all connections, in steps, added up.
+MOST_SIGNALS = 250_000_000
 
 
 class Limits(NamedTuple):
-    """Most neurons and most connections (§3)."""
+    """Most neurons and most connections of a network; ``--limit`` raises them."""
 
     neurons: int = 1_000_000
     connections: int = 10_000_000

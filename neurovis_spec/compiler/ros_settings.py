@@ -19,41 +19,46 @@ MOST_WAITING = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Subscription:
-    """An input that comes from a topic. ``type`` is written ``package/Name``; ``field`` is a dotted path in a message.
-
-    Of a message that names its joints those of ``names`` are taken, in this order; without names all numbers.
-    ``timeout`` seconds after the last message it is as ``on_timeout`` says; None: never.
-    """
+    """An input that comes from a topic."""
 
     input: str
     topic: str
+    #: of the messages, ``package/Name``
     type: str
+    #: the dotted path to the numbers in a message
     field: str = "data"
+    #: the joints to take of a message that names its joints, in this order; empty: all numbers
     names: tuple[str, ...] = ()
+    #: seconds after the last message until the input is as ``on_timeout`` says; None: never
     timeout: float | None = None
     on_timeout: OnTimeout = "zero"
 
 
 @dataclass(frozen=True, slots=True)
 class Publication:
-    """An output that goes to a topic; ``safe`` is what is sent when the run ends or stops, None: nothing."""
+    """An output that goes to a topic."""
 
     output: str
     topic: str
+    #: of the messages, ``package/Name``
     type: str
+    #: the dotted path to the numbers in a message
     field: str = "data"
+    #: what is sent when the run ends or stops; None: nothing
     safe: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class RosSettings:
-    """The ``ros`` section, references resolved. ``namespace`` is absolute; ``rate`` is steps a second; ``depth`` is how
-    many messages wait to be sent, None: as the rate asks for."""
+    """The ``ros`` section, references resolved."""
 
+    #: steps a second
     rate: float = 1.0
+    #: absolute
     namespace: str = NAMESPACE
     reliability: Reliability = "reliable"
     durability: Durability = "volatile"
+    #: how many messages wait to be sent; None: as the rate asks for (``depth_at``)
     depth: int | None = None
     subscribe: tuple[Subscription, ...] = ()
     publish: tuple[Publication, ...] = ()
@@ -65,7 +70,7 @@ class RosSettings:
 
 
 def absolute(topic: str, node: str) -> str:
-    """A topic's whole name, seen from a node.
+    """A topic's whole name, seen from a node, whose own whole name is ``node``.
 
     >>> absolute("/a", "/ns/net"), absolute("a/b", "/ns/net"), absolute("~/a", "/ns/net")
     ('/a', '/ns/a/b', '/ns/net/a')
