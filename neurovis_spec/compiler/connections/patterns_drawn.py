@@ -1,7 +1,7 @@
-"""Patterns that are drawn so many at a time: fixed degrees and small worlds.
+"""Patterns that draw a fixed number for each neuron: fixed degrees and small worlds.
 
 In: the Ends and a Stream. Out: pairs, row by row. No row knows of another, and no number depends on how many rows are
-made at once, so that the pairs depend on nothing but seed, names and sizes (§4, Randomness).
+made at once, so that the pairs depend on nothing but seed, names and sizes.
 
 Both patterns draw from a row of *slots*, which change as they are drawn from. Writing a fresh row of slots for each
 source would take as long as connecting it with all targets. So there is one table, a line of slots for each of some
@@ -41,7 +41,7 @@ def fixed_indegree(ends: Ends, count: int, stream: Stream) -> Pairs:
 
 
 def small_world(ends: Ends, degree: int, rewire: float, stream: Stream) -> Pairs:
-    """A ring whose neurons reach ``degree`` neighbours, some of these connections led elsewhere.
+    """A ring whose neurons reach ``degree`` neighbours (an even number), some of these connections led elsewhere.
 
     Source i begins with the targets i + 1, i − 1, i + 2, … i − degree/2 around the ring. In this order each of them, j,
     is given up where the uniform number of the counter (i, j, 0, 0) is below ``rewire``, for one of the f targets that
@@ -65,12 +65,12 @@ def small_world(ends: Ends, degree: int, rewire: float, stream: Stream) -> Pairs
         rewired = stream.uniform(sources[:, None], neighbours, 0, 0) < rewire
         drawn_slots = np.zeros_like(neighbours)
         if rewire:
-            drawn_slots = _slot(stream.uniform(sources[:, None], neighbours, 0, 1), len(slots))
+            drawn_slots = _slot_index(stream.uniform(sources[:, None], neighbours, 0, 1), len(slots))
         for neighbour in range(degree):
-            lines = np.flatnonzero(rewired[:, neighbour])
-            drawn = drawn_slots[lines, neighbour]
-            reached_offsets[lines, neighbour] = table[lines, drawn]
-            table[lines, drawn] = offsets[neighbour]
+            table_rows = np.flatnonzero(rewired[:, neighbour])
+            drawn = drawn_slots[table_rows, neighbour]
+            reached_offsets[table_rows, neighbour] = table[table_rows, drawn]
+            table[table_rows, drawn] = offsets[neighbour]
         # put the table back
         changed = drawn_slots[rewired]
         table[np.nonzero(rewired)[0], changed] = slots[changed]
@@ -91,30 +91,30 @@ def _chosen_targets(ends: Ends, count: int, draw: Callable[[IntArray, IntArray],
         uniform = draw(sources[:, None], np.arange(count, dtype=np.int64))
         chosen = np.empty((len(sources), count), dtype=np.int64)
         drawn_slots = np.empty_like(chosen)
-        lines = np.arange(len(sources))
+        table_rows = np.arange(len(sources))
         for draw_round in range(count):
-            drawn = drawn_slots[:, draw_round] = draw_round + _slot(uniform[:, draw_round], allowed - draw_round)
-            chosen[:, draw_round] = table[lines, drawn]
-            table[lines, drawn] = table[:, draw_round]
-        # put the table back
-        table[lines[:, None], drawn_slots] = drawn_slots
+            drawn = drawn_slots[:, draw_round] = draw_round + _slot_index(uniform[:, draw_round], allowed - draw_round)
+            chosen[:, draw_round] = table[table_rows, drawn]
+            table[table_rows, drawn] = table[:, draw_round]
+        # put the table back: in a fresh row slot s holds s
+        table[table_rows[:, None], drawn_slots] = drawn_slots
         # slots skip the excluded target, so those at or behind it are one too low
         chosen += (excluded_target >= 0)[:, None] & (chosen >= excluded_target[:, None])
         batches.append(np.sort(chosen, axis=1))
     return np.repeat(np.arange(n, dtype=np.int64), count), np.concatenate(batches).ravel()
 
 
-def _slot(uniform: FloatArray, slots: int | IntArray) -> IntArray:
+def _slot_index(uniform: FloatArray, slots: int | IntArray) -> IntArray:
     """⌊uniform · slots⌋, and below ``slots`` whatever rounding does."""
-    slot: IntArray = np.minimum(np.floor(uniform * slots).astype(np.int64), np.asarray(slots) - 1)
-    return slot
+    index: IntArray = np.minimum(np.floor(uniform * slots).astype(np.int64), np.asarray(slots) - 1)
+    return index
 
 
 def _row_tables(n: int, slots: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
     """The rows 0 … n − 1, some at a time, each time with the table: a line of ``slots`` for each of these rows. It is
     always the same memory, so who changes a cell puts it back."""
-    together = max(1, min(n, _CELLS // max(1, len(slots))))
-    table = np.tile(slots, (together, 1))
-    for start in range(0, n, together):
-        rows = np.arange(start, min(start + together, n), dtype=np.int64)
+    rows_at_once = max(1, min(n, _CELLS // max(1, len(slots))))
+    table = np.tile(slots, (rows_at_once, 1))
+    for start in range(0, n, rows_at_once):
+        rows = np.arange(start, min(start + rows_at_once, n), dtype=np.int64)
         yield rows, table[: len(rows)]

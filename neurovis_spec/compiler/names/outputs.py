@@ -31,6 +31,8 @@ def make_outputs(spec: Spec, finder: Finder) -> tuple[Output, ...]:
 
 @dataclass(frozen=True)
 class _Reader:
+    """Reads the section; ``finder`` resolves what it names."""
+
     finder: Finder
 
     @property
@@ -41,10 +43,10 @@ class _Reader:
     def outputs(self, spec: Spec) -> Iterator[Output]:
         """The outputs in the order written; what is invalid is reported and left out."""
         for name, reference in spec.outputs.items():
-            written = [(part, text) for text in reference.parts for part in parse_sum(text.value)]
-            named = [(part, text, self.finder.name_of_state(part)) for part, text in written]
-            if any(state is not None for _, _, state in named):
-                output = self._of_states(name, named)
+            parts = [(part, text) for text in reference.parts for part in parse_sum(text.value)]
+            parts_with_states = [(part, text, self.finder.name_of_state(part)) for part, text in parts]
+            if any(state_name is not None for _, _, state_name in parts_with_states):
+                output = self._of_states(name, parts_with_states)
             else:
                 output = self._of_neurons(name, reference)
             if output is not UNKNOWN:
@@ -54,36 +56,38 @@ class _Reader:
         neurons = resolve(reference.parts, self.finder.directory, self.findings)
         if neurons is UNKNOWN:
             return UNKNOWN
-        return Output(name, frozen(np.array(neurons, dtype=np.int64)), len(neurons) == 1)
+        return Output(name, frozen(np.array(neurons, dtype=np.int64)), scalar=len(neurons) == 1)
 
-    def _of_states(self, name: str, named: list[tuple[Part, Located[str], StateName | None]]) -> Output | Unknown:
+    def _of_states(
+        self, name: str, parts_with_states: list[tuple[Part, Located[str], StateName | None]]
+    ) -> Output | Unknown:
         """An output of states; UNKNOWN where a part is invalid, is no state, or names states that are named before
         it."""
-        found: list[StateOf] = []
+        states: list[StateOf] = []
         failed = False
         seen: set[tuple[str, str, int]] = set()
         before = self.findings.errors
-        for part, text, state in named:
+        for part, text, state_name in parts_with_states:
             if self.findings.errors - before >= PATIENCE:
                 return UNKNOWN
             span = text.node.at(part.start, part.end)
-            if state is None:
+            if state_name is None:
                 message = f"'{shorten(part.text)}' is no state, and the output '{name}' is of states"
                 self.findings.error("mixed-output", span, message, "make an output of each kind")
                 failed = True
                 continue
-            one = self.finder.state(state, part, text)
-            if one is UNKNOWN:
+            state = self.finder.state(state_name, part, text)
+            if state is UNKNOWN:
                 failed = True
                 continue
-            own = set(singles([one]))
-            if not seen.isdisjoint(own):
+            its_singles = set(singles([state]))
+            if not seen.isdisjoint(its_singles):
                 message = f"'{shorten(part.text)}' names states that are named before it"
                 self.findings.error("repeated-reference", span, message)
                 failed = True
-            seen |= own
-            found.append(one)
+            seen |= its_singles
+            states.append(state)
         if failed:
             return UNKNOWN
-        neurons = frozen(np.unique(np.concatenate([one.neurons for one in found])))
-        return Output(name, neurons, sum(one.size for one in found) == 1, tuple(found))
+        neurons = frozen(np.unique(np.concatenate([state.neurons for state in states])))
+        return Output(name, neurons, scalar=sum(state.size for state in states) == 1, states=tuple(states))
