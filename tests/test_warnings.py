@@ -167,7 +167,7 @@ def test_idle_are_those_that_nothing_else_leads_to(
     entries = "".join(
         f"  {source} -> {target}: {'{self: true}' if source == target else 1}\n" for source, target in edges
     )
-    with patch.object(checks, "_FEW", few), patch.object(checks, "_AT_ONCE", at_once):
+    with patch.object(checks, "_FEW_ENOUGH_FOR_LOOP", few), patch.object(checks, "_WHOLE_ARRAY_PASSES", at_once):
         found = warnings(f"neurons:\n{groups}connections:\n{entries}")
     assert sorted(found) == [("idle-neuron", name) for name in sorted(first)]
 

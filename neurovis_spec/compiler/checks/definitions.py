@@ -31,17 +31,17 @@ from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.language.values import Choice
 from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
 
-#: What definitions of a kind give, in the author's words.
-_GIVEN: AnyMapping[Kind, str] = {ACTIVATION: "the value", MODEL: "the activity", RULE: "the weight"}
+#: What the result of definitions of a kind is, in the author's words.
+_RESULT_NOUN: AnyMapping[Kind, str] = {ACTIVATION: "the value", MODEL: "the activity", RULE: "the weight"}
 _NOUNS = {"let": "intermediate value", "signals": "signal", "parameters": "parameter"}
 
 
 def check_definitions(compiled: Compiled, findings: Findings) -> None:
     """Warn of all such definitions."""
     for library in compiled.libraries:
-        for kind, given in _GIVEN.items():
+        for kind, result_noun in _RESULT_NOUN.items():
             for name, model in library.definitions[kind.section].items():
-                _check_parts(model, given, findings)
+                _check_parts(model, result_noun, findings)
                 if kind.lasting:
                     _check_replaced(model, compiled.library.definitions.of(kind).known()[name], findings)
     _check_unused(compiled, findings)
@@ -95,10 +95,10 @@ def _reached(names: Iterable[str], parts: AnyMapping[str, _Part]) -> set[str]:
     return found
 
 
-def _check_parts(definition: DefinitionModel, what: str, findings: Findings) -> None:
-    """Each part on which neither the activity or the weight depends, nor a state: states can be recorded, by an output
-    or whoever runs the network, so all of them count as read. A part that only such parts read is not reported: that
-    follows from these."""
+def _check_parts(definition: DefinitionModel, result_noun: str, findings: Findings) -> None:
+    """Warn of each part that neither the result nor any state depends on. All states count as read, as an output, or
+    whoever runs the network, can record them. A part that only such parts read is not reported: that follows from
+    these."""
     parts, written = _parts_of(definition), definition.parts()
     wanted = _names_read(written.each_step, written.each_episode)
     states = [name for name, part in parts.items() if part.section == "state"]
@@ -107,7 +107,7 @@ def _check_parts(definition: DefinitionModel, what: str, findings: Findings) -> 
     for name, (section, span, _) in unused.items():
         if any(name in part.reads for other, part in unused.items() if other != name):
             continue
-        message = f"{what} does not depend on the {_NOUNS[section]} '{name}'"
+        message = f"{result_noun} does not depend on the {_NOUNS[section]} '{name}'"
         if section == "parameters":
             findings.warning("unused-parameter", span, message, "remove it, or use it")
         else:
@@ -117,40 +117,40 @@ def _check_parts(definition: DefinitionModel, what: str, findings: Findings) -> 
 # Weights that are replaced where a change is meant
 
 
-def _check_replaced(model: DefinitionModel, made: Defined, findings: Findings) -> None:
+def _check_replaced(model: DefinitionModel, rule: Defined, findings: Findings) -> None:
     """``weight: {each_step: 0.01 * pre * post}``: a formula that reads what is active but nothing that outlasts the
     step, neither the weight nor a state that builds up, and that is 0 where all activities are 0, as a change would be.
     A weight that follows states, the time or a signal, or that has a value then, is not reported."""
-    parts, said, weight = _parts_of(model), model.parts(), made.definition.given
+    parts, written, weight = _parts_of(model), model.parts(), rule.definition.given
     for formula, tree, when in (
-        (said.each_step, weight.each_step, "each step"),
-        (said.each_episode, weight.each_episode, "the end of each episode"),
+        (written.each_step, weight.each_step, "each step"),
+        (written.each_episode, weight.each_episode, "the end of each episode"),
     ):
         if formula is None or tree is None:
             continue
-        found = _reached(_names_read(formula), parts)
-        active = not found.isdisjoint(ACTIVITIES)
-        if active and not _lasts(found, parts) and _in_silence(tree, made) == 0:
+        read = _reached(_names_read(formula), parts)
+        reads_activity = not read.isdisjoint(ACTIVITIES)
+        if reads_activity and not _any_lasts(read, parts) and _in_silence(tree, rule) == 0:
             message = f"this replaces the weight at {when}: it does not read 'weight'"
             findings.warning("replaces-weight", formula.span, message, "for a change write weight + …")
 
 
-def _lasts(found: set[str], parts: dict[str, _Part]) -> bool:
+def _any_lasts(names: set[str], parts: dict[str, _Part]) -> bool:
     """Whether there is among some names one whose value outlasts a step: the weight, or a state that reads itself."""
-    states = [name for name in found if name in parts and parts[name].section == "state"]
-    return "weight" in found or any(name in _reached(parts[name].reads, parts) for name in states)
+    states = [name for name in names if name in parts and parts[name].section == "state"]
+    return "weight" in names or any(name in _reached(parts[name].reads, parts) for name in states)
 
 
-def _in_silence(tree: Tree, made: Defined) -> Value:
+def _in_silence(tree: Tree, rule: Defined) -> Value:
     """What a formula gives where nothing is active, with the default parameters."""
-    rule = made.definition
+    definition = rule.definition
     values: dict[str, Value] = {**CONSTANTS, "dt": 1.0, "k": 1.0, "t": 1.0, "weight": 0.0}
-    values |= dict.fromkeys((*ACTIVITIES, *rule.signals), 0.0)
-    for default in made.defaults:
+    values |= dict.fromkeys((*ACTIVITIES, *definition.signals), 0.0)
+    for default in rule.defaults:
         value = value_of(default.value, values)
         values[default.name] = 0.0 if value is UNKNOWN else value
-    values |= {state.name: evaluate_array(state.initial, values) for state in rule.state}
-    for name, let in rule.let:
+    values |= {state.name: evaluate_array(state.initial, values) for state in definition.state}
+    for name, let in definition.let:
         values[name] = evaluate_array(let, values)
     with np.errstate(all="ignore"):
         return evaluate_array(tree, values)
@@ -166,14 +166,14 @@ def _check_unused(compiled: Compiled, findings: Findings) -> None:
     used = {
         ACTIVATION.section: {group.activation for group in network.neurons.groups},
         MODEL.section: {group.model for group in network.neurons.groups},
-        RULE.section: {one.rule.definition.name for one in network.projections},
+        RULE.section: {projection.rule.definition.name for projection in network.projections},
     }
     modules = [library.source.get("modules") for library in compiled.libraries]
     named = {text for node in modules if node is not None for text in _texts_in(node)}
-    for section, own in used.items():
+    for section, used_here in used.items():
         node = compiled.spec.source.get(section)
         for entry in node.entries if isinstance(node, Mapping) else ():
-            if entry.name not in own | named:
+            if entry.name not in used_here | named:
                 message = f"nobody uses the {section.removesuffix('s')} '{entry.name}'"
                 findings.warning("unused-definition", entry.key.span, message, "remove it, or use it")
 
@@ -198,9 +198,9 @@ def _texts_in(node: Node) -> Iterator[str]:
 def _check_modules(compiled: Compiled, findings: Findings) -> None:
     """Modules of the spec's own that have no instance; those of an included file may be there for others."""
     modules = compiled.library.modules.known()
-    inside = {instance.module.value for module in modules.values() for instance in module.model.instances.values()}
+    in_modules = {instance.module.value for module in modules.values() for instance in module.model.instances.values()}
     for name, module in modules.items():
-        if module.own and name not in compiled.used and name not in inside:
+        if module.own and name not in compiled.used and name not in in_modules:
             message, hint = f"the module '{name}' has no instance", "add one under 'instances', or remove it"
             findings.warning("unused-module", key_span(compiled.spec, "modules", name), message, hint)
 
@@ -209,7 +209,9 @@ def _check_hidden(compiled: Compiled, findings: Findings) -> None:
     """Names that another installed package defines, too, whose definition is not used: what the spec means is not what
     its author may think. A definition of the spec's own has another warning (``replaces-builtin``)."""
     hidden = installed().hidden
-    for section, choice in _choices(compiled) if hidden else ():
+    if not hidden:
+        return
+    for section, choice in _choices(compiled):
         name = choice.name.value
         found = hidden.get((section, name))
         if found is not None and not any(name in getattr(library, section) for library in compiled.libraries):

@@ -28,38 +28,50 @@ from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.sections import GroupModel
 
 Mask = npt.NDArray[np.bool_]
-#: How far what is active is followed at once; only long ways are gone step by step.
-_AT_ONCE = 8
+#: So many steps from what is active are taken for all connections at once; what lies farther is followed by its ways.
+_WHOLE_ARRAY_PASSES = 8
 #: From so many neurons connections are followed one by one, from more together.
-_FEW = 32
-#: the keys of a group that make its drive
+_FEW_ENOUGH_FOR_LOOP = 32
+#: The keys of a group that make its drive
 _DRIVING = ("input", "bias", "noise", "combine")
 
 
 def check_neurons(compiled: Compiled, findings: Findings) -> None:
     """Warn of idle neurons, once for each group as it is written, and of what a model leaves out of account."""
+    told = _warn_ignored(compiled, findings)
+    if any(event.clamp for event in compiled.spec.events):
+        return  # what is clamped is active from outside
+    _warn_idle(compiled, told, findings)
+
+
+def _warn_ignored(compiled: Compiled, findings: Findings) -> set[Span]:
+    """Warn of what groups are given that their models do not read; the places of these warnings."""
     told: set[Span] = set()
     reads: dict[str, _Reads] = {}
-    for kind, written in compiled.models:
-        model = kind.model.definition
+    for neuron_type, written in compiled.models:
+        model = neuron_type.model.definition
         read = reads.get(model.name) or reads.setdefault(model.name, _reads(model))
         for span, message, hint in _ignored(model, read, written):
             if span not in told:
                 told.add(span)
                 findings.warning("no-effect", span, message, hint)
-    if any(event.clamp for event in compiled.spec.events):
-        return  # what is clamped is active from outside
+    return told
+
+
+def _warn_idle(compiled: Compiled, told: set[Span], findings: Findings) -> None:
+    """Warn of the groups with idle neurons, but for those at whose places something is ``told`` already."""
     network = compiled.network
     idle = _idle(network)
-    driven = np.zeros(len(network.neurons), dtype=np.bool_)
-    driven[network.connections.targets.compact()] = True
     if not idle.any():
         return
+    has_incoming = np.zeros(len(network.neurons), dtype=np.bool_)
+    has_incoming[network.connections.targets.compact()] = True
     origin = {scope.called(name): (scope, name) for scope in compiled.scopes for name in scope.section.neurons}
     for group in network.neurons.groups:
         members = [member for member in group.indices if idle[member]]
-        scope, own = origin[group.name]
-        written, span = scope.section.neurons[own], key_span(scope.section, "neurons", own)
+        scope, own_name = origin[group.name]
+        written, span = scope.section.neurons[own_name], key_span(scope.section, "neurons", own_name)
+        # a bias or an initial of 0 that is written is meant
         if not members or span in told or written.bias is not None or written.initial is not None:
             continue
         told.add(span)
@@ -67,7 +79,7 @@ def check_neurons(compiled: Compiled, findings: Findings) -> None:
         shown = f"'{group.name}'" if len(names) == group.count else ", ".join(f"'{name}'" for name in names[:5])
         if len(names) > 5 and len(names) < group.count:
             shown += " and others"
-        outside = "from outside " if driven[members].any() else ""
+        outside = "from outside " if has_incoming[members].any() else ""
         message = (
             f"nothing {outside}reaches {shown}, and there is no input, bias, initial or noise: the activity stays 0"
         )
@@ -126,7 +138,7 @@ def _idle(network: Network) -> Mask:
             quiet[population.members] = False
     sources, targets = connections.sources.compact(), connections.targets.compact()
     idle = _unreached(quiet, sources, targets)
-    return _first(idle, sources, targets) if idle.any() else idle
+    return _first_causes(idle, sources, targets) if idle.any() else idle
 
 
 def _needed(network: Network) -> Mask:
@@ -151,11 +163,11 @@ class _Ways:
     def follow(self, reached: Mask, begin: list[int]) -> None:
         """Mark neurons as reached, and all to which a way leads from them through neurons that are not yet."""
         reached[begin] = True
-        seen, starts, ends = reached.data, self._starts.data, self._ends.data
+        seen, starts, ends = reached.data, self._starts.data, self._ends.data  # items of these are read faster
         waiting = begin
         while waiting:
-            if len(waiting) > _FEW:
-                waiting = self._together(reached, np.array(waiting))
+            if len(waiting) > _FEW_ENOUGH_FOR_LOOP:
+                waiting = self._follow_all(reached, np.array(waiting))
                 continue
             found = []
             for neuron in waiting:
@@ -165,10 +177,12 @@ class _Ways:
                         found.append(end)
             waiting = found
 
-    def _together(self, reached: Mask, begin: IntArray) -> list[int]:
+    def _follow_all(self, reached: Mask, begin: IntArray) -> list[int]:
         """Mark where connections lead from many neurons, and say what is new."""
         first, counts = self._starts[begin], self._starts[begin + 1] - self._starts[begin]
-        ends = self._ends[np.repeat(first - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())]
+        # each neuron's ends are a run of _ends: the positions of all these runs, one after the other
+        positions = np.repeat(first - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
+        ends = self._ends[positions]
         new: Indices = np.unique(ends[~reached[ends]])
         reached[new] = True
         return [*map(int, new)]
@@ -177,7 +191,7 @@ class _Ways:
 def _unreached(quiet: Mask, sources: Indices, targets: Indices) -> Mask:
     """The quiet neurons that no way leads to from one that is not."""
     reached = ~quiet
-    for _ in range(_AT_ONCE):
+    for _ in range(_WHOLE_ARRAY_PASSES):
         before = int(reached.sum())
         reached[targets[reached[sources]]] = True
         if int(reached.sum()) == before:
@@ -187,13 +201,14 @@ def _unreached(quiet: Mask, sources: Indices, targets: Indices) -> Mask:
     return ~reached
 
 
-def _first(idle: Mask, sources: Indices, targets: Indices) -> Mask:
+def _first_causes(idle: Mask, sources: Indices, targets: Indices) -> Mask:
     """Of the idle neurons those that are not behind other ones: without sources, or on a cycle that has none.
 
-    What is behind neurons without sources is reached from these. Of the rest each neuron has sources, in the rest: we
-    follow the ways from one neuron after the other that was not reached yet, and then once more, beginning with the
-    last of these: now those that are not reached yet are on cycles without sources, one on each, and the whole cycle is
-    what leads to it."""
+    What is behind neurons without sources is reached from these. Of the rest each neuron has sources, in the rest. Two
+    passes find the cycles, as those of Kosaraju's algorithm find strong components: the first follows the ways from one
+    neuron after the other that was not reached yet; the second does so once more, beginning with the last of these.
+    Those that it has not reached yet are on cycles without sources, one on each, and the whole cycle is what leads to
+    it."""
     inside = idle[sources] & idle[targets] & (sources != targets)
     begins, ends = sources[inside], targets[inside]
     behind = np.zeros(len(idle), dtype=np.bool_)
@@ -203,16 +218,16 @@ def _first(idle: Mask, sources: Indices, targets: Indices) -> Mask:
     result = idle & ~behind
     ways, reached = _Ways(len(idle), begins, ends), ~idle
     ways.follow(reached, np.flatnonzero(result).tolist())
-    again, tried = reached.copy(), []
+    reached_again, starts = reached.copy(), []
     for neuron in np.flatnonzero(~reached).tolist():
         if not reached[neuron]:
-            tried.append(neuron)
+            starts.append(neuron)
             ways.follow(reached, [neuron])
-    back = _Ways(len(idle), ends, begins) if tried else ways
-    for neuron in reversed(tried):
-        if not again[neuron]:
-            ways.follow(again, [neuron])
-            back.follow(result, [neuron])
+    backwards = _Ways(len(idle), ends, begins) if starts else ways
+    for neuron in reversed(starts):
+        if not reached_again[neuron]:
+            ways.follow(reached_again, [neuron])
+            backwards.follow(result, [neuron])
     return result
 
 
