@@ -20,7 +20,7 @@ from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray, narro
 from neurovis_spec.compiler.connections.edges import EdgeReader, End
 from neurovis_spec.compiler.connections.ends import Ends, counted
 from neurovis_spec.compiler.connections.patterns import all_to_all, empty_reason, pairs_of
-from neurovis_spec.compiler.connections.plasticity import Learning, Wired, learning_of
+from neurovis_spec.compiler.connections.plasticity import ConnectionEnds, Learning, learning_of
 from neurovis_spec.compiler.connections.weight_scale import Scaled, check_scale, scaled
 from neurovis_spec.compiler.events.settable import Assembled, Distance, Part
 from neurovis_spec.compiler.limits import LONGEST_DELAY, Limits, amount
@@ -71,9 +71,11 @@ class Bundle(NamedTuple):
 
 
 class _Shape(NamedTuple):
-    """Which pairs of an entry exist (positions within its ends), and what its shape says of weights and delays."""
+    """Which pairs of an entry exist, and what its shape says of weights and delays."""
 
+    #: for each pair the position of its source among the sources of the entry
     i: Indices
+    #: for each pair the position of its target among the targets of the entry
     j: Indices
     weights: FloatArray | None = None
     delays: Indices | None = None
@@ -126,6 +128,7 @@ class EntryBuilder:
             check_length(body.label, findings)
         delay = 1 if body.delay is None else self.constants.integer(body.delay, "a delay", 0, LONGEST_DELAY)
         errors_before_shape = findings.errors
+        # what is collected here stands at cells of the matrix, what ``centre_parts`` collects at connections
         with self.constants.following() as centre_cell_parts:
             centre = self._grid(body.centre, "centre") if isinstance(body.centre, (MatrixRows, FileReference)) else None
         shape = self._shape(centre)
@@ -138,7 +141,7 @@ class EntryBuilder:
         with self.constants.following() as centre_parts:
             centres = self._centres(centre, shape)
             self.constants.follow(self._parts_per_connection(centre, centre_cell_parts, shape))
-        with self.constants.following() as bound_parts:  # these know their field
+        with self.constants.following() as bound_parts:  # ``_bounds`` sets the field of each
             bounds = self._bounds(weights)
         learning = self._learning(shape)
         if shape is UNKNOWN or weights is UNKNOWN or centres is UNKNOWN or bounds is UNKNOWN or learning is UNKNOWN:
@@ -168,7 +171,7 @@ class EntryBuilder:
                 *(part._replace(field="weights" if learning is None else "initial_weights") for part in weight_parts),
                 *(part._replace(field="centres") for part in centre_parts),
                 *bound_parts,
-                *(() if learning is None else learning.used.parts),
+                *(() if learning is None else learning.settled.parts),
             ),
             label=None if body.label is None else body.label.value,
             empty=None if len(shape.i) else (self.sources, self.targets),
@@ -233,7 +236,7 @@ class EntryBuilder:
             if centre is None or centre is UNKNOWN:
                 return UNKNOWN
             return _cells_of(centre.present, centre.values)._replace(weights=None)
-        return pattern if body.pattern is not None else self._all()
+        return pattern if body.pattern is not None else self._all_pairs()
 
     def _ends(self) -> Ends | Unknown:
         if self.sources is UNKNOWN or self.targets is UNKNOWN or not self._is_sound("self"):
@@ -244,14 +247,15 @@ class EntryBuilder:
         return Ends(self.sources, self.targets, loops, position[self.sources], position[self.targets])
 
     def _pattern(self) -> _Shape | Unknown:
+        """The pairs of a pattern. Some patterns connect by position, so ends with an invalid one are not known."""
         assert self.body.pattern is not None
         ends = UNKNOWN if self._misplaced() else self._ends()
         pairs = pairs_of(self.body.pattern, ends, self.constants, self._stream("edges"), self._fits)
-        if ends is not UNKNOWN and self.body.pattern.name.value == "nearest":
+        if ends is not UNKNOWN and self.body.pattern.name.value == "nearest":  # what places neurons is structural then
             self.context.census.go_by_position(np.concatenate((ends.sources, ends.targets)))
         return UNKNOWN if pairs is UNKNOWN else _Shape(narrow(pairs[0]), narrow(pairs[1]))
 
-    def _all(self) -> _Shape | Unknown:
+    def _all_pairs(self) -> _Shape | Unknown:
         """All pairs, where nothing says which."""
         ends = self._ends()
         if ends is UNKNOWN:
@@ -301,10 +305,11 @@ class EntryBuilder:
         if "distance" in names(tree):
             position = self.context.census.neurons.position
             ends = position[self.sources[shape.i]], position[self.targets[shape.j]]
-            if self._misplaced() or not all(np.isfinite(end).all() for end in ends):
-                if not self._misplaced():
-                    message = "'distance' needs a position of every neuron of both ends"
-                    self.constants.findings.error("no-position", formula.span, message, "give the groups a 'position'")
+            if self._misplaced():
+                return UNKNOWN
+            if not all(np.isfinite(end).all() for end in ends):
+                message = "'distance' needs a position of every neuron of both ends"
+                self.constants.findings.error("no-position", formula.span, message, "give the groups a 'position'")
                 return UNKNOWN
             with np.errstate(over="ignore"):  # what is then infinite is found where it matters
                 difference = ends[0] - ends[1]
@@ -341,7 +346,7 @@ class EntryBuilder:
         scale = Scaled(Assembled(weights, tuple(parts)), self.body.scale, ends, pairs, self.constants)
         if scale.slots:
             self.constants.follow([Part(scale)])
-        with self.constants.following():  # dropped: the weights follow as a whole, by ``scale``
+        with self.constants.following():  # dropped: ``Part(scale)`` says all that the weights follow
             return scaled(self.body.scale, weights, ends, pairs, self.constants)
 
     def _plain_weights(self, shape: _Shape | Unknown) -> FloatArray | Unknown:
@@ -407,13 +412,13 @@ class EntryBuilder:
         """What the entry learns by; None without a rule."""
         if self.body.plasticity is None:
             return None
-        wired: Wired | Unknown = UNKNOWN
+        ends: ConnectionEnds | Unknown = UNKNOWN
         if shape is not UNKNOWN and self.sources is not UNKNOWN and self.targets is not UNKNOWN:
             i, j = shape.i.astype(np.int64), shape.j.astype(np.int64)  # formulas compute with them
-            wired = Wired(i, j, len(self.sources), len(self.targets))
+            ends = ConnectionEnds(i, j, len(self.sources), len(self.targets))
         return learning_of(
             self.body.plasticity,
-            wired,
+            ends,
             target_count=UNKNOWN if self.targets is UNKNOWN else len(self.targets),
             scope=self.context.scope,
             directory=self.context.directory,

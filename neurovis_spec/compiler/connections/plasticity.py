@@ -29,27 +29,28 @@ from neurovis_spec.likeness import suggest
 
 
 class Learning(NamedTuple):
-    """A rule in use. ``signals`` are indices into all activities followed by all inputs, one a connection; ``texts``
-    are what the author calls them."""
+    """A rule in use."""
 
-    used: Settled
+    settled: Settled
+    #: where each signal comes from: indices into all activities followed by all inputs, one a connection
     signals: Mapping[str, IntArray]
+    #: what the author calls each signal
     texts: Mapping[str, str]
 
     @property
     def rule(self) -> Definition:
         """The rule."""
-        return self.used.definition
+        return self.settled.definition
 
     @property
     def parameters(self) -> Mapping[str, FloatArray]:
         """Its parameters, one value a connection."""
-        return self.used.parameters
+        return self.settled.parameters
 
 
-class Wired(NamedTuple):
+class ConnectionEnds(NamedTuple):
     """The connections of an entry: connection c goes from the ``i[c]``-th of ``n_from`` sources to the ``j[c]``-th of
-    ``n_to`` targets."""
+    ``n_to`` targets. The fields have the names that the settings of a rule see (``_SETTING``)."""
 
     i: IntArray
     j: IntArray
@@ -64,7 +65,7 @@ _SHOWN = 3
 
 def learning_of(
     choice: Choice,
-    wired: Wired | Unknown,
+    ends: ConnectionEnds | Unknown,
     target_count: int | Unknown,
     scope: Scope,
     directory: Directory,
@@ -75,18 +76,18 @@ def learning_of(
 
     ``directory`` says what the names of the scope mean, ``neurons`` is how many the network has.
     """
-    constants, targets = scope.constants, UNKNOWN if wired is UNKNOWN else wired.j
-    each = Each("connection", dict.fromkeys(_SETTING.sees, UNKNOWN) if wired is UNKNOWN else wired._asdict())
+    constants, targets = scope.constants, UNKNOWN if ends is UNKNOWN else ends.j
+    each = Each("connection", dict.fromkeys(_SETTING.sees, UNKNOWN) if ends is UNKNOWN else ends._asdict())
     count = UNKNOWN if targets is UNKNOWN else len(targets)
-    used = settled_of(choice, RULE, scope.definitions, constants, each, count)
-    if used is UNKNOWN:
+    settled = settled_of(choice, RULE, scope.definitions, constants, each, count)
+    if settled is UNKNOWN:
         return UNKNOWN
-    rule = used.definition
+    rule = settled.definition
     signals: dict[str, IntArray] = {}
-    failed = not used.sound
+    failed = not settled.sound
     is_reported = constants.findings.is_invalid(choice.name.span)
     for signal in rule.signals:
-        entry = used.entries.get(signal)
+        entry = settled.entries.get(signal)
         if entry is None or entry is UNKNOWN:
             failed = True
             if entry is None and not is_reported:
@@ -99,9 +100,9 @@ def learning_of(
             failed = True
         else:
             signals[signal] = indices
-    if failed or not check_initials(used, choice, constants):
+    if failed or not check_initials(settled, choice, constants):
         return UNKNOWN
-    return Learning(used, signals, {name: _text(used.entries.known()[name].value) for name in rule.signals})
+    return Learning(settled, signals, {name: _text(settled.entries.known()[name].value) for name in rule.signals})
 
 
 def _signal_indices(
@@ -115,30 +116,27 @@ def _signal_indices(
     """Where a signal comes from, for each connection: an index into all activities followed by all inputs. It is one
     name, or a list of names that are taken together, with one component in all or one for each target."""
     node, before = entry.value, scope.constants.findings.errors
-    items = one_or_more(node)
-    parts: list[IntArray | Unknown] = []
-    for item in items:
-        parts.append(_source_indices(entry.name, item, scope, directory, neurons))
+    per_item: list[IntArray | Unknown] = []
+    for item in one_or_more(node):
+        per_item.append(_source_indices(entry.name, item, scope, directory, neurons))
         if scope.constants.findings.errors - before >= PATIENCE:
             return UNKNOWN
-    if not parts:
+    if not per_item:
         message = f"the signal '{entry.name}' names no neuron, group or input"
         scope.constants.findings.error("wrong-type", node.span, message)
-    known_parts = [part for part in parts if part is not UNKNOWN]
-    if not known_parts or len(known_parts) < len(parts):
+    sources = [indices for indices in per_item if indices is not UNKNOWN]
+    if not sources or len(sources) < len(per_item):
         return UNKNOWN
-    components = np.concatenate(known_parts)
+    components = np.concatenate(sources)
     count = len(components)
-    if count == 1 and targets is not UNKNOWN:
-        return np.repeat(components, len(targets))
-    if count == target_count and targets is not UNKNOWN:
-        return components[targets]
-    if target_count is UNKNOWN or count in (1, target_count):
+    if target_count is not UNKNOWN and count not in (1, target_count):
+        title = f"'{_text(node)}'" if isinstance(node, Scalar) else f"'{entry.name}'"
+        message = f"the signal {title} has {count} components; 1 or {target_count}, one for each target, are wanted"
+        scope.constants.findings.error("wrong-size", node.span, message)
         return UNKNOWN
-    title = f"'{_text(node)}'" if isinstance(node, Scalar) else f"'{entry.name}'"
-    message = f"the signal {title} has {count} components; 1 or {target_count}, one for each target, are wanted"
-    scope.constants.findings.error("wrong-size", node.span, message)
-    return UNKNOWN
+    if targets is UNKNOWN:
+        return UNKNOWN
+    return np.repeat(components, len(targets)) if count == 1 else components[targets]
 
 
 def _source_indices(signal: str, node: Node, scope: Scope, directory: Directory, neurons: int) -> IntArray | Unknown:
@@ -173,8 +171,8 @@ def _source_indices(signal: str, node: Node, scope: Scope, directory: Directory,
 def _text(node: Node) -> str:
     """What an author calls a signal."""
     if isinstance(node, AnyList):
-        few = [_text(item) for item in node.items[:_SHOWN]]
-        return f"[{', '.join(few if len(node.items) <= _SHOWN else [*few, '…'])}]"
+        shown = [_text(item) for item in node.items[:_SHOWN]]
+        return f"[{', '.join(shown if len(node.items) <= _SHOWN else [*shown, '…'])}]"
     return str(node.value).strip() if isinstance(node, Scalar) else "…"
 
 
