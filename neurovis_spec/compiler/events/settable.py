@@ -1,4 +1,4 @@
-"""What can be set in a run: parameters, and the numbers of a network that depend on them (§9).
+"""What can be set in a run: parameters, and the numbers of a network that depend on them.
 
 In: formulas and what their names mean. Out: Settable, a part of a Network. To set a parameter is to evaluate the
 bindings that read it and to write what they give into arrays; nothing is compiled anew. What depends on a parameter and
@@ -210,10 +210,12 @@ class Binding:
     formula: Dependent
     #: whether they are weights; the others stand in the vector of Settable's ``variables``
     weights: bool
-    #: where they stand in the vector of all weights, or in that of the variables
+    #: where they stand in the vector of all weights, or in that of the variables: one index alone where all numbers of
+    #: an array are the same, as these take one place in that vector
     indices: IntArray
-    #: which array of the network they belong to, and their indices there, however the vector is laid out
+    #: which array of the network they belong to
     array: Key
+    #: their indices in that array, one for each, however the vector is laid out
     places: IntArray
     #: the bounds within which they must lie
     low: Dependent | None = None

@@ -1,4 +1,4 @@
-"""The timeline: from the events of a spec to what changes in a run, and when (§9).
+"""The timeline: from the events of a spec to what changes in a run, and when.
 
 In: a Network, its events. Out: the same network with a Change for each step at which something changes, and a hash that
 covers what the changes make of it; findings, each at its event, where something cannot be done. The changes are tried
@@ -31,11 +31,14 @@ from neurovis_spec.language.expressions.tree import Number
 from neurovis_spec.language.located import Formula
 from neurovis_spec.language.unknown import UNKNOWN
 
+#: More clamps than an event can have (``_clamp_order``).
+_MOST_CLAMPS = 1 << 32
+
 
 def with_changes(network: Network, events: tuple[Event, ...], constants: Constants) -> Network:
     """The network with what its events change. An expression that is set sees the values that the parameters have by
     then, not those of the other parameters that are set at the same step."""
-    settable = constants.settable.keys()
+    settable = constants.settable.keys()  # names; the slots themselves are in ``network.settable``
     events = tuple(  # a parameter whose own value is invalid has no slot, and that is reported
         event
         if event.set.keys() <= settable
@@ -52,14 +55,20 @@ def with_changes(network: Network, events: tuple[Event, ...], constants: Constan
         for step in sorted({*starting_at, *ending_at})
     )
     trial, run_hash = _TrialRun(network, events, changes, constants), hashlib.sha256()
-    for change in changes:
+    for change in changes:  # each is tried out, findings included, with all that those before it have made
         run_hash.update(trial.apply(change, [events[index] for index in starting_at[change.at]]))
     return replace(network, changes=changes, hash=digest(network.hash, run_hash.hexdigest()))
 
 
-#: More clamps than an event can have: the order of a clamp is the index of its event times this, plus its own index
-#: in the event. So of two clamps of a neuron the one written later has the higher order, and holds.
-_MOST_CLAMPS = 1 << 32
+def _clamp_order(event: int, index_in_event: int) -> int:
+    """The order of a clamp, known by the index of its event and by its own index in that: of two clamps of a neuron the
+    one written later has the higher order, and holds."""
+    return event * _MOST_CLAMPS + index_in_event
+
+
+def _index_in_event(clamp_order: int) -> int:
+    """The index of a clamp in its event, from its order."""
+    return clamp_order % _MOST_CLAMPS
 
 
 def _change(step: int, starting: dict[int, Event], ending: list[int], constants: Constants) -> Change:
@@ -71,8 +80,8 @@ def _change(step: int, starting: dict[int, Event], ending: list[int], constants:
     for index, event in starting.items():
         for name, formula in event.set.items():
             values[constants.settable[name]] = _formula(formula, constants)
-        for place, (neurons, formula) in enumerate(event.clamp):
-            order = index * _MOST_CLAMPS + place
+        for index_in_event, (neurons, formula) in enumerate(event.clamp):
+            order = _clamp_order(index, index_in_event)
             clamps.append(Clamp(order, event=index, neurons=neurons, value=_formula(formula, constants)))
         learning += event.learning
     events = starting.values()
@@ -116,21 +125,23 @@ class _WrittenArray(NamedTuple):
     #: whether it is the weights
     weights: bool
     #: the index of each of these bindings, and which of all numbers are its own
-    segments: tuple[tuple[int, slice], ...]
+    bindings_and_slices: tuple[tuple[int, slice], ...]
     #: sorts the numbers by their places in the array
     order: IntArray
     #: bytes that stand for the name of the array and for the places
-    identity: bytes
+    hash_prefix: bytes
 
 
 def _written_array(name: str, indices: list[int], bindings: tuple[Binding, ...]) -> _WrittenArray:
     """The array of this name that the bindings with these indices write to."""
     places = np.concatenate([bindings[index].places for index in indices])
     ends = [0, *accumulate(len(bindings[index].places) for index in indices)]
-    segments = tuple((index, slice(start, end)) for index, (start, end) in zip(indices, pairwise(ends), strict=True))
+    bindings_and_slices = tuple(
+        (index, slice(start, end)) for index, (start, end) in zip(indices, pairwise(ends), strict=True)
+    )
     order = np.argsort(places, kind="stable")
-    identity = name.encode() + hashlib.sha256(places[order].tobytes()).digest()
-    return _WrittenArray(bindings[indices[0]].weights, segments, order, identity)
+    hash_prefix = name.encode() + hashlib.sha256(places[order].tobytes()).digest()
+    return _WrittenArray(bindings[indices[0]].weights, bindings_and_slices, order, hash_prefix)
 
 
 @dataclass
@@ -227,18 +238,18 @@ class _TrialRun:
         try:
             patch = self._patcher.patch(self._parameters, self._was_set, values)
         except PatchError as error:
-            was_set = [before or slot in values for slot, before in enumerate(self._was_set.tolist())]
+            was_set = [set_before or slot in values for slot, set_before in enumerate(self._was_set.tolist())]
             for slot, key in keys.items():
                 if not error.slots.isdisjoint((slot, *settable.reached([slot], was_set))):
                     self.findings.error("out-of-range", key, f"from step {step} on {error}")
             return b"", frozenset()
         self._was_set[list(values)] = True
-        before, self._parameters = self._parameters, patch.parameters
+        previous, self._parameters = self._parameters, patch.parameters
         identity, has_effect = self._identity_and_effect(patch)
         patch.write(self._weights, self._variables)
         if not has_effect and self._read_in_run.isdisjoint(patch.changed):
             for slot, key in keys.items():
-                if before[slot] != patch.parameters[slot]:
+                if previous[slot] != patch.parameters[slot]:
                     message = f"setting '{settable.slots[slot].name}' changes nothing in the run"
                     hint = "what it begins with (an initial, a weight that learns) and how it is drawn stay as they are"
                     self.findings.warning("no-effect", key, message, hint)
@@ -250,15 +261,14 @@ class _TrialRun:
         identities = [patch.parameters[self._spec_slots].tobytes()]
         has_effect = False
         for array in self._arrays_written_by(patch.bindings):
-            now = self._weights if array.weights else self._variables
+            current = self._weights if array.weights else self._variables
             values = np.empty(len(array.order))
-            for index, segment in array.segments:
-                values[segment] = patch.values[index]
-                if (now[patch.bindings[index].indices] != patch.values[index]).any():
+            for index, own_slice in array.bindings_and_slices:
+                values[own_slice] = patch.values[index]
+                if (current[patch.bindings[index].indices] != patch.values[index]).any():
                     has_effect = True
-            all_equal = bool((values == values[0]).all())
-            # of equal numbers one is hashed
-            identities.append(array.identity + values[slice(1) if all_equal else array.order].tobytes())
+            hashed = values[:1] if (values == values[0]).all() else values[array.order]  # of equal numbers one
+            identities.append(array.hash_prefix + hashed.tobytes())
         return b"/".join(identities), has_effect
 
     def _arrays_written_by(self, bindings: tuple[Binding, ...]) -> tuple[_WrittenArray, ...]:
@@ -276,7 +286,7 @@ class _TrialRun:
         """A name of an array in which no order of the spec shows: that of an input has the input's name, not its
         number."""
         owner = array.owner
-        if owner is None or array != table_of(owner.number):
+        if owner is None or array != table_of(owner.number):  # anything but the table of an input
             return array.text
         return f"{owner.kind}/{self.network.inputs[owner.number].name}"
 
@@ -294,7 +304,7 @@ class _TrialRun:
         values = self._held.value[neurons]
         for order in dict.fromkeys(self._held.order[neurons[~np.isfinite(values)]].tolist()):
             clamp = self._held.active[order]
-            _, formula = self.events[clamp.event].clamp[order % _MOST_CLAMPS]
+            _, formula = self.events[clamp.event].clamp[_index_in_event(order)]
             check_finite(float(clamp.value.values(self._parameters)), formula, self.findings)
         # nothing changes where the same neurons are held at the same values, by whichever clamp
         if np.array_equal(neurons, np.flatnonzero(before.order >= 0)) and np.array_equal(values, before.value[neurons]):

@@ -37,6 +37,8 @@ from neurovis_spec.likeness import suggest
 #: What ``set`` knows beside the parameters: the number of the instance, from 0, and how many its entry makes.
 _SETTING = formula_at(InstanceModel, "set", "PARAMETER")
 COUNTED = _SETTING.sees
+#: What to do where a module reads a parameter from around it.
+_OUTSIDE: Final = "a module sees its own parameters alone: declare '{0}' there, and give it with set: {{{0}: {0}}}"
 
 
 @dataclass(frozen=True)
@@ -73,8 +75,9 @@ class Expander:
     files: dict[Path, Files] = field(default_factory=dict)
     #: the names of the modules that have an instance
     used: set[str] = field(default_factory=set)
-    #: how many scopes were made, and whether there would have been too many
-    made: int = 0
+    #: how many scopes were made by all expansions so far
+    scopes_made: int = 0
+    #: whether a finding says that there would be too many, or that they are nested too deep
     stopped: bool = False
     limits: Limits = field(default_factory=Limits)
 
@@ -88,11 +91,11 @@ class Expander:
         path = module or ""
         self.scopes, self.inputs = [], []
         try:
-            self._unit(section, constants, folder, _Place(path, path, 0, 0, 1), (), module=module)
+            self._make_scope(section, constants, folder, _Place(path, path, 0, 0, 1), (), module=module)
         except _StoppedError:  # which instances there are is not known then
             root = self._scope(0)
             self.scopes = [replace(root, children=root.children.opened())]
-        self.made += len(self.scopes)
+        self.scopes_made += len(self.scopes)
         return Expansion(tuple(map(self._scope, range(len(self.scopes)))), tuple(self.inputs))
 
     def files_in(self, folder: Path) -> Files:
@@ -101,65 +104,66 @@ class Expander:
             self.files[folder] = Files(folder, self.root, self.findings)
         return self.files[folder]
 
-    def _unit(
+    def _make_scope(
         self,
         section: Section,
         constants: Constants,
         folder: Path,
         place: _Place,
-        way: tuple[int, ...],
+        ancestors: tuple[int, ...],
         bound: Mapping[str, InputBinding] | None = None,
         module: str | None = None,
         settings: Mapping[str, frozenset[str]] | None = None,
     ) -> int:
-        """Make one scope and those within it. ``way`` are the indices of the scopes around it, ``bound`` the inputs
-        that are given to it. Returns the index of the scope."""
+        """Make one scope and those within it. ``ancestors`` are the indices of the scopes around it, the spec
+        first, ``bound`` the inputs that are given to it. Returns the index of the scope."""
         index = len(self.scopes)
         self.scopes.append(None)
         files = self.files_in(folder)
-        own = self._inputs(section, constants, files, place, bound or {})
+        inputs = self._inputs(section, constants, files, place, bound or {})
         scope = Scope(
             path=place.path,
             section=section,
             constants=constants,
             definitions=self.library.definitions,
             files=files,
-            inputs=own,
+            inputs=inputs,
             children=names_of(section, "instances", {}),  # those within are not known yet
             module=module,
-            parent=way[-1] if way else -1,
+            parent=ancestors[-1] if ancestors else -1,
             declared=place.declared,
             number=place.number,
             settings=settings or {},
         )
         self.scopes[index] = scope
-        if not way:
-            self._count(scope)
+        if not ancestors:
+            self._check_size(scope)
         if not section.instances:
             return index
-        made: dict[str, tuple[int, ...] | Unknown] = {}
+        by_name: dict[str, tuple[int, ...] | Unknown] = {}
         for name, model in section.instances.items():
-            made.update(self._instances(name, model, scope, (*way, index)))
-        children = names_of(section, "instances", made)
-        inner = {
-            f"{name}.{key}": found
-            for name, places in children.known().items()
-            if len(places) == 1
-            for key, found in self._scope(places[0]).inputs.items()
+            by_name.update(self._instances(name, model, scope, (*ancestors, index)))
+        children = names_of(section, "instances", by_name)
+        inner = {  # inputs of a single instance are also seen from here, as INSTANCE.INPUT
+            f"{name}.{key}": its_input
+            for name, scopes in children.known().items()
+            if len(scopes) == 1
+            for key, its_input in self._scope(scopes[0]).inputs.items()
         }
-        self.scopes[index] = replace(scope, children=children, inputs=Names({**own, **inner}, own.is_open))
+        self.scopes[index] = replace(scope, children=children, inputs=Names({**inputs, **inner}, inputs.is_open))
         return index
 
-    def _count(self, scope: Scope) -> None:
+    def _check_size(self, scope: Scope) -> None:
         """Refuse more instances, or neurons, than there may be before any of them is made. Modules that are checked
-        by themselves share what there may be: behind that, those within them are left out."""
+        by themselves share the limit of instances: one that would go beyond it is made without the instances within
+        it, which is no finding."""
         if self.stopped:
             raise _StoppedError
         if scope.section.instances:
             quiet = replace(scope.constants, findings=Findings(), structural=set())
             instances = self._size_estimate.instances(scope.section, quiet, self.findings)
             self.stopped = instances is None
-            if instances is None or (self.made + instances > MOST_INSTANCES and scope.module is not None):
+            if instances is None or (self.scopes_made + instances > MOST_INSTANCES and scope.module is not None):
                 raise _StoppedError
 
     def _scope(self, index: int) -> Scope:
@@ -198,9 +202,10 @@ class Expander:
         return names_of(section, "inputs", result)
 
     def _instances(
-        self, name: str, model: InstanceModel, scope: Scope, way: tuple[int, ...]
+        self, name: str, model: InstanceModel, scope: Scope, ancestors: tuple[int, ...]
     ) -> Mapping[str, tuple[int, ...] | Unknown]:
-        """The places of the instances that one entry makes, by name."""
+        """The indices of the scopes of the instances that one entry makes, by name: ``left1`` has one, ``left`` all of
+        a counted one."""
         module = self._module(model)
         count = None if model.count is None else scope.constants.integer(model.count, "'count'", 1)
         if module is UNKNOWN or count is UNKNOWN or "count" in model.unknown:
@@ -208,31 +213,33 @@ class Expander:
                 scope.constants.value(formula, dict.fromkeys(COUNTED, UNKNOWN))
             bindings_of(model, scope, self.findings)
             return {name: UNKNOWN}
-        if len(way) > DEEPEST:
+        if len(ancestors) > DEEPEST:
             span = key_span(scope.section, "instances", name)
             self.findings.error("too-deep", span, f"modules are nested at most {DEEPEST} deep")
             self.stopped = True
             raise _StoppedError
-        called = [name] if count is None else [f"{name}{number}" for number in range(1, count + 1)]
-        if len(called[-1]) > 64:
-            self.findings.error("bad-name", key_span(scope.section, "instances", name), too_long(called[-1]), NAME_RULE)
+        instance_names = [name] if count is None else [f"{name}{number}" for number in range(1, count + 1)]
+        if len(instance_names[-1]) > 64:
+            self.findings.error(
+                "bad-name", key_span(scope.section, "instances", name), too_long(instance_names[-1]), NAME_RULE
+            )
             return {name: UNKNOWN}
         self.used.add(module.name)
         self._check_keys(model, module)
         bound = bindings_of(model, scope, self.findings)
         result: dict[str, tuple[int, ...]] = {}
-        for position, own in enumerate(called):
+        for position, instance_name in enumerate(instance_names):
             number = 0 if count is None else position + 1
-            place = _Place(scope.called(own), scope.called(name), number, position, len(called))
+            place = _Place(scope.called(instance_name), scope.called(name), number, position, len(instance_names))
             constants, settings = self._constants(model, module, scope, place)
-            index = self._unit(
-                module.model, constants, module.folder, place, way, bound, module=module.name, settings=settings
+            index = self._make_scope(
+                module.model, constants, module.folder, place, ancestors, bound, module=module.name, settings=settings
             )
-            result[own] = (index,)
+            result[instance_name] = (index,)
         for binding in bound.values():
-            check_sizes(binding, called, self.findings)
+            check_sizes(binding, instance_names, self.findings)
         if count is not None:
-            result[name] = tuple(result[own][0] for own in called)
+            result[name] = tuple(result[instance_name][0] for instance_name in instance_names)
         return result
 
     def _module(self, model: InstanceModel) -> Module | Unknown:
@@ -267,15 +274,15 @@ class Expander:
     def _constants(
         self, model: InstanceModel, module: Module, scope: Scope, place: _Place
     ) -> tuple[Constants, dict[str, frozenset[str]]]:
-        """The constants of one instance, and what its settings depend on."""
+        """The constants of one instance, and for each of its settings the names that its formula reads."""
         outer = scope.constants
         constants = constants_of(module, self.dt, self.findings)
         around = Outside(outer.names, _OUTSIDE)
         constants = replace(constants, slots=outer.slots, path=place.path, outside=around)
         extra = dict(zip(COUNTED, (float(place.position), float(place.count)), strict=True))
         given: dict[str, float] = {}
-        following: dict[str, ParameterFormula] = {}
-        settings: dict[str, frozenset[str]] = {}
+        following_settings: dict[str, ParameterFormula] = {}
+        names_read: dict[str, frozenset[str]] = {}
         for name, formula in model.set.items():
             value = scope.constants.value(formula, extra)
             if name not in module.model.parameters:
@@ -285,18 +292,14 @@ class Expander:
                 continue
             given[name] = float(value)
             tree = scope.constants.tree(formula, _SETTING) if isinstance(formula.value, str) else UNKNOWN
-            settings[name] = frozenset() if tree is UNKNOWN else names(tree)
+            names_read[name] = frozenset() if tree is UNKNOWN else names(tree)
             if tree is not UNKNOWN and not names(tree).isdisjoint(outer.settable):
-                following[name] = outer.bound(tree, extra)
-        constants.settings = following
+                following_settings[name] = outer.bound(tree, extra)
+        constants.settings = following_settings
         constants.names.declared.update(unread(model, "set"))
         places = {name: formula.span for name, formula in model.set.items()}
         make_parameters(module.model, constants, given, places)
-        return constants, settings
-
-
-#: What to do where a module reads a parameter from around it.
-_OUTSIDE: Final = "a module sees its own parameters alone: declare '{0}' there, and give it with set: {{{0}: {0}}}"
+        return constants, names_read
 
 
 def constants_of(module: Module, dt: float, findings: Findings) -> Constants:
