@@ -31,8 +31,8 @@ from neurovis_spec.compiler.names.finder import Finder, finder_of
 from neurovis_spec.compiler.names.modules import Library, library_of
 from neurovis_spec.compiler.names.outputs import make_outputs
 from neurovis_spec.compiler.names.references import other_parameter
-from neurovis_spec.compiler.names.scope import Scope, Surroundings
-from neurovis_spec.compiler.network import Input, Instance, Network, Noise, Output
+from neurovis_spec.compiler.names.scope import Expansion, Scope, Surroundings
+from neurovis_spec.compiler.network import Instance, Network, Noise, Output
 from neurovis_spec.compiler.neurons.noise import make_noises
 from neurovis_spec.compiler.neurons.populate import Census, populate, without_neurons
 from neurovis_spec.compiler.ros_settings import RosSettings
@@ -74,24 +74,31 @@ class Request:
     body: bool | Path = True
 
 
-class _Sections(NamedTuple):
-    """What the sections of a spec come to. All of them are valid."""
+class _Declared(NamedTuple):
+    """What the sections declare that the others name. What of it is invalid is reported."""
 
     seed: int
+    constants: Constants
+    #: whether ``dt`` is in order, or left out
+    dt_known: bool
     steps: int
     episode: int | None
-    constants: Constants
     library: Library
     #: the names of the modules that have an instance
     modules_used: set[str]
-    scopes: tuple[Scope, ...]
+    expansion: Expansion
     census: Census
+
+
+class _Sections(NamedTuple):
+    """What the sections come to, but for the events. All of them are valid."""
+
+    declared: _Declared
     connected: Connected
     #: the level of each neuron
     level: IntArray
     #: resolves what events name
     finder: Finder
-    inputs: tuple[Input, ...]
     outputs: tuple[Output, ...]
     noises: tuple[Noise, ...]
     layout: LayoutSettings
@@ -106,18 +113,56 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
     if sections is None:
         return None
     network = _assemble(spec, sections)
-    eventful = _eventful(spec, network, sections.finder, sections.constants)
+    declared, bundles = sections.declared, sections.connected.bundles
+    eventful = _eventful(spec, network, sections.finder, declared.constants)
     if eventful is not None and not findings.failed:  # the shape may have been invalid
         files = tuple(file.model for file in request.includes.files)
-        scopes, library, used = sections.scopes, sections.library, sections.modules_used
-        bundles, census = sections.connected.bundles, sections.census
-        warn(Compiled(spec, scopes, library, used, eventful, bundles, census, files), findings)
+        scopes, library, used = declared.expansion.scopes, declared.library, declared.modules_used
+        warn(Compiled(spec, scopes, library, used, eventful, bundles, declared.census, files), findings)
     return None if eventful is None else with_checks(eventful)
 
 
 def _compile_sections(spec: Spec, request: Request, findings: Findings) -> _Sections | None:
     """Every section but the events; None where anything is invalid. Then the events are only checked."""
     before = findings.errors
+    declared = _declare(spec, request, findings)
+    constants, census = declared.constants, declared.census
+    scopes, inputs = declared.expansion.scopes, declared.expansion.inputs
+    layout = layout_settings(spec.layout, scopes, census, findings)
+    connected = connect(scopes, census, request.limits, declared.seed)
+    finder = finder_of(census, connected, findings)
+    render = render_settings(spec.render, finder, constants)
+    outputs = make_outputs(spec, finder)
+    if spec.render is not None and spec.render.figure:
+        from neurovis_spec.compiler.drawing.figure import figure_of
+
+        render = replace(render, figure=figure_of(spec, census, outputs, finder))
+    around = Surroundings(spec, scopes[0], inputs, outputs)
+    ros = _ros(around, constants)
+    body = _body(around, request, constants, dt_known=declared.dt_known)
+    noises = make_noises(census, sum(entry.size for entry in inputs))
+    declared.expansion.depend()  # last, as every section may have made parameters of instances structural
+    level = _levels(connected, census, findings)
+    valid = connected.complete and findings.errors == before
+    if level is None or not valid or not _signals_fit(connected.bundles, findings):
+        _read_events(spec, finder, constants)  # for its findings alone
+        return None
+    return _Sections(
+        declared=declared,
+        connected=connected,
+        level=level,
+        finder=finder,
+        outputs=outputs,
+        noises=noises,
+        layout=layout,
+        render=render,
+        ros=ros,
+        body=body,
+    )
+
+
+def _declare(spec: Spec, request: Request, findings: Findings) -> _Declared:
+    """Parameters, definitions, modules, inputs and neurons; modules without an instance are checked as a whole."""
     seed = 0 if spec.seed is None else spec.seed.value
     seed = seed if request.seed is None else request.seed
     constants = Constants(names_of(spec, "parameters", {}), 1.0, findings)
@@ -128,56 +173,28 @@ def _compile_sections(spec: Spec, request: Request, findings: Findings) -> _Sect
     steps, episode = _clock(spec, constants)
     expander = Expander(library, request.root, findings, constants.dt, files={**request.files}, limits=request.limits)
     expansion = expander.expand(spec, constants, request.base)
-    scopes, inputs = expansion.scopes, expansion.inputs
-    census = populate(scopes, request.limits, seed)
+    census = populate(expansion.scopes, request.limits, seed)
     _check_modules_without_instance(expander, request.limits, seed)
     if not len(census.neurons):
         _report_no_neurons(spec, census, findings)
         census = without_neurons(census)
-    layout = layout_settings(spec.layout, scopes, census, findings)
-    connected = connect(scopes, census, request.limits, seed)
-    finder = finder_of(census, connected, findings)
-    render = render_settings(spec.render, finder, constants)
-    outputs = make_outputs(spec, finder)
-    if spec.render is not None and spec.render.figure:
-        from neurovis_spec.compiler.drawing.figure import figure_of
-
-        render = replace(render, figure=figure_of(spec, census, outputs, finder))
-    around = Surroundings(spec, scopes[0], inputs, outputs)
-    ros = _ros(around, constants)
-    body = _body(around, request, constants, dt_known=dt_known)
-    noises = make_noises(census, sum(entry.size for entry in inputs))
-    expansion.depend()  # last, as every section may have made parameters of instances structural
-    level = _levels(connected, census, findings)
-    valid = level is not None and connected.complete and findings.errors == before
-    if level is None or not valid or not _signals_fit(connected.bundles, findings):
-        _read_events(spec, finder, constants)  # for its findings alone
-        return None
-    return _Sections(
+    return _Declared(
         seed=seed,
+        constants=constants,
+        dt_known=dt_known,
         steps=steps,
         episode=episode,
-        constants=constants,
         library=library,
         modules_used=expander.used,
-        scopes=scopes,
+        expansion=expansion,
         census=census,
-        connected=connected,
-        level=level,
-        finder=finder,
-        inputs=inputs,
-        outputs=outputs,
-        noises=noises,
-        layout=layout,
-        render=render,
-        ros=ros,
-        body=body,
     )
 
 
 def _assemble(spec: Spec, sections: _Sections) -> Network:
     """The network that valid sections make, but for its events."""
-    constants, census, connected = sections.constants, sections.census, sections.connected
+    declared, connected = sections.declared, sections.connected
+    constants, census = declared.constants, declared.census
     name = known(spec.name.value, "")
     projections, rules = make_projections(connected.bundles)
     connections = join(connected, rules)
@@ -189,14 +206,14 @@ def _assemble(spec: Spec, sections: _Sections) -> Network:
         description="\n".join(text.value for text in spec.description or ()),
         dt=constants.dt,
         dt_given=spec.time is not None and spec.time.dt is not None,
-        steps=sections.steps,
-        episode=sections.episode,
-        seed=sections.seed,
+        steps=declared.steps,
+        episode=declared.episode,
+        seed=declared.seed,
         parameters=dict(constants.parameters),
         structural=frozenset(constants.structural),
         neurons=census.neurons,
         connections=connections,
-        inputs=sections.inputs,
+        inputs=declared.expansion.inputs,
         outputs=sections.outputs,
         populations=populations,
         projections=projections,
@@ -205,7 +222,7 @@ def _assemble(spec: Spec, sections: _Sections) -> Network:
         render=sections.render,
         hash="",  # of all the rest
         noises=sections.noises,
-        instances=_instances(sections.scopes, census),
+        instances=_instances(declared.expansion.scopes, census),
         numbering=own_weights(slots, connected.bundles, connections.weights.whole()),
         ros=sections.ros,
         body=sections.body,
