@@ -161,7 +161,7 @@ class EntryBuilder:
             targets=self.targets[shape.j],
             weights=weights,
             centres=centres,
-            delays=_delays(shape, known(delay, 0)),
+            delays=_delays(shape, known(delay, 1)),  # at 0 it could close a cycle
             low=bounds[0],
             high=bounds[1],
             learning=learning,
