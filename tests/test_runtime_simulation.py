@@ -253,7 +253,7 @@ def test_a_neuron_among_many_is_warned_of(place: int) -> None:
     state = initial_state(network)
     state.activity[place] = np.inf
     with pytest.warns(RuntimeWarning, match=f"the activity of A{place + 1} is inf"):
-        Watch(network).look(state)
+        Watch(network).check(state)
 
 
 class Multiplied(np.ndarray[tuple[int], np.dtype[np.float64]]):
@@ -271,7 +271,7 @@ def test_no_product_is_so_large_that_threads_share_it() -> None:
     network = nv.compile_text("neurovis: 1\nname: x\nneurons: {A: {count: 50000}}").network
     state = initial_state(network)
     state.activity = state.activity.view(Multiplied)
-    Watch(network).look(state)
+    Watch(network).check(state)
     assert sum(Multiplied.sizes) == 50_000
     assert max(Multiplied.sizes) <= 10_000
 

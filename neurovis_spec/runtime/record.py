@@ -192,7 +192,7 @@ def run_steps(network: Network, state: State, course: Course, rows: RowSink, pro
     watch = Watch(network)
     columns = columns_of(network, course.keep, body)
     backend = ready(network, course.backend)
-    reader, stepper = InputReader(network, course.inputs, watch.given, backend.functions), backend.stepper
+    reader, stepper = InputReader(network, course.inputs, watch.take_inputs, backend.functions), backend.stepper
     hands = _Hands(course.every, rows, reader, watch)
     make: _Make = _OneByOne(hands, columns, stepper, body, frozenset(course.inputs or ()))
     # a runner gives the activities of all neurons and all changing weights, and nothing else
@@ -250,7 +250,7 @@ class _OneByOne:
 
     def steps(self, state: State, first: int, stop: int) -> bool:
         every, rows, reader, watch = self.hands
-        step, look, due, columns = self.stepper.step, watch.look, rows.due, self.columns
+        step, check, due, columns = self.stepper.step, watch.check, rows.due, self.columns
         changing, recorded = subscript(columns.weights), columns.neurons
         probe = columns.probe if columns.probe.names else None
         rows_left = _rows_between(first, stop, every)
@@ -262,11 +262,11 @@ class _OneByOne:
                 weights[row] = state.weights[changing]
             if body is not None:
                 vector = body.sense(vector, self.given)
-                watch.given_at(k, vector, body.inputs)
+                watch.take_inputs_at(k, vector, body.inputs)
                 if keep:
                     body.show(sensors[row], poses[row])
             step(state, vector)
-            look(state)
+            check(state)
             if keep:
                 activity[row] = state.activity if recorded is None else state.activity[recorded]
                 if probe is not None:
@@ -306,12 +306,12 @@ class _Together:
         for part in reader.parts(first, stop):
             begin = k
             while k < begin + len(part):
-                until = watch.until(k, min(k + most, begin + len(part)))
+                until = watch.next_stop(k, min(k + most, begin + len(part)))
                 vectors = part[k - begin : until - begin]
                 made = self._run(state, vectors, activity[row:], weights[row:], every, not watch.warned)
                 row += _rows_between(k, k + made, every)
                 k += made
-                watch.look(state)
+                watch.check(state)
                 if rows.due() if self.watched is None else self.watched.asked():
                     rows.end(row)
                     if rows.over():

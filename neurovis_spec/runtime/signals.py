@@ -44,16 +44,16 @@ class SignalLayout:
 def signal_layout(network: Network) -> SignalLayout:
     """Lay the slots out by delay, then by population of the target, then in the order of the connections."""
     connections = network.connections
-    home = np.zeros(len(network.neurons), dtype=width(0, len(network.populations)))
+    population_of = np.zeros(len(network.neurons), dtype=width(0, len(network.populations)))
     for number, population in enumerate(network.populations):
-        home[population.members] = number
-    populations = home[connections.targets.compact()]
+        population_of[population.members] = number
+    populations = population_of[connections.targets.compact()]
     offsets = np.full(len(connections), -1, dtype=np.int64)
     classes: list[DelayClass] = []
     size = 0
-    kept, kind = connections.delays.compact(), width(0, len(connections))
+    delays, index_type = connections.delays.compact(), width(0, len(connections))
     for delay in np.unique(connections.delays.kept[connections.delays.kept > 0]).tolist():
-        members = np.flatnonzero(kept == delay).astype(kind)
+        members = np.flatnonzero(delays == delay).astype(index_type)
         if len(network.populations) > 1:
             members = members[np.argsort(populations[members], kind="stable")]
         offsets[members] = np.arange(size, size + delay * len(members), delay)

@@ -90,7 +90,7 @@ class Simulation:
         """Have the backend that is asked for make the steps to come, else the one that made those ``before``."""
         self._backend = ready(self.network, self._asked_backend, before)
         self._stepper = self._backend.stepper
-        self._reader = InputReader(self.network, self._inputs, self._watch.given, self._backend.functions)
+        self._reader = InputReader(self.network, self._inputs, self._watch.take_inputs, self._backend.functions)
         self._controls = Controls(self.network, self._backend.functions)
 
     @property
@@ -264,13 +264,13 @@ class Simulation:
         if body is not None:
             vector = body.sense(vector, self._given.union(given))
         if body is not None or given:
-            self._watch.given_at(state.k, vector, given if body is None else body.inputs.union(given))
+            self._watch.take_inputs_at(state.k, vector, given if body is None else body.inputs.union(given))
         recorder = self._recorder if self._recorder is not None and self._recorder.going else None
         if recorder is not None:
             recorder.begin(state)
         with np.errstate(all="ignore"):
             self._stepper.step(state, vector)
-            self._watch.look(state)
+            self._watch.check(state)
         self._ended = self.after() if self._controls.due(state) else None
         if recorder is not None:
             recorder.end(state)

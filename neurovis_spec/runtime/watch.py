@@ -19,9 +19,9 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Check
 from neurovis_spec.runtime.state import State
 
-#: Numbers of one product. More of them BLAS shares among threads, which takes a thousand times as long as the product
-#: where the processors have other work to do.
-_PIECE = 8192
+#: The longest array that is squared at once. A longer one BLAS shares among threads, which takes a thousand times as
+#: long as the product where the processors have other work to do.
+_LONGEST_SQUARED = 8192
 #: What is said of an undefined operation that no number shows.
 _HIDDEN = "which the rest of the formula hides"
 
@@ -35,8 +35,8 @@ class Watch:
         self._wrong_inputs: dict[int, tuple[FloatArray, BoolArray | None]] = {}
         self.warned = False
 
-    def given(self, first: int, vectors: FloatArray, hidden: BoolArray | None = None) -> None:
-        """Take the inputs of the steps from ``first`` on, a row a step; ``look`` warns of them at their step.
+    def take_inputs(self, first: int, vectors: FloatArray, hidden: BoolArray | None = None) -> None:
+        """Take the inputs of the steps from ``first`` on, a row a step; ``check`` warns of them at their step.
         ``hidden`` are those in whose formulas something is undefined that their numbers do not show."""
         wrong = ~np.isfinite(vectors).all(axis=1)
         if hidden is not None:
@@ -44,7 +44,7 @@ class Watch:
         rows = np.flatnonzero(wrong).tolist()
         self._wrong_inputs = {first + row: (vectors[row], None if hidden is None else hidden[row]) for row in rows}
 
-    def given_at(self, k: int, vector: FloatArray, replaced: Iterable[str]) -> None:
+    def take_inputs_at(self, k: int, vector: FloatArray, replaced: Iterable[str]) -> None:
         """Take the inputs of step k alone, where they are known only then: these (``replaced``) do not come from their
         formulas."""
         _, hidden = self._wrong_inputs.pop(k, (vector, None))
@@ -55,12 +55,12 @@ class Watch:
         if not all_finite([vector]) or (hidden is not None and hidden.any()):
             self._wrong_inputs[k] = vector, hidden
 
-    def until(self, k: int, stop: int) -> int:
+    def next_stop(self, k: int, stop: int) -> int:
         """How far steps from k on may be made, ``stop`` at most, before one must be checked: one behind the first
         whose inputs are not finite."""
         return stop if self.warned else min((step + 1 for step in self._wrong_inputs if k <= step < stop), default=stop)
 
-    def look(self, state: State) -> None:
+    def check(self, state: State) -> None:
         """Warn if something of the step just made is NaN or infinite."""
         if self.warned:
             return
@@ -88,7 +88,8 @@ class Watch:
                     name = names[member] if of_neurons else network.connection_names[member]
                     if not isinstance(quantity, Check):
                         yield f"the state '{quantity.name}' of {name} is {value} {when}"
-                    elif not (of_neurons and lesioned[member]):  # what a lesioned neuron computes is for nobody
+                    # of a check the name says all; what a lesioned neuron computes is for nobody
+                    elif not (of_neurons and lesioned[member]):
                         yield f"{quantity.name} for {name} {when}, {_HIDDEN}"
         vector, hidden = self._wrong_inputs.get(step, (np.zeros(0), None))
         for index in _wrong(vector):
@@ -117,14 +118,15 @@ def carried_by(network: Network, state: State) -> list[FloatArray]:
 
 
 def _pieces(values: FloatArray) -> list[FloatArray]:
-    if len(values) <= _PIECE:
+    if len(values) <= _LONGEST_SQUARED:
         return [values]
-    return [values[first : first + _PIECE] for first in range(0, len(values), _PIECE)]
+    return [values[first : first + _LONGEST_SQUARED] for first in range(0, len(values), _LONGEST_SQUARED)]
 
 
 def all_finite(pieces: list[FloatArray]) -> bool:
     """Whether all numbers of all of these are finite."""
-    # A sum of squares is finite only if all terms are: one cheap product instead of a test each.
+    # A sum of squares is finite only if all terms are: one cheap product instead of a test each. If it is not, it may
+    # be the sum that overflows: then each number is tested.
     for values in pieces:
         if isfinite(values.dot(values)):
             continue

@@ -60,11 +60,11 @@ class _Last:
         self._block[self._filled] = value
         self._filled += 1
         self._head = _combined(self._summary, self._head, value)
-        made = self._filled if self._tails is None else self._count
+        count = self._filled if self._tails is None else self._count
         total = self._head
         if self._tails is not None and self._filled < self._count:
             total = _combined(self._summary, float(self._tails[self._filled]), total)
-        return _finished(self._summary, total, made)
+        return _finished(self._summary, total, count)
 
     def _begin_block(self) -> None:
         """The block is full: another begins."""
@@ -93,11 +93,11 @@ class _Last:
             heads = combine.accumulate(np.concatenate(([self._head], values)))[1:]
             self._head, self._filled = float(heads[-1]), end
             if self._tails is None:
-                totals, made = heads, np.arange(begin + 1.0, end + 1.0)
+                totals, counts = heads, np.arange(begin + 1.0, end + 1.0)
             else:
                 tails = np.append(self._tails, _BEGIN[self._summary])[begin + 1 : end + 1]
-                totals, made = combine(tails, heads), np.full(len(values), float(self._count))
-            return _all_finished(self._summary, totals, made)
+                totals, counts = combine(tails, heads), np.full(len(values), float(self._count))
+            return _finished_array(self._summary, totals, counts)
 
 
 class _All:
@@ -106,6 +106,7 @@ class _All:
     def __init__(self, summary: Summary) -> None:
         self._summary = summary
         self._made = 0
+        #: the summary so far; of a sum also what its rounding has left
         self._high, self._low = _BEGIN[summary], 0.0
 
     def push(self, value: float) -> float:
@@ -120,12 +121,13 @@ class _All:
             totals = combine.accumulate(np.concatenate(([self._high], values)))[1:]
             if combine is np.add:
                 self._add(values)
+                # those between are rounded one by one; the last is as exact as the sum, on which the next call goes on
                 totals[-1] = self._high
             else:
                 self._high = float(totals[-1])
-            made = np.arange(self._made + 1.0, self._made + len(values) + 1.0)
+            counts = np.arange(self._made + 1.0, self._made + len(values) + 1.0)
             self._made += len(values)
-            return _all_finished(self._summary, totals, made)
+            return _finished_array(self._summary, totals, counts)
 
     def _add(self, values: FloatArray) -> None:
         """Add to the sum: ``_high`` is it rounded, ``_low`` what the rounding has left."""
@@ -144,16 +146,16 @@ def _combined(summary: Summary, one: float, other: float) -> float:
     return minimum(one, other) if summary == "min" else maximum(one, other)
 
 
-def _finished(summary: Summary, total: float, made: int) -> float:
-    """The summary of so many values that come to ``total``."""
+def _finished(summary: Summary, total: float, count: int) -> float:
+    """The summary of ``count`` values that come to ``total``."""
     if summary in ("min", "max"):
         return total + 0.0  # of 0 and −0 NumPy takes either: −0 becomes 0
-    mean = total / made
+    mean = total / count
     return mean if summary == "mean" else math.sqrt(mean)
 
 
-def _all_finished(summary: Summary, totals: FloatArray, made: FloatArray) -> FloatArray:
+def _finished_array(summary: Summary, totals: FloatArray, counts: FloatArray) -> FloatArray:
     """The same for many totals at once."""
     if summary in ("min", "max"):
         return totals + 0.0
-    return np.asarray(np.sqrt(totals / made) if summary == "rms" else totals / made, dtype=np.float64)
+    return np.asarray(np.sqrt(totals / counts) if summary == "rms" else totals / counts, dtype=np.float64)
