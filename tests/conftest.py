@@ -12,7 +12,7 @@ import pytest
 from hypothesis import settings
 
 from neurovis_spec.interrupts import ENDING
-from neurovis_spec.runtime.backend import DEFAULT
+from neurovis_spec.runtime.backend import ENVIRONMENT_VARIABLE
 
 if TYPE_CHECKING:
     from ros_worlds import World
@@ -24,7 +24,7 @@ for _number in ENDING:
         signal.signal(_number, signal.default_int_handler if _number == signal.SIGINT else signal.SIG_DFL)
 
 # Array code needs no compiler, and compiles nothing anew for each example: of this process and of those that it starts.
-os.environ[DEFAULT] = "numpy"
+os.environ[ENVIRONMENT_VARIABLE] = "numpy"
 
 # How long an example takes says something of the machine, not of the program. The examples are the same in each run, so
 # that a change is judged by what it changes; --hypothesis-profile=explore looks for new ones.

@@ -15,7 +15,7 @@ import pytest
 from networks_by_hand import cpg_rbf
 
 from neurovis_spec.runtime import c_library
-from neurovis_spec.runtime.backend import DEFAULT, available, choose_backend, listing
+from neurovis_spec.runtime.backend import ENVIRONMENT_VARIABLE, available, choose_backend, listing
 from neurovis_spec.runtime.c_library import folder, load, place
 
 pytestmark = pytest.mark.compiler
@@ -165,7 +165,7 @@ def test_without_any_other_compiler_that_of_the_package_ziglang_is_taken(
     c_library._compiler.cache_clear()
     assert load(TEXT % 47).answer() == 47
     assert available("c").note.endswith("compiled by ziglang")
-    monkeypatch.delenv(DEFAULT)
+    monkeypatch.delenv(ENVIRONMENT_VARIABLE)
     assert choose_backend(cpg_rbf())[0] == "numpy"  # it takes seconds when it is first used: who wants it asks for it
     said = json.loads((tmp_path / "said").read_text())
     assert said == {"arguments": ["cc", "-mcpu=baseline"], "cache": str(cache / "zig")}

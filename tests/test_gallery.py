@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import gallery
-from neurovis_spec.runtime.backend import DEFAULT
+from neurovis_spec.runtime.backend import ENVIRONMENT_VARIABLE
 
 HERE = Path(__file__).parent.parent
 PICTURES = HERE / "docs" / "pictures"
@@ -112,7 +112,7 @@ def test_what_is_committed_is_what_is_drawn(
 ) -> None:
     """But for the last digits of numbers, which differ from machine to machine. The gallery is drawn from runs in C,
     whose bits the reference has without a compiler; NumPy's part from them within thousands of steps of learning."""
-    monkeypatch.setenv(DEFAULT, "reference")
+    monkeypatch.setenv(ENVIRONMENT_VARIABLE, "reference")
     gallery.draw(picture, tmp_path / "drawn.svg")
     drawn, committed = tmp_path / "drawn.svg", PICTURES / f"{picture.name}.svg"
     assert gallery.alike(drawn.read_text(encoding="utf-8"), committed.read_text(encoding="utf-8"))

@@ -23,7 +23,7 @@ from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.runtime import backend as backends
 from neurovis_spec.runtime import c_library
 from neurovis_spec.runtime.backend import (
-    DEFAULT,
+    ENVIRONMENT_VARIABLE,
     Availability,
     BackendError,
     Capabilities,
@@ -40,7 +40,7 @@ from neurovis_spec.runtime.recording import Recording
 @pytest.fixture
 def chosen_here(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The default is that of the machine, and what it says once has not been said yet."""
-    monkeypatch.delenv(DEFAULT)
+    monkeypatch.delenv(ENVIRONMENT_VARIABLE)
     monkeypatch.delenv("CC", raising=False)
     backends._warn_once.cache_clear()
     yield
@@ -127,10 +127,10 @@ loaded = EntryPoint.load
 
 
 def test_the_environment_names_another_default(network: nv.CompiledNetwork, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(DEFAULT, "reference")
+    monkeypatch.setenv(ENVIRONMENT_VARIABLE, "reference")
     assert network.choose_backend() == ("reference", "named by NEUROVIS_BACKEND")
     assert network.run(3).backend == network.simulator().backend == "reference"
-    monkeypatch.setenv(DEFAULT, "nmupy")
+    monkeypatch.setenv(ENVIRONMENT_VARIABLE, "nmupy")
     with pytest.raises(BackendError, match="NEUROVIS_BACKEND names 'nmupy', which is no backend; did you mean 'numpy'"):
         network.run(3)
 
@@ -156,12 +156,12 @@ def test_auto_means_the_choice(tmp_path: Path, network: nv.CompiledNetwork, monk
     neuron, seed = network.network.neurons.names[0], network.network.seed
     table = nv.sweep(tmp_path / "spec.yaml", {"seed": [seed]}, {"last": f"{neuron} * 1"}, steps=3, backend="auto")
     assert table["last"][0] == network.run(3)[neuron][-1]
-    monkeypatch.setenv(DEFAULT, "auto")
+    monkeypatch.setenv(ENVIRONMENT_VARIABLE, "auto")
     assert network.choose_backend() == chosen_without(network, monkeypatch)
 
 
 def chosen_without(network: nv.CompiledNetwork, monkeypatch: pytest.MonkeyPatch) -> tuple[str, str]:
-    monkeypatch.delenv(DEFAULT)
+    monkeypatch.delenv(ENVIRONMENT_VARIABLE)
     return network.choose_backend()
 
 
@@ -269,7 +269,7 @@ def test_a_warning_points_at_the_caller_s_line(network: nv.CompiledNetwork, monk
         network.run(5, backend="numpy", start=before)
         network.simulator("numpy", start=before)
         monkeypatch.setenv("CC", "/nonexistent/cc")
-        monkeypatch.delenv(DEFAULT)
+        monkeypatch.delenv(ENVIRONMENT_VARIABLE)
         backends._warn_once.cache_clear()
         network.run(5)
     backends._warn_once.cache_clear()

@@ -21,9 +21,9 @@ from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.state import State
 
-#: The environment variable that names the default.
-DEFAULT: Final = "NEUROVIS_BACKEND"
-#: What names none, so that one is chosen, as where nothing is said.
+#: It may name the backend that is taken where nobody names one.
+ENVIRONMENT_VARIABLE: Final = "NEUROVIS_BACKEND"
+#: Asks for the automatic choice, as if no backend were named.
 AUTO: Final = "auto"
 #: What runs a network where no backend is to be taken by default: it is everywhere, and runs all.
 _LAST_RESORT: Final = "numpy"
@@ -45,7 +45,7 @@ class Capabilities:
     largest: int | None = None
     #: its numbers are the reference's to the ``bits``, where the C library is the same, or up to ``rounding``
     exactness: Literal["bits", "rounding"] = "rounding"
-    #: was asked for once, and may still be given; it means nothing
+    #: obsolete: may still be given, and is ignored
     exact_sums: InitVar[bool | None] = None
 
 
@@ -164,15 +164,15 @@ def _is_exact(name: str) -> bool:
 def choose_backend(network: Network) -> tuple[str, str]:
     """The name of the backend that runs this network unless another is asked for, and why: the first by name that is
     to be taken by default here and has what the network asks for, else NumPy's; by the network and the machine alone,
-    so that a run and its parts give the same bits. The environment may name another (``DEFAULT``). Raises BackendError
-    where it names none that there is."""
+    so that a run and its parts give the same bits. The environment may name another (``ENVIRONMENT_VARIABLE``). Raises
+    BackendError where it names none that there is."""
     named = _named()
     if named:
         if named not in names():
             raise BackendError(
-                f"{DEFAULT} names '{named}', which is no backend; {suggest(named, names(), 'there are')}"
+                f"{ENVIRONMENT_VARIABLE} names '{named}', which is no backend; {suggest(named, names(), 'there are')}"
             )
-        return named, f"named by {DEFAULT}"
+        return named, f"named by {ENVIRONMENT_VARIABLE}"
     size = f"{plural(len(network.neurons), 'neuron')}, {plural(len(network.connections), 'connection')}"
     passed_over = list[str]()  # the others, and why
     for name in names():
@@ -180,15 +180,18 @@ def choose_backend(network: Network) -> tuple[str, str]:
             continue
         found = available(name)
         missing = lacking(network, load(name).capabilities) if found.available else ()
-        if found.by_default and not missing:
+        if found.by_default and not missing:  # available or not: if not, ``ready`` warns, and NumPy computes
             return name, f"{found.note} ({size})"
-        passed_over += missing if found.by_default else [f"{name} on request" if found.available else found.note]
+        if found.by_default:
+            passed_over += missing
+        else:
+            passed_over.append(f"{name} on request" if found.available else found.note)
     return _LAST_RESORT, "; ".join((f"array code made for this network ({size})", *passed_over))
 
 
 def _named() -> str:
     """The backend that the environment names, if it does."""
-    name = os.environ.get(DEFAULT, "").strip()
+    name = os.environ.get(ENVIRONMENT_VARIABLE, "").strip()
     return "" if name == AUTO else name
 
 
@@ -204,12 +207,15 @@ class Ready:
 
 
 def ready(network: Network, backend: str | Backend | Ready | None = None, before: str = "") -> Ready:
-    """Make a network ready to run on a backend; without one, or for ``auto``, on that which has made the steps
-    ``before``, if there are any, else on the one that is chosen. Where that cannot be had, as a compiler fails, array
-    code takes its place, which a RuntimeWarning says once.
+    """Make a network ready to run on a backend:
 
-    Raises BackendError where it is unknown, not available, or lacks something that the network asks for. Warns where
-    another one is asked for than has made the steps before, and not both promise the same bits.
+    - on the one that is named; with a warning if another has made the steps ``before``, and not both promise the same
+      bits;
+    - where none is named, or ``auto``, on the one that has made the steps ``before``;
+    - where there are no such steps, on the one that is chosen. If it cannot be had, as a compiler fails, array code
+      takes its place, which a RuntimeWarning says once.
+
+    Raises BackendError where it is unknown, not available, or lacks something that the network asks for.
     """
     if isinstance(backend, Ready):
         return backend

@@ -32,17 +32,18 @@ from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.state import State, initial_state
 
 
-def resumed_state(network: Network, recording: Recording, by: Library = NUMPY) -> State:
-    """The state in which a run goes on, whose functions are computed ``by`` a library. Raises RecordingError where
+def resumed_state(network: Network, recording: Recording, functions: Library = NUMPY) -> State:
+    """The state in which a run goes on, with what computes the ``functions`` of formulas. Raises RecordingError where
     names do not agree or the recording is empty."""
+    # a table is given the structure of the network first: what it lacks is known by that
     (of_table(recording, network) or recording).check_whole("a run cannot go on from")
     if not len(recording):
         raise RecordingError("the recording holds no step to go on from")
     column_of = _matching_neurons(network, recording)  # of each neuron
-    columns, learned = _learned(network, recording)
+    columns, learned = _learned_weights(network, recording)
     state = initial_state(network)
     state.continued, state.drawn = True, recording.reached
-    controls = Controls(network, by)
+    controls = Controls(network, functions)
     _set_again(network, recording, state, controls)
     _lesion_again(network, recording, state, controls)
     depth = int(network.connections.delays.kept.max(initial=1))
@@ -107,6 +108,7 @@ def _send(network: Network, state: State, step: int, activity: FloatArray, weigh
     offsets = signal_layout(network).offsets[under_way]
     with np.errstate(all="ignore"):
         signals = weights[under_way] * activity[connections.sources[under_way]]
+    # a step is negative here; its remainder is a slot ≥ 0 all the same
     state.signals[offsets + step % connections.delays[under_way]] = signals
     if -step < len(state.history):
         state.history[step % len(state.history)] = activity
@@ -125,13 +127,13 @@ def _matching_neurons(network: Network, recording: Recording) -> IntArray:
 
 
 def _same_connections(network: Network, recording: Recording) -> tuple[IntArray, IntArray]:
-    """The connections of the recording that the network has, too, and their places there."""
+    """The connections that both have: their indices in the recording, and in the network."""
     places = np.array([network.connection_index.get(name, -1) for name in recording.connection_names], dtype=np.int64)
     known = np.flatnonzero(places >= 0)
     return known, places[known]
 
 
-def _learned(network: Network, recording: Recording) -> tuple[IntArray, IntArray]:
+def _learned_weights(network: Network, recording: Recording) -> tuple[IntArray, IntArray]:
     """The columns of weights that were learned, and their places in the network. Weights that follow parameters are
     what these make of them."""
     follows = np.zeros(len(network.connections), dtype=np.bool_)
