@@ -127,7 +127,7 @@ class Code:
         #: lines at the head of the function, by the identifier that each declares; one may read those before it
         self.head: dict[str, str] = {}
         #: what every expression may name; kd and td are k and t as numbers, declared at the head where they are read
-        self.clock: dict[str, Value] = {**constants(dt), "k": "kd", "t": "td"}
+        self.common_names: dict[str, Value] = {**constants(dt), "k": "kd", "t": "td"}
         self._dt = dt
 
     @property
@@ -231,7 +231,7 @@ class Code:
             self.head["kd"] = f"const {self.real} kd = ({self.real})k;"
         if "t" in read:
             self.head["td"] = f"const {self.real} td = kd * {self.emitter.literal(self._dt)[0]};"
-        return self.emitter.value(tree, {**self.clock, **known}, calls, drawn)
+        return self.emitter.value(tree, {**self.common_names, **known}, calls, drawn)
 
     def remainder(self, divisor: int) -> str:
         """k mod a number."""

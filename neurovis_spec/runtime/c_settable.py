@@ -70,7 +70,7 @@ def formula(code: Code, dependent: Dependent, place: Place, parameters: str = "p
                     return f"(({low}) + (({high}) - ({low}))*{number})"
                 return f"(({high}) < 0 ? NAN : ({low}) + ({high})*{number})"
 
-            return code.emitter.value(tree, {**code.clock, **names}, {}, drawn)
+            return code.emitter.value(tree, {**code.common_names, **names}, {}, drawn)
         case Assembled(base=base, parts=parts):
             index = _number(place) if base.size > 1 else 0  # one number for all
             for part in reversed(parts):  # a later part covers an earlier one

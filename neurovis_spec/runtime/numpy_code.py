@@ -11,6 +11,29 @@ identifier made here. What the methods of ``Code`` give, with what they add to t
     select("activity", [3, 1], 9)   'activity[c6]'           c6 in the namespace
     position([2, 3], 9)             '[2:4]'                  to be written to: activity[2:4] = …
     slot(3)                         'r3'                     r3 = k % 3, at the head of a step
+
+Of two neurons with an input and a third, which they reach with a delay of one step, the text is as follows; c5 is where
+signals arrive, c7 the biases.
+
+    def steps(state, vectors):
+        activity = state.activity
+        weights = state.weights
+        signals = state.signals
+        holds = state.conditions.holds
+        s0_ = signals[0:2]
+        a1_ = activity[0:2]
+        for k, s in enumerate(vectors, state.k):
+            g4 = s0_
+            u6 = bincount(c5, g4, 3)
+            u8 = u6 + c7
+            u9 = np.array(u8)
+            u9[0:2] += s[0:1]
+            y10 = u9
+            activity[:] = y10
+            if holds and holds[0]: activity[holds[0][0]] = holds[0][1]
+            multiply(weights, a1_, s0_)
+            state.k = k + 1
+            yield
 """
 
 from __future__ import annotations
@@ -48,15 +71,15 @@ class Code:
         self.namespace: dict[str, object] = {"np": np, "bincount": np.bincount, "multiply": np.multiply}
         self.lines: list[str] = []
         self.indent = 1
-        #: lines at the head of a step, which depend on it alone
-        self.used: set[str] = set()
+        #: lines at the head of a step, which depend on its number alone
+        self.head_lines: set[str] = set()
         #: identifiers of what is looked up once, before the steps, by its code
         self._views: dict[str, str] = {}
         self._states: dict[Key, str] = {}
         self._count = 0
-        #: identifiers that stand for the names every expression knows
-        self.clock = {name: self.constant(np.float64(value)) for name, value in constants(dt).items()}
-        self.clock |= {"k": "k_", "t": "t_"}
+        #: the identifiers of the names that every expression knows: constants, k and t
+        self.common_names = {name: self.constant(np.float64(value)) for name, value in constants(dt).items()}
+        self.common_names |= {"k": "k_", "t": "t_"}
 
     def name(self, prefix: str) -> str:
         """A new identifier."""
@@ -96,8 +119,8 @@ class Code:
         ``share`` one number where all are the same."""
         variable = self._variables.get(array)
         if variable is None:
-            own = values if some is None else values[some]
-            return self.constant(shared(own) if share else np.array(own, dtype=np.float64))
+            numbers = values if some is None else values[some]
+            return self.constant(shared(numbers) if share else np.array(numbers, dtype=np.float64))
         start, size = variable
         if size == 1:
             return self.view(_VARIABLES, f"{start}:{start + 1}")
@@ -121,7 +144,8 @@ class Code:
         return f"{array}[{self.constant(np.ascontiguousarray(indices, dtype=np.intp))}]"
 
     def view(self, array: str, part: str) -> str:
-        """A slice. Slices of the state's own arrays are taken once, before the steps: they follow all changes."""
+        """A slice. Slices of the state's own arrays are taken once, before the steps: they follow all changes.
+        Their identifiers begin with the first letter of the array's."""
         if array not in (*_PARTS, _VARIABLES):
             return f"{array}[{part}]"
         return self._views.setdefault(f"{array}[{part}]", f"{array[0]}{len(self._views)}_")
@@ -134,15 +158,15 @@ class Code:
         """k mod delay."""
         if delay == 1:
             return "0"
-        self.used.add(f"r{delay} = k % {delay}")
+        self.head_lines.add(f"r{delay} = k % {delay}")
         return f"r{delay}"
 
     def expression(self, tree: Tree, known: Mapping[str, str], functions: Functions | None = None) -> str:
         """An expression as code."""
         if names(tree) & {"k", "t"}:
-            self.used.add("k_ = float64(k)")
-            self.used.add(f"t_ = k_ * {self.clock['dt']}")
-        return emit(tree, {**self.clock, **known}, functions or {})
+            self.head_lines.add("k_ = float64(k)")
+            self.head_lines.add(f"t_ = k_ * {self.common_names['dt']}")
+        return emit(tree, {**self.common_names, **known}, functions or {})
 
     def fresh(self, prefix: str, tree: Tree, known: Mapping[str, str], functions: Functions | None = None) -> str:
         """The value of an expression under a new identifier, and never an alias of an array that changes."""
@@ -152,7 +176,8 @@ class Code:
     def text(self) -> str:
         """The steps as Python text. What stays the same over all of them is looked up before the first."""
         views = [f"    {name} = {code}" for code, name in self._views.items()]
-        body = [*(f"    {text}" for text in sorted(self.used)), *self.lines, "    state.k = k + 1", "    yield"]
+        # sorted, as the line of t_ reads k_
+        body = [*(f"    {text}" for text in sorted(self.head_lines)), *self.lines, "    state.k = k + 1", "    yield"]
         lookups = [f"    {name} = state.{name}" for name in _PARTS if any(name in line for line in [*views, *body])]
         lookups += [
             f"    {name} = state.conditions.{name}"
@@ -165,68 +190,71 @@ class Code:
     def compiled(self) -> Steps:
         """The steps as a function. The text holds our own identifiers only."""
         namespace = {**self.namespace, "float64": np.float64}
-        made = defined("steps", [self.text()], "steps of a network", namespace)
-        assert callable(made)
-        return made
+        steps = defined("steps", [self.text()], "steps of a network", namespace)
+        assert callable(steps)
+        return steps
 
 
 class Cell(NamedTuple):
-    """Where something that lasts is kept, for all members: the code of its value now, what is assigned to, and what is
-    kept of a new value."""
+    """Where something that lasts is kept, for all members, as code. Of weights from 0 to 1, say:
+    ``Cell("w0_", "weights[0:3]", lambda value: f"np.clip({value}, 0, 1)")``."""
 
+    #: its value now
     now: str
+    #: what is assigned to
     place: str
+    #: of the code of a new value that of what is kept of it
     kept: Callable[[str], str] = str
 
 
 def emit_change(
     code: Code,
-    made: Definition,
+    definition: Definition,
     seen: Mapping[str, str],
     cells: Mapping[str, Cell],
     episode: int | None,
     functions: Functions | None = None,
 ) -> dict[str, str]:
-    """What becomes of all that lasts of a definition, from old values at once, and once more at an episode's end; gives
-    what does not last, made from the new states, by identifiers. ``seen`` is what formulas see besides their own."""
-    fleeting = {one.name: one.each_step for one in made.fleeting}
-    given = _emit_replace(
-        code, made, seen, cells, {one.name: one.each_step for one in made.lasting}, fleeting, functions
-    )
-    ends = {one.name: one.each_episode for one in made.lasting}
+    """Emit the new value of all that lasts of a definition, from old values at once, then its change at an episode's
+    end. Gives the identifiers of what does not last, which is made from the new states. ``seen``: what formulas see
+    besides their own."""
+    each_step = {one.name: one.each_step for one in definition.lasting}
+    fleeting = {one.name: one.each_step for one in definition.fleeting}
+    fleeting_names = _emit_replace(code, definition, seen, cells, each_step, fleeting, functions)
+    ends = {one.name: one.each_episode for one in definition.lasting}
     if episode is not None and any(tree is not None for tree in ends.values()):
         code.line(f"if (k + 1) % {episode} == 0:")
         code.indent += 1
-        _emit_replace(code, made, seen, cells, ends, {}, None)
+        _emit_replace(code, definition, seen, cells, ends, {}, None)
         code.indent -= 1
-    return given
+    return fleeting_names
 
 
 def _emit_replace(
     code: Code,
-    made: Definition,
+    definition: Definition,
     seen: Mapping[str, str],
     cells: Mapping[str, Cell],
     trees: Mapping[str, Tree | None],
     fleeting: Mapping[str, Tree | None],
     functions: Functions | None,
 ) -> dict[str, str]:
-    """All right-hand sides, then all changes."""
+    """Emit all right-hand sides, then all changes; gives the identifiers of what is ``fleeting``."""
     known = dict(seen)
     known |= {name: cell.now if cell.now.isidentifier() else code.let("v", cell.now) for name, cell in cells.items()}
-    wanted = all_names([*trees.values(), *fleeting.values(), *(tree for _, tree in made.let)])
-    for name, tree in made.let:
+    wanted = all_names([*trees.values(), *fleeting.values(), *(tree for _, tree in definition.let)])
+    for name, tree in definition.let:
         if name in wanted:
             known[name] = code.fresh("m", tree, known)
     new = {name: code.fresh("n", tree, known, functions) for name, tree in trees.items() if tree is not None}
-    given = {
+    fleeting_names = {
         name: code.let("y", code.expression(tree, known | new, functions))
         for name, tree in fleeting.items()
         if tree is not None
     }
     for name, value in new.items():
         code.line(f"{cells[name].place} = {cells[name].kept(value)}")
-    return given
+    return fleeting_names
 
 
 def _may_alias(tree: Tree) -> bool:
