@@ -3,14 +3,19 @@
 In: a Network. Out: a Stepper over the arrays of a State, which are read and written in place. What can be set, held,
 lesioned or stopped is data: none of it compiles anything. A step looks for it only where there is any: there are two
 forms of the step, a plain one and one that looks after everything.
+
+Whole runs of large networks have a third form, the *fused* one: a signal that arrives after one step along a weight
+that does not change is not stored; the neuron that it arrives at takes it from the activities of the step *before*. The
+weights of such connections are *packed* at the beginning of a call, in the order in which neurons read them; at its
+end their last signals *leave*, into the array where every other form looks for them.
 """
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -38,6 +43,15 @@ _AT_ONCE = 1 << 22
 _PLAIN, _GENERAL, _FIRST = 0, 1, 2
 _FORMS = tuple(ctypes.c_int32(form) for form in (_PLAIN, _GENERAL, _FIRST))
 
+#: ``nv_state``: of a State ``activity``, ``weights``, ``signals``, ``history``, and ``cells``, one pointer for each
+#: state of a model or a rule; ``x``: the numbers that can be set; ``s``: the inputs of the step; ``held``, ``holding``,
+#: ``gone``, ``still``, ``lost``, ``before``, ``packed``: as ``Form`` says; ``given``: the tables that are too long for
+#: the text.
+#:
+#: ``nv_course``: ``steps`` steps from ``k`` on, the first in ``form``, the others in the form ``then``; the inputs of
+#: each are a row of ``rows``. Steps that ``every`` divides are kept: a row of ``activity``, and one of ``weights`` with
+#: those that are ``changing``, which lie next to each other if ``beside``. With ``look`` it ends behind the first step
+#: after which something is not finite.
 _HEAD: Final = """#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -67,6 +81,8 @@ typedef struct {
 } nv_course;
 """
 
+#: ``nv_odd``: whether a number is not finite. Its exponent is all ones then; one more overflows into bit 63. In
+#: ``nv_run`` ``wait`` is the number of steps until one is kept.
 _TAIL: Final = """
 NV_PUBLIC void nv_once(const nv_state *p, int64_t k, int32_t form)
 {
@@ -140,7 +156,7 @@ class Written:
 
     text: str
     #: the tables that are too long for the text, as ``nv_state.given`` has them
-    given: tuple[Table, ...]
+    long_tables: tuple[Table, ...]
     #: how many weights are packed in whole runs
     packed: int
 
@@ -161,6 +177,19 @@ def forget() -> None:
     _written.clear()
 
 
+class _Function(NamedTuple):
+    """A function of the text, over an ``nv_state``."""
+
+    type: str
+    name: str
+    form: Form
+    write: Callable[[StepCode], None]
+    #: its further parameters
+    parameters: str = ""
+    #: whether it is for fused connections alone, and empty where there are none
+    of_fused: bool = False
+
+
 def _write(network: Network) -> Written:
     emitter, tables = Emitter(), Tables("double", LONGEST)
     small = len(network.neurons) + len(network.connections) <= SMALL
@@ -171,28 +200,14 @@ def _write(network: Network) -> Written:
     incoming = [incoming_of(network, population) for population in network.populations]
     whole = StepCode(network, Code(emitter, tables, network.dt, {}), Form(), incoming)
     fused = not small and bool(whole.fuses.any())
-    of_step = ", int64_t k, const double *restrict s"
-    for name, form, write, more in (
-        ("double nv_plain", Form(written_out=small, watched=watched), StepCode.write, of_step),
-        (
-            "void nv_general",
-            Form(first=True, held=True, gone=True, still=True, lost=True),
-            StepCode.write,
-            f"{of_step}, int first",
-        ),
-        ("double nv_fused", Form(fused=True, watched=watched), StepCode.write, of_step),
-        ("void nv_pack", Form(fused=True), StepCode.pack, ""),
-        ("void nv_leave", Form(fused=True), lambda step: step.leave(step.fuses), ""),
-    ):
+    for type_, name, form, write, parameters, of_fused in _functions(small, watched):
         code = Code(emitter, tables, network.dt, network.settable.variables)
-        if fused or name in ("double nv_plain", "void nv_general"):
+        if fused or not of_fused:
             write(StepCode(network, code, form, incoming))
-        if name.startswith("double"):
+        if type_ == "double":
             code.line("return odd;" if form.watched and code.lines else "return 0.0;")
-        bodies += [
-            *function(code, f"static {name}(const nv_state *p{more})", pointer_lines | tables.pointer_lines()),
-            "",
-        ]
+        head = f"static {type_} {name}(const nv_state *p{parameters})"
+        bodies += [*function(code, head, pointer_lines | tables.pointer_lines()), ""]
     counts = {"NEURONS": len(network.neurons), "INPUTS": network.vector_size, "CHANGING": len(network.changing)}
     defined = [f"#define {name} {value}" for name, value in counts.items()]
     neurons, connections = _look(network)
@@ -202,6 +217,21 @@ def _write(network: Network) -> Written:
     parts = [_HEAD, "\n".join(defined), emitter.helpers(used), tables.text(used), "\n".join(bodies)]
     return Written(
         "\n\n".join(part for part in parts if part) + _TAIL, tuple(tables.passed_in), whole.count if fused else 0
+    )
+
+
+def _functions(small: bool, watched: bool) -> tuple[_Function, ...]:
+    """The functions that ``nv_once`` and ``nv_run`` call. Those of type double give ``odd``."""
+    of_step = ", int64_t k, const double *restrict s"
+    plain = Form(written_out=small, watched=watched)
+    general = Form(first=True, held=True, gone=True, still=True, lost=True)
+    fused = Form(fused=True)
+    return (
+        _Function("double", "nv_plain", plain, StepCode.write, of_step),
+        _Function("void", "nv_general", general, StepCode.write, f"{of_step}, int first"),
+        _Function("double", "nv_fused", replace(fused, watched=watched), StepCode.write, of_step, of_fused=True),
+        _Function("void", "nv_pack", fused, StepCode.pack, of_fused=True),
+        _Function("void", "nv_leave", fused, lambda step: step.leave(step.fuses), of_fused=True),
     )
 
 
@@ -244,8 +274,7 @@ class _State(ctypes.Structure):
 
 
 class _Course(ctypes.Structure):
-    """``nv_course``: ``steps`` steps from ``k`` on, the first in ``form``, the others in the form ``then``; with
-    ``look`` up to one after which something is not finite; ``beside``: the weights kept lie next to each other."""
+    """``nv_course``: the steps of a call."""
 
     _fields_ = [
         *((name, ctypes.c_int64) for name in ("k", "steps", "every", "form", "then", "look", "beside")),
@@ -255,7 +284,7 @@ class _Course(ctypes.Structure):
 
 class CStepper:
     """One network, compiled. Of the state that it stepped last it keeps where the arrays lie, and looks them up again
-    only where one of them is another object (``_take``)."""
+    only where one of them is another object (``_point_to``)."""
 
     def __init__(self, network: Network) -> None:
         self.network = network
@@ -267,24 +296,25 @@ class CStepper:
         self._step, self._run = library.nv_once, library.nv_run
         self._step.restype = None
         self._run.argtypes, self._run.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
-        self._given = made.given
+        self._long_tables = made.long_tables
         self._vector = np.zeros(network.vector_size)
         self._initial = bool((~np.isnan(network.neurons.initial)).any())
         self._changing = np.ascontiguousarray(network.changing, dtype=np.int64)
-        # whether the weights that are recorded lie beside each other
+        # whether the weights that are recorded lie next to each other
         count = len(self._changing)
-        self._beside = count > 0 and bool((np.diff(self._changing) == 1).all())
+        self._contiguous = count > 0 and bool((np.diff(self._changing) == 1).all())
         self._pointers = _State()
         self._pointers.s = self._vector.ctypes.data
         self._address = ctypes.addressof(self._pointers)
         #: arguments of ``nv_once`` that need not be converted anew: where the struct is, and the step
         self._struct, self._step_number = ctypes.c_void_p(self._address), ctypes.c_int64(0)
-        self._handed = _addresses(self._given)
+        self._table_addresses = _addresses(self._long_tables)
         self._before, self._packed = np.zeros(len(network.neurons)), np.zeros(made.packed)
         self._pointers.before, self._pointers.packed = self._before.ctypes.data, self._packed.ctypes.data
-        self._pointers.given = ctypes.addressof(self._handed)
-        #: the state whose arrays the struct points to, these arrays, and what holds in it
-        self._of: State | None = None
+        self._pointers.given = ctypes.addressof(self._table_addresses)
+        #: the state whose arrays the struct points to, these arrays, and the objects that say what holds in it: where
+        #: each is still the same one, nothing has changed
+        self._known_state: State | None = None
         self._activity = self._weights = self._signals = self._history = self._variables = self._vector
         self._holds: object = None
         self._structure: Structure | None = None
@@ -294,7 +324,7 @@ class CStepper:
         """Advance the state by a step."""
         now = state.conditions
         if (
-            state is not self._of
+            state is not self._known_state
             or now.holds is not self._holds
             or now.structure is not self._structure
             or now.variables is not self._variables
@@ -303,7 +333,7 @@ class CStepper:
             or state.signals is not self._signals
             or state.history is not self._history
         ):
-            self._take(state)
+            self._point_to(state)
         k = state.k
         self._vector[:] = inputs
         self._step_number.value = k
@@ -316,7 +346,7 @@ class CStepper:
         """Advance the state by a step for each row of ``vectors``; steps that ``every`` divides are kept, in the first
         rows of ``activity`` and ``weights``. With ``look`` it ends behind the first step after which something is not
         finite. Gives the number of steps made."""
-        self._take(state)
+        self._point_to(state)
         rows = np.ascontiguousarray(vectors, dtype=np.float64)
         course = _Course(
             k=state.k,
@@ -325,7 +355,7 @@ class CStepper:
             form=self._form(state),
             then=_GENERAL if self._general else _PLAIN,
             look=look,
-            beside=self._beside,
+            beside=self._contiguous,
             rows=rows.ctypes.data,
             activity=activity.ctypes.data,
             weights=weights.ctypes.data,
@@ -346,7 +376,7 @@ class CStepper:
             return _FIRST
         return _GENERAL if self._general else _PLAIN
 
-    def _take(self, state: State) -> None:
+    def _point_to(self, state: State) -> None:
         """Note where the arrays of a state lie, and what is held and left out."""
         now, pointers = state.conditions, self._pointers
         for name in ("activity", "weights", "signals", "history"):
@@ -360,7 +390,7 @@ class CStepper:
         pointers.cells = ctypes.addressof(self._cells)
         if now.holds is not self._holds or now.structure is not self._structure:
             self._take_conditions(now)
-        self._of = state  # what is kept alive cannot be mistaken for another array at the same address
+        self._known_state = state  # what is kept alive cannot be mistaken for another array at the same address
         self._activity, self._weights, self._variables = state.activity, state.weights, now.variables
         self._signals, self._history = state.signals, state.history
 
