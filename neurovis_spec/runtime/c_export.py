@@ -2,7 +2,8 @@
 
 In: a Network, the State that it begins in, the type of numbers. Out: the texts of the files. The step is that of the C
 backend; around it stand what is done in Python elsewhere: inputs, noise, events, the setting of parameters. Everything
-that changes is in a struct of the caller's.
+that changes is in a struct of the caller's. Events of step 0 happen in ``NAME_init``; those of step k + 1 at the end of
+step k, when ``state->k`` is that of the step to come.
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ from neurovis_spec.runtime.state import NEVER_LOST, Mask, State, by_kind, initia
 
 @dataclass(frozen=True)
 class Phase:
-    """What is held and left out from a step on, by events; the fields of Structure and Held at that step."""
+    """What is held and left out from a step on, by events: at that step ``gone``, ``still`` and ``lost`` are those of
+    Structure, ``order`` and ``clamps`` those of Held."""
 
     #: the step, −1 for what is so before any
     at: int
@@ -84,13 +86,14 @@ class Exported:
         free = [name for name in network.parameters if name not in network.structural and name in slots]
         self.settable = [name for name in free if slots[name] not in kept_slots]
         #: parameters that keep their values in C, and could be set in a run; what follows each
-        self.fixed: Mapping[str, str] = {name: kept_slots[slots[name]] for name in free if slots[name] in kept_slots}
+        self.kept_parameters: Mapping[str, str] = {
+            name: kept_slots[slots[name]] for name in free if slots[name] in kept_slots
+        }
         self._check_events(kept_slots)
         self.settable_names = identifiers(self.settable)
         self.phases = self._phases()
-        #: whether any phase holds neurons, and whether any leaves out connections
+        #: whether any phase holds neurons
         self.holding = any(any(order >= 0 for order in phase.order) or phase.lesioned.any() for phase in self.phases)
-        self.leaving = any(phase.gone.any() or phase.still.any() for phase in self.phases)
         self.members = self._members()
 
     # ---- what there is -----------------------------------------------------------------------------------------
@@ -133,8 +136,10 @@ class Exported:
         """The arrays of the struct, without those that are empty."""
         network, state = self.network, self.state
         # the state may have checks of a run, which this network has not
-        own = {use.owner: use.definition.state for _, use in network.uses}
-        cells = {owner: {one.name: state.cells[owner][one.name] for one in states} for owner, states in own.items()}
+        cells = {
+            use.owner: {quantity.name: state.cells[use.owner][quantity.name] for quantity in use.definition.state}
+            for _, use in network.uses
+        }
         members = [
             Member("activity", state.activity, "a[k - 1] of all neurons"),
             Member("weights", state.weights, "w[k] of all connections"),
@@ -153,7 +158,7 @@ class Exported:
         return [member for member in members if len(member.begin) or member.name in ("activity", "weights")]
 
     @property
-    def first(self) -> bool:
+    def takes_initial(self) -> bool:
         """Whether neurons take ``initial`` at step 0."""
         return not self.state.continued and bool((~np.isnan(self.network.neurons.initial)).any())
 
@@ -163,8 +168,10 @@ class Exported:
         """The text of NAME.h."""
         network, name, macro = self.network, self.name, self.macro
         n, m = len(network.neurons), len(network.connections)
-        inputs = [(own, entry.size) for own, entry in zip(self.input_names, self.inputs, strict=True)]
-        outputs = [(own, len(entry.neurons)) for own, entry in zip(self.output_names, network.outputs, strict=True)]
+        inputs = [(c_name, entry.size) for c_name, entry in zip(self.input_names, self.inputs, strict=True)]
+        outputs = [
+            (c_name, len(entry.neurons)) for c_name, entry in zip(self.output_names, network.outputs, strict=True)
+        ]
         setters = "".join(map(self._setter, self.settable, self.settable_names))
         return f"""/*
  * {words(network.title or network.name)}
@@ -191,10 +198,10 @@ extern const char *const {name}_neuron_names[{max(n, 1)}];
 {self._struct("state", self._state_fields())}
 
 /* The inputs of a step that have no source of their own. */
-{self._struct("inputs", [f"{self.real} {own}[{size}];" for own, size in inputs])}
+{self._struct("inputs", [f"{self.real} {c_name}[{size}];" for c_name, size in inputs])}
 
 /* The outputs of a step. */
-{self._struct("outputs", [f"{self.real} {own}[{size}];" for own, size in outputs])}
+{self._struct("outputs", [f"{self.real} {c_name}[{size}];" for c_name, size in outputs])}
 
 /* Make a state ready for step 0, whatever its memory holds. */
 void {name}_init({name}_state *state);
@@ -231,12 +238,12 @@ void {name}_step({name}_state *state, const {name}_inputs *in, {name}_outputs *o
             fields.append(f"unsigned char held[{len(self.network.neurons)}]; /* neurons that are held */")
         return fields
 
-    def _setter(self, parameter: str, own: str) -> str:
-        """The declaration of the function that sets a parameter; ``own`` is its name in C."""
+    def _setter(self, parameter: str, c_name: str) -> str:
+        """The declaration of the function that sets a parameter; ``c_name`` is its name in C."""
         return f"""
 /* Set the parameter {words(parameter, 40)} from the next step on, and what follows it. Gives 1; or
    0, and nothing has changed, where a number would not be finite or leave its bounds. */
-int {self.name}_set_{own}({self.name}_state *state, {self.real} value);
+int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
 """
 
     # ---- the source --------------------------------------------------------------------------------------------
@@ -251,8 +258,8 @@ int {self.name}_set_{own}({self.name}_state *state, {self.real} value);
         if self.network.vector_size:
             body += [*self._sense(), ""]
         body += [*self._compute(), "", *self._init(), "", *self._step()]
-        for parameter, own in zip(self.settable, self.settable_names, strict=True):
-            body += ["", *self._set(parameter, own)]
+        for parameter, c_name in zip(self.settable, self.settable_names, strict=True):
+            body += ["", *self._set(parameter, c_name)]
         if self.holding:
             body = [*self._hold(), "", *body]
         used = words_of(body)
@@ -309,8 +316,8 @@ int {self.name}_set_{own}({self.name}_state *state, {self.real} value);
         return pointer_lines
 
     def _left_out(self) -> dict[str, tuple[str, list[npt.NDArray[np.integer]]]]:
-        """What a step has to look at for what events leave out, where they do: its type, and its numbers in each
-        phase."""
+        """Those of ``gone``, ``still`` and ``lost`` that a step has to look at, as events leave something out by them:
+        the type in C, and the array in each phase."""
         phases, found = self.phases, dict[str, tuple[str, list[npt.NDArray[np.integer]]]]()
         for name, masks in (("gone", [phase.gone for phase in phases]), ("still", [phase.still for phase in phases])):
             if any(mask.any() for mask in masks):
@@ -326,7 +333,7 @@ int {self.name}_set_{own}({self.name}_state *state, {self.real} value);
         left_out = self._left_out()
         form = Form(
             written_out=len(network.neurons) + len(network.connections) <= SMALL,
-            first=self.first,
+            first=self.takes_initial,
             held=self.holding,
             gone="gone" in left_out,
             still="still" in left_out,
@@ -339,13 +346,15 @@ int {self.name}_set_{own}({self.name}_state *state, {self.real} value);
             lines, which = _by_phase(name, kind, phases)
             before += lines
             pointer_lines[name] = f"const {kind} *const {name} = {which};"
-        if self.first:
+        if self.takes_initial:
             code.head["first"] = "const int first = k == 0;"
         return [*before, *self._function(code, "What a step computes.", "void nv_compute", pointer_lines)]
 
-    def _function(self, code: Code, about: str, own: str, pointer_lines: dict[str, str], more: str = "") -> list[str]:
-        """A function of our own over a state."""
-        head = f"static {own}({self.name}_state *state{more})"
+    def _function(
+        self, code: Code, about: str, declaration: str, pointer_lines: dict[str, str], more: str = ""
+    ) -> list[str]:
+        """A function of our own over a state; ``declaration`` is its type and name, ``more`` its further parameters."""
+        head = f"static {declaration}({self.name}_state *state{more})"
         lines = function(code, head, {"k": "const int64_t k = state->k;", **pointer_lines})
         if "state" not in words_of(lines[1:]):
             lines.insert(2, "    (void)state;")
@@ -353,7 +362,7 @@ int {self.name}_set_{own}({self.name}_state *state, {self.real} value);
 
     def _hold(self) -> list[str]:
         """What neurons are held at, by the parameters of now."""
-        code, n = self._code(), len(self.network.neurons)
+        code = self._code()
         code.line("memset(state->held, 0, sizeof state->held);")
         switch = len(self.phases) > 1
         for number, phase in enumerate(self.phases):
@@ -362,12 +371,11 @@ int {self.name}_set_{own}({self.name}_state *state, {self.real} value);
             if (order < 0).all() and not phase.lesioned.any():
                 continue
             with code.block(f"if (state->phase == {number})" if switch else ""):
-                for one in sorted(set(order[order >= 0].tolist())):
-                    value = code.text(formula(code, phase.clamps[one].value, 0))
-                    self._hold_at(code, np.flatnonzero(order == one), value)
+                for clamp in sorted(set(order[order >= 0].tolist())):
+                    value = code.text(formula(code, phase.clamps[clamp].value, 0))
+                    self._hold_at(code, np.flatnonzero(order == clamp), value)
                 if phase.lesioned.any():
                     self._hold_at(code, np.flatnonzero(phase.lesioned), code.text(0.0))
-        assert n
         return self._function(code, "What neurons are held at.", "void nv_hold", self._pointer_lines())
 
     def _hold_at(self, code: Code, neurons: IntArray, value: str) -> None:
@@ -451,9 +459,9 @@ int {self.name}_set_{own}({self.name}_state *state, {self.real} value);
                 code.line(f"    v[{entry.start} + i] = {value};")
             elif entry.table is not None:
                 self._row(code, number, entry)
-        for own, entry in zip(self.input_names, self.inputs, strict=True):
+        for c_name, entry in zip(self.input_names, self.inputs, strict=True):
             code.line(code.loop("i", entry.size))
-            code.line(f"    v[{entry.start} + i] = in != NULL ? in->{own}[i] : {code.text(0.0)};")
+            code.line(f"    v[{entry.start} + i] = in != NULL ? in->{c_name}[i] : {code.text(0.0)};")
         for noise in network.noises:
             self._noise(code, noise)
         if not self.inputs:
@@ -531,15 +539,15 @@ int {self.name}_set_{own}({self.name}_state *state, {self.real} value);
             code.line("nv_events(state);")
         if self.network.outputs:
             with code.block("if (out != NULL)"):
-                for own, entry in zip(self.output_names, self.network.outputs, strict=True):
+                for c_name, entry in zip(self.output_names, self.network.outputs, strict=True):
                     code.line(code.loop("i", len(entry.neurons)))
-                    code.line(f"    out->{own}[i] = state->activity[{code.at(entry.neurons, 'i')}];")
+                    code.line(f"    out->{c_name}[i] = state->activity[{code.at(entry.neurons, 'i')}];")
         else:
             code.line("(void)out;")
         head = f"void {name}_step({name}_state *state, const {name}_inputs *in, {name}_outputs *out)"
         return function(code, head, {})
 
-    def _set(self, parameter: str, own: str) -> list[str]:
+    def _set(self, parameter: str, c_name: str) -> list[str]:
         """The function that sets a parameter."""
         code, slot = self._code(), self.network.settable.index[parameter]
         self._begin_setting(code)
@@ -551,7 +559,7 @@ int {self.name}_set_{own}({self.name}_state *state, {self.real} value);
         if self.holding:
             code.line("nv_hold(state);")
         code.line("return 1;")
-        return function(code, f"int {self.name}_set_{own}({self.name}_state *state, {self.real} value)", {})
+        return function(code, f"int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value)", {})
 
 
 def _only_sets(change: Change) -> bool:
@@ -572,13 +580,13 @@ def _by_phase(name: str, kind: str, arrays: list[npt.NDArray[np.integer]]) -> tu
     and ``nv_gone[nv_gone_at[state->phase]]``."""
     unique: dict[tuple[int, ...], int] = {}
     numbers = [tuple(array.tolist()) for array in arrays]
-    for own in numbers:
-        unique.setdefault(own, len(unique))
-    rows = ["    {" + ", ".join(map(str, own)) + "}," for own in unique]
+    for row in numbers:
+        unique.setdefault(row, len(unique))
+    rows = ["    {" + ", ".join(map(str, row)) + "}," for row in unique]
     lines = [f"static const {kind} nv_{name}[{len(rows)}][{len(numbers[0])}] = {{", *rows, "};"]
     if len(arrays) == 1:
         return lines, f"nv_{name}[0]"
-    which = ", ".join(str(unique[own]) for own in numbers)
+    which = ", ".join(str(unique[row]) for row in numbers)
     lines.append(f"static const int32_t nv_{name}_at[{len(arrays)}] = {{{which}}};")
     return lines, f"nv_{name}[nv_{name}_at[state->phase]]"
 

@@ -58,7 +58,7 @@ def _fixed(made: Exported) -> list[str]:
     """For each parameter that could be set in a run, and keeps its value in C, what it is and why."""
     return [
         f"'{words(name)}' is structural in C and keeps its value, {made.network.parameters[name]:g}: {why} follows it"
-        for name, why in made.fixed.items()
+        for name, why in made.kept_parameters.items()
     ]
 
 
