@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import BinaryIO, Final
 
 from neurovis_spec.real_paths import CIRCLE, is_circular, real_path
-from neurovis_spec.runtime.parts import Kind, clear, open_beside, shown
+from neurovis_spec.runtime.parts import Kind, clear, open_beside, path_shown
 
 #: What the system says where there is no room: on the disk, for this user, in a file.
 FULL: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
@@ -143,7 +143,7 @@ def _open(path: Path, target: Path) -> Iterator[Part]:
         if part.path is not None and part.held is None:
             part.path.unlink(missing_ok=True)
         elif part.path is not None:
-            words = f"{path}: what was recorded, up to step {part.held}, is in {shown(beside, path)}"
+            words = f"{path}: what was recorded, up to step {part.held}, is in {path_shown(beside, path)}"
             warnings.warn(words + ("" if target.exists() else ", and is read in its place"), stacklevel=2)
         raise
     else:

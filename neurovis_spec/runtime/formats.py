@@ -1,7 +1,8 @@
 """Formats of recordings: ``.npz``, which keeps everything, ``.csv`` for tables, ``.mcap`` for the tools of robots.
 
 In: a Recording and a path, or a path alone. Out: a file, or a Recording. Formats are found through the entry point
-group ``neurovis.formats`` by the suffix of the path.
+group ``neurovis.formats`` by the suffix of the path. A *part* is the file of a run that is going on, or broke off,
+beside the one that it is to become (``runtime/parts.py``).
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ from neurovis_spec.runtime.npz_file import (
     stream_npz,
     write_npz,
 )
-from neurovis_spec.runtime.parts import beside, is_written, rest, seize, shown, target_of
+from neurovis_spec.runtime.parts import abandoned_parts, files_beside, is_written, lock_abandoned, path_shown, target_of
 from neurovis_spec.runtime.recording import Format, Readable, Recording, for_path, read_by
 from neurovis_spec.runtime.rows import RowWriter, Steps
 
@@ -127,11 +128,11 @@ def load(path: str | os.PathLike[str], run: int | None = None) -> Recording:
             return format_.recover(path)
     found = read_by(path)
     if isinstance(found, StreamingFormat):
-        parts = beside(real_path(path), "part")
+        parts = files_beside(real_path(path), "part")
         if path.exists():
-            _tell(path, parts, found)
+            _warn_of_later_part(path, parts, found)
         elif parts:
-            return _in_place(path, parts[0], found)
+            return _load_part_instead(path, parts[0], found)
     if isinstance(found, RepeatingFormat):
         return found.load_run(path, run)
     if run not in (None, 1):
@@ -139,7 +140,7 @@ def load(path: str | os.PathLike[str], run: int | None = None) -> Recording:
     return found.load(path)
 
 
-def _in_place(path: Path, part: Path, format_: StreamingFormat) -> Recording:
+def _load_part_instead(path: Path, part: Path, format_: StreamingFormat) -> Recording:
     """The recording in a part, which stands in for the file itself."""
     try:
         recording = format_.recover(part)
@@ -148,42 +149,42 @@ def _in_place(path: Path, part: Path, format_: StreamingFormat) -> Recording:
     if not len(recording):
         return format_.load(path)
     fate = "is still going on" if is_written(part) else "did not come to its end"
-    held = f"what was recorded, up to step {recording.step[-1]}, is read from {shown(part, path)}"
-    _warn(f"{path}: its run {fate}; {held}")
+    where = f"what was recorded, up to step {recording.step[-1]}, is read from {path_shown(part, path)}"
+    _warn(f"{path}: its run {fate}; {where}")
     return recording
 
 
-def _tell(path: Path, parts: Sequence[Path], format_: StreamingFormat) -> None:
+def _warn_of_later_part(path: Path, parts: Sequence[Path], format_: StreamingFormat) -> None:
     """Warn if beside the file that is read lies the part of a later run, which broke off."""
     for part in parts:
-        file = seize(part)
+        file = lock_abandoned(part)
         if file is not None:
             last = None
             with file, suppress(RecordingError):
                 last = format_.held(file)
             if last is not None:
-                held = f"what it recorded, up to step {last}, is in {shown(part, path)}"
-                _warn(f"{path} is of an earlier run: a later run did not come to its end; {held}")
+                where = f"what it recorded, up to step {last}, is in {path_shown(part, path)}"
+                _warn(f"{path} is of an earlier run: a later run did not come to its end; {where}")
 
 
-def settle(path: Path, format_: StreamingFormat) -> None:
+def take_over_parts(path: Path, format_: StreamingFormat) -> None:
     """Before a run writes a recording: take over what runs that are gone have left beside it, or clear it away, and
     say so. Where the file itself is not there a part becomes it. Raises RecordingError, OSError."""
     target = real_path(path)
-    for part, file in rest(target):
+    for part, file in abandoned_parts(target):
         try:
             last = format_.held(file)
         except RecordingError:  # a file of somebody else
             continue
-        held = f"what an earlier run recorded before it broke off, up to step {last},"
+        recorded = f"what an earlier run recorded before it broke off, up to step {last},"
         if last is None:
             part.unlink()
         elif target.exists():
             part.unlink()
-            _warn(f"{path}: {held} is removed ({shown(part, path)})")
+            _warn(f"{path}: {recorded} is removed ({path_shown(part, path)})")
         else:
             format_.finish(file, part, path)
-            _warn(f"{path}: {held} is in it until this run is at its end")
+            _warn(f"{path}: {recorded} is in it until this run is at its end")
 
 
 def _warn(message: str) -> None:

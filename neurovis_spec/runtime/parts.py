@@ -21,10 +21,11 @@ from typing import Literal, TypeAlias
 if sys.platform != "win32":
     import fcntl
 
-#: ``part``: rows of a recording that can be read at any time; the other: a file of use to nobody before it is whole,
-#: of a name that nobody else gives a file
+#: ``part``: rows of a recording whose run has not come to its end, which can be read at any time; the other: a file of
+#: use to nobody before it is whole, of a name that nobody else gives a file
 Kind: TypeAlias = Literal["part", "neurovis-new"]
 
+#: bytes of a name up to which it stands as it is in the name of a file beside
 _LONGEST = 200
 _PART = re.compile(r"\.(?P<name>.+?)(?:\.[0-9]+)?\.part")
 
@@ -45,7 +46,7 @@ def open_beside(target: Path, kind: Kind) -> tuple[Path, FileIO]:
     return path, file
 
 
-def beside(target: Path, kind: Kind) -> list[Path]:
+def files_beside(target: Path, kind: Kind) -> list[Path]:
     """The files of this kind beside ``target``, the one written last first."""
     pattern = re.compile(re.escape(f".{short(target.name)}") + rf"(?:\.[0-9]+)?\.{kind}")
     found: list[tuple[int, Path]] = []
@@ -59,7 +60,7 @@ def beside(target: Path, kind: Kind) -> list[Path]:
     return [path for _, path in sorted(found, reverse=True)]
 
 
-def seize(path: Path) -> FileIO | None:
+def lock_abandoned(path: Path) -> FileIO | None:
     """Open and lock a part whose writer has ended; None if it is still being written, or if that is not known."""
     if sys.platform == "win32":
         return None
@@ -75,7 +76,7 @@ def seize(path: Path) -> FileIO | None:
 
 def is_written(path: Path) -> bool:
     """Whether somebody is writing a file beside."""
-    file = seize(path)
+    file = lock_abandoned(path)
     if file is None:
         return True
     file.close()
@@ -92,7 +93,7 @@ def target_of(path: Path) -> Path | None:
     return path.with_name(match["name"]) if match else None
 
 
-def shown(part: Path, path: Path) -> Path:
+def path_shown(part: Path, path: Path) -> Path:
     """A file beside as one names it who names its target by a path."""
     return part if path.is_symlink() else path.with_name(part.name)
 
@@ -137,28 +138,28 @@ def _liken(file: FileIO, target: Path) -> None:
         return
     if sys.platform == "win32":
         return
-    own = os.fstat(file.fileno())
-    for part in ((wanted.st_uid, -1), (-1, wanted.st_gid)):
-        if part not in ((own.st_uid, -1), (-1, own.st_gid)):
+    now = os.fstat(file.fileno())
+    for owner in ((wanted.st_uid, -1), (-1, wanted.st_gid)):  # −1: leave it as it is
+        if owner not in ((now.st_uid, -1), (-1, now.st_gid)):
             with suppress(OSError):
-                os.fchown(file.fileno(), *part)
+                os.fchown(file.fileno(), *owner)
     with suppress(OSError):  # a file system without permissions
         os.fchmod(file.fileno(), stat.S_IMODE(wanted.st_mode))
 
 
 def clear(target: Path, kind: Kind) -> None:
     """Remove the files of this kind whose writer has ended."""
-    for path in beside(target, kind):
-        file = seize(path)
+    for path in files_beside(target, kind):
+        file = lock_abandoned(path)
         if file is not None:
             with file, suppress(OSError):
                 path.unlink()
 
 
-def rest(target: Path) -> Iterator[tuple[Path, FileIO]]:
-    """The parts of runs that are gone, locked for the time of an iteration."""
-    for path in beside(target, "part"):
-        file = seize(path)
+def abandoned_parts(target: Path) -> Iterator[tuple[Path, FileIO]]:
+    """The parts of runs that are gone, each locked while it is looked at."""
+    for path in files_beside(target, "part"):
+        file = lock_abandoned(path)
         if file is not None:
             with file:
                 yield path, file

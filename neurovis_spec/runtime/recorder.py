@@ -21,9 +21,9 @@ from neurovis_spec.real_paths import real_path
 from neurovis_spec.runtime.columns import Numbers, columns_of, recording_of
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.errors import RecordingError
-from neurovis_spec.runtime.formats import StreamingFormat, load, settle
+from neurovis_spec.runtime.formats import StreamingFormat, load, take_over_parts
 from neurovis_spec.runtime.inputs import STRETCH
-from neurovis_spec.runtime.parts import beside
+from neurovis_spec.runtime.parts import files_beside
 from neurovis_spec.runtime.recording import Recording, for_path
 from neurovis_spec.runtime.rows import After, Rows, RowWriter, Steps
 from neurovis_spec.runtime.state import State
@@ -60,12 +60,12 @@ class Recorder:
 
     def _stream(self, format_: StreamingFormat, path: Path) -> None:
         """Begin the file. Its part, which can be read meanwhile, is what is new beside it."""
-        settle(path, format_)
+        take_over_parts(path, format_)
         target = real_path(path)
-        parts_before = set(beside(target, "part"))
+        parts_before = set(files_beside(target, "part"))
         frame = empty_recording(self._network, self._columns, self._last)
         self._writer = self._open.enter_context(format_.stream(path, frame, self._steps))
-        self._part = next(iter(set(beside(target, "part")) - parts_before), None)
+        self._part = next(iter(set(files_beside(target, "part")) - parts_before), None)
 
     @property
     def going(self) -> bool:

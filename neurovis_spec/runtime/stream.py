@@ -17,7 +17,7 @@ from neurovis_spec.interrupts import Asked, Ended, deferred
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.columns import Columns, columns_of, recording_of
 from neurovis_spec.runtime.course import Course
-from neurovis_spec.runtime.formats import StreamingFormat, settle
+from neurovis_spec.runtime.formats import StreamingFormat, take_over_parts
 from neurovis_spec.runtime.inputs import STRETCH
 from neurovis_spec.runtime.memory import check_disk
 from neurovis_spec.runtime.record import InMemory, begin_run, end_values, keep_state, record, run_steps
@@ -60,7 +60,7 @@ def record_to(network: Network, path: Path, course: Course, progress: Progress |
     steps = Steps(course.length(network), course.every, state.k)
     columns = columns_of(network, course.keep, course.body)
     empty = empty_recording(network, columns, state)
-    settle(path, format_)
+    take_over_parts(path, format_)
     check_disk(path, steps.total, steps.every, format_.size(empty, steps))
     written = False
     try:
