@@ -94,19 +94,20 @@ def _compiler(chosen: str, path: str) -> Compiler:
 
 
 def _stamp(path: str) -> str:
+    """Where a file really lies, its size and its age: another where a compiler was replaced."""
     try:
         real = os.path.realpath(path)
-        about = Path(real).stat()
+        status = Path(real).stat()
     except OSError:
         return path
-    return f"{real} {about.st_size} {about.st_mtime_ns}"
+    return f"{real} {status.st_size} {status.st_mtime_ns}"
 
 
 def folder() -> Path:
     """Where compiled libraries are kept."""
-    given = os.environ.get("XDG_CACHE_HOME", "")
+    named = os.environ.get("XDG_CACHE_HOME", "")
     try:
-        base = Path(given) if given and Path(given).is_absolute() else Path.home() / ".cache"
+        base = Path(named) if named and Path(named).is_absolute() else Path.home() / ".cache"
     except RuntimeError:  # there is no home
         base = Path(tempfile.gettempdir()) / "neurovis-no-home"
     return base / "neurovis" / "c"
@@ -137,7 +138,7 @@ def load(text: str) -> ctypes.CDLL:
             raise OSError("no file")
         library = ctypes.CDLL(str(path))
     except OSError:  # not there, or no library
-        return _made(text, path)
+        return _compile_and_load(text, path)
     with suppress(OSError):
         os.utime(path)
     return library
@@ -147,34 +148,34 @@ def _is_ours(cache: Path) -> bool:
     """Whether nobody else can have put a library there, which would run as this user."""
     if sys.platform == "win32":
         return True
-    about = cache.stat()
-    return about.st_uid == os.getuid() and not about.st_mode & 0o022
+    status = cache.stat()
+    return status.st_uid == os.getuid() and not status.st_mode & 0o022
 
 
-def _made(text: str, path: Path) -> ctypes.CDLL:
-    """Compile into the cache, or where that cannot be, beside it."""
+def _compile_and_load(text: str, path: Path) -> ctypes.CDLL:
+    """Compile into the cache, or where that cannot be, in a temporary folder."""
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         if not _is_ours(path.parent):
             raise OSError("not a folder that this user alone writes to")
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".making") as beside:
-            made = _compiled(text, Path(beside), path.parent / "zig")
-            made.replace(path)
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".making") as temporary:
+            _compile(text, Path(temporary), path.parent / "zig").replace(path)
             library = ctypes.CDLL(str(path))
         _trim(path.parent, path)
         return library
     except OSError:
         pass
     try:
-        with tempfile.TemporaryDirectory(prefix="neurovis", ignore_cleanup_errors=True) as beside:
-            return ctypes.CDLL(str(_compiled(text, Path(beside), Path(beside) / "zig")))
+        with tempfile.TemporaryDirectory(prefix="neurovis", ignore_cleanup_errors=True) as temporary:
+            return ctypes.CDLL(str(_compile(text, Path(temporary), Path(temporary) / "zig")))
     except OSError as error:
         raise CompilerError(f"what is compiled cannot be written or loaded: {error}") from None
 
 
-def _compiled(text: str, into: Path, zig: Path) -> Path:
-    """Compile in a folder; ``zig`` is where ziglang may keep what it makes for itself (it waits for ever where it
-    cannot write). Raises OSError where the folder cannot be written to, CompilerError where the compiler fails."""
+def _compile(text: str, into: Path, zig: Path) -> Path:
+    """Make the library of a text in a folder; ``zig`` is where ziglang may keep what it makes for itself (it waits for
+    ever where it cannot write). Raises OSError where the folder cannot be written to, CompilerError where the compiler
+    fails."""
     source, library = into / "network.c", into / f"network{_SUFFIX}"
     source.write_text(text, encoding="ascii")
     made_by = compiler()
@@ -184,12 +185,12 @@ def _compiled(text: str, into: Path, zig: Path) -> Path:
     command += ["-o", str(library), str(source)]
     if sys.platform != "win32":
         command.append("-lm")
-    own = {"ZIG_GLOBAL_CACHE_DIR": str(zig), "ZIG_LOCAL_CACHE_DIR": str(into / "zig-local")}
+    zig_folders = {"ZIG_GLOBAL_CACHE_DIR": str(zig), "ZIG_LOCAL_CACHE_DIR": str(into / "zig-local")}
     try:
-        done = subprocess.run(
+        result = subprocess.run(
             command,
             cwd=into,
-            env={**own, **for_others()},
+            env={**zig_folders, **for_others()},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -197,10 +198,11 @@ def _compiled(text: str, into: Path, zig: Path) -> Path:
         )
     except OSError as error:
         raise CompilerError(f"'{made_by.name}' cannot be started: {error.strerror}") from None
-    if done.returncode != 0 or not library.exists():
-        said = done.stdout.decode(errors="replace").strip().splitlines()
-        first = next((line for line in said if "error" in line), said[0] if said else "").strip()[:300]
-        raise CompilerError(f"'{made_by.name}' fails " + (f"({first})" if first else f"with status {done.returncode}"))
+    if result.returncode != 0 or not library.exists():
+        output = result.stdout.decode(errors="replace").strip().splitlines()
+        first = next((line for line in output if "error" in line), output[0] if output else "").strip()[:300]
+        why = f"({first})" if first else f"with status {result.returncode}"
+        raise CompilerError(f"'{made_by.name}' fails {why}")
     return library
 
 
@@ -209,10 +211,10 @@ def _trim(cache: Path, newest: Path) -> None:
     found: list[tuple[float, int, Path]] = []
     for path in _entries(cache):
         try:
-            about = path.stat()
+            status = path.stat()
         except OSError:
             continue
-        found.append((about.st_mtime, about.st_size, path))
+        found.append((status.st_mtime, status.st_size, path))
     total = sum(size for _, size, _ in found)
     for _, size, path in sorted(found):
         if total <= MOST_BYTES:

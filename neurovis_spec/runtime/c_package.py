@@ -37,28 +37,29 @@ class FixedWarning(UserWarning):
 
 def files(network: Network, start: State | None = None, real: str = "double") -> dict[str, str]:
     """The texts of all files by name. Warns (FixedWarning) of parameters that keep their values. Raises ExportError."""
-    made = Exported(network, start, real)
-    tell_fixed(made)
+    exported = Exported(network, start, real)
+    tell_fixed(exported)
     return {
-        f"{made.name}.h": made.header(),
-        f"{made.name}.c": made.source(),
-        "README.md": _readme(made),
-        "main.c": _example(made),
-        "CMakeLists.txt": _cmake(made),
+        f"{exported.name}.h": exported.header(),
+        f"{exported.name}.c": exported.source(),
+        "README.md": _readme(exported),
+        "main.c": _example(exported),
+        "CMakeLists.txt": _cmake(exported),
     }
 
 
-def tell_fixed(made: Exported) -> None:
+def tell_fixed(exported: Exported) -> None:
     """Warn of each parameter that keeps its value."""
-    for line in _fixed(made):
+    for line in _fixed(exported):
         warnings.warn(f"{line}; export with --set for another", FixedWarning, stacklevel=4)
 
 
-def _fixed(made: Exported) -> list[str]:
+def _fixed(exported: Exported) -> list[str]:
     """For each parameter that could be set in a run, and keeps its value in C, what it is and why."""
+    values = exported.network.parameters
     return [
-        f"'{words(name)}' is structural in C and keeps its value, {made.network.parameters[name]:g}: {why} follows it"
-        for name, why in made.kept_parameters.items()
+        f"'{words(name)}' is structural in C and keeps its value, {values[name]:g}: {why} follows it"
+        for name, why in exported.kept_parameters.items()
     ]
 
 
@@ -95,15 +96,15 @@ def _holds(path: Path, text: str) -> bool:
     return path.is_file() and path.read_bytes() == text.encode()
 
 
-def size_of_state(made: Exported) -> int:
+def size_of_state(exported: Exported) -> int:
     """The bytes of the struct on common machines."""
-    network = made.network
-    number = 4 if made.real == "float" else 8
-    numbers = sum(max(len(member.begin), 1) for member in made.members)
-    size = -(-numbers * number // 8) * 8 + 8 + len(network.settable.slots)
-    if len(made.phases) > 1:
-        size = -(-size // 4) * 4 + 4
-    if made.holding:
+    network = exported.network
+    number = 4 if exported.real == "float" else 8
+    numbers = sum(max(len(member.begin), 1) for member in exported.members)
+    size = -(-numbers * number // 8) * 8 + 8 + len(network.settable.slots)  # the numbers, k and chosen
+    if len(exported.phases) > 1:
+        size = -(-size // 4) * 4 + 4  # phase
+    if exported.holding:  # held
         size += len(network.neurons)
     return -(-size // 8) * 8
 
@@ -115,14 +116,15 @@ def _calls(trees: Iterable[Tree | None]) -> int:
     return sum(row is not None and row.agree == "rounding" for row in called)
 
 
-def _calls_a_step(made: Definition) -> int:
+def _calls_a_step(definition: Definition) -> int:
     """The functions of the library that a definition calls at a step."""
-    first = made.gives[:1]  # without what checks an activation
-    return _calls([*(tree for _, tree in made.let), *(one.each_step for one in (*made.state, *first))])
+    first = definition.gives[:1]  # without what checks an activation
+    return _calls([*(tree for _, tree in definition.let), *(one.each_step for one in (*definition.state, *first))])
 
 
-def _cost(made: Exported) -> str:
-    network = made.network
+def _cost(exported: Exported) -> str:
+    """What a step takes, a line each."""
+    network = exported.network
     functions = 0
     for population in network.populations:
         each = _calls_a_step(population.model.definition)
@@ -146,10 +148,10 @@ def _cost(made: Exported) -> str:
     return "\n".join(lines)
 
 
-def _readme(made: Exported) -> str:
-    name, network = made.name, made.network
+def _readme(exported: Exported) -> str:
+    name, network = exported.name, exported.network
     neurons, connections = plural(len(network.neurons), "neuron"), plural(len(network.connections), "connection")
-    kept = "".join(f"\n{line}. `--set` of the export gives it another.\n" for line in _fixed(made))
+    kept = "".join(f"\n{line}. `--set` of the export gives it another.\n" for line in _fixed(exported))
     return f"""# {words(network.title or network.name)}
 
 Made by neurovis export: a network of {neurons} and {connections} as C99 (or C++17). It needs libm
@@ -167,15 +169,15 @@ and nothing else: no heap, no files, no variables that change but the struct tha
 After call k, `state.activity` is a[k - 1] and `state.weights` w[k], in the order of a recording. Events of the spec
 apply at their steps. A copy of the struct is a copy of all that the run carries.
 
-{_interface(made)}
+{_interface(exported)}
 
 Each gives 1, or 0 where the value cannot be taken; then nothing has changed.
 {kept}
 ## Cost
 
-The state takes {size_of_state(made)} bytes where a pointer has 8. A step takes
+The state takes {size_of_state(exported)} bytes where a pointer has 8. A step takes
 
-{_cost(made)}
+{_cost(exported)}
 
 ## Building
 
@@ -188,19 +190,19 @@ and `-fno-builtin-exp` and its like from working out functions itself; so the nu
 """
 
 
-def _interface(made: Exported) -> str:
+def _interface(exported: Exported) -> str:
     """What goes in and comes out, and what can be set, by its name in C."""
     inputs = "\n".join(
-        f"- `in->{own}`: {entry.size} number{'s' * (entry.size > 1)} for {words(entry.name)}"
-        for own, entry in zip(made.input_names, made.inputs, strict=True)
+        f"- `in->{c_name}`: {entry.size} number{'s' * (entry.size > 1)} for {words(entry.name)}"
+        for c_name, entry in zip(exported.input_names, exported.inputs, strict=True)
     )
     outputs = "\n".join(
-        f"- `out->{own}`: {len(entry.neurons)} number{'s' * (len(entry.neurons) > 1)} of {words(entry.name)}"
-        for own, entry in zip(made.output_names, made.network.outputs, strict=True)
+        f"- `out->{c_name}`: {len(entry.neurons)} number{'s' * (len(entry.neurons) > 1)} of {words(entry.name)}"
+        for c_name, entry in zip(exported.output_names, exported.network.outputs, strict=True)
     )
     sets = "\n".join(
-        f"- `{made.name}_set_{own}`: {words(parameter)}"
-        for parameter, own in zip(made.settable, made.settable_names, strict=True)
+        f"- `{exported.name}_set_{c_name}`: {words(parameter)}"
+        for parameter, c_name in zip(exported.settable, exported.settable_names, strict=True)
     )
     return f"""## Inputs
 
@@ -215,8 +217,8 @@ def _interface(made: Exported) -> str:
 {sets or "None can be set."}"""
 
 
-def _example(made: Exported) -> str:
-    name, network = made.name, made.network
+def _example(exported: Exported) -> str:
+    name, network = exported.name, exported.network
     lines = [
         f"/* An example, made by neurovis export: ten steps of {name}. */",
         f'#include "{name}.h"',
@@ -233,17 +235,17 @@ def _example(made: Exported) -> str:
         f"    {name}_init(&state);",
         "    for (int k = 0; k < 10; k++) {",
     ]
-    lines += [f"        in.{own}[0] = 0; /* what a sensor says */" for own in made.input_names[:1]]
+    lines += [f"        in.{c_name}[0] = 0; /* what a sensor says */" for c_name in exported.input_names[:1]]
     lines += [f"        {name}_step(&state, &in, &out);"]
     if network.outputs:
-        lines.append(f'        printf("%d %g\\n", k, (double)out.{made.output_names[0]}[0]);')
+        lines.append(f'        printf("%d %g\\n", k, (double)out.{exported.output_names[0]}[0]);')
     else:
         lines.append('        printf("%d %g\\n", k, (double)state.activity[0]);')
     return "\n".join([*lines, "    }", "    return 0;", "}", ""])
 
 
-def _cmake(made: Exported) -> str:
-    name = made.name
+def _cmake(exported: Exported) -> str:
+    name = exported.name
     return f"""# made by neurovis export
 cmake_minimum_required(VERSION 3.10)
 project({name} C)
