@@ -15,7 +15,7 @@ from neurovis_spec.compiler.program import Projection
 def history_depth(network: Network) -> int:
     """Rows of the history: a[t−d] … a[t] for the largest d of a rule that reads ``pre``; 0 where none is delayed."""
     deepest = max(
-        (int(network.connections.delays[entry.members].max(initial=0)) for entry in _readers_of_pre(network)),
+        (int(network.connections.delays[reader.members].max(initial=0)) for reader in _readers_of_pre(network)),
         default=0,
     )
     return deepest + 1 if deepest else 0
@@ -24,10 +24,10 @@ def history_depth(network: Network) -> int:
 def remembering(network: Network) -> npt.NDArray[np.bool_]:
     """The connections (m,) whose rule reads an activity of the past: delayed ones whose rule reads ``pre``."""
     reading = np.zeros(len(network.connections), dtype=np.bool_)
-    for entry in _readers_of_pre(network):
-        reading[entry.members] = True
+    for reader in _readers_of_pre(network):
+        reading[reader.members] = True
     return reading & (network.connections.delays.whole() > 0)
 
 
 def _readers_of_pre(network: Network) -> list[Projection]:
-    return [entry for entry in network.projections if "pre" in entry.read]
+    return [projection for projection in network.projections if "pre" in projection.read]

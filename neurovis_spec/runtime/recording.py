@@ -1,7 +1,7 @@
 """The Recording: activities and weights over a run; the Snapshot: those of one step.
 
-In: arrays as a ``.npz`` holds them (language reference, §12). Out: frozen values that answer by name. They refer to
-their Network by its hash and hold as much of its structure as is needed to read them alone.
+In: arrays as a ``.npz`` holds them (``docs/language.md``, *Recordings*). Out: frozen values that answer by name. They
+refer to their Network by its hash and hold as much of its structure as is needed to read them alone.
 """
 
 from __future__ import annotations
@@ -61,8 +61,9 @@ class Recording:
 
     ``step`` (rows,) are the steps recorded, ``activity`` (rows, n) is a[t], ``weights`` (rows, p) is w[t], before the
     step's update; ``plastic`` (p,) are the indices of the changing connections, ``weights_static`` (m − p,) the weights
-    of the others, in their order. ``weights_after`` and the four below it are what ``After`` says. All arrays are
-    read-only. ``recording["O"]`` is the activity of a neuron (rows,), of a group, an output or any other reference of a
+    of the others, in their order. What is true after the last step made (``weights_after``, ``reached``,
+    ``set_parameters``, ``lesioned_neurons`` and ``lesioned_connections``) is as in ``After``. All arrays are read-only.
+    ``recording["O"]`` is the activity of a neuron (rows,), of a group, an output or any other reference of a
     spec (``K3..K5``, ``K1 + O``, ``left.K``) (rows, size); ``recording["K.v"]`` is a state of models or rules that was
     recorded: ``states`` (rows, states), after the step, whose columns ``state_names`` names.
 
@@ -265,7 +266,7 @@ class Recording:
         index = self.connection_index.get(arguments.text("name", name))
         if index is None:
             raise unknown("connection", name, self.connection_names)
-        column = int(np.searchsorted(self.plastic, index))
+        column = int(np.searchsorted(self.plastic, index))  # so many of those that change come before it
         if column < len(self.plastic) and self.plastic[column] == index:
             if not self.weights.shape[1]:
                 raise UnknownNameError(f"the weight '{name}' was not recorded: the recording is partial")
@@ -309,9 +310,9 @@ class Recording:
         """Activities and all weights at a step. Raises RecordingError where it was not recorded."""
         self.check_whole("a picture cannot be drawn from")
         row = self.row(step)
-        before = self.all_weights(row - 1) if row > 0 and self.step[row - 1] == step - 1 else None
+        previous = self.all_weights(row - 1) if row > 0 and self.step[row - 1] == step - 1 else None
         pose, sensors = (None if array is None else array[row] for array in (self.pose, self.sensors))
-        return Snapshot(step, self.activity[row], self.all_weights(row), before, pose=pose, sensors=sensors)
+        return Snapshot(step, self.activity[row], self.all_weights(row), previous, pose=pose, sensors=sensors)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a file of the format that the suffix names. Raises RecordingError, OSError."""
@@ -448,21 +449,21 @@ _F = TypeVar("_F", bound=Readable)
 
 def for_path(path: str | os.PathLike[str]) -> Format:
     """The format to write that the suffix names. Raises RecordingError where there is none."""
-    return _named(path, (made for made in plugins.working(plugins.FORMATS) if isinstance(made, Format)))
+    return _of_suffix(path, (one for one in plugins.working(plugins.FORMATS) if isinstance(one, Format)))
 
 
 def read_by(path: str | os.PathLike[str]) -> Readable:
     """The format to read that the suffix names. Raises RecordingError where there is none."""
-    return _named(path, (made for made in plugins.working(plugins.FORMATS) if isinstance(made, Readable)))
+    return _of_suffix(path, (one for one in plugins.working(plugins.FORMATS) if isinstance(one, Readable)))
 
 
-def _named(path: str | os.PathLike[str], formats: Iterable[_F]) -> _F:
+def _of_suffix(path: str | os.PathLike[str], formats: Iterable[_F]) -> _F:
     suffix = Path(path).suffix.lower()
     known: set[str] = set()
-    for made in formats:
-        if suffix in made.suffixes:
-            return made
-        known |= made.suffixes - {""}
+    for format_ in formats:
+        if suffix in format_.suffixes:
+            return format_
+        known |= format_.suffixes - {""}
     raise RecordingError(f"{os.fspath(path)}: no format has the suffix '{suffix}'; known: {', '.join(sorted(known))}")
 
 

@@ -72,7 +72,7 @@ class ReferenceStepper:
         state.k += 1
 
     def gather(self, population: Population, state: State, inputs: FloatArray) -> list[float]:
-        """u[t] of each member: what arrives, combined, + bias + input + noise (§5.2)."""
+        """u[t] of each member: what arrives, combined, + bias + input + noise."""
         connections, neurons = self.network.connections, self.network.neurons
         arriving: list[list[tuple[float, float]]] = [[] for _ in population.members]
         for connection, slot in zip(population.drive.incoming.tolist(), population.drive.slots.tolist(), strict=True):
@@ -145,20 +145,20 @@ class ReferenceStepper:
         """What becomes of the states of a definition in use, and of what it gives, for one member: all from old values
         at once, then what does not last from the new states; at an episode's end once more from what these gave.
         ``lasting`` is what it gives and lasts, within its bounds. States are replaced, all is returned."""
-        made, cells = use.definition, state.cells[use.owner]
+        definition, cells = use.definition, state.cells[use.owner]
         old = {name: float(values[position]) for name, values in cells.items()}
-        old |= {name: one.value for name, one in lasting.items()}
-        known = with_let({**seen, **old}, made.let)
-        new = changed(old, [(one.name, one.each_step) for one in made.lasting], known, lasting, functions)
-        fleeting = [(one.name, one.each_step) for one in made.fleeting]
-        given = changed(new, fleeting, known | new, {}, functions) if fleeting else new
+        old |= {name: bounded.value for name, bounded in lasting.items()}
+        known = with_let({**seen, **old}, definition.let)
+        new = changed(old, [(one.name, one.each_step) for one in definition.lasting], known, lasting, functions)
+        fleeting = [(one.name, one.each_step) for one in definition.fleeting]
+        results = changed(new, fleeting, known | new, {}, functions) if fleeting else new
         if self.ends_episode(state):
-            ends = [(one.name, one.each_episode) for one in made.lasting]
-            new = changed(new, ends, with_let({**seen, **new}, made.let), lasting)
-            given = given | new
+            ends = [(one.name, one.each_episode) for one in definition.lasting]
+            new = changed(new, ends, with_let({**seen, **new}, definition.let), lasting)
+            results = results | new
         for name, values in cells.items():
             values[position] = new[name]
-        return given
+        return results
 
     def send(self, state: State) -> None:
         """w[t]·a[t] of every delayed connection leaves; a[t] is remembered."""
@@ -183,11 +183,10 @@ class ReferenceStepper:
         low = self.number(LOW, connections.low, connection, state)
         high = self.number(HIGH, connections.high, connection, state)
         seen = self.known(projection.rule, position, state) | self.seen(connection, state)
-        both = (*state.activity.tolist(), *inputs.tolist())
-        seen |= {signal: both[indices[position]] for signal, indices in projection.signals.items()}
+        signals = (*state.activity.tolist(), *inputs.tolist())  # as ``Projection.signals`` numbers them
+        seen |= {signal: signals[indices[position]] for signal, indices in projection.signals.items()}
         weight = Bounded(float(state.weights[connection]), low, high)
-        made = self.change(projection.rule, position, seen, state, {"weight": weight})
-        state.weights[connection] = made["weight"]
+        state.weights[connection] = self.change(projection.rule, position, seen, state, {"weight": weight})["weight"]
 
     def seen(self, connection: int, state: State) -> dict[str, float]:
         """``pre`` = a_j[t−d], 0 where what was sent then is lost, ``sent`` = a_j[t] and ``post`` = a_i[t] of a

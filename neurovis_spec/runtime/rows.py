@@ -82,6 +82,7 @@ class Steps:
     first: int = 0
 
     def __len__(self) -> int:
+        # the multiples before the end without those before ``first``: −(−a // b) is a/b rounded up
         return -(-(self.first + self.total) // self.every) + -self.first // self.every
 
     def at(self, row: int) -> int:

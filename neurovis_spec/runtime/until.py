@@ -70,14 +70,15 @@ class Watched:
     def made(self, activity: FloatArray) -> int:
         """Evaluate the measure after each of these steps, of which these are the activities (steps, n): how many of
         them the run has, all unless it ends among them. Only where the measure is ``together``."""
-        before, parameters = self._meter.copy(), self._state.conditions.parameters
+        parameters = self._state.conditions.parameters
+        meter_before = self._meter.copy()
         values = self._meter.rows(activity, parameters, np.zeros((len(activity), 0)))
-        true = np.flatnonzero((values == values) & (values != 0))
+        true = np.flatnonzero((values == values) & (values != 0))  # NaN is not true
         if not len(true):
             return len(activity)
         self._met, count = True, int(true[0]) + 1
-        self._meter = before
-        before.rows(activity[:count], parameters, np.zeros((count, 0)))
+        self._meter = meter_before  # without the steps behind the end
+        self._meter.rows(activity[:count], parameters, np.zeros((count, 0)))
         return count
 
     def asked(self) -> bool:
