@@ -1,4 +1,4 @@
-"""A network as plain data: what ``neurovis inspect --format json`` prints (§12).
+"""A network as plain data: what ``neurovis inspect --format json`` prints.
 
 In: a Network, and the layout engine with the reason for it. Out: a dict of plain values.
 """

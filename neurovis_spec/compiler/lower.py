@@ -34,7 +34,7 @@ from neurovis_spec.compiler.program import (
 
 
 def make_program(populations: tuple[Population, ...], projections: tuple[Projection, ...]) -> tuple[Operation, ...]:
-    """What a step does, in order (§5): inputs, neurons along delay 0, signals that leave, rules."""
+    """What a step does, in order: inputs, neurons along delay 0, signals that leave, rules."""
     program: list[Operation] = [ReadInputs()]
     for population in range(len(populations)):
         program += [Gather(population), Update(population)]

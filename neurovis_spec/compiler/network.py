@@ -194,7 +194,7 @@ class Located(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Network:
-    """A compiled network. ``hash`` is the SHA-256 of its canonical content (§12, inspect)."""
+    """A compiled network. ``hash`` is the SHA-256 of its canonical content, as ``inspect`` prints it."""
 
     name: str
     title: str

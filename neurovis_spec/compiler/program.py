@@ -214,7 +214,7 @@ class Projection:
 Holder: TypeAlias = Population | Projection
 
 
-# The update program: operations in the order of §5. Each sees what those before it have made in the same step.
+# The update program: operations in order. Each sees what those before it have made in the same step.
 
 
 @dataclass(frozen=True, slots=True)

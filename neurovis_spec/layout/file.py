@@ -1,4 +1,4 @@
-"""Layout files (§11): a Layout as YAML, and back; and the one that a spec names, to be remembered.
+"""Layout files: a Layout as YAML, and back; and the one that a spec names, to be remembered.
 
 In: a Layout, or a text. Out: a text whose numbers read back exactly, or a Layout. A file that the layout command writes
 holds every neuron and every route; one written by hand may hold any part. The one that a spec names may be of an

@@ -1,6 +1,6 @@
 """What a layout is worth: crossings, overlaps, routes over discs, flow, area.
 
-In: a layout and its problem. Out: the numbers of ``neurovis layout --metrics`` (§12), computed from the routes as
+In: a layout and its problem. Out: the numbers of ``neurovis layout --metrics``, computed from the routes as
 drawn: splines flattened to short segments, which meet only in the cells of a grid. Labels overlap something, in a
 picture that is not reduced, if they lie on another disc, on another label, on the frame of others, or across the line
 of a frame that their neuron is in; or if no room is kept for them.

@@ -1,4 +1,4 @@
-"""Controls: how events and callers change the conditions of a run (§9).
+"""Controls: how events and callers change the conditions of a run.
 
 In: a State, and Changes or what a caller sets, clamps, lesions, mends, stops. Out: other Conditions in the State.
 A *slot* is the index of a parameter in ``Settable``. Setting and clamping replace numbers; only lesions and stopped

@@ -2,10 +2,10 @@
 
 In: a Recording and a path, or a path. Out: a file, or a Recording. Nothing in a file is trusted: headers are read
 before memory is taken, sizes must agree with each other and with the archive, and pickles are never loaded. Beside the
-arrays of §12 ours hold ``about``, a JSON text with what arrays do not say (names of groups and outputs, the network's
-hash, ranks of parallel connections, parameters that were set, the backend); a file without it is read as well. While a
-network runs its rows go into a journal beside the file, of which the archive is made at the end. A *frame* is a
-recording without rows: all that is known before the first step; the journal begins with it.
+arrays that ``docs/language.md`` names ours hold ``about``, a JSON text with what arrays do not say (names of groups and
+outputs, the network's hash, ranks of parallel connections, parameters that were set, the backend); a file without it is
+read as well. While a network runs its rows go into a journal beside the file, of which the archive is made at the end.
+A *frame* is a recording without rows: all that is known before the first step; the journal begins with it.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Lesions: what has been removed from a network by a step stays in its picture, faintly.
 
-In: a network with its events (§9). Out: for each connection and neuron the step of its lesion. A lesioned
+In: a network with its events. Out: for each connection and neuron the step of its lesion. A lesioned
 connection keeps the width of its last weight (Eq. 4), so what says that it is gone is that all of it is faint.
 """
 

@@ -52,7 +52,7 @@ def ring(ends: Ends) -> Pairs:
 
 
 def random(ends: Ends, probability: float, stream: Stream) -> Pairs:
-    """Every pair with a probability; drawn row by row by geometric gaps (§4, Randomness)."""
+    """Every pair with a probability; drawn row by row by geometric gaps."""
     return ends.pairs(*stream.random_pairs(len(ends.sources), len(ends.targets), probability))
 
 

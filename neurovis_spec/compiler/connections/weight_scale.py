@@ -1,4 +1,4 @@
-"""Scale: the weights of an entry, scaled together when they are made (§4).
+"""Scale: the weights of an entry, scaled together when they are made.
 
 In: the weights of an entry and where they go from and to, the ``scale`` of its body. Out: the scaled weights. The
 matrix of an entry has its sources as rows and its targets as columns; parallel connections add up in it.

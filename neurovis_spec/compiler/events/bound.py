@@ -1,4 +1,4 @@
-"""What follows parameters, from all parts of a network, as bindings of its arrays (§9).
+"""What follows parameters, from all parts of a network, as bindings of its arrays.
 
 In: the slots, the parts of groups, entries and inputs, the network that was made of these. Out: Settable. A Part says
 which numbers of a group follow a formula, a Binding which numbers of an array of the network do (``settable``).

@@ -1,4 +1,4 @@
-"""Changes: what the events of a spec do to a network in a run, step by step (§9).
+"""Changes: what the events of a spec do to a network in a run, step by step.
 
 In: nothing; these are values of a Network, which ``timeline`` makes of events and a run applies. A Change is a
 difference: how many there are costs no more than to keep them, and a step costs nothing for those that are past.

@@ -1,4 +1,4 @@
-"""Events: what changes during a run (§9).
+"""Events: what changes during a run.
 
 In: the ``events`` section, who finds what it names. Out: the events, resolved; those that name the same share one
 array. What they change in a run is for ``timeline``.

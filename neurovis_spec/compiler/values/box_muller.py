@@ -2,7 +2,7 @@
 
 In: pairs of uniform numbers, multiples of 2^-53 in [0, 1). Out: standard normal numbers. A platform's ``log`` and
 ``cos`` differ from the next one's in the last bit, and NumPy's from themselves where a vector scope takes over; a draw
-must not (§5 of the language: draws are equal bit for bit everywhere). So both are computed here from operations that
+must not, as draws are equal bit for bit everywhere. So both are computed here from operations that
 IEEE 754 rounds exactly: + − × ÷ and the square root, none of them fused. Coefficients: fdlibm (Sun Microsystems, 1993),
 e_log.c, k_sin.c and k_cos.c.
 """

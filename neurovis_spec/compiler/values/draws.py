@@ -1,4 +1,4 @@
-"""Randomness that depends on names alone: Philox4x32-10, counted (§4 of the language).
+"""Randomness that depends on names alone: Philox4x32-10, counted.
 
 In: the seed, what is drawn (a purpose and a name), and for each number its counter (i, j, step, number of the draw).
 Out: the number. There is no state: a draw depends on no order, no backend and no platform. Source: Salmon, Moraes,

@@ -461,7 +461,7 @@ _ROWS = (
 }}""",
     ),
 )  # fmt: skip
-#: All functions of §6, in its order.
+#: All functions, in the order of ``docs/language.md``.
 FUNCTIONS: Mapping[str, Function] = MappingProxyType({row.name: row for row in _ROWS})
 
 

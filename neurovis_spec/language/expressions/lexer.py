@@ -20,7 +20,7 @@ from neurovis_spec.language.yaml.characters import character_name
 
 Kind = Literal["number", "name", "operator", "end"]
 
-#: The longest expression, in characters (§6).
+#: The longest expression, in characters.
 MAX_LENGTH = 1000
 #: Words that are operators, and so no names.
 WORDS = frozenset({"and", "or", "not", "if", "else"})

@@ -1,6 +1,6 @@
 """Measures: expressions of a run, such as ``rms(O - T, last=129) < 0.01``.
 
-In: the text of an expression (§6) whose names may be references to neurons and outputs (``left1.K3``), with ``rms``,
+In: the text of an expression whose names may be references to neurons and outputs (``left1.K3``), with ``rms``,
 ``mean``, ``min`` and ``max`` over the last N steps. Out: a Formula: the windows, and a tree in which each of them is a
 name; or an ExpressionError. Names are not looked up here.
 """
@@ -67,7 +67,7 @@ def parse_measure(text: str) -> Formula:
 
 
 class _Parser(Parser):
-    """The parser of §6, with windows."""
+    """The parser of expressions, with windows."""
 
     def __init__(self, text: str) -> None:
         super().__init__(text, False, {"rms": 1, "mean": 1}, references=True)

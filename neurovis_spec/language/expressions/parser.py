@@ -1,6 +1,6 @@
 """From text to a typed tree, by precedence climbing.
 
-In: the text of an expression (§6) and what its place allows. Out: a tree of ``tree.py``, or an ExpressionError at the
+In: the text of an expression and what its place allows. Out: a tree of ``tree.py``, or an ExpressionError at the
 characters invalid. From loose to tight: ``a if c else b`` (to the right), ``or``, ``and``, ``not``, comparisons
 (which do not chain), ``+ -``, ``* / %``, signs, ``^`` and ``**`` (to the right, so -x^2 is −(x²) and 2^-1 is a half).
 Names are not looked up here: who parses knows which there are (``unknown_names``).
@@ -59,8 +59,8 @@ def parse(
     """The tree of an expression. Raises ExpressionError.
 
     ``random`` allows ``normal(m, s)`` and ``uniform(a, b)``, which become Draws numbered from 0 as they are written;
-    ``extra_functions`` are functions of this place besides those of §6, with their arities, which become Calls;
-    ``subscripts`` allows names such as ``legs[3]``.
+    ``extra_functions`` are functions of this place besides those of all expressions, with their arities, which become
+    Calls; ``subscripts`` allows names such as ``legs[3]``.
 
     >>> parse("-x^2")
     Unary(operator='-', operand=Binary(operator='^', left=Name(name='x', start=1, end=2), \

@@ -183,7 +183,7 @@ class Call:
 
 @dataclass(frozen=True, slots=True)
 class Draw:
-    """``normal(m, s)`` or ``uniform(a, b)``; ``index`` numbers the draws of one expression from 0 (§4, Randomness)."""
+    """``normal(m, s)`` or ``uniform(a, b)``; ``index`` numbers the draws of one expression from 0."""
 
     kind: Literal["normal", "uniform"]
     first: Tree
