@@ -72,10 +72,13 @@ class Controller:
         called.restype = ctypes.c_int
         return lambda *arguments: int(called(*(ctypes.c_void_p(a) if isinstance(a, int) else a for a in arguments)))
 
-    def step(self, inputs: FloatArray | None = None) -> None:
-        """A step; ``inputs`` are those without a source, in order."""
+    def step(self, inputs: FloatArray | None = None, outputs: int = 0) -> FloatArray:
+        """A step; ``inputs`` are those without a source, in order. Gives the numbers of its ``outputs``, so many."""
         given = None if inputs is None else np.ascontiguousarray(inputs, dtype=self.kind)
-        self._call("step")(ctypes.addressof(self.memory), 0 if given is None else given.ctypes.data, 0)
+        out = np.full(outputs, np.nan, dtype=self.kind)
+        start = out.ctypes.data if outputs else 0
+        self._call("step")(ctypes.addressof(self.memory), 0 if given is None else given.ctypes.data, start)
+        return out.astype(np.float64)
 
     def set(self, name: str, value: float) -> bool:
         """Set a parameter."""

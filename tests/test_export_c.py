@@ -27,6 +27,16 @@ from neurovis_spec.runtime.c_library import FLAGS
 from neurovis_spec.runtime.c_settable import ExportError
 
 pytestmark = pytest.mark.compiler
+#: outputs that are states of models, in another order than they are kept, activities, and states of a rule
+OUTPUTS = """
+neurovis: 1
+name: seen
+models: {slow: {state: {v: {each_step: 0.5*v + drive}}, activity: tanh(v)}}
+rules: {fades: {state: {trace: {each_step: 0.9*trace + pre}}, weight: {each_step: weight + 0.1*trace}}}
+neurons: {A: {count: 2, bias: [1, 2], model: slow}, B: {count: 2, bias: 0.5, model: slow}, C: {count: 2}}
+connections: {A -> B: {weight: 0.5, pattern: one_to_one, plasticity: fades}, B -> C: {pattern: all_to_all}}
+outputs: {levels: B.v + A.v, plain: C, fading: (A -> B).trace}
+"""
 
 
 def runs_alike(network: nv.CompiledNetwork, folder: Path, language: str = "C99", steps: int = 60) -> None:
@@ -67,6 +77,21 @@ neurons: {S: {count: 20, bias: "0.1*i", activation: tanh}, O: {combine: product,
 connections: {S -> O: {weight: "uniform(0.5, 1.5)"}, O -> S: {weight: "normal(0, 1)"}}
 """
     runs_alike(nv.compile_text(text), tmp_path, language, 20)
+
+
+@pytest.mark.parametrize("small", [0, 600], ids=["loops", "written out"])
+def test_outputs_that_are_states_are_these_states(small: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(c_export, "SMALL", small)
+    network = nv.compile_text(OUTPUTS)
+    expected = network.run(12, backend="reference")
+    controller = exported(network, tmp_path)
+    for k in range(12):
+        states = expected.states[k]
+        out = controller.step(outputs=2 + len(states))
+        np.testing.assert_array_equal(out, [*states[:4], *expected.activity[k, 4:], *states[4:]])
+    readme = (tmp_path / "README.md").read_text(encoding="utf-8")
+    assert "- `out->levels`: 4 numbers of levels" in readme
+    assert "- `out->fading`: 2 numbers of fading" in readme
 
 
 def test_what_is_set_follows_as_in_a_simulation(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,7 @@ from neurovis_spec.compiler.events.changes import Change, Clamp
 from neurovis_spec.compiler.events.settable import table_of
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Input, Network, Noise
+from neurovis_spec.compiler.program import Owner
 from neurovis_spec.compiler.run_checks import without_checks
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.language.expressions.emit_c import Emitter, Value
@@ -30,6 +32,7 @@ from neurovis_spec.runtime.c_draws import drawing
 from neurovis_spec.runtime.c_names import LONGEST_STRING, identifiers, prefix, string, words
 from neurovis_spec.runtime.c_settable import ExportError, fixed, formula, write_follow
 from neurovis_spec.runtime.c_step import StepCode
+from neurovis_spec.runtime.columns import probe_of
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.state import NEVER_LOST, Mask, State, by_kind, initial_state, kept_as
@@ -169,9 +172,7 @@ class Exported:
         network, name, macro = self.network, self.name, self.macro
         n, m = len(network.neurons), len(network.connections)
         inputs = [(c_name, entry.size) for c_name, entry in zip(self.input_names, self.inputs, strict=True)]
-        outputs = [
-            (c_name, len(entry.neurons)) for c_name, entry in zip(self.output_names, network.outputs, strict=True)
-        ]
+        outputs = [(c_name, entry.size) for c_name, entry in zip(self.output_names, network.outputs, strict=True)]
         setters = "".join(map(self._setter, self.settable, self.settable_names))
         return f"""/*
  * {words(network.title or network.name)}
@@ -306,14 +307,23 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
         pointer_lines["holding"] = f"const {real} *{quick} const holding = state->holding;"
         pointer_lines["held"] = f"const unsigned char *{quick} const held = state->held;"
         pointer_lines["parameters"] = f"const {real} *const parameters = state->parameters;"
-        starts: dict[str, int] = {}
-        for holder, use in network.uses:
-            kept = kept_as(use.owner.kind)
-            for i in range(len(use.definition.state)):
-                name, start = state_name(use.owner, i), starts.get(kept, 0)
+        for _, use in network.uses:
+            for i, quantity in enumerate(use.definition.state):
+                name, (kept, start) = state_name(use.owner, i), self._state_starts[use.owner, quantity.name]
                 pointer_lines[name] = f"{real} *{quick} const {name} = state->{kept} + {start};"
-                starts[kept] = start + len(holder.members)
         return pointer_lines
+
+    @cached_property
+    def _state_starts(self) -> Mapping[tuple[Owner, str], tuple[str, int]]:
+        """For each state of an owner the array of the struct that holds it, and where it begins there."""
+        starts: dict[tuple[Owner, str], tuple[str, int]] = {}
+        lengths: dict[str, int] = {}
+        for holder, use in self.network.uses:
+            kept = kept_as(use.owner.kind)
+            for quantity in use.definition.state:
+                starts[use.owner, quantity.name] = kept, lengths.get(kept, 0)
+                lengths[kept] = lengths.get(kept, 0) + len(holder.members)
+        return starts
 
     def _left_out(self) -> dict[str, tuple[str, list[npt.NDArray[np.integer]]]]:
         """Those of ``gone``, ``still`` and ``lost`` that a step has to look at, as events leave something out by them:
@@ -540,8 +550,14 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
         if self.network.outputs:
             with code.block("if (out != NULL)"):
                 for c_name, entry in zip(self.output_names, self.network.outputs, strict=True):
-                    code.line(code.loop("i", len(entry.neurons)))
-                    code.line(f"    out->{c_name}[i] = state->activity[{code.at(entry.neurons, 'i')}];")
+                    if not entry.states:
+                        code.line(code.loop("i", len(entry.neurons)))
+                        code.line(f"    out->{c_name}[i] = state->activity[{code.at(entry.neurons, 'i')}];")
+                    for read in probe_of(self.network, entry.states).reads:
+                        kept, start = self._state_starts[read.owner, read.state]
+                        to, place = code.at(read.columns, "i"), code.at(read.members + start, "i")
+                        code.line(code.loop("i", len(read.members)))
+                        code.line(f"    out->{c_name}[{to}] = state->{kept}[{place}];")
         else:
             code.line("(void)out;")
         head = f"void {name}_step({name}_state *state, const {name}_inputs *in, {name}_outputs *out)"

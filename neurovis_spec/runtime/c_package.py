@@ -197,7 +197,7 @@ def _interface(exported: Exported) -> str:
         for c_name, entry in zip(exported.input_names, exported.inputs, strict=True)
     )
     outputs = "\n".join(
-        f"- `out->{c_name}`: {len(entry.neurons)} number{'s' * (len(entry.neurons) > 1)} of {words(entry.name)}"
+        f"- `out->{c_name}`: {entry.size} number{'s' * (entry.size > 1)} of {words(entry.name)}"
         for c_name, entry in zip(exported.output_names, exported.network.outputs, strict=True)
     )
     sets = "\n".join(

@@ -814,6 +814,10 @@ void written_step(written_state *state, const written_inputs *in, written_output
     if (out != NULL) {
         for (int32_t i = 0; i < 2; i++)
             out->all[i] = state->activity[5 + i];
+        for (int32_t i = 0; i < 3; i++)
+            out->levels[i] = state->cells[i];
+        for (int32_t i = 0; i < 6; i++)
+            out->fading[i] = state->traces[i];
     }
 }
 

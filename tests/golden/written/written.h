@@ -45,6 +45,8 @@ typedef struct written_inputs {
 /* The outputs of a step. */
 typedef struct written_outputs {
     double all[2];
+    double levels[3];
+    double fading[6];
 } written_outputs;
 
 /* Make a state ready for step 0, whatever its memory holds. */
