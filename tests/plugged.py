@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -28,11 +29,13 @@ def plugged(site: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def forget() -> None:
-    """What is found or read once in a process is found and read anew."""
+    """What is found or read once in a process is found and read anew, by functions and by methods of classes."""
     for name, module in list(sys.modules.items()):
-        for value in vars(module).values() if name.startswith("neurovis_") else ():
-            if callable(clear := getattr(value, "cache_clear", None)):
-                clear()
+        for value in list(vars(module).values()) if name.startswith("neurovis_") else ():
+            methods = list(vars(value).values()) if isinstance(value, type) else ()
+            for function in (value, *(getattr(method, "__func__", method) for method in methods)):
+                if isinstance(function, type(functools.cache(len))):
+                    function.cache_clear()
 
 
 def call(*arguments: str) -> Result:

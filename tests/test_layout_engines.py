@@ -246,7 +246,7 @@ def test_the_same_bytes_whatever_the_hash_seed() -> None:
         "import layout_conformance as s; from neurovis_spec.layout.arrange import lay_out_problem as l;"
         "from neurovis_spec.layout.file import dump; from neurovis_spec.layout.problem import NamedProblem as c;"
         "n = s.members('R', 9); e = s.named([(n[i * 5 % 9], n[i * i % 7]) for i in range(20)]);"
-        "p = c('x', n + ['A', 'B'], [('R', n[:5])], e + s.named(s.full(['A'], n)), boxes=[('b', n[:3])]);"
+        "p = c('x', n + ['A', 'B'], [('R', n[:5])], e + s.named(s.full(['A'], n)), boxes=[('b', n[:3])]).canonical();"
         "print(dump(l(p, 'layered')), dump(l(s.use_case_one(), 'layered')))"
     )
     texts = []

@@ -137,7 +137,7 @@ def test_parameters_are_traits_of_what_the_run_has() -> None:
         assert widget.mix == 0.5
         traitlets.link((widget, "mix"), (widget, "layout_"))
         widget.layout_ = 0.125
-        assert widget._session.shown.status.parameters == {"mix": 0.125, "layout": 0.125, "lambda": 0.2}
+        until(lambda: widget._session.shown.status.parameters == {"mix": 0.125, "layout": 0.125, "lambda": 0.2})
         assert widget.lambda_ == 0.2
 
 
