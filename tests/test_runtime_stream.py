@@ -178,11 +178,11 @@ def test_ctrl_c_keeps_the_steps_until_then(
 def interrupt(monkeypatch: pytest.MonkeyPatch, at: int) -> None:
     """Have Ctrl-C come while a step is computed."""
 
-    def look(self: Watch, state: State) -> None:
+    def check(self: Watch, state: State) -> None:
         if state.k > at:
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr("neurovis_spec.runtime.watch.Watch.look", look)
+    monkeypatch.setattr("neurovis_spec.runtime.watch.Watch.check", check)
 
 
 def test_ctrl_c_before_the_first_step_leaves_what_was_there(
