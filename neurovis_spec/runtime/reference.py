@@ -62,6 +62,11 @@ class ReferenceStepper:
             use.owner: [(name, values, variables.get(Key(use.owner, name))) for name, values in use.parameters.items()]
             for _, use in network.uses
         }
+        # one connection after the other is slow in columns
+        connections = network.connections
+        self.sources, self.targets = connections.sources.whole(), connections.targets.whole()
+        self.delays, self.centres = connections.delays.whole(), connections.centres.whole()
+        self.low, self.high = connections.low.whole(), connections.high.whole()
         #: u[t] of the members of each population, as they were gathered last
         self.drives: dict[int, list[float]] = {}
 
@@ -73,12 +78,12 @@ class ReferenceStepper:
 
     def gather(self, population: Population, state: State, inputs: FloatArray) -> list[float]:
         """u[t] of each member: what arrives, combined, + bias + input + noise."""
-        connections, neurons = self.network.connections, self.network.neurons
+        neurons = self.network.neurons
         arriving: list[list[tuple[float, float]]] = [[] for _ in population.members]
         for connection, slot in zip(population.drive.incoming.tolist(), population.drive.slots.tolist(), strict=True):
             if not state.conditions.structure.gone[connection]:
                 signal = self.arriving(connection, state)
-                arriving[slot].append((signal, self.number(CENTRES, connections.centres, connection, state)))
+                arriving[slot].append((signal, self.number(CENTRES, self.centres, connection, state)))
         drives = []
         for neuron, signals in zip(population.members.tolist(), arriving, strict=True):
             drive = combined(population.drive.combine, signals) + self.number(BIAS, neurons.bias, neuron, state)
@@ -103,10 +108,9 @@ class ReferenceStepper:
 
     def arriving(self, connection: int, state: State) -> float:
         """w[t−d]·a[t−d]: of this step for d = 0, else what was sent d steps ago."""
-        connections = self.network.connections
-        delay = int(connections.delays[connection])
+        delay = int(self.delays[connection])
         if delay == 0:
-            return float(state.weights[connection]) * float(state.activity[connections.sources[connection]])
+            return float(state.weights[connection]) * float(state.activity[self.sources[connection]])
         return float(state.signals[self.offsets[connection] + state.k % delay])
 
     def update(self, number: int, drives: list[float], state: State) -> None:
@@ -162,10 +166,9 @@ class ReferenceStepper:
 
     def send(self, state: State) -> None:
         """w[t]·a[t] of every delayed connection leaves; a[t] is remembered."""
-        connections = self.network.connections
-        for connection, delay in enumerate(connections.delays.tolist()):
+        for connection, delay in enumerate(self.delays.tolist()):
             if delay > 0:
-                signal = float(state.weights[connection]) * float(state.activity[connections.sources[connection]])
+                signal = float(state.weights[connection]) * float(state.activity[self.sources[connection]])
                 state.signals[self.offsets[connection] + state.k % delay] = signal
         if len(state.history):
             state.history[state.k % len(state.history)] = state.activity
@@ -179,9 +182,9 @@ class ReferenceStepper:
 
     def learn_one(self, number: int, position: int, connection: int, state: State, inputs: FloatArray) -> None:
         """The weight and the states of one connection."""
-        projection, connections = self.network.projections[number], self.network.connections
-        low = self.number(LOW, connections.low, connection, state)
-        high = self.number(HIGH, connections.high, connection, state)
+        projection = self.network.projections[number]
+        low = self.number(LOW, self.low, connection, state)
+        high = self.number(HIGH, self.high, connection, state)
         seen = self.known(projection.rule, position, state) | self.seen(connection, state)
         signals = (*state.activity.tolist(), *inputs.tolist())  # as ``Projection.signals`` numbers them
         seen |= {signal: signals[indices[position]] for signal, indices in projection.signals.items()}
@@ -191,9 +194,8 @@ class ReferenceStepper:
     def seen(self, connection: int, state: State) -> dict[str, float]:
         """``pre`` = a_j[t−d], 0 where what was sent then is lost, ``sent`` = a_j[t] and ``post`` = a_i[t] of a
         connection from j to i."""
-        connections = self.network.connections
-        source, target = int(connections.sources[connection]), int(connections.targets[connection])
-        delay = int(connections.delays[connection])
+        source, target = int(self.sources[connection]), int(self.targets[connection])
+        delay = int(self.delays[connection])
         sent = float(state.activity[source])
         pre = sent
         if delay > 0 and len(state.history):
