@@ -12,7 +12,7 @@ from functools import singledispatch
 from types import MappingProxyType
 from typing import NamedTuple
 
-from neurovis_spec.arrays import FloatArray, FloatColumn
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.events.settable import BIAS, CENTRES, HIGH, LOW, Variable
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Gather, Key, Learn, Operation, Population, ReadInputs, Send, Update, Use
@@ -22,6 +22,19 @@ from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.backend import Availability, Capabilities
 from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.state import State, constants
+
+
+class NetworkArray(NamedTuple):
+    """An array of the network, and the variable that it is in a run, where it can be set there."""
+
+    values: FloatArray
+    variable: Variable | None
+
+    def at(self, place: int, state: State) -> float:
+        """One of them, as it is by now."""
+        if self.variable is None:
+            return float(self.values[place])
+        return float(state.conditions.variables[self.variable.start + (place if self.variable.size > 1 else 0)])
 
 
 class Bounded(NamedTuple):
@@ -56,17 +69,22 @@ class ReferenceStepper:
     def __init__(self, network: Network) -> None:
         self.network, self.functions = network, PLAIN
         self.offsets = signal_layout(network).offsets
-        variables = network.settable.variables
-        #: the parameters of definitions in use, with what of them can be set
+        variables, connections = network.settable.variables, network.connections
+        #: the parameters of definitions in use
         self.settings = {
-            use.owner: [(name, values, variables.get(Key(use.owner, name))) for name, values in use.parameters.items()]
+            use.owner: [
+                (name, NetworkArray(values, variables.get(Key(use.owner, name))))
+                for name, values in use.parameters.items()
+            ]
             for _, use in network.uses
         }
         # one connection after the other is slow in columns
-        connections = network.connections
         self.sources, self.targets = connections.sources.whole(), connections.targets.whole()
-        self.delays, self.centres = connections.delays.whole(), connections.centres.whole()
-        self.low, self.high = connections.low.whole(), connections.high.whole()
+        self.delays = connections.delays.whole()
+        self.bias = NetworkArray(network.neurons.bias, variables.get(BIAS))
+        self.centres = NetworkArray(connections.centres.whole(), variables.get(CENTRES))
+        self.low = NetworkArray(connections.low.whole(), variables.get(LOW))
+        self.high = NetworkArray(connections.high.whole(), variables.get(HIGH))
         #: u[t] of the members of each population, as they were gathered last
         self.drives: dict[int, list[float]] = {}
 
@@ -83,10 +101,10 @@ class ReferenceStepper:
         for connection, slot in zip(population.drive.incoming.tolist(), population.drive.slots.tolist(), strict=True):
             if not state.conditions.structure.gone[connection]:
                 signal = self.arriving(connection, state)
-                arriving[slot].append((signal, self.number(CENTRES, self.centres, connection, state)))
+                arriving[slot].append((signal, self.centres.at(connection, state)))
         drives = []
         for neuron, signals in zip(population.members.tolist(), arriving, strict=True):
-            drive = combined(population.drive.combine, signals) + self.number(BIAS, neurons.bias, neuron, state)
+            drive = combined(population.drive.combine, signals) + self.bias.at(neuron, state)
             if neurons.input[neuron] >= 0:
                 drive += float(inputs[neurons.input[neuron]])
             if self.network.noise_index[neuron] >= 0:
@@ -94,16 +112,12 @@ class ReferenceStepper:
             drives.append(drive)
         return drives
 
-    def number(self, array: Key, values: FloatArray | FloatColumn, place: int, state: State) -> float:
-        """A number of the network; of an array that can be set, as it is by now."""
-        return now(self.network.settable.variables.get(array), values, place, state)
-
     def known(self, use: Use, place: int, state: State) -> dict[str, float]:
         """What the formulas of a definition in use see, whatever its kind: the clock, and its parameters for one of the
         members."""
         known = self.clock(state)
-        for name, values, variable in self.settings[use.owner]:
-            known[name] = now(variable, values, place, state)
+        for name, numbers in self.settings[use.owner]:
+            known[name] = numbers.at(place, state)
         return known
 
     def arriving(self, connection: int, state: State) -> float:
@@ -183,8 +197,7 @@ class ReferenceStepper:
     def learn_one(self, number: int, position: int, connection: int, state: State, inputs: FloatArray) -> None:
         """The weight and the states of one connection."""
         projection = self.network.projections[number]
-        low = self.number(LOW, self.low, connection, state)
-        high = self.number(HIGH, self.high, connection, state)
+        low, high = self.low.at(connection, state), self.high.at(connection, state)
         seen = self.known(projection.rule, position, state) | self.seen(connection, state)
         signals = (*state.activity.tolist(), *inputs.tolist())  # as ``Projection.signals`` numbers them
         seen |= {signal: signals[indices[position]] for signal, indices in projection.signals.items()}
@@ -210,13 +223,6 @@ class ReferenceStepper:
     def ends_episode(self, state: State) -> bool:
         """Whether (t + 1) mod m = 0."""
         return self.network.episode is not None and (state.k + 1) % self.network.episode == 0
-
-
-def now(variable: Variable | None, values: FloatArray | FloatColumn, place: int, state: State) -> float:
-    """A number of an array of the network, which can be set where there is a variable: then it is as it is by now."""
-    if variable is None:
-        return float(values[place])
-    return float(state.conditions.variables[variable.start + (place if variable.size > 1 else 0)])
 
 
 def combined(combine: str, signals: Iterable[tuple[float, float]]) -> float:
