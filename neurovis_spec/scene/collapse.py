@@ -292,8 +292,8 @@ class _Gatherer:
         first = np.array([own[0] for own in self.bundles], np.int64)
         entries = list(old.entries)
         descriptions, learns = list(old.descriptions), list(old.learns)
-        entry = old.entry[first].tolist()
-        weights, weights_of, delays_of = old.weights[first].tolist(), old.weights.whole(), old.delays.whole()
+        entry_of, weights_of, delays_of = old.entry.whole(), old.weights.whole(), old.delays.whole()
+        entry, weights = entry_of[first].tolist(), weights_of[first].tolist()
         for place, (own, joined) in enumerate(zip(self.bundles, self.sheaf, strict=True)):
             if not joined:
                 continue
@@ -303,7 +303,7 @@ class _Gatherer:
             parts = [f"{len(own):,} connection{'s' * (len(own) > 1)}, added up"]
             if up and down:
                 parts.append(f"at first {texts.number(up, sign=True)} and {texts.number(down)}")
-            rules = {old.learns[old.entry[index]] for index in own} - {None}
+            rules = {old.learns[number] for number in set(entry_of[own].tolist())} - {None}
             entry[place] = len(entries)
             entries.append(ADDED)
             descriptions.append(": ".join(parts))

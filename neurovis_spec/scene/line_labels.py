@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.geometry import Rect
 from neurovis_spec.layout.model import Point
@@ -35,8 +37,8 @@ def line_labels(
     connections = network.connections
     wanted: dict[int, list[int]] = {}
     if any(connections.labels):
-        for index in lines:
-            wanted.setdefault(int(connections.entry[index]), []).append(index)
+        for index, entry in zip(lines, connections.entry[np.array([*lines], np.int64)].tolist(), strict=True):
+            wanted.setdefault(entry, []).append(index)
     result: dict[str, Text] = {}
     for entry, label in enumerate(connections.labels):
         if label and entry in wanted:

@@ -309,8 +309,8 @@ def _in_user_units(made: Plan, unit: float) -> Plan:
 def rerouted(planned: Plan, layout: Layout, connections: Sequence[int]) -> list[Line]:
     """How some connections run in another layout, on the same picture."""
     network, frame, unit = planned.network, planned.frame, planned.unit
-    names, ends = network.neurons.names, network.connections
-    pairs = [(int(ends.sources[index]), int(ends.targets[index])) for index in connections]
+    names, ends, chosen = network.neurons.names, network.connections, np.array(connections, np.int64)
+    pairs = list(zip(ends.sources[chosen].tolist(), ends.targets[chosen].tolist(), strict=True))
     radii = np.array(planned.radii) + np.array(planned.rings) / 2
     radius = RADIUS * frame.scale / unit
     routes = routes_of(
