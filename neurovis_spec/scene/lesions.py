@@ -30,11 +30,11 @@ class Lesions:
 def lesions_of(network: Network) -> Lesions:
     """A connection is lesioned with either of its ends, too."""
     found = Lesions({}, {})
-    connections = network.connections
+    sources, targets = network.connections.sources.whole(), network.connections.targets.whole()
     for change in network.changes:
         silent = np.zeros(len(network.neurons), dtype=bool)
         silent[change.lesioned_neurons] = True
-        gone = silent[connections.sources.whole()] | silent[connections.targets.whole()]
+        gone = silent[sources] | silent[targets]
         gone[change.lesioned_connections] = True
         for index in np.flatnonzero(gone).tolist():
             found.connections.setdefault(index, change.at)

@@ -140,7 +140,7 @@ def plan(
         lines=page.lines,
         order=_order(network, encoding.thickness(network.connections.weights.whole(), gains.thickness), seen.lines),
         beads=delays.beads(network, page.lines, RADIUS * frame.scale, theme),
-        lesions=lesions_of(network),
+        lesions=content.lesions,
         labels=tuple(raised(said.labels, sizes)),
         back=(*_box_frames(page.boxes, frame, theme), *_dotted_groups(content, page, theme)),
         front=(
@@ -172,6 +172,7 @@ class _Content:
     boxes: Sequence[Box]
     #: who has a dotted line to whom
     teachers: Sequence[Teacher]
+    lesions: Lesions
     notes: tuple[str, ...]
     extent: Rect
 
@@ -188,7 +189,9 @@ def _content(drawn: Gathered, layout: Layout, settings: RenderSettings, weights:
     beside = room_beside(network, RADIUS * UNIT) if settings.labels else []
     beside = [(index, reach) for index, reach in beside if index not in rooms]
     extent = _extent(positions, radii, routes, boxes, beside, rooms.values())
-    return _Content(network, positions, routes, seen, radii, rooms, sides, boxes, teachers, notes, extent)
+    return _Content(
+        network, positions, routes, seen, radii, rooms, sides, boxes, teachers, lesions_of(network), notes, extent
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -452,7 +455,7 @@ def _frame(wanted: _Wanted, gains: Gains, delayed: str, margin: float) -> tuple[
             learns=len(network.changing) > 0,
             teaches=label_of(content.teachers) if content.teachers else "",
             delays=delayed,
-            lesions=bool(lesions_of(network)),
+            lesions=bool(content.lesions),
             inhibits=_inhibits(network),
             traces=_ends_of(seconds_of(network)),
         )
