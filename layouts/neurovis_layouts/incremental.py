@@ -20,7 +20,7 @@ from neurovis_layouts.pins import with_origins
 from neurovis_layouts.routing import RoutePlan, Surroundings, route_all
 from neurovis_layouts.routing.ends import keys_of
 from neurovis_layouts.routing.images import Images, images_of
-from neurovis_layouts.routing.obstacles import Frame, Obstacles, Walls
+from neurovis_layouts.routing.obstacles import Barriers, Frame, Obstacles, Walls
 from neurovis_layouts.settling import Whole, settled
 from neurovis_spec.layout import FloatArray
 from neurovis_spec.layout.frames import Frames
@@ -172,9 +172,9 @@ class _Ways:
     def unclear(self, found: Mapping[int, Route], routes: Mapping[int, Route]) -> set[int]:
         """Which of these routes, by edge, run over a disc or enter a foreign frame, and their mirror images."""
         lines, ends = list(found.values()), self.ends(found)
-        through = Walls(self.walls({**routes, **found}), len(self.centres)).entered(lines, ends)
-        tried = zip(found, self._obstacles.run_over(lines, ends), through, strict=True)
-        return {k for i, over, enters in tried if over or enters for k in (i, self.image.get(i, i))}
+        barriers = Barriers(self._obstacles, Walls(self.walls({**routes, **found}), len(self.centres)))
+        tried = zip(found, barriers.hit(lines, ends), strict=True)
+        return {k for i, hit in tried if hit for k in (i, self.image.get(i, i))}
 
     def add_clear(self, found: Mapping[int, Route], routes: dict[int, Route]) -> None:
         """Add those of the found routes, by edge, that have a clear way, and whose mirror images have."""
