@@ -17,14 +17,13 @@ import numpy as np
 import numpy.typing as npt
 from PIL import GifImagePlugin, Image
 
-from neurovis_renderers.canvas import paint
+from neurovis_renderers.canvas import Pixels, paint
 from neurovis_renderers.frames import all_frames
 from neurovis_renderers.lettering import warn_of_letters
 from neurovis_spec.scene import Film, Progress, RendererCapabilities, Scene
 
 #: pixels of all frames of a WebP: its encoder keeps them compressed until the end, some 50 MB for each 2^30
 MOST_PIXELS = 1 << 34
-Pixels = npt.NDArray[np.uint8]
 #: Colours of a picture of a GIF; one more is for what has not changed.
 _COLOURS = 255
 #: The longest that a picture of a GIF can last, in milliseconds.
