@@ -1,6 +1,6 @@
 """The Scene: what is drawn, in plain units; themes; and how a network becomes one (Eqs. 2–5).
 
-Renderers use what stands here; ``encode``, ``film`` and ``choose_gains`` are in the modules of these names.
+Renderers use what stands here; ``film`` is in the module of this name, ``choose_gains`` in ``gains``.
 """
 
 from neurovis_spec.arrays import FloatArray, IntArray

@@ -208,7 +208,7 @@ class _Gatherer:
             noises=(),
             populations=(),
             program=(),
-            projections=self._plasticity(),
+            projections=self._projections(),
             layout=self._layout(),
             render=self._render(),
             instances=self._instances(),
@@ -326,7 +326,7 @@ class _Gatherer:
             (*old.labels, *(None for _ in entries[len(old.labels) :])),
         )
 
-    def _plasticity(self) -> tuple[Projection, ...]:
+    def _projections(self) -> tuple[Projection, ...]:
         """Rules whose signals and targets are neurons that are drawn: these are taught, and have an error."""
         count, result = len(self.whole.neurons), []
         targets = self.whole.connections.targets.whole()

@@ -78,7 +78,6 @@ class Plan:
     #: how many neurons each stands for, where it is a glyph, and how many connections each line
     sizes: Mapping[int, int]
     counts: Mapping[int, int]
-    #: of every connection; those that are drawn are in ``order``
     #: of the connections that are drawn
     lines: Mapping[int, Line]
     order: tuple[int, ...]
@@ -383,9 +382,9 @@ class _Wanted:
     theme: Theme
     narrowest: float
 
-    def margin(self, frame: Frame | None) -> float:
+    def margin(self, frame: Frame) -> float:
         """What is left free on either side, so that there is room for the labels of discs at the rim."""
-        if not self.settings.labels or frame is None:
+        if not self.settings.labels:
             return MARGIN
         content = self.content
         reach = margin_beside(content.network, RADIUS * frame.scale, frozenset(content.rooms))

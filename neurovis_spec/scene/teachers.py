@@ -1,4 +1,4 @@
-"""Who teaches whom: the signals of projection rules, as quiet dotted lines.
+"""Who teaches whom: the signals of plasticity rules, as quiet dotted lines.
 
 In: a network's rules and where its neurons are. Out: a dotted spline from each neuron that is a signal of a rule to
 the neuron whose connections learn by it. Signals that come from inputs alone have no neuron to start from.
