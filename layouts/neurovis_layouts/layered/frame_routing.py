@@ -119,7 +119,8 @@ class Standing:
         """Neurons, what is within frames, and, where they are to be ``routed``, the connections between them."""
         problem, places = self.problem, self.rests.places
         routes: dict[Key, Route] = {}
-        known = set(keys_of(problem.edges))
+        keys = keys_of(problem.edges)
+        known = set(keys)
         for piece, move in self.rests.pieces:
             members = piece.part.members
             for (a, b, number), route in piece.drawing.routes.items():
@@ -131,7 +132,7 @@ class Standing:
             over = Obstacles(places).run_over(list(routes.values()), [key[:2] for key in routes])
             routes = {key: route for (key, route), on in zip(routes.items(), over, strict=True) if not on}
         if routed:
-            routes.update(_linked(self, pair, routes))
+            routes.update(_linked(self, pair, keys, routes))
         axis = self.rests.axis if pair else None
         upright = bool(problem.plan and pair) or any(piece.drawing.upright for piece, _ in self.rests.pieces)
         return Drawing(
@@ -158,11 +159,12 @@ def _box(
     return snap(x0), snap(y0), snap(x1), snap(y1)
 
 
-def _linked(standing: Standing, pair: Mapping[int, int], known: Mapping[Key, Route]) -> dict[Key, Route]:
-    """Routes by key of the edges that are not ``known`` from within the frames. Boxes are drawn, though nothing had to
-    make room for them; to routes a label is the frame of its neuron."""
+def _linked(
+    standing: Standing, pair: Mapping[int, int], keys: Sequence[Key], known: Mapping[Key, Route]
+) -> dict[Key, Route]:
+    """Routes by key of the edges, which have these ``keys``, that are not ``known`` from within the frames. Boxes are
+    drawn, though nothing had to make room for them; to routes a label is the frame of its neuron."""
     problem, plan, rests = standing.problem, standing.plan, standing.rests
-    keys = keys_of(problem.edges)
     links = [i for i, key in enumerate(keys) if key not in known]
     edges, own = [problem.edges[i] for i in links], [keys[i] for i in links]
     labels = [padded(rect, -PAD_LABEL) for rect in standing.labels.values()]
