@@ -18,12 +18,16 @@ import ast
 import io
 import sys
 import tokenize
-from collections.abc import Iterable, Iterator, Mapping, Set
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import CodeType, FrameType
 
-import networkx as nx
+import grimp
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
+
+from acyclic import circles
 from front_end import COMMAND, EXAMPLE, best, process
 
 import neurovis_spec as nv
@@ -45,11 +49,6 @@ class Module:
     path: Path
     text: str
 
-    @property
-    def package(self) -> str:
-        """The package that relative imports are relative to."""
-        return self.name if self.path.name == "__init__.py" else self.name.rpartition(".")[0]
-
 
 @dataclass(frozen=True, slots=True)
 class Function:
@@ -70,29 +69,6 @@ def modules() -> list[Module]:
                 name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
                 found.append(Module(name, path, path.read_text(encoding="utf-8")))
     return found
-
-
-def imported(module: Module, known: Set[str]) -> Iterator[str]:
-    """The modules of ours that one imports, wherever the statement stands."""
-    for node in ast.walk(ast.parse(module.text)):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names if alias.name in known)
-        elif isinstance(node, ast.ImportFrom):
-            base = module.package.split(".")[: len(module.package.split(".")) - max(node.level - 1, 0)]
-            start = ".".join([*(base if node.level else []), *([node.module] if node.module else [])])
-            for alias in node.names:
-                inner = f"{start}.{alias.name}"
-                if inner in known or start in known:
-                    yield inner if inner in known else start
-
-
-def circles(found: Iterable[Module]) -> list[list[str]]:
-    """Modules that import each other, set by set."""
-    known = {module.name: module for module in found}
-    graph: nx.DiGraph[str] = nx.DiGraph()
-    for module in known.values():
-        graph.add_edges_from((module.name, other) for other in imported(module, known.keys()) if other != module.name)
-    return sorted(sorted(part) for part in nx.strongly_connected_components(graph) if len(part) > 1)
 
 
 def functions(module: Module) -> Iterator[Function]:
@@ -144,7 +120,7 @@ def called() -> int:
 
 def figures(found: list[Module]) -> Mapping[str, tuple[str, list[str]]]:
     """Each figure, and what was counted."""
-    around = circles(found)
+    around = circles(grimp.build_graph(*PACKAGES, cache_dir=None))
     all_functions = [function for module in found for function in functions(module)]
     long = [function for function in all_functions if function.lines > LINES]
     wide = [function for function in all_functions if function.parameters >= PARAMETERS]
