@@ -31,7 +31,7 @@ COMPILERS := dot or compiler or cluster
 # What is compiled once is kept: else each process that a test starts compiles all of it anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help install demo walk gallery test test-all test-elsewhere test-browsers test-compilers test-ros test-lowest test-pythons test-3.13 test-system needs needs-ros fuzz layouts docs page page-check format clean
+.PHONY: help install demo walk gallery test test-all test-browsers test-compilers test-ros test-lowest test-pythons test-3.13 test-system needs needs-ros fuzz layouts docs page page-check format clean
 .DELETE_ON_ERROR:
 
 help:
@@ -84,9 +84,7 @@ test: $(VENV)/tested
 	$(BIN)/python -m pytest -n auto --dist worksteal -m "not ($(BROWSERS) or $(COMPILERS) or ros)" $(PYTEST_ARGS) || failed=1; \
 	wait $$types || failed=1; echo '$(BIN)/mypy'; cat $(VENV)/types; exit $$failed
 
-test-all: test-elsewhere test-ros
-
-test-elsewhere: test-browsers test-compilers
+test-all: test-browsers test-compilers test-ros
 
 test-browsers: needs $(VENV)/tested page-check
 	$(BIN)/python -m pytest -m "$(BROWSERS)" $(PYTEST_ARGS)
