@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from neurovis_spec.compilation import Compilation
-from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.layout import Layout
 from neurovis_spec.runtime.recording import Snapshot
@@ -23,10 +22,10 @@ def scene_of(
 
 
 def film_of(
-    network: CompiledNetwork, snapshots: Collection[Snapshot], layout: Layout | None = None, fps: float = 25
+    network: Compilation, snapshots: Collection[Snapshot], layout: Layout | None = None, fps: float = 25
 ) -> Film:
     """Several steps."""
-    whole, layout = network.network, layout or network.drawn().value
+    whole, layout = network.network, layout or network.placed()
     return film(whole, layout, snapshots, network.gains, whole.render, fps)
 
 

@@ -12,14 +12,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from large_networks import connectome
-from scenes import scene_of
+from scenes import film_of, scene_of
 
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.scene import Disc, Group, Rectangle, Scene, Spline, Text
-from neurovis_spec.scene.film import film
 from neurovis_spec.scene.renderers import RendererError
 from neurovis_spec.scene.shown import LeftOut
 from neurovis_spec.scene.texts import Cut
@@ -114,7 +113,7 @@ render: {min_weight: 0.2, gain: {activity: 1, signal: 1, thickness: 1, change: 1
     assert len(first) == 1
     recording = network.run(6)
     snapshots = [recording.snapshot(step) for step in range(6)]
-    moving = film(network.network, network.drawn().value, snapshots, network.gains, network.network.render, 5)
+    moving = film_of(network, snapshots, fps=5)
     assert set(of_kind(moving.scene, "connection")) == set(last) | set(first)
 
 
