@@ -314,18 +314,22 @@ class Network:
         places: dict[str, list[int]] = {}
         for index, name in enumerate(plain):
             places.setdefault(name, []).append(index)
-        for name, members in places.items():
-            if len(members) > 1:
-                for rank, index in enumerate(sorted(members, key=self._parallel_key)):
-                    plain[index] = name if rank == 0 else f"{name} ({rank + 1})"
+        parallel = {name: members for name, members in places.items() if len(members) > 1}
+        keys = self._parallel_keys([index for members in parallel.values() for index in members])
+        for name, members in parallel.items():
+            for rank, index in enumerate(sorted(members, key=keys.__getitem__)):
+                plain[index] = name if rank == 0 else f"{name} ({rank + 1})"
         return tuple(plain)
 
-    def _parallel_key(self, index: int) -> tuple[int, str, float, int]:
-        connections = self.connections
-        rule = int(connections.rules[index])
-        name = self.projections[rule].rule.definition.name if rule >= 0 else ""
+    def _parallel_keys(self, indices: list[int]) -> Mapping[int, tuple[int, str, float, int]]:
+        """What each of these connections is ordered by among those that share both ends."""
+        connections, at = self.connections, np.array(indices, dtype=np.int64)
         weights: FloatColumn | FloatArray = connections.weights if self.numbering is None else self.numbering
-        return (int(connections.delays[index]), name, float(weights[index]), index)
+        rules = [
+            self.projections[rule].rule.definition.name if rule >= 0 else "" for rule in connections.rules[at].tolist()
+        ]
+        keys = zip(connections.delays[at].tolist(), rules, weights[at].tolist(), indices, strict=True)
+        return dict(zip(indices, keys, strict=True))
 
     def state_names(self, states: Iterable[StateOf]) -> tuple[str, ...]:
         """How each number of these states is called: ``K1.v``, ``(K1 -> O).eligibility``."""
