@@ -57,11 +57,12 @@ def assign_levels(n: int, sources: IntColumn, targets: IntColumn, delays: IntCol
     if not (delays.kept == 0).any():
         return result
     undelayed = np.flatnonzero(delays.compact() == 0)
+    begins, ends = sources.some(undelayed), targets.some(undelayed)
     # the targets of each neuron: outgoing[starts[neuron] : starts[neuron + 1]]
-    order = undelayed[np.argsort(sources[undelayed], kind="stable")]
-    outgoing = targets[order]
-    starts = np.searchsorted(sources[order], np.arange(n + 1)).tolist()
-    waiting = np.bincount(targets[undelayed], minlength=n).tolist()
+    order = np.argsort(begins, kind="stable")
+    outgoing = ends[order]
+    starts = np.searchsorted(begins[order], np.arange(n + 1)).tolist()
+    waiting = np.bincount(ends, minlength=n).tolist()
     ready = [neuron for neuron in range(n) if waiting[neuron] == 0]
     level = result.tolist()
     finished = 0
@@ -75,24 +76,24 @@ def assign_levels(n: int, sources: IntColumn, targets: IntColumn, delays: IntCol
                 ready.append(target)
     if len(ready) == n:
         return np.array(level, dtype=np.int64)
-    return _cycle(undelayed.tolist(), sources, targets, waiting)
+    return _cycle(undelayed, begins, ends, waiting)
 
 
-def _cycle(undelayed: list[int], sources: IntColumn, targets: IntColumn, waiting: list[int]) -> Cycle:
+def _cycle(undelayed: IntArray, begins: Indices, ends: Indices, waiting: list[int]) -> Cycle:
     """Go backwards among the neurons that still wait until one comes up again: each of them has a source that waits,
-    as there is a cycle."""
+    as there is a cycle. ``begins`` and ``ends`` are the sources and the targets of the ``undelayed`` connections."""
     connection_into: dict[int, int] = {}
-    for connection in undelayed:
-        source, target = int(sources[connection]), int(targets[connection])
-        if waiting[source] and waiting[target]:
-            connection_into.setdefault(target, connection)
-    neuron = min(connection_into)  # any of them; the same each time
+    source_of: dict[int, int] = {}
+    for connection, source, target in zip(undelayed.tolist(), begins.tolist(), ends.tolist(), strict=True):
+        if waiting[source] and waiting[target] and target not in source_of:
+            connection_into[target], source_of[target] = connection, source
+    neuron = min(source_of)  # any of them; the same each time
     path: list[int] = []
     place_in_path: dict[int, int] = {}
     while neuron not in place_in_path:
         place_in_path[neuron] = len(path)
         path.append(neuron)
-        neuron = int(sources[connection_into[neuron]])
+        neuron = source_of[neuron]
     ring = path[place_in_path[neuron] :]
     forward = (ring[0], *reversed(ring))
     return Cycle(forward, connection_into[ring[0]])
@@ -122,8 +123,9 @@ def make_populations(census: Census, targets: Indices, levels: IntArray) -> tupl
     for population, (members, incoming) in enumerate(
         zip(members_of, _split(population_of[targets], len(members_of)), strict=True)
     ):
-        first = groups[group_of[members[0]]]
-        activation, model = (_use(population, members, group_of[members], groups, which) for which in (0, 1))
+        group_of_member = group_of[members]
+        first = groups[group_of_member[0]]
+        activation, model = (_use(population, members, group_of_member, groups, which) for which in (0, 1))
         drive = Port("drive", first.group.combine, frozen(incoming), frozen(place_in_population[targets[incoming]]))
         populations.append(Population(int(levels[members[0]]), frozen(members), activation, model, (drive,)))
     return tuple(populations)
