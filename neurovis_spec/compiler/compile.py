@@ -223,7 +223,7 @@ def _assemble(spec: Spec, sections: _Sections) -> Network:
         hash="",  # of all the rest
         noises=sections.noises,
         instances=_instances(declared.expansion.scopes, census),
-        numbering=own_weights(slots, connected.bundles, connections.weights.whole()),
+        numbering=own_weights(slots, connected.bundles, connections.weights),
         ros=sections.ros,
         body=sections.body,
     )

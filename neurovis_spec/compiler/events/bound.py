@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, IntArray, frozen
+from neurovis_spec.arrays import Column, FloatArray, FloatColumn, IntArray, frozen
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.events.changes import NO_INDICES
 from neurovis_spec.compiler.events.settable import (
@@ -94,12 +94,15 @@ def make_settable(network: Network, slots: tuple[Slot, ...], found: Iterable[Loc
     initial: list[FloatArray] = [np.zeros(0)]
     start = 0
     for array in sorted(by_array.keys() - {WEIGHTS}, key=lambda key: key.text):  # the order in checkpoints
-        whole, parts = arrays[array], by_array[array]
-        if len(parts) == 1 and _is_one_number(parts[0].part.formula) and len(parts[0].places) == len(whole) > 0:
-            whole = whole[:1]
-        variables[array] = Variable(start, len(whole))
-        initial.append(np.asarray(whole, dtype=np.float64))
-        start += len(whole)
+        numbers, parts = arrays[array], by_array[array]
+        is_one = len(parts) == 1 and _is_one_number(parts[0].part.formula)
+        if is_one and len(parts[0].places) == len(numbers) > 0:
+            numbers = numbers[:1]
+        elif isinstance(numbers, Column):
+            numbers = numbers.whole()
+        variables[array] = Variable(start, len(numbers))
+        initial.append(np.asarray(numbers, dtype=np.float64))
+        start += len(numbers)
     bindings = [
         _binding(located, variables.get(located.array), len(arrays.get(located.array, ()))) for located in merged
     ]
@@ -107,14 +110,14 @@ def make_settable(network: Network, slots: tuple[Slot, ...], found: Iterable[Loc
     return Settable(slots, tuple(bindings), variables, frozen(np.concatenate(initial)))
 
 
-def _arrays(network: Network) -> Mapping[Key, FloatArray]:
+def _arrays(network: Network) -> Mapping[Key, FloatArray | FloatColumn]:
     """The arrays of a network, all numbers of which can be set."""
     connections = network.connections
-    arrays = {
+    arrays: dict[Key, FloatArray | FloatColumn] = {
         BIAS: network.neurons.bias,
-        CENTRES: connections.centres.whole(),
-        LOW: connections.low.whole(),
-        HIGH: connections.high.whole(),
+        CENTRES: connections.centres,
+        LOW: connections.low,
+        HIGH: connections.high,
     }
     for _, use in network.uses:
         arrays |= {Key(use.owner, name): values for name, values in use.parameters.items()}
@@ -149,7 +152,7 @@ def _of_noise(noise: Noise) -> Iterator[Binding]:
         yield Binding(width, weights=False, indices=NO_INDICES, array=NOISE, places=NO_INDICES, low=zero)
 
 
-def own_weights(slots: tuple[Slot, ...], bundles: tuple[Bundle, ...], weights: FloatArray) -> FloatArray | None:
+def own_weights(slots: tuple[Slot, ...], bundles: tuple[Bundle, ...], weights: FloatColumn) -> FloatArray | None:
     """The first weights with the parameters as the spec has them; None where none are given from outside."""
     if not any(slot.given for slot in slots):
         return None
@@ -157,7 +160,7 @@ def own_weights(slots: tuple[Slot, ...], bundles: tuple[Bundle, ...], weights: F
     for index, slot in enumerate(slots):  # a formula reads only slots before its own
         formula = slot.own if slot.given else slot.formula
         own[index] = slot.value if formula is None else formula.values(own)
-    result = weights.copy()
+    result: FloatArray = np.array(weights.whole())
     start = 0
     for bundle in bundles:
         count = len(bundle.sources)
