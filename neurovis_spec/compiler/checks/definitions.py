@@ -164,17 +164,17 @@ def _check_unused(compiled: Compiled, findings: Findings) -> None:
     has no instance."""
     network = compiled.network
     used = {
-        ACTIVATION.section: {group.activation for group in network.neurons.groups},
-        MODEL.section: {group.model for group in network.neurons.groups},
-        RULE.section: {projection.rule.definition.name for projection in network.projections},
+        ACTIVATION: {group.activation for group in network.neurons.groups},
+        MODEL: {group.model for group in network.neurons.groups},
+        RULE: {projection.rule.definition.name for projection in network.projections},
     }
     modules = [library.source.get("modules") for library in compiled.libraries]
     named = {text for node in modules if node is not None for text in _texts_in(node)}
-    for section, used_here in used.items():
-        node = compiled.spec.source.get(section)
+    for kind, used_here in used.items():
+        node = compiled.spec.source.get(kind.section)
         for entry in node.entries if isinstance(node, Mapping) else ():
             if entry.name not in used_here | named:
-                message = f"nobody uses the {section.removesuffix('s')} '{entry.name}'"
+                message = f"nobody uses the {kind.name} '{entry.name}'"
                 findings.warning("unused-definition", entry.key.span, message, "remove it, or use it")
 
 
@@ -214,7 +214,7 @@ def _check_hidden(compiled: Compiled, findings: Findings) -> None:
     for section, choice in _choices(compiled):
         name = choice.name.value
         found = hidden.get((section, name))
-        if found is not None and not any(name in getattr(library, section) for library in compiled.libraries):
+        if found is not None and not any(name in library.definitions[section] for library in compiled.libraries):
             message = f"'{name}' is that of {found.owner}; {found.place} defines one, too, which is not used"
             hint = "rename it in that package, or define here what is meant"
             findings.warning("hidden-definition", choice.name.span, message, hint)
@@ -225,9 +225,9 @@ def _choices(compiled: Compiled) -> Iterator[tuple[str, Choice]]:
     for section, _ in compiled.sections:
         for group in section.neurons.values():
             if group.activation is not None:
-                yield "activations", group.activation
+                yield ACTIVATION.section, group.activation
             if group.model is not None:
-                yield "models", group.model
+                yield MODEL.section, group.model
         for _, body in section.connections:
             if body.plasticity is not None:
-                yield "rules", body.plasticity
+                yield RULE.section, body.plasticity
