@@ -92,7 +92,7 @@ def _ends(
 
 
 def join(made: Connected, rules: list[int]) -> Connections:
-    """All entries as one structure of columns; ``rules`` says, for each entry, which plasticity it has."""
+    """All entries as one structure of columns; ``rules`` has for each entry the index of its Projection, or −1."""
     bundles = made.bundles
     sizes = np.array([len(bundle.sources) for bundle in bundles], dtype=np.int64)
     return Connections(

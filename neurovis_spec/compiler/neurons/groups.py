@@ -1,6 +1,7 @@
 """Groups: one group of neurons, from what is written of it to its values.
 
-In: a Scope and the model of a group. Out: its neurons' names, what they are (Kind), and their values, one a neuron.
+In: a Scope and the model of a group. Out: its neurons' names, what they are (NeuronType), and their values, one a
+neuron.
 """
 
 from __future__ import annotations

@@ -333,7 +333,7 @@ def substitute(tree: Tree, mapping: Mapping[str, Tree]) -> Tree:
     >>> substitute(Binary("^", Name("u"), Name("x")), {"u": Number(2.0), "x": Name("u")})
     Binary(operator='^', left=Number(value=2.0, start=0, end=0), right=Name(name='u', start=0, end=0), start=0, end=0)
     """
-    costs = {name: sum(map(_cost, walk(put))) for name, put in mapping.items()}
+    costs = {name: sum(map(_cost, walk(inner))) for name, inner in mapping.items()}
     cost = sum(costs.get(node.name, 1) if isinstance(node, Name) else _cost(node) for node in walk(tree))
     _check_cost(cost, tree)
     result = put(tree, mapping)
