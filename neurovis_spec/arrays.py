@@ -24,6 +24,8 @@ Number = TypeVar("Number", np.float64, np.int64)
 _SHORT = 8
 #: numbers that are made at once where a column is read from one end to the other
 _PIECE = 1 << 16
+#: the integers that are narrower than others, with the least and the greatest of each
+_NARROW = tuple((kind, np.iinfo(kind).min, np.iinfo(kind).max) for kind in (np.int8, np.int16, np.int32))
 
 
 def frozen(array: Array) -> Array:
@@ -44,8 +46,8 @@ def narrow(array: Indices) -> Indices:
 
 def width(low: int, high: int) -> type[np.signedinteger]:
     """The least width of integers from ``low`` to ``high``."""
-    for kind in (np.int8, np.int16, np.int32):
-        if np.iinfo(kind).min <= low and high <= np.iinfo(kind).max:
+    for kind, least, most in _NARROW:
+        if least <= low and high <= most:
             return kind
     return np.int64
 
