@@ -299,10 +299,11 @@ class EntryBuilder:
         tree = self.constants.tree(formula, _WEIGHT)
         if tree is UNKNOWN:
             return UNKNOWN
+        used = names(tree)
         extra: dict[str, Value] = {"n_from": float(len(self.sources)), "n_to": float(len(self.targets))}
         for name, positions in (("i", shape.i), ("j", shape.j)):  # what nobody reads takes no room
-            extra[name] = positions.astype(np.float64) if name in names(tree) else 0.0
-        if "distance" in names(tree):
+            extra[name] = positions.astype(np.float64) if name in used else 0.0
+        if "distance" in used:
             position = self.context.census.neurons.position
             ends = position[self.sources[shape.i]], position[self.targets[shape.j]]
             if self._misplaced():

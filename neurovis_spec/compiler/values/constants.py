@@ -314,20 +314,21 @@ class Constants:
         tree = self.tree(formula, Role("formula", sees=tuple(extra or ()), draws=randomness is not None))
         if tree is UNKNOWN:
             return UNKNOWN
+        used = names(tree)
         if structural:
-            self.depend(names(tree))
-        given = {name: value for name, value in (extra or {}).items() if name in names(tree)}
+            self.depend(used)
+        given = {name: value for name, value in (extra or {}).items() if name in used}
         context = {name: value for name, value in given.items() if value is not UNKNOWN}
         if len(context) < len(given) or (randomness is UNKNOWN and draws(tree)):
             return UNKNOWN
-        values = self._known(names(tree), context)
+        values = self._known(used, context)
         randomness = None if randomness is UNKNOWN else randomness
         drawing = None if randomness is None else _Drawing(randomness)
         result = evaluate_array(tree, values, draw=drawing)
         if drawing is not None and drawing.wrong is not None and np.isnan(result).any():
             self.refuse_draw(formula, *drawing.wrong)
             return UNKNOWN
-        if self._collected is not None and not structural and not self.settable.keys().isdisjoint(names(tree)):
+        if self._collected is not None and not structural and not self.settable.keys().isdisjoint(used):
             self._collected.append(Part(self.bound(tree, context, randomness), places))
         return float(result) if np.ndim(result) == 0 else np.asarray(result, dtype=np.float64)
 
