@@ -351,7 +351,11 @@ print(one.counts.recorded, one.counts.lost)
         assert recorded > 500
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            assert arrays_in(tmp_path / name) == sent(1, range(recorded))
+            kept = arrays_in(tmp_path / name)
+        # a smaller chunk may still get in after one that did not
+        rest = iter(sent(1, range(3000)))
+        assert len(kept) == recorded
+        assert all(one in rest for one in kept)
 
 
 @KINDS
