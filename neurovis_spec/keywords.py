@@ -199,7 +199,7 @@ def course_of(
         backend=given["backend"],
         start=given["start"],
         until=until,
-        keep=keep_of(given, given.get("last", False)),
+        keep=keep_of(given, given["last"]),
         checkpoint=None if checkpoint is None else arguments.path("checkpoint", checkpoint),
     )
 

@@ -11,7 +11,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.excerpt import chosen, excerpt, rows_between
 from neurovis_spec.runtime.named_array import Axis, NamedArray
@@ -36,8 +36,7 @@ def traces(
 ) -> NamedArray:
     """a[t] of each neuron, a row a step."""
     part = excerpt(recording, of, start, stop)
-    steps = Axis("step", tuple(str(step) for step in part.step.tolist()))
-    return NamedArray("traces", part.activity, steps, Axis("neuron", part.names))
+    return NamedArray("traces", part.activity, _steps(part.step), Axis("neuron", part.names))
 
 
 def topography(
@@ -79,15 +78,14 @@ def awake_at_once(
 def weights(recording: Recording, start: int | None = None, stop: int | None = None) -> NamedArray:
     """w[t] of each connection that can change, a row a step."""
     part = _with_weights(recording, start, stop)
-    return NamedArray("weights", part.weights, _steps(part), _connections(part))
+    return NamedArray("weights", part.weights, _steps(part.step), _connections(part))
 
 
 def updates(recording: Recording, start: int | None = None, stop: int | None = None) -> NamedArray:
     """w[t+1] − w[t] of each connection that can change, for each step but the last (where only every K-th step was
     recorded, the sum of K updates)."""
     part = _with_weights(recording, start, stop)
-    rows = Axis("step", _steps(part).labels[:-1])
-    return NamedArray("updates", _differences(part), rows, _connections(part))
+    return NamedArray("updates", _differences(part), _steps(part.step[:-1]), _connections(part))
 
 
 def weight_changes(recording: Recording, start: int | None = None, stop: int | None = None) -> NamedArray:
@@ -122,8 +120,8 @@ def _differences(part: Recording) -> FloatArray:
         return np.diff(part.weights, axis=0)
 
 
-def _steps(part: Recording) -> Axis:
-    return Axis("step", tuple(str(step) for step in part.step.tolist()))
+def _steps(step: IntArray) -> Axis:
+    return Axis("step", tuple(str(one) for one in step.tolist()))
 
 
 def _connections(part: Recording) -> Axis:

@@ -252,8 +252,7 @@ def sensitivity_by(trials: Trials, progress: Progress | None = None) -> NamedArr
         mean, rms = _derivative(move, trials.intact, STEP * (size or 1.0))
         found.append((mean, rms, rms * size))
         labels.append(label)
-        if progress is not None:
-            progress(min(len(found), total), total)
+        _tell(progress, min(len(found), total), total)
     values = np.array(found, dtype=np.float64).reshape(-1, len(_OF_SENSITIVITY))
     return NamedArray("sensitivity", values, Axis("to", tuple(labels)), Axis("quantity", _OF_SENSITIVITY))
 

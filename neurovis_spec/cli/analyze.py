@@ -134,9 +134,15 @@ def command(
     for name in file_names():
         check_files(output / name, network)
     record, arrays = recording_of(recording, run), tables(inputs, network.network)
-    asked = measuring
     options = ReportOptions(
-        asked.of or None, start, stop, asked.threshold, asked.bins, asked.trials, asked.theme, arrays
+        of=measuring.of or None,
+        start=start,
+        stop=stop,
+        threshold=measuring.threshold,
+        bins=measuring.bins,
+        trials=measuring.trials,
+        theme=measuring.theme,
+        inputs=arrays,
     )
     with progress("measuring") as bar, writing(output):
         files = analyze(network, output, record, options, bar)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from neurovis_spec.arrays import IntArray
     from neurovis_spec.compiled import CompiledNetwork
     from neurovis_spec.compiler.body_settings import BodySettings
-    from neurovis_spec.compiler.network import Group, Input, Network
+    from neurovis_spec.compiler.network import Connections, Group, Input, Network
 
 #: The largest network whose connection matrix is shown, in neurons.
 _MATRIX = 24
@@ -41,8 +41,7 @@ def _parts(compiled: CompiledNetwork, network: Network) -> Iterator[str]:
     groups = [_group(network, group) for group in network.neurons.groups]
     yield "neurons\n" + table(*_without_empty(groups, _OF_GROUPS))
     if len(network.connections):
-        entries = [_entry(network, index, name) for index, name in enumerate(network.connections.entries)]
-        yield "connections\n" + table(*_without_empty(entries, _OF_ENTRIES))
+        yield "connections\n" + table(*_without_empty(_entries(network), _OF_ENTRIES))
     if network.inputs:
         sensed = set() if network.body is None else {one.input for one in network.body.sensed}
         inputs = [_input(entry, index in sensed) for index, entry in enumerate(network.inputs)]
@@ -105,9 +104,16 @@ def _few(names: list[str], most: int = 12) -> str:
     return " ".join(names[:most]) + (" …" if len(names) > most else "")
 
 
-def _entry(network: Network, index: int, name: str) -> tuple[str, ...]:
+def _entries(network: Network) -> list[tuple[str, ...]]:
     connections = network.connections
-    members = np.flatnonzero(connections.entry.whole() == index)
+    entry = connections.entry.compact()
+    return [
+        _entry(connections, index, name, np.flatnonzero(entry == index))
+        for index, name in enumerate(connections.entries)
+    ]
+
+
+def _entry(connections: Connections, index: int, name: str, members: IntArray) -> tuple[str, ...]:
     if not len(members):
         return name, "0", "", "", "", ""
     return (

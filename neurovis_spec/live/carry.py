@@ -173,9 +173,10 @@ def _carry_signals(
     was: Network, old: State, network: Network, state: State, connections: tuple[IntArray, IntArray]
 ) -> None:
     before, after = signal_layout(was).offsets, signal_layout(network).offsets
-    same = was.connections.delays[connections[0]] == network.connections.delays[connections[1]]
+    delays = network.connections.delays[connections[1]]
+    same = was.connections.delays[connections[0]] == delays
     for delay in np.unique(network.connections.delays.kept).tolist():
-        own = same & (network.connections.delays[connections[1]] == delay)
+        own = same & (delays == delay)
         slots = np.arange(delay)
         one, other = before[connections[0][own]], after[connections[1][own]]
         state.signals[other[:, None] + slots] = old.signals[one[:, None] + slots]

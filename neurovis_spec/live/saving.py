@@ -34,6 +34,9 @@ from neurovis_spec.scene.film_size import frames_a_second
 from neurovis_spec.scene.poses import Poses
 from neurovis_spec.scene.renderers import drawing, renderer_for
 
+#: The most steps that are looked back, the most numbers in them, and the most seconds of a film.
+MOST_STEPS, _NUMBERS, MOST_SECONDS = 10_000, 8_000_000, 60
+
 
 def as_turned(network: Network, turned: Sequence[Turned]) -> Network:
     """The network with the parameters that were set by hand, and the lesions, among what changes; by its hash it is
@@ -58,10 +61,6 @@ def as_turned(network: Network, turned: Sequence[Turned]) -> Network:
 def _parameters(network: Network, what: Set) -> tuple[tuple[int, ParameterFormula], ...]:
     slots = network.settable.index
     return tuple((slots[name], ParameterFormula(Number(value), {})) for name, value in what.values.items())
-
-
-#: The most steps that are looked back, the most numbers in them, and the most seconds of a film.
-MOST_STEPS, _NUMBERS, MOST_SECONDS = 10_000, 8_000_000, 60
 
 
 def steps_for(network: Network, seconds: float | None) -> int:

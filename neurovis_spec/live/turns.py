@@ -17,7 +17,7 @@ import numpy.typing as npt
 from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.references import Arrow, parse
-from neurovis_spec.runtime.names import Found, names_of
+from neurovis_spec.runtime.names import Found, Names, names_of
 from neurovis_spec.runtime.simulation import Simulation
 
 
@@ -134,11 +134,13 @@ class Rule:
 def rules(network: Network) -> tuple[Rule, ...]:
     """The rules in the order of the spec; what one reference names has one."""
     connections = network.connections
+    known, learning = names_of(network), np.flatnonzero(connections.rules.whole() >= 0)
+    entry = connections.entry[learning]
     found: dict[str, tuple[list[str], IntArray]] = {}
     for number, (name, written) in enumerate(zip(connections.entries, connections.learns, strict=True)):
-        members = np.flatnonzero((connections.entry.whole() == number) & (connections.rules.whole() >= 0))
+        members = learning[entry == number]
         if written is not None and len(members):
-            reference = _reference(network, name, members)
+            reference = _reference(network, known, name, members)
             words, others = found.get(reference, ([], members[:0]))
             found[reference] = ([*words, written], np.union1d(others, members))
     return tuple(Rule(name, "; ".join(dict.fromkeys(words)), members) for name, (words, members) in found.items())
@@ -151,14 +153,14 @@ def carried_out(rules: Sequence[Rule], stopped: npt.NDArray[np.bool_]) -> dict[s
     return {name: None if some.any() and not some.all() else not some.any() for name, some in off.items()}
 
 
-def _reference(network: Network, name: str, members: IntArray) -> str:
+def _reference(network: Network, known: Names, name: str, members: IntArray) -> str:
     """What names the connections of an entry; one of a module says the instance of its source alone."""
     plain = name.partition(" (")[0]
     arrow = parse(plain)
     assert isinstance(arrow, Arrow)
     source, target = arrow.sources.text, arrow.targets
     inside, _, _ = source.rpartition(".")
-    known, wanted = names_of(network), set(network.connections.targets[members].tolist())
+    wanted = set(network.connections.targets[members].tolist())
     for one in (target.text, " + ".join(f"{inside}.{part.text}" for part in target.parts)):
         ends = known.find(one)
         if isinstance(ends, Found) and wanted <= set(ends.neurons):

@@ -11,7 +11,7 @@ from concurrent.futures import Future
 from importlib.util import find_spec
 from keyword import iskeyword
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from neurovis_spec.compilation import Compilation
 from neurovis_spec.live.commands import Command, Pause, Play, Restart, Seek
@@ -29,9 +29,6 @@ if find_spec("anywidget") is None:
 import anywidget
 import numpy as np
 import traitlets
-
-if TYPE_CHECKING:
-    pass
 
 #: Seconds that whoever asks for something waits for its answer: a step may take long.
 _PATIENCE: Final = 10.0

@@ -83,9 +83,8 @@ def in_the_way(path: Path, force: bool) -> list[Path]:
     while numbered(path, number).exists():
         old.append(numbered(path, number))
         number += 1
-    if (
-        path.suffix and numbered(path, 1).exists() and not numbered(path, 0).exists()
-    ):  # the first may have been moved away
+    # the first may have been moved away
+    if path.suffix and numbered(path, 1).exists() and not numbered(path, 0).exists():
         old.append(numbered(path, 1))
     there = [one for one in dict.fromkeys(old) if one.exists()]
     if there and not force:

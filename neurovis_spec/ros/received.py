@@ -94,7 +94,9 @@ class ReceivedSource:
         self._steering: Steering | None = None
         self._turned: tuple[Turned, ...] = ()
         self._changing = network.changing
-        self._weights = network.connections.weights[self._changing].copy()
+        #: w[0] of all connections
+        self._begins = network.connections.weights.whole()
+        self._weights = self._begins[self._changing]
         self._lock = Lock()
         self._rows = [_Row(0, None, 0, np.zeros(len(network.neurons)), self._weights, None, True)]
         self._each = _EACH + 8 * len(network.neurons) + 8 * len(self._changing)
@@ -248,7 +250,7 @@ class ReceivedSource:
         return Snapshot(row.step, row.activity, self._all_weights(row), previous, row.seen)
 
     def _all_weights(self, row: _Row) -> FloatArray:
-        weights: FloatArray = self.network.connections.weights.whole().copy()
+        weights: FloatArray = self._begins.copy()
         weights[self._changing] = row.weights
         return weights
 

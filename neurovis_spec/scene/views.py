@@ -318,7 +318,7 @@ class Maker:
             values = np.clip(weights / full, -1.0, 1.0)
         lows, highs = weights.min(axis=0), weights.max(axis=0)
         activity = np.stack([snapshots[0].activity, snapshots[0].activity])
-        low, high = (np.array(ends.weights, float) for _ in range(2))
+        low, high = (ends.weights.whole().copy() for _ in range(2))
         low[connections], high[connections] = lows, highs
         titles = tooltips(network, self.gains, activity, np.stack([low, high]))[1]
         scale = scale_of("weight", used)

@@ -79,11 +79,8 @@ def compiled(job: Job, point: Point | None) -> CompiledNetwork:
         source.text,
         file=source.file,
         folder=source.folder,
-        parameters=values,
         seed=None if seed is None else int(seed),
-        root=how["root"],
-        limit=how["limit"],
-        body=how["body"],
+        **(how | {"parameters": values}),
     )
 
 
