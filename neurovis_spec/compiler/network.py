@@ -22,7 +22,7 @@ from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, Rend
 from neurovis_spec.compiler.events.changes import Change
 from neurovis_spec.compiler.events.settable import Binding, ParameterFormula, Part, Settable
 from neurovis_spec.compiler.names.state_references import StateOf
-from neurovis_spec.compiler.program import Each, Holder, Operation, Population, Projection, Use
+from neurovis_spec.compiler.program import DRIVE, Each, Holder, Operation, Population, Projection, Use
 from neurovis_spec.compiler.ros_settings import RosSettings
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.language.words import Combine, NeuronRole
@@ -92,9 +92,25 @@ class Neurons:
     position: FloatArray
     #: by states of models, what each begins with; NaN where the model says it
     starts: Mapping[str, FloatArray] = field(default_factory=dict)
+    #: bias and input, as above, of ports other than ``drive``, by the names of these
+    port_bias: Mapping[str, FloatArray] = field(default_factory=dict)
+    port_input: Mapping[str, IntArray] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.names)
+
+
+class Route(NamedTuple):
+    """What connections take at their source, and where they bring it: the state or output that is sent (``activity``
+    is one; "" is what the source's model sends), and the ports of the target, with what the signal is multiplied by in
+    each."""
+
+    sends: str = ""
+    ports: tuple[tuple[str, float], ...] = ((DRIVE, 1.0),)
+
+
+#: What a connection does that says nothing else: from the activity to ``drive``.
+PLAIN_ROUTE = Route()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,6 +140,8 @@ class Connections:
     learns: tuple[str | None, ...]
     #: what each entry is called in pictures
     labels: tuple[str | None, ...]
+    #: what the connections of each entry take and where they bring it; empty where all do as PLAIN_ROUTE says
+    routes: tuple[Route, ...] = ()
 
     def __len__(self) -> int:
         return len(self.sources)
@@ -165,6 +183,18 @@ class Noise:
     slots: Mapping[str, int] = field(default_factory=dict)
     #: deviations, and widths of ``uniform``, that follow parameters: none may become negative
     widths: tuple[ParameterFormula, ...] = ()
+    #: the port that the numbers are added to; "" where they are the standard normal numbers of a flow ``state``
+    port: str = DRIVE
+    state: str = ""
+
+
+class Outlet(NamedTuple):
+    """A state or an output that some connections take in place of the activity: of which population, and where its
+    members stand in ``State.outlets``, from ``start`` on."""
+
+    population: int
+    name: str
+    start: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -272,11 +302,60 @@ class Network:
 
     @cached_property
     def noise_index(self) -> IntArray:
-        """Where the noise of each neuron stands in that vector, −1 without noise; (n,)."""
+        """Where the noise of each neuron's drive stands in that vector, −1 without noise; (n,)."""
+        return self.noise_of(DRIVE)
+
+    def noise_of(self, port: str = "", state: str = "") -> IntArray:
+        """Where the noise of a port, or the standard normal numbers of a flow state, of each neuron stand in the vector
+        of a step, −1 without; (n,)."""
         result = np.full(len(self.neurons), -1, dtype=np.int64)
         for noise in self.noises:
+            if (noise.port, noise.state) != (port, state):
+                continue
             result[noise.members] = np.arange(noise.start, noise.start + len(noise.members))
         return frozen(result)
+
+    @cached_property
+    def outlets(self) -> tuple[Outlet, ...]:
+        """What connections can take beside activities, in the order of the populations and of what these keep."""
+        asked = {route.sends for route in self.connections.routes}
+        found: list[Outlet] = []
+        start = 0
+        for number, population in enumerate(self.populations):
+            model = population.model.definition
+            for one in model.kept if asked or model.send else ():
+                if one.name in asked or one.name == model.send:
+                    found.append(Outlet(number, one.name, start))
+                    start += len(population.members)
+        return tuple(found)
+
+    @cached_property
+    def outlet_count(self) -> int:
+        """Length of ``State.outlets``."""
+        return sum(len(self.populations[one.population].members) for one in self.outlets)
+
+    @cached_property
+    def sending(self) -> IntArray | None:
+        """What each connection takes, (m,): an index into the activities of all neurons followed by the outlets; None
+        where all take activities, which are those of their sources."""
+        if not self.outlets:
+            return None
+        connections = self.connections
+        result, entry = connections.sources.whole().astype(np.int64), connections.entry.whole()
+        routes = connections.routes or (PLAIN_ROUTE,) * len(connections.entries)
+        for name in dict.fromkeys(route.sends for route in routes):
+            taking = np.isin(entry, [number for number, route in enumerate(routes) if route.sends == name])
+            result[taking] = self._taken(name)[result[taking]]
+        return frozen(result)
+
+    def _taken(self, name: str) -> IntArray:
+        """What of each neuron (n,) is taken by a connection that sends this, "" for what the neuron's model sends."""
+        result = np.arange(len(self.neurons), dtype=np.int64)
+        for outlet in self.outlets:
+            population = self.populations[outlet.population]
+            if outlet.name == (name or population.model.definition.send):
+                result[population.members] = len(result) + outlet.start + np.arange(len(population.members))
+        return result
 
     @cached_property
     def mark(self) -> str:

@@ -20,12 +20,20 @@ _ZERO = Number(0.0)
 @dataclass(frozen=True, slots=True)
 class Quantity:
     """A number that a definition keeps or gives, and what it becomes: its value at each step and at an episode's end;
-    where there is no such expression, it stays. ``initial`` is what a state begins with."""
+    where there is no such expression, it stays. ``initial`` is what a state begins with.
+
+    A state with a ``derivative`` *flows*: it is integrated over a step, before its ``each_step``. ``noise`` is what a
+    standard normal number is multiplied by to disturb it, per square root of the time (dx = derivative dt + noise dW).
+    Both are per second or millisecond, as their definition says."""
 
     name: str
     each_step: Tree | None = None
     each_episode: Tree | None = None
     initial: Tree = _ZERO
+    derivative: Tree | None = None
+    noise: Tree | None = None
+    #: as it is written, to be shown
+    unit: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +76,19 @@ RULE = Kind("rule", "connection", "weight", lasting=True)
 
 #: The function of an activation that says whether it is undefined for an argument.
 UNDEFINED_F = "f is undefined"
+#: The function of an activation that is its derivative.
+SLOPE_F = "slope of f"
+#: The port that all neurons have.
+DRIVE = "drive"
+
+
+class PortOf(NamedTuple):
+    """A port that a model declares, beside ``drive``."""
+
+    name: str
+    combine: Combine = "sum"
+    #: as it is written, to be shown
+    unit: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,13 +99,34 @@ class Definition:
     kind: Kind
     name: str
     parameters: tuple[str, ...]
-    #: what it gives; the first is what its kind gives
+    #: what it gives; the first is what its kind gives, the others are further outputs of a model
     gives: tuple[Quantity, ...]
     let: tuple[tuple[str, Tree], ...] = ()
     state: tuple[Quantity, ...] = ()
     signals: tuple[str, ...] = ()
     #: of a model whether its activity, of a step as the activation where it depends on one, is a spike or nothing
     spikes: bool = False
+    #: of a model its inputs beside ``drive``
+    ports: tuple[PortOf, ...] = ()
+    #: of a model which state or output connections take unless they say otherwise; "" is the activity
+    send: str = ""
+    #: how many of its unit of time a second has: 1, or 1000 where ``time: ms``; ``t`` and ``dt`` are in that unit in it
+    per_second: float = 1.0
+
+    @property
+    def outputs(self) -> tuple[Quantity, ...]:
+        """What a model gives beside the activity. Like a state it is kept, for whoever reads it."""
+        return self.gives[1:] if self.kind == MODEL else ()
+
+    @property
+    def kept(self) -> tuple[Quantity, ...]:
+        """Whatever has a cell in ``State.cells``: states, then outputs."""
+        return (*self.state, *self.outputs)
+
+    @property
+    def flows(self) -> tuple[Quantity, ...]:
+        """The states with a derivative."""
+        return tuple(one for one in self.state if one.derivative is not None)
 
     @property
     def given(self) -> Quantity:
@@ -113,7 +155,7 @@ class Definition:
         for _, tree in self.let:
             found |= names(tree)
         for one in (*self.state, *self.gives):
-            for part in (one.each_step, one.each_episode):
+            for part in (one.each_step, one.each_episode, one.derivative, one.noise):
                 found |= frozenset() if part is None else names(part)
         return frozenset(found)
 
@@ -167,18 +209,22 @@ class Port:
     combine: Combine
     incoming: Indices
     slots: Indices
+    #: what each signal is multiplied by here (``port: {ampa: 1, nmda: 0.3}``); None where that is 1
+    factors: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Population:
     """Neurons that are updated together: the same activation, model, combination and level. ``members`` are neuron
-    indices, ascending."""
+    indices, ascending. ``stage`` is their level within a stage of the integration: behind all whose outputs reach
+    theirs there."""
 
     level: int
     members: IntArray
     activation: Use
     model: Use
     ports: tuple[Port, ...]
+    stage: int = 0
 
     @property
     def uses(self) -> tuple[Use, ...]:
@@ -213,6 +259,9 @@ class Projection:
 
 Holder: TypeAlias = Population | Projection
 
+#: How flow states are integrated (``Integrate``).
+Method: TypeAlias = Literal["euler", "heun", "rk4", "exponential", "semi_implicit"]
+
 
 # The update program: operations in order. Each sees what those before it have made in the same step.
 
@@ -229,8 +278,8 @@ class ReadInputs(Operation):
 
 @dataclass(frozen=True, slots=True)
 class Gather(Operation):
-    """u[t] of a population: what arrives, combined, + bias + input. Delay 0 reads activities of this step, the rest the
-    signals under way."""
+    """What each port of a population is: what arrives there, combined, + bias + input + noise. Delay 0 reads what is
+    sent in this step, the rest the signals under way."""
 
     population: int
 
@@ -241,6 +290,24 @@ class Update(Operation):
     instead."""
 
     population: int
+
+
+@dataclass(frozen=True, slots=True)
+class Integrate(Operation):
+    """The flow states of these populations, together, over a step from k − 1 to k; none at step 0. What does not flow
+    is held. ``populations`` are in the order in which their outputs are made at a stage."""
+
+    populations: tuple[int, ...]
+    method: Method
+    substeps: int
+
+
+@dataclass(frozen=True, slots=True)
+class Diffuse(Operation):
+    """The noise of the flow states of these populations, once a step, behind their integration: x += g·√dt·ξ (Itô,
+    Euler-Maruyama), with g as it was at the step's beginning."""
+
+    populations: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
