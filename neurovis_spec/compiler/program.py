@@ -211,6 +211,9 @@ class Port:
     slots: Indices
     #: what each signal is multiplied by here (``port: {ampa: 1, nmda: 0.3}``); None where that is 1
     factors: FloatArray | None = None
+    #: which of them are made anew at each stage of the integration, since what they bring flows: positions in
+    #: ``incoming``; the others are held over a step
+    staged: Indices | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
