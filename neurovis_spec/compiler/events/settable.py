@@ -26,7 +26,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
-from neurovis_spec.compiler.program import Key, Owner
+from neurovis_spec.compiler.program import DRIVE, Key, Owner
 from neurovis_spec.language.expressions.evaluate import Drawing, Value, evaluate_array
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.language.expressions.tree import Number, Tree, names
@@ -35,6 +35,11 @@ from neurovis_spec.language.expressions.tree import Number, Tree, names
 BIAS, CENTRES, LOW, HIGH, WEIGHTS, NOISE = (
     Key(None, name) for name in ("bias", "centres", "low", "high", "weights", "noise")
 )
+
+
+def bias_of(port: str) -> Key:
+    """The biases of a port, one a neuron."""
+    return BIAS if port == DRIVE else Key(Owner("bias", 0), port)
 
 
 def table_of(number: int) -> Key:
