@@ -9,7 +9,7 @@ Names of kinds and fields are those of the first version, whatever the types are
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,13 +18,23 @@ from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.digest import TREES, Content, Record, content, digest
 from neurovis_spec.compiler.names.state_references import singles
 from neurovis_spec.compiler.network import Connections, Group, Input, Network, Neurons, Noise, Output
-from neurovis_spec.compiler.program import ACTIVATION, MODEL, RULE, Definition, Population, Projection, Quantity
+from neurovis_spec.compiler.program import (
+    ACTIVATION,
+    DRIVE,
+    MODEL,
+    RULE,
+    Definition,
+    Integrate,
+    Population,
+    Projection,
+    Quantity,
+)
 
-#: What of each type is content. What follows parameters shows by the parameters; ``starts`` and states of outputs are
-#: put behind the rest, where there are some.
+#: What of each type is content. What follows parameters shows by the parameters; ``starts``, states of outputs and what
+#: is of ports and flows are put behind the rest, where there are some.
 SCHEMA: Mapping[type, Content] = {
     **TREES,
-    Neurons: content("Neurons", "names groups bias initial input position", "labels starts"),
+    Neurons: content("Neurons", "names groups bias initial input position", "labels starts port_bias port_input"),
     Group: content(
         "Group",
         "name start count activation model combine activation_parameters model_parameters input",
@@ -33,12 +43,12 @@ SCHEMA: Mapping[type, Content] = {
     Connections: content(
         "Connections",
         "sources targets weights centres delays rules entry low high entries",
-        "descriptions learns labels",
+        "descriptions learns labels routes",
     ),
     Input: content("Input", "name start size expression table", "slots parts"),
     Output: content("Output", "name neurons scalar", "states"),
     Quantity: content("Quantity", "name initial each_step each_episode"),
-    Noise: content("Noise", "name members start expression parameters", "slots widths"),
+    Noise: content("Noise", "name members start expression parameters", "slots widths port state"),
 }
 
 
@@ -64,8 +74,23 @@ def content_hash(network: Network) -> str:
         network.noises,
         *((output.name, *singles(output.states)) for output in network.outputs if output.states),
         *([("starts", neurons.starts)] if neurons.starts else []),
+        *_flows(network, places),
         schema=SCHEMA,
     )
+
+
+def _flows(network: Network, places: IntArray) -> Iterator[tuple[object, ...]]:
+    """What there is of ports and flows beside the definitions; nothing in most networks. ``places``: where each number
+    of the vector of all inputs is here."""
+    neurons = network.neurons
+    if network.connections.routes:
+        yield "routes", network.connections.routes
+    if neurons.port_bias:
+        yield "port_bias", neurons.port_bias
+    if neurons.port_input:
+        yield "port_input", {port: np.append(places, -1)[given] for port, given in neurons.port_input.items()}
+    yield from (("noise", one.name, one.port, one.state) for one in network.noises if one.port != DRIVE)
+    yield from (("integrate", by.method, by.substeps) for by in network.program if isinstance(by, Integrate))
 
 
 def _arranged(inputs: Sequence[Input]) -> tuple[list[Input], IntArray]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import IntArray
+from neurovis_spec.arrays import BoolArray
 from neurovis_spec.compiler.body_settings import BodySettings
 from neurovis_spec.compiler.canonical import content_hash
 from neurovis_spec.compiler.checks.compiled import Compiled
@@ -24,17 +24,19 @@ from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
 from neurovis_spec.compiler.drawing.sections import layout_settings, render_settings
 from neurovis_spec.compiler.events.bound import found_in, make_settable, own_weights
-from neurovis_spec.compiler.limits import MOST_SIGNALS, Limits, amount
-from neurovis_spec.compiler.lower import Cycle, assign_levels, make_populations, make_program, make_projections
+from neurovis_spec.compiler.levels import Cycle, Order, order_of
+from neurovis_spec.compiler.limits import MOST_SIGNALS, MOST_SUBSTEPS, Limits, amount
+from neurovis_spec.compiler.lower import Integration, make_populations, make_program, make_projections
 from neurovis_spec.compiler.names.expand import Expander, constants_of
 from neurovis_spec.compiler.names.finder import Finder, finder_of
 from neurovis_spec.compiler.names.modules import Library, library_of
 from neurovis_spec.compiler.names.outputs import make_outputs
 from neurovis_spec.compiler.names.references import other_parameter
 from neurovis_spec.compiler.names.scope import Expansion, Scope, Surroundings
-from neurovis_spec.compiler.network import Instance, Network, Noise, Output
+from neurovis_spec.compiler.network import Input, Instance, Network, Noise, Output
 from neurovis_spec.compiler.neurons.noise import make_noises
 from neurovis_spec.compiler.neurons.populate import Census, populate, without_neurons
+from neurovis_spec.compiler.program import DRIVE
 from neurovis_spec.compiler.ros_settings import RosSettings
 from neurovis_spec.compiler.run_checks import with_checks
 from neurovis_spec.compiler.values.constants import Constants, Sight, parse_formula
@@ -43,6 +45,7 @@ from neurovis_spec.compiler.values.parameters import make_parameters
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.includes import Includes, ReadBytes
+from neurovis_spec.language.located import value_or
 from neurovis_spec.language.model import names_of, opening
 from neurovis_spec.language.spec import Spec, is_library
 from neurovis_spec.language.unknown import UNKNOWN, known
@@ -83,6 +86,7 @@ class _Declared(NamedTuple):
     dt_known: bool
     steps: int
     episode: int | None
+    integration: Integration
     library: Library
     #: the names of the modules that have an instance
     modules_used: set[str]
@@ -95,8 +99,7 @@ class _Sections(NamedTuple):
 
     declared: _Declared
     connected: Connected
-    #: the level of each neuron
-    level: IntArray
+    order: Order
     #: resolves what events name
     finder: Finder
     outputs: tuple[Output, ...]
@@ -142,15 +145,15 @@ def _compile_sections(spec: Spec, request: Request, findings: Findings) -> _Sect
     body = _body(around, request, constants, dt_known=declared.dt_known)
     noises = make_noises(census, sum(entry.size for entry in inputs))
     declared.expansion.depend()  # last, as every section may have made parameters of instances structural
-    level = _levels(connected, census, findings)
+    order = _order(connected, census, inputs, noises, findings)
     valid = connected.complete and findings.errors == before
-    if level is None or not valid or not _signals_fit(connected.bundles, findings):
+    if order is None or not valid or not _signals_fit(connected.bundles, findings):
         _read_events(spec, finder, constants)  # for its findings alone
         return None
     return _Sections(
         declared=declared,
         connected=connected,
-        level=level,
+        order=order,
         finder=finder,
         outputs=outputs,
         noises=noises,
@@ -170,7 +173,7 @@ def _declare(spec: Spec, request: Request, findings: Findings) -> _Declared:
     library = library_of(spec, request.includes, request.base, constants.dt, findings)
     make_parameters(spec, constants, request.parameters)
     _check_names_set(spec, constants, request.parameters)
-    steps, episode = _clock(spec, constants)
+    steps, episode, integration = _clock(spec, constants)
     expander = Expander(library, request.root, findings, constants.dt, files={**request.files}, limits=request.limits)
     expansion = expander.expand(spec, constants, request.base)
     census = populate(expansion.scopes, request.limits, seed)
@@ -184,6 +187,7 @@ def _declare(spec: Spec, request: Request, findings: Findings) -> _Declared:
         dt_known=dt_known,
         steps=steps,
         episode=episode,
+        integration=integration,
         library=library,
         modules_used=expander.used,
         expansion=expansion,
@@ -198,7 +202,7 @@ def _assemble(spec: Spec, sections: _Sections) -> Network:
     name = known(spec.name.value, "")
     projections, rules = make_projections(connected.bundles)
     connections = join(connected, rules)
-    populations = make_populations(census, connected.targets.compact(), sections.level)
+    populations = make_populations(census, connected.wired, sections.order)
     slots = tuple(constants.slots)
     network = Network(
         name=name,
@@ -217,7 +221,7 @@ def _assemble(spec: Spec, sections: _Sections) -> Network:
         outputs=sections.outputs,
         populations=populations,
         projections=projections,
-        program=make_program(populations, projections),
+        program=make_program(populations, projections, sections.order, declared.integration),
         layout=sections.layout,
         render=sections.render,
         hash="",  # of all the rest
@@ -332,19 +336,44 @@ def _report_no_neurons(spec: Spec, census: Census, findings: Findings) -> None:
     findings.error("no-neurons", span, message, hint, key="neurons")  # also where the name is missing there
 
 
-def _levels(connected: Connected, census: Census, findings: Findings) -> IntArray | None:
-    """The level of each neuron; None where neurons wait for each other, which is reported: a cycle of connections that
+def _order(
+    connected: Connected, census: Census, inputs: tuple[Input, ...], noises: tuple[Noise, ...], findings: Findings
+) -> Order | None:
+    """The levels of all neurons; None where neurons wait for each other, which is reported: a cycle of connections that
     are in order is one whatever becomes of the others."""
-    level = assign_levels(len(census.neurons), connected.sources, connected.targets, connected.delays)
-    if not isinstance(level, Cycle):
-        return level
-    path = [census.neurons.names[neuron] for neuron in level.neurons]
+    held = _held(census, inputs, noises) if census.models.flow else {}
+    order = order_of(census.models.different, census.models.of, connected.wired, held)
+    if not isinstance(order, Cycle):
+        return order
+    names = (*census.neurons.names, "the integration")
+    path = [names[node] for node in order.neurons]
     shown = path if len(path) <= 12 else [*path[:6], "…", *path[-5:]]
+    ends = np.cumsum(connected.sizes)
+    key = connected.bundles[int(np.searchsorted(ends, order.connection, side="right"))].key
+    if order.algebraic:
+        message = f"what these neurons send reads each other within one stage: {' -> '.join(shown)}"
+        findings.error("algebraic-loop", key, message, "a state with a derivative, or delay: 1, breaks it")
+        return None
     message = f"these neurons wait for each other within one step: {' -> '.join(shown)}"
-    ends = np.cumsum([len(bundle.sources) for bundle in connected.bundles])
-    bundle = connected.bundles[int(np.searchsorted(ends, level.connection, side="right"))]
-    findings.error("delay-0-cycle", bundle.key, message, "give one of these connections a delay of at least 1")
+    hint = "give one of these connections a delay of at least 1"
+    if len(census.neurons) in order.neurons:
+        hint += "; what reaches a derivative without delay, and does not flow itself, is made before the integration"
+    findings.error("delay-0-cycle", key, message, hint)
     return None
+
+
+def _held(census: Census, inputs: tuple[Input, ...], noises: tuple[Noise, ...]) -> Mapping[str, BoolArray]:
+    """By ports for each neuron whether a number is added there that is the same over a step: a table's, one that is
+    supplied, noise."""
+    neurons = census.neurons
+    flows = np.concatenate(
+        [np.repeat([one.expression is not None for one in inputs], [one.size for one in inputs]), [True]]
+    )
+    result = {port: ~flows[given] for port, given in ((DRIVE, neurons.input), *neurons.port_input.items())}
+    for noise in noises:
+        if not noise.state:
+            result.setdefault(noise.port, np.zeros(len(neurons), dtype=np.bool_))[noise.members] = True
+    return result
 
 
 def _signals_fit(bundles: tuple[Bundle, ...], findings: Findings) -> bool:
@@ -387,12 +416,16 @@ def _check_names_set(spec: Spec, constants: Constants, values: Mapping[str, floa
             constants.findings.error("unknown-parameter", span, f"there is no parameter '{name}' to be set", hint)
 
 
-def _clock(spec: Spec, constants: Constants) -> tuple[int, int | None]:
-    """The default run length and the length of an episode."""
+def _clock(spec: Spec, constants: Constants) -> tuple[int, int | None, Integration]:
+    """The default run length, the length of an episode, and how states are integrated."""
     time = spec.time
-    steps, episode = 1000, None
+    steps, episode, integration = 1000, None, Integration()
     if time is not None and time.steps is not None:
         steps = known(constants.integer(time.steps, "'steps'", 1, structural=False), steps)
     if time is not None and time.episode is not None:
         episode = known(constants.integer(time.episode, "'episode'", 1), None)
-    return steps, episode
+    if time is not None and time.integrate is not None:
+        by = time.integrate
+        parts = 1 if by.substeps is None else known(constants.integer(by.substeps, "'substeps'", 1, MOST_SUBSTEPS), 1)
+        integration = Integration(value_or(by.method, integration.method), parts)
+    return steps, episode, integration

@@ -19,6 +19,9 @@ LONGEST_DELAY = 1_000_000
 #: The most signals under way at once: the delays of all connections, in steps, added up.
 MOST_SIGNALS = 250_000_000
 
+#: In how many parts a step may be integrated.
+MOST_SUBSTEPS = 10_000
+
 
 class Limits(NamedTuple):
     """Most neurons and most connections of a network; ``--limit`` raises them."""

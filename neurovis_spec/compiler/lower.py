@@ -1,105 +1,76 @@
 """Lowering: from neurons and connections to populations and the update program.
 
-In: the Census, the connections. Out: levels of neurons along delay-0 connections (one more than the highest of
-those that reach it within the step) or a Cycle; Populations (neurons that are updated together), Projections
-(connections that learn by one rule) and the program, an ordered list of operations.
+In: the Census, the connections, the Order of the neurons. Out: Populations (neurons that are updated together),
+Projections (connections that learn by one rule) and the program, an ordered list of operations.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import Indices, IntArray, IntColumn, frozen, narrow, width
+from neurovis_spec.arrays import FloatArray, Indices, IntArray, frozen, narrow, width
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.connections.plasticity import Learning
+from neurovis_spec.compiler.levels import Order, Stages, Wired
 from neurovis_spec.compiler.neurons.groups import Built
 from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.program import (
+    DRIVE,
+    Diffuse,
     Gather,
+    Integrate,
     Learn,
     Operation,
     Owner,
     Population,
     Port,
+    PortOf,
     Projection,
     ReadInputs,
     Send,
     Update,
     Use,
 )
+from neurovis_spec.language.words import Method
 
 
-def make_program(populations: tuple[Population, ...], projections: tuple[Projection, ...]) -> tuple[Operation, ...]:
-    """What a step does, in order: inputs, neurons along delay 0, signals that leave, rules."""
-    program: list[Operation] = [ReadInputs()]
-    for population in range(len(populations)):
-        program += [Gather(population), Update(population)]
-    program.append(Send())
-    program += [Learn(projection) for projection in range(len(projections))]
-    return tuple(program)
+class Integration(NamedTuple):
+    """How states are integrated over a step."""
+
+    method: Method = "rk4"
+    substeps: int = 1
 
 
-class Cycle(NamedTuple):
-    """Neurons that wait for each other: the first is named again at the end; ``connection`` closes the cycle."""
-
-    neurons: tuple[int, ...]
-    connection: int
-
-
-def assign_levels(n: int, sources: IntColumn, targets: IntColumn, delays: IntColumn) -> IntArray | Cycle:
-    """The level of each of n neurons, by Kahn's algorithm: one more than the highest of those that reach it without
-    delay; a cycle of such connections where there is one."""
-    result = np.zeros(n, dtype=np.int64)
-    if not (delays.kept == 0).any():
-        return result
-    undelayed = np.flatnonzero(delays.compact() == 0)
-    begins, ends = sources.some(undelayed), targets.some(undelayed)
-    # the targets of each neuron: outgoing[starts[neuron] : starts[neuron + 1]]
-    order = np.argsort(begins, kind="stable")
-    outgoing = ends[order]
-    starts = np.searchsorted(begins[order], np.arange(n + 1)).tolist()
-    waiting = np.bincount(ends, minlength=n).tolist()
-    ready = [neuron for neuron in range(n) if waiting[neuron] == 0]
-    level = result.tolist()
-    finished = 0
-    while finished < len(ready):
-        neuron = ready[finished]
-        finished += 1
-        for target in outgoing[starts[neuron] : starts[neuron + 1]].tolist():
-            level[target] = max(level[target], level[neuron] + 1)
-            waiting[target] -= 1
-            if waiting[target] == 0:
-                ready.append(target)
-    if len(ready) == n:
-        return np.array(level, dtype=np.int64)
-    return _cycle(undelayed, begins, ends, waiting)
+def make_program(
+    populations: tuple[Population, ...], projections: tuple[Projection, ...], order: Order, by: Integration
+) -> tuple[Operation, ...]:
+    """What a step does, in order: inputs, neurons along delay 0, signals that leave, rules. Where states flow they are
+    integrated behind the neurons that reach a derivative without delay and do not flow themselves."""
+    before = 0
+    integration: tuple[Operation, ...] = ()
+    if order.stages is not None:
+        before = sum(population.level < order.stages.level for population in populations)
+        integration = _integration(populations, order.stages, by)
+    updates: list[list[Operation]] = [[Gather(number), Update(number)] for number in range(len(populations))]
+    learning = (Learn(number) for number in range(len(projections)))
+    return ReadInputs(), *chain(*updates[:before]), *integration, *chain(*updates[before:]), Send(), *learning
 
 
-def _cycle(undelayed: IntArray, begins: Indices, ends: Indices, waiting: list[int]) -> Cycle:
-    """Go backwards among the neurons that still wait until one comes up again: each of them has a source that waits,
-    as there is a cycle. ``begins`` and ``ends`` are the sources and the targets of the ``undelayed`` connections."""
-    connection_into: dict[int, int] = {}
-    source_of: dict[int, int] = {}
-    for connection, source, target in zip(undelayed.tolist(), begins.tolist(), ends.tolist(), strict=True):
-        if waiting[source] and waiting[target] and target not in source_of:
-            connection_into[target], source_of[target] = connection, source
-    neuron = min(source_of)  # any of them; the same each time
-    path: list[int] = []
-    place_in_path: dict[int, int] = {}
-    while neuron not in place_in_path:
-        place_in_path[neuron] = len(path)
-        path.append(neuron)
-        neuron = source_of[neuron]
-    ring = path[place_in_path[neuron] :]
-    forward = (ring[0], *reversed(ring))
-    return Cycle(forward, connection_into[ring[0]])
+def _integration(populations: tuple[Population, ...], stages: Stages, by: Integration) -> tuple[Operation, ...]:
+    """The integration of all states that flow, and what noise adds to them."""
+    flowing = [number for number, one in enumerate(populations) if one.model.definition.flows]
+    made = [number for number, one in enumerate(populations) if stages.made[one.members].any()]
+    numbers = sorted({*flowing, *made}, key=lambda number: (populations[number].stage, number))
+    noisy = tuple(n for n in flowing if any(one.noise is not None for one in populations[n].model.definition.flows))
+    diffuse = (Diffuse(noisy),) if noisy else ()
+    return Integrate(tuple(numbers), by.method, by.substeps), *diffuse
 
 
-def make_populations(census: Census, targets: Indices, levels: IntArray) -> tuple[Population, ...]:
+def make_populations(census: Census, wired: Wired, order: Order) -> tuple[Population, ...]:
     """Neurons of the same level, activation, model and combination, in the order of the levels."""
     groups = census.groups
     kind_numbers: dict[tuple[str, ...], int] = {}
@@ -111,24 +82,67 @@ def make_populations(census: Census, targets: Indices, levels: IntArray) -> tupl
     ]
     counts = [built.group.count for built in groups]
     group_of = np.repeat(np.arange(len(groups)), counts)
-    population_of = _population_of(
-        levels, np.repeat(np.array(kind_of_group, dtype=np.int64), counts), len(kind_numbers)
-    )
+    kinds = np.repeat(np.array(kind_of_group, dtype=np.int64), counts)
+    if order.stages is not None:  # those of different levels within a stage are different kinds, too
+        kinds = np.unique(kinds * len(kinds) + order.stage, return_inverse=True)[1]
+    population_of = _population_of(order.level, kinds, int(kinds.max(initial=0)) + 1)
     members_of = [members.astype(np.int64) for members in _split(population_of, int(population_of.max(initial=-1)) + 1)]
     population_of = narrow(population_of)
     place_in_population = np.zeros(len(population_of), dtype=width(0, len(population_of)))
     for members in members_of:
         place_in_population[members] = np.arange(len(members))
+    arriving = _arriving(wired, order, population_of, place_in_population, len(members_of))
     populations = []
-    for population, (members, incoming) in enumerate(
-        zip(members_of, _split(population_of[targets], len(members_of)), strict=True)
-    ):
+    for number, members in enumerate(members_of):
         group_of_member = group_of[members]
         first = groups[group_of_member[0]]
-        activation, model = (_use(population, members, group_of_member, groups, which) for which in (0, 1))
-        drive = Port("drive", first.group.combine, frozen(incoming), frozen(place_in_population[targets[incoming]]))
-        populations.append(Population(int(levels[members[0]]), frozen(members), activation, model, (drive,)))
+        activation, model = (_use(number, members, group_of_member, groups, which) for which in (0, 1))
+        declared = (PortOf(DRIVE, first.group.combine), *model.definition.ports)
+        ports = tuple(_port(one, arriving[one.name][number] if one.name in arriving else _NOTHING) for one in declared)
+        level, stage = int(order.level[members[0]]), int(order.stage[members[0]])
+        populations.append(Population(level, frozen(members), activation, model, ports, stage))
     return tuple(populations)
+
+
+class _Arriving(NamedTuple):
+    """What arrives at a port of a population, as a Port has it."""
+
+    incoming: Indices
+    slots: Indices
+    factors: FloatArray | None = None
+    staged: Indices | None = None
+
+
+_NOTHING = _Arriving(frozen(np.zeros(0, dtype=np.int8)), frozen(np.zeros(0, dtype=np.int8)))
+
+
+def _port(declared: PortOf, arriving: _Arriving) -> Port:
+    return Port(declared.name, declared.combine, *arriving)
+
+
+def _arriving(
+    wired: Wired, order: Order, population_of: Indices, places: Indices, count: int
+) -> dict[str, list[_Arriving]]:
+    """By ports what arrives there, for each of so many populations; ``places`` has for each neuron which member it
+    is."""
+    targets = wired.targets.compact()
+    result: dict[str, list[_Arriving]] = {}
+    for port, (connections, factors) in wired.lines.items():
+        staged = None if order.stages is None else order.stages.staged[port]
+        ends = targets if connections is None else targets[connections]
+        result[port] = []
+        for at in _split(population_of[ends], count):
+            incoming = at if connections is None else connections[at]
+            anew = None if staged is None else np.flatnonzero(staged[at])
+            result[port].append(
+                _Arriving(
+                    incoming=frozen(incoming),
+                    slots=frozen(places[ends[at]]),
+                    factors=None if factors is None or (factors[at] == 1).all() else frozen(factors[at]),
+                    staged=None if anew is None or not len(anew) else frozen(anew),
+                )
+            )
+    return result
 
 
 def _population_of(levels: IntArray, kind_of: IntArray, kinds: int) -> Indices:

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple, TypeAlias
 
 from neurovis_spec.arrays import FloatArray, Indices, IntArray
 from neurovis_spec.language.expressions.tree import Call, Number, Tree, names, walk
-from neurovis_spec.language.words import Combine
+from neurovis_spec.language.words import Combine, Method
 
 _ZERO = Number(0.0)
 
@@ -261,9 +261,6 @@ class Projection:
 
 
 Holder: TypeAlias = Population | Projection
-
-#: How flow states are integrated (``Integrate``).
-Method: TypeAlias = Literal["euler", "heun", "rk4", "exponential", "semi_implicit"]
 
 
 # The update program: operations in order. Each sees what those before it have made in the same step.

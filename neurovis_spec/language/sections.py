@@ -67,12 +67,30 @@ from neurovis_spec.language.values import (
     MatrixField,
     ModelField,
     Pair,
+    PortsField,
     RuleField,
     as_file,
     pair,
 )
-from neurovis_spec.language.words import Combine, NeuronRole
+from neurovis_spec.language.words import METHODS, Combine, Method, NeuronRole
 from neurovis_spec.language.yaml.source import AnyList, Entry, Mapping, Node, Scalar, one_or_more
+
+
+class IntegrateModel(Model):
+    """How states with a derivative are integrated over a step; a bare word is read as ``{method: …}``."""
+
+    PLACE: ClassVar[str] = "'integrate'"
+    ELSEWHERE: ClassVar[AnyMapping[str, str]] = {
+        **dict.fromkeys(("solver", "integrator", "scheme"), "method"),
+        **dict.fromkeys(("steps", "sub_steps", "unfolds"), "substeps"),
+    }
+
+    method: Annotated[Located[Method], words(Method, abouts=METHODS)] | None = Field(
+        None, description="The method (default rk4)."
+    )
+    substeps: FormulaField | None = Field(
+        None, description="In how many parts of equal length a step is integrated (default 1)."
+    )
 
 
 class Time(Model):
@@ -84,6 +102,9 @@ class Time(Model):
     dt: FormulaField | None = Field(None, description="Seconds a step (default 1).")
     steps: FormulaField | None = Field(None, description="Default run length in steps (default 1000).")
     episode: FormulaField | None = Field(None, description="Steps of an episode; it ends after every m steps.")
+    integrate: Annotated[IntegrateModel, Short("method", "a method, or {method: …, substeps: …}")] | None = Field(
+        None, description="How derivatives are integrated: a method, or {method: …, substeps: …} (default rk4)."
+    )
 
     @classmethod
     def _foreign(cls, name: str) -> tuple[str, str] | None:
@@ -287,6 +308,12 @@ class ConnectionModel(Model):
     ] = Field(None, description="Whether the rows of a matrix are sources (from) or targets (to) (default from).")
     delay: FormulaField | None = Field(
         None, description="Steps the signal travels; 0 is within the same step (default 1)."
+    )
+    port: PortsField | None = Field(
+        None, description="The port of the target, or several with factors: {ampa: 1, nmda: 0.3} (default drive)."
+    )
+    send: TextField | None = Field(
+        None, description="What is sent: a state or an output of the source's model, or its activity."
     )
     plasticity: RuleField | None = Field(None, description="A rule: name, or {name: {parameter: value, signal: …}}.")
     bounds: Annotated[

@@ -269,6 +269,28 @@ _STATES: Final = Map(
 InitialField = Annotated[Initial, Leaf(as_initial, Either((FORMULA, ListOf(FORMULA), _STATES)))]
 
 
+class PortFactor(NamedTuple):
+    """A port by its name, and what a signal is multiplied by in it; None where it is as it is."""
+
+    name: Located[str]
+    factor: Formula | None = None
+
+
+def as_ports(node: Node, info: ValidationInfo) -> tuple[PortFactor, ...]:
+    """The name of a port, or a mapping of ports and factors."""
+    if isinstance(node, AnyList):
+        refuse(info, node, "a port, or ports with factors", "write {PORT: 1, PORT: 1}")
+    if not isinstance(node, Mapping):
+        return (PortFactor(as_text(node, info)),)
+    if not node.entries:
+        refuse(info, node, "a port, or ports with factors", "write port: NAME")
+    return tuple(PortFactor(Located(one.name, one.key), as_formula(one.value, info)) for one in node.entries)
+
+
+_PORTS: Final = Either((TEXT, Map({}, FORMULA, least=1)))
+PortsField = Annotated[tuple[PortFactor, ...], Leaf(as_ports, _PORTS)]
+
+
 class ParameterModel(Model):
     """A named constant: its value, and the bounds within which it may be set."""
 

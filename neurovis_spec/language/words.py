@@ -3,14 +3,25 @@
 In: nothing. Out: types and tables; the models take their words from here.
 """
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Final, Literal
 
 Direction = Literal["down", "up", "right", "left"]
 Combine = Literal["sum", "product", "distance"]
+Method = Literal["euler", "heun", "rk4", "exponential", "semi_implicit"]
 NeuronRole = Literal["input", "hidden", "output"]
 Reliability = Literal["reliable", "best_effort"]
 Durability = Literal["volatile", "transient_local"]
 OnTimeout = Literal["hold", "zero", "stop"]
+
+#: How states are integrated, and what that is.
+METHODS: Final[Mapping[Method, str]] = {
+    "euler": "One evaluation a step, order 1.",
+    "heun": "Two evaluations a step, order 2.",
+    "rk4": "The classical Runge-Kutta method: four evaluations a step, order 4.",
+    "exponential": "One evaluation; exact for what decays linearly, so that stiff equations stay stable. Order 1.",
+    "semi_implicit": "One evaluation, implicit in what decays: stable for stiff equations. Order 1.",
+}
 
 #: What a picture can show.
 VIEWS = ("network", "matrix", "traces", "raster", "weights", "body")

@@ -11,13 +11,14 @@ from functools import cached_property
 
 import numpy as np
 
-from neurovis_spec.arrays import Column, Indices, IntColumn, integers, narrow, reals
+from neurovis_spec.arrays import Column, Indices, IntArray, IntColumn, integers, narrow, reals
 from neurovis_spec.compiler.connections.entries import Bundle, EntryBuilder, EntryContext
 from neurovis_spec.compiler.connections.plasticity import title_of
+from neurovis_spec.compiler.levels import Wired
 from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.compiler.names.references import Directory, arrow_of, resolve_sum
 from neurovis_spec.compiler.names.scope import Scope
-from neurovis_spec.compiler.network import Connections
+from neurovis_spec.compiler.network import PLAIN_ROUTE, Connections
 from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.located import Located
@@ -46,6 +47,22 @@ class Connected:
     def delays(self) -> IntColumn:
         """The delay of every connection."""
         return integers(*(bundle.delays for bundle in self.bundles))
+
+    @cached_property
+    def entry(self) -> IntColumn:
+        """The number of the entry of every connection."""
+        return Column.repeated(np.arange(len(self.bundles)), self.sizes, np.int64)
+
+    @property
+    def sizes(self) -> IntArray:
+        """How many connections each entry makes."""
+        return np.array([len(bundle.sources) for bundle in self.bundles], dtype=np.int64)
+
+    @cached_property
+    def wired(self) -> Wired:
+        """The connections as levels go by them."""
+        routes = tuple(bundle.route for bundle in self.bundles)
+        return Wired(self.sources, self.targets, self.delays, self.entry, routes)
 
 
 def connect(scopes: tuple[Scope, ...], census: Census, limits: Limits, seed: int) -> Connected:
@@ -93,8 +110,7 @@ def _ends(
 
 def join(made: Connected, rules: list[int]) -> Connections:
     """All entries as one structure of columns; ``rules`` has for each entry the index of its Projection, or −1."""
-    bundles = made.bundles
-    sizes = np.array([len(bundle.sources) for bundle in bundles], dtype=np.int64)
+    bundles, sizes = made.bundles, made.sizes
     return Connections(
         sources=made.sources,
         targets=made.targets,
@@ -102,11 +118,12 @@ def join(made: Connected, rules: list[int]) -> Connections:
         centres=reals(*(bundle.centres for bundle in bundles)),
         delays=made.delays,
         rules=Column.repeated(np.array(rules, dtype=np.int64), sizes, np.int64),
-        entry=Column.repeated(np.arange(len(bundles)), sizes, np.int64),
+        entry=made.entry,
         low=Column.repeated(np.array([bundle.low for bundle in bundles]), sizes, np.float64),
         high=Column.repeated(np.array([bundle.high for bundle in bundles]), sizes, np.float64),
         entries=tuple(bundle.name for bundle in bundles),
         descriptions=tuple(bundle.description for bundle in bundles),
         learns=tuple(None if bundle.learning is None else title_of(bundle.learning) for bundle in bundles),
         labels=tuple(bundle.label for bundle in bundles),
+        routes=() if all(route == PLAIN_ROUTE for route in made.wired.routes) else tuple(made.wired.routes),
     )

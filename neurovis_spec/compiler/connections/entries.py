@@ -21,11 +21,13 @@ from neurovis_spec.compiler.connections.edges import EdgeReader, End
 from neurovis_spec.compiler.connections.ends import Ends, counted
 from neurovis_spec.compiler.connections.patterns import all_to_all, empty_reason, pairs_of
 from neurovis_spec.compiler.connections.plasticity import ConnectionEnds, Learning, learning_of
+from neurovis_spec.compiler.connections.routes import default_delays, route_of
 from neurovis_spec.compiler.connections.weight_scale import Scaled, check_scale, scaled
 from neurovis_spec.compiler.events.settable import Assembled, Distance, Part
 from neurovis_spec.compiler.limits import LONGEST_DELAY, Limits, amount
 from neurovis_spec.compiler.names.references import Directory
 from neurovis_spec.compiler.names.scope import Scope
+from neurovis_spec.compiler.network import PLAIN_ROUTE, Route
 from neurovis_spec.compiler.neurons.labels import check_length
 from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.values.constants import Constants, Randomness, Value
@@ -68,6 +70,7 @@ class Bundle(NamedTuple):
     label: str | None = None
     #: of an entry that makes no connection the neurons of its ends
     empty: tuple[Indices, Indices] | None = None
+    route: Route = PLAIN_ROUTE
 
 
 class _Shape(NamedTuple):
@@ -127,6 +130,7 @@ class EntryBuilder:
         if body.label is not None:
             check_length(body.label, findings)
         delay = 1 if body.delay is None else self.constants.integer(body.delay, "a delay", 0, LONGEST_DELAY)
+        route = route_of(body, self.sources, self.targets, self.context.census, self.constants)
         errors_before_shape = findings.errors
         # what is collected here stands at cells of the matrix, what ``centre_parts`` collects at connections
         with self.constants.following() as centre_cell_parts:
@@ -149,19 +153,24 @@ class EntryBuilder:
         if (
             self.sources is UNKNOWN
             or self.targets is UNKNOWN
+            or route is UNKNOWN
             or not body.sound
             or findings.errors > errors_before_entry
         ):
             return UNKNOWN
+        sources, targets = self.sources[shape.i], self.targets[shape.j]
+        unsaid: int | Indices = known(delay, 1)
+        if body.delay is None:
+            unsaid = default_delays(sources, targets, route, self.context.census.models)
         learning = learning if len(shape.i) else None  # without connections there is nothing that a rule would change
         return Bundle(
             name=self.context.scope.called(self.name),
             key=self.key.span,
-            sources=self.sources[shape.i],
-            targets=self.targets[shape.j],
+            sources=sources,
+            targets=targets,
             weights=weights,
             centres=centres,
-            delays=_delays(shape, known(delay, 1)),  # at 0 it could close a cycle
+            delays=_delays(shape, unsaid),  # an invalid one is 1: at 0 it could close a cycle
             low=bounds[0],
             high=bounds[1],
             learning=learning,
@@ -175,6 +184,7 @@ class EntryBuilder:
             ),
             label=None if body.label is None else body.label.value,
             empty=None if len(shape.i) else (self.sources, self.targets),
+            route=route,
         )
 
     def _report_empty(self) -> None:
@@ -427,10 +437,10 @@ class EntryBuilder:
         )
 
 
-def _delays(shape: _Shape, delay: int) -> Indices:
+def _delays(shape: _Shape, delay: int | Indices) -> Indices:
     """The delay of each connection: that of its edge, where it has one, else that of the entry."""
     if shape.delays is None or (shape.delays < 0).all():
-        return np.broadcast_to(np.int64(delay), shape.i.shape)
+        return np.broadcast_to(np.asarray(delay, dtype=np.int64), shape.i.shape)
     return narrow(np.where(shape.delays >= 0, shape.delays, delay))
 
 

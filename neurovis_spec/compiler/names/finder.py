@@ -22,6 +22,7 @@ from neurovis_spec.compiler.names.state_references import (
     connections_state,
     model_state,
 )
+from neurovis_spec.compiler.neurons.groups import model_is_known
 from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.program import Definition
 from neurovis_spec.diagnostics import Findings, shorten
@@ -141,10 +142,8 @@ def _models(census: Census) -> tuple[Holder, ...]:
     members: dict[str, list[range]] = {}
     models: dict[str, Definition] = {}
     for one in census.groups:
-        written, model = one.model, one.kind.model.definition
-        if (not written.sound and "model" in written.unknown) or (
-            written.model is not None and written.model.name.value != model.name
-        ):
+        model = one.kind.model.definition
+        if not model_is_known(one):
             continue
         models[model.name] = model
         members.setdefault(model.name, []).append(one.group.indices)

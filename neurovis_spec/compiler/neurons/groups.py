@@ -92,6 +92,14 @@ class Built(NamedTuple):
     parts: tuple[Part, ...] = ()
 
 
+def model_is_known(one: Built) -> bool:
+    """Whether the model of a group is the one that is written: it is another one where that is invalid."""
+    written = one.model
+    if not written.sound and "model" in written.unknown:
+        return False
+    return written.model is None or written.model.name.value == one.kind.model.definition.name
+
+
 class _Defaults(NamedTuple):
     """The default values of n neurons, for keys that are not written."""
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.arrays import FloatArray, IntArray, frozen
+from neurovis_spec.arrays import FloatArray, Indices, IntArray, frozen, narrow
 from neurovis_spec.compiler.events.settable import Assembled
 from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.compiler.names.references import Directory, key_span
@@ -24,12 +24,25 @@ from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import Group, Neurons
 from neurovis_spec.compiler.neurons.groups import Builder, Built, Kinds, unread_neurons
 from neurovis_spec.compiler.neurons.positions import depend_on_positions
+from neurovis_spec.compiler.program import Definition
 from neurovis_spec.language.located import IDENTIFIER
 from neurovis_spec.language.model import names_of
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 
 #: Characters that no name has.
 _NO_LETTERS = re.compile(r"[^A-Za-z0-9_]+")
+
+
+class Models(NamedTuple):
+    """The models that there are, and for each neuron the number of its own."""
+
+    different: tuple[Definition, ...]
+    of: Indices
+
+    @property
+    def flow(self) -> bool:
+        """Whether any has a state with a derivative."""
+        return any(one.flows for one in self.different)
 
 
 @dataclass(frozen=True)
@@ -62,15 +75,31 @@ class Census:
         """For each neuron whether what the spec says of its position is invalid."""
         return self._each([one.position is UNKNOWN or "position" in one.model.unknown for one in self.groups])
 
+    @cached_property
+    def models(self) -> Models:
+        """The model of every neuron."""
+        different = {one.kind.model.definition.name: one.kind.model.definition for one in self.groups}
+        number = {name: place for place, name in enumerate(different)}
+        numbers = [number[one.kind.model.definition.name] for one in self.groups]
+        return Models(tuple(different.values()), np.repeat(narrow(np.array(numbers, dtype=np.int64)), self._counts))
+
+    @cached_property
+    def _counts(self) -> list[int]:
+        return [one.group.count for one in self.groups]
+
+    def groups_of(self, neurons: Indices) -> list[Built]:
+        """The groups that these neurons belong to."""
+        starts = [one.group.start for one in self.groups]
+        return [self.groups[number] for number in np.unique(np.searchsorted(starts, neurons, side="right") - 1)]
+
     def _each(self, values: list[bool]) -> npt.NDArray[np.bool_]:
         """For each neuron what holds of its group."""
-        return np.repeat(np.array(values, dtype=np.bool_), [one.group.count for one in self.groups])
+        return np.repeat(np.array(values, dtype=np.bool_), self._counts)
 
     def go_by_position(self, neurons: IntArray) -> None:
         """Mark the parameters that place these neurons as structural: which connections exist depends on them."""
-        starts = [one.group.start for one in self.groups]
-        for number in np.unique(np.searchsorted(starts, neurons, side="right") - 1).tolist():
-            depend_on_positions(self.groups[number].model.position, self.groups[number].constants)
+        for one in self.groups_of(neurons):
+            depend_on_positions(one.model.position, one.constants)
 
     @property
     def directory(self) -> Directory:

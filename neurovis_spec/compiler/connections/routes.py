@@ -1,0 +1,96 @@
+"""Routes: what the connections of an entry take at their sources, and to which ports of their targets they bring it.
+
+In: ``send`` and ``port`` of an entry, the neurons of its ends. Out: a Route, or UNKNOWN with findings; the delays of
+connections that name none, which depend on it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from functools import partial
+
+import numpy as np
+
+from neurovis_spec.arrays import Indices
+from neurovis_spec.compiler.levels import default_delay, ports_of, sent_by
+from neurovis_spec.compiler.network import PLAIN_ROUTE, Route
+from neurovis_spec.compiler.neurons.groups import Built, model_is_known
+from neurovis_spec.compiler.neurons.populate import Census, Models
+from neurovis_spec.compiler.program import MODEL, Definition
+from neurovis_spec.compiler.values.constants import Constants
+from neurovis_spec.diagnostics import Findings, Home, Undeclared, shorten
+from neurovis_spec.language.located import Located
+from neurovis_spec.language.sections import ConnectionModel
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
+from neurovis_spec.language.values import PortFactor
+from neurovis_spec.likeness import suggest
+
+
+def route_of(
+    body: ConnectionModel, sources: Indices | Unknown, targets: Indices | Unknown, census: Census, constants: Constants
+) -> Route | Unknown:
+    """The route of an entry; UNKNOWN where what it says of that is invalid."""
+    if body.port is None and body.send is None:
+        return PLAIN_ROUTE if body.unknown.isdisjoint(("port", "send")) else UNKNOWN
+    findings = constants.findings
+    before = findings.errors
+    ports = PLAIN_ROUTE.ports
+    if body.port is not None:
+        ports = tuple(_ports(body.port, () if targets is UNKNOWN else _known(census.groups_of(targets)), constants))
+    from_ = [] if sources is UNKNOWN else _known(census.groups_of(sources))
+    sends = "" if body.send is None else _sends(body.send, from_, findings)
+    return UNKNOWN if findings.errors > before else Route(sends, ports)
+
+
+def _known(groups: Sequence[Built]) -> list[Built]:
+    """The groups whose model is in order."""
+    return [one for one in groups if model_is_known(one)]
+
+
+def _ports(written: Sequence[PortFactor], groups: Sequence[Built], constants: Constants) -> Iterator[tuple[str, float]]:
+    """The ports with their factors, on which the structure depends."""
+    for name, factor in written:
+        lacking = next((one for one in groups if name.value not in ports_of(one.kind.model.definition)), None)
+        if lacking is not None:
+            report_no_port(name, lacking.name, lacking.kind.model.definition, constants.findings)
+        value = 1.0 if factor is None else constants.scalar(factor, structural=True)
+        yield name.value, math.nan if value is UNKNOWN else value
+
+
+def report_no_port(name: Located[str], group: str, model: Definition, findings: Findings) -> None:
+    """That the neurons of a group have no such port."""
+    ports = ports_of(model)
+    message = f"'{group}' has no port '{shorten(name.value)}': its model '{model.name}' has none of that name"
+    lost = Undeclared(name.value, Home((MODEL.section, model.name), ("ports",)))
+    findings.error("unknown-port", name.span, message, partial(suggest, name.value, ports, "ports"), undeclared=lost)
+
+
+def _sends(name: Located[str], groups: Sequence[Built], findings: Findings) -> str:
+    """What is taken; "" where it is what all of these send by themselves."""
+    for one in groups:
+        model = one.kind.model.definition
+        having = (MODEL.gives, *(quantity.name for quantity in model.kept))
+        if name.value not in having:
+            message = (
+                f"'{one.name}' cannot send '{shorten(name.value)}': its model '{model.name}' has none of that name"
+            )
+            lost = Undeclared(name.value, Home((MODEL.section, model.name), ("state", "outputs")))
+            hint = partial(suggest, name.value, having, "it can send")
+            findings.error("unknown-output", name.span, message, hint, undeclared=lost)
+            return ""
+    own = all(sent_by(one.kind.model.definition, "") == name.value for one in groups)
+    return "" if own else name.value
+
+
+def default_delays(sources: Indices, targets: Indices, route: Route, models: Models) -> int | Indices:
+    """The delays of connections that name none: one for all, or one for each."""
+    if not models.flow:
+        return 1
+    ports = [name for name, _ in route.ports]
+    table = np.array([
+        [default_delay(source, route.sends, target, ports) for target in models.different]
+        for source in models.different
+    ])  # fmt: skip
+    found = table[models.of[sources], models.of[targets]]
+    return int(found[0]) if len(found) and (found == found[0]).all() else found

@@ -1,0 +1,387 @@
+"""Levels: when neurons are updated within a step, and what of them is made anew at the stages of its integration.
+
+In: the model of each neuron, the connections with what they take and where they bring it. Out: an Order, or a Cycle:
+neurons that wait for each other.
+
+A neuron is updated behind all that reach it with delay 0. Where states flow, their integration is one more node of that
+graph: behind what does not flow and reaches a derivative without delay, and before all neurons whose states flow. What
+*flows* is a function of states with a derivative, parameters, the time, and ports at which only what flows arrives; it
+reaches derivatives at each stage, so that such connections may form cycles, unless an output closes them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray, IntColumn, frozen, narrow
+from neurovis_spec.compiler.network import PLAIN_ROUTE, Route
+from neurovis_spec.compiler.program import DRIVE, MODEL, Definition
+from neurovis_spec.language.expressions.functions import CONSTANTS
+from neurovis_spec.language.expressions.tree import Tree, names
+
+#: What formulas read that is the same at all stages, or the time of each.
+_STEADY = frozenset({*CONSTANTS, "t", "dt"})
+
+
+class Reads(NamedTuple):
+    """The names that formulas of a model read, with intermediate values put in."""
+
+    #: of each thing that connections can take: the activity, states, outputs
+    sent: Mapping[str, frozenset[str]]
+    #: of derivatives and noise
+    flow: frozenset[str]
+    #: of what is made once a step
+    update: frozenset[str]
+
+
+def reads_of(model: Definition) -> Reads:
+    """What a model reads."""
+    unfolded: dict[str, frozenset[str]] = {}
+
+    def read(*trees: Tree | None) -> frozenset[str]:
+        found: set[str] = set()
+        for tree in trees:
+            for name in () if tree is None else names(tree):
+                found |= unfolded.get(name, {name})
+        return frozenset(found)
+
+    for name, tree in model.let:
+        unfolded[name] = read(tree)
+    sent = {one.name: frozenset((one.name,)) for one in model.state}
+    sent |= {one.name: read(one.each_step) for one in model.gives}
+    steps = (tree for one in (*model.state, *model.gives) for tree in (one.each_step, one.each_episode))
+    return Reads(sent, read(*(tree for one in model.flows for tree in (one.derivative, one.noise))), read(*steps))
+
+
+def sent_by(model: Definition, sends: str) -> str:
+    """What a connection takes of a neuron of this model that is told to take this; "" is what the model sends."""
+    return sends or model.send or MODEL.gives
+
+
+def _steady(model: Definition) -> frozenset[str]:
+    """What a formula of a model may read that flows or never changes within a step, beside its ports."""
+    return _STEADY.union(model.parameters, (one.name for one in model.flows))
+
+
+def ports_of(model: Definition) -> tuple[str, ...]:
+    """The names of the ports of a model."""
+    return DRIVE, *(port.name for port in model.ports)
+
+
+def default_delay(source: Definition, sends: str, target: Definition, ports: Sequence[str]) -> int:
+    """The delay of a connection that names none, by the models of its ends: 0 where the source has a derivative, what
+    is sent is a function of what flows there, and a derivative of the target reads what arrives; else 1."""
+    if not source.flows or not target.flows or reads_of(target).flow.isdisjoint(ports):
+        return 1
+    read = reads_of(source).sent.get(sent_by(source, sends))
+    return 0 if read is not None and read <= _steady(source) else 1
+
+
+class Cycle(NamedTuple):
+    """Neurons that wait for each other: the first is named again at the end; ``connection`` closes the cycle. The
+    number behind those of all neurons is the integration. ``algebraic``: it is their outputs that read each other
+    within a stage."""
+
+    neurons: tuple[int, ...]
+    connection: int
+    algebraic: bool = False
+
+
+class Stages(NamedTuple):
+    """The integration: its level; by ports which signals of their Line are made anew at each stage; for each neuron
+    whether anything that is sent is."""
+
+    level: int
+    staged: Mapping[str, BoolArray]
+    made: BoolArray
+
+
+class Order(NamedTuple):
+    """For each neuron its level, and its level within a stage; ``stages`` where anything flows."""
+
+    level: IntArray
+    stage: IntArray
+    stages: Stages | None = None
+
+
+class Line(NamedTuple):
+    """What arrives at the ports of a name: the connections, ascending (None: all), and what each signal is multiplied
+    by, None where that is 1."""
+
+    connections: Indices | None = None
+    factors: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class Wired:
+    """The connections, as far as levels go by them: an entry has one of the ``routes``, and ``entry`` says of each
+    connection which entry it is of."""
+
+    sources: IntColumn
+    targets: IntColumn
+    delays: IntColumn
+    entry: IntColumn
+    routes: Sequence[Route]
+
+    @cached_property
+    def lines(self) -> Mapping[str, Line]:
+        """By ports what arrives there."""
+        if all(route == PLAIN_ROUTE for route in self.routes):
+            return {DRIVE: Line()}
+        entry, result = self.entry.compact(), {DRIVE: Line(np.zeros(0, dtype=np.int64))}
+        for port in dict.fromkeys(name for route in self.routes for name, _ in route.ports):
+            factor = np.array([dict(route.ports).get(port, np.nan) for route in self.routes])
+            there = np.flatnonzero(~np.isnan(factor)[entry])
+            factors = factor[entry[there]]
+            result[port] = Line(frozen(narrow(there)), None if (factors == 1).all() else frozen(factors))
+        return result
+
+    @cached_property
+    def undelayed(self) -> BoolArray:
+        """For each connection whether it brings what is sent in the same step."""
+        return np.asarray(self.delays.compact() == 0)
+
+
+def order_of(
+    models: Sequence[Definition], model: Indices, wired: Wired, held: Mapping[str, BoolArray]
+) -> Order | Cycle:
+    """The levels of all neurons. ``models`` are those that there are, ``model`` the number of that of each neuron;
+    ``held`` says by ports where something is added that does not flow: tables, supplied inputs, noise."""
+    if any(one.flows for one in models):
+        return _Coupled(models, model, wired, held).order
+    level: IntArray | Cycle = np.zeros(len(model), dtype=np.int64)
+    if (wired.delays.kept == 0).any():
+        undelayed = np.flatnonzero(wired.undelayed)
+        level = levels_along(len(model), undelayed, wired.sources.some(undelayed), wired.targets.some(undelayed))
+    return level if isinstance(level, Cycle) else Order(level, np.zeros(len(model), dtype=np.int64))
+
+
+class _Undelayed(NamedTuple):
+    """The connections to the ports of a name: which of them have no delay, these, their sources and their targets."""
+
+    among: BoolArray
+    connections: Indices
+    sources: Indices
+    targets: Indices
+
+
+@dataclass(frozen=True)
+class _Coupled:
+    """A network in which something flows."""
+
+    models: Sequence[Definition]
+    model: Indices
+    wired: Wired
+    held: Mapping[str, BoolArray]
+
+    @cached_property
+    def reads(self) -> tuple[Reads, ...]:
+        """What each model reads."""
+        return tuple(map(reads_of, self.models))
+
+    @cached_property
+    def sources(self) -> Indices:
+        """The source of each connection."""
+        return self.wired.sources.compact()
+
+    @cached_property
+    def targets(self) -> Indices:
+        """The target of each connection."""
+        return self.wired.targets.compact()
+
+    def _arriving(self, port: str) -> Indices:
+        """The connections to the ports of a name."""
+        found = self.wired.lines[port].connections
+        return np.arange(len(self.sources), dtype=np.int64) if found is None else found
+
+    @cached_property
+    def undelayed(self) -> dict[str, _Undelayed]:
+        """By ports the connections without delay."""
+        result = {}
+        for port in self.wired.lines:
+            arriving = self._arriving(port)
+            among = self.wired.undelayed[arriving]
+            found = arriving[among]
+            result[port] = _Undelayed(among, found, self.sources[found], self.targets[found])
+        return result
+
+    def _of_neurons(self, port: str, reading: Sequence[Collection[str]]) -> BoolArray:
+        """For each neuron whether what there is for its model has the name of a port in it."""
+        return np.array([port in read for read in reading], dtype=np.bool_)[self.model]
+
+    @cached_property
+    def by_flow(self) -> dict[str, BoolArray]:
+        """By ports for each neuron whether a derivative reads it."""
+        return {port: self._of_neurons(port, [one.flow for one in self.reads]) for port in self.wired.lines}
+
+    @cached_property
+    def by_update(self) -> dict[str, BoolArray]:
+        """By ports for each neuron whether what is made once a step reads it."""
+        return {port: self._of_neurons(port, [one.update for one in self.reads]) for port in self.wired.lines}
+
+    def _of_sent(self, holds: Callable[[Definition, Collection[str]], bool]) -> BoolArray:
+        """For each connection what holds of its source's model and of what is read there for what it takes."""
+        table = [
+            [
+                holds(model, reads.sent.get(sent_by(model, route.sends), ()))  # of no such neuron it takes anything
+                for route in self.wired.routes
+            ]
+            for model, reads in zip(self.models, self.reads, strict=True)
+        ]
+        of_both = np.array(table, dtype=np.bool_).reshape(len(self.models), len(self.wired.routes))
+        return np.asarray(of_both[self.model[self.sources], self.wired.entry.compact()])
+
+    @cached_property
+    def through(self) -> dict[str, BoolArray]:
+        """By ports for each connection whether what it takes reads that port of its source."""
+        return {port: self._reading(port) for port in self.wired.lines}
+
+    def _reading(self, port: str) -> BoolArray:
+        """The same for one port."""
+        return self._of_sent(lambda _, read: port in read)
+
+    @cached_property
+    def flowing(self) -> BoolArray:
+        """For each connection whether what it brings flows. What reads something that is held is held, too, and so on
+        until nothing more is found."""
+        n = len(self.model)
+        mixed = {port: self.held.get(port, np.zeros(n, dtype=np.bool_)).copy() for port in self.wired.lines}
+        for port, values in mixed.items():
+            arriving = self._arriving(port)
+            values[self.targets[arriving[~self.undelayed[port].among]]] = True
+        flowing = self._of_sent(lambda model, read: _steady(model).union(ports_of(model)).issuperset(read))
+        while True:
+            for port, values in mixed.items():
+                flowing &= ~(self.through[port] & values[self.sources])
+            before = sum(int(values.sum()) for values in mixed.values())
+            for port, (_, connections, _, targets) in self.undelayed.items():
+                mixed[port][targets[~flowing[connections]]] = True
+            if sum(int(values.sum()) for values in mixed.values()) == before:
+                return flowing
+
+    @cached_property
+    def staged(self) -> dict[str, BoolArray]:
+        """By ports for each of its undelayed connections whether it is made anew at each stage: what it brings flows,
+        and a derivative reads that, or what another such connection takes."""
+        result: dict[str, BoolArray] = {}
+        making = np.zeros(len(self.sources), dtype=np.bool_)
+        while True:
+            before = int(making.sum())
+            for port, (_, connections, _, targets) in self.undelayed.items():
+                read = self.by_flow[port] | self._passed_on(port, making)
+                result[port] = self.flowing[connections] & read[targets]
+                making[connections[result[port]]] = True
+            if int(making.sum()) == before:
+                return result
+
+    def _passed_on(self, port: str, making: BoolArray) -> BoolArray:
+        """For each neuron whether any of some connections takes of it what reads a port."""
+        reading = np.zeros(len(self.model), dtype=np.bool_)
+        reading[self.sources[making & self.through[port]]] = True
+        return reading
+
+    @cached_property
+    def making(self) -> BoolArray:
+        """For each connection whether it brings to any port what is made anew at each stage."""
+        result = np.zeros(len(self.sources), dtype=np.bool_)
+        for port, (_, connections, _, _) in self.undelayed.items():
+            result[connections[self.staged[port]]] = True
+        return result
+
+    @property
+    def order(self) -> Order | Cycle:
+        """The levels."""
+        n = len(self.model)
+        stage = self._stages()
+        if isinstance(stage, Cycle):
+            return stage
+        level = levels_along(n + 1, *self._waits())
+        if isinstance(level, Cycle):
+            return level
+        staged = {}
+        for port, (among, *_) in self.undelayed.items():
+            staged[port] = np.zeros(len(among), dtype=np.bool_)
+            staged[port][among] = self.staged[port]
+        made = np.zeros(n, dtype=np.bool_)
+        made[self.sources[self.making]] = True
+        return Order(level[:n], stage, Stages(int(level[n]), staged, made))
+
+    def _stages(self) -> IntArray | Cycle:
+        """For each neuron its level within a stage."""
+        edges = []
+        for port, (_, connections, sources, targets) in self.undelayed.items():
+            waits = self.staged[port] & self._passed_on(port, self.making)[targets]
+            edges.append((connections[waits], sources[waits], targets[waits]))
+        level = levels_along(len(self.model), *_joined(edges))
+        return level._replace(algebraic=True) if isinstance(level, Cycle) else level
+
+    def _waits(self) -> tuple[Indices, Indices, Indices]:
+        """Who waits for whom within a step: the connection (−1 for none), the first, and the one that waits."""
+        integration = len(self.model)
+        flows = np.flatnonzero(np.array([bool(one.flows) for one in self.models], dtype=np.bool_)[self.model])
+        edges: list[tuple[Indices, Indices, Indices]] = [
+            (np.full(len(flows), -1), np.full(len(flows), integration), flows)
+        ]
+        for port, (_, connections, sources, targets) in self.undelayed.items():
+            updated = self.by_update[port][targets]
+            edges.append((connections[updated], sources[updated], targets[updated]))
+            before = self.by_flow[port][targets] & ~self.flowing[connections]
+            edges.append((connections[before], sources[before], np.full(int(before.sum()), integration)))
+        return _joined(edges)
+
+
+def _joined(edges: list[tuple[Indices, Indices, Indices]]) -> tuple[Indices, Indices, Indices]:
+    """Edges one behind the other: connections, begins and ends."""
+    connections, begins, ends = zip(*edges, strict=True)
+    return np.concatenate(connections), np.concatenate(begins), np.concatenate(ends)
+
+
+def levels_along(n: int, connections: Indices, begins: Indices, ends: Indices) -> IntArray | Cycle:
+    """The level of each of n nodes, by Kahn's algorithm: one more than the highest of those that reach it; a cycle
+    where there is one. ``connections`` are those that the edges stand for, −1 where there is none."""
+    level = [0] * n
+    if not len(begins):
+        return np.array(level, dtype=np.int64)
+    # the targets of each node: outgoing[starts[node] : starts[node + 1]]
+    order = np.argsort(begins, kind="stable")
+    outgoing = ends[order]
+    starts = np.searchsorted(begins[order], np.arange(n + 1)).tolist()
+    waiting = np.bincount(ends, minlength=n).tolist()
+    ready = [node for node in range(n) if waiting[node] == 0]
+    finished = 0
+    while finished < len(ready):
+        node = ready[finished]
+        finished += 1
+        for target in outgoing[starts[node] : starts[node + 1]].tolist():
+            level[target] = max(level[target], level[node] + 1)
+            waiting[target] -= 1
+            if waiting[target] == 0:
+                ready.append(target)
+    if len(ready) == n:
+        return np.array(level, dtype=np.int64)
+    return _cycle(connections, begins, ends, waiting)
+
+
+def _cycle(connections: Indices, begins: Indices, ends: Indices, waiting: list[int]) -> Cycle:
+    """Go backwards among the nodes that still wait until one comes up again: each of them has a source that waits, as
+    there is a cycle. ``begins`` and ``ends`` are the sources and the targets of the ``connections``."""
+    connection_into: dict[int, int] = {}
+    source_of: dict[int, int] = {}
+    for connection, source, target in zip(connections.tolist(), begins.tolist(), ends.tolist(), strict=True):
+        if waiting[source] and waiting[target] and target not in source_of:
+            connection_into[target], source_of[target] = connection, source
+    node = min(source_of)  # any of them; the same each time
+    path: list[int] = []
+    place_in_path: dict[int, int] = {}
+    while node not in place_in_path:
+        place_in_path[node] = len(path)
+        path.append(node)
+        node = source_of[node]
+    ring = path[place_in_path[node] :]
+    forward = (ring[0], *reversed(ring))
+    return Cycle(forward, next(connection_into[one] for one in ring if connection_into[one] >= 0))
