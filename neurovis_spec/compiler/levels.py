@@ -20,7 +20,7 @@ import numpy as np
 
 from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray, IntColumn, frozen, narrow
 from neurovis_spec.compiler.network import PLAIN_ROUTE, Route
-from neurovis_spec.compiler.program import DRIVE, MODEL, Definition
+from neurovis_spec.compiler.program import DRIVE, MODEL, Definition, ports_of
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import Tree, names
 
@@ -66,11 +66,6 @@ def sent_by(model: Definition, sends: str) -> str:
 def _steady(model: Definition) -> frozenset[str]:
     """What a formula of a model may read that flows or never changes within a step, beside its ports."""
     return _STEADY.union(model.parameters, (one.name for one in model.flows))
-
-
-def ports_of(model: Definition) -> tuple[str, ...]:
-    """The names of the ports of a model."""
-    return DRIVE, *(port.name for port in model.ports)
 
 
 def default_delay(source: Definition, sends: str, target: Definition, ports: Sequence[str]) -> int:

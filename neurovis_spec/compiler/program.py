@@ -165,6 +165,11 @@ class Definition:
         return any(is_activation(node) for tree in self.functions.values() for node in walk(tree))
 
 
+def ports_of(model: Definition) -> tuple[str, ...]:
+    """The names of the ports of a model."""
+    return DRIVE, *(port.name for port in model.ports)
+
+
 def is_activation(node: Tree) -> bool:
     """Whether a node of a formula of a model is the neuron's activation of something."""
     return isinstance(node, Call) and node.function == "f"

@@ -59,17 +59,20 @@ from neurovis_spec.language.patterns import PATTERNS, PatternField
 from neurovis_spec.language.values import (
     FILE,
     ActivationField,
+    AtPort,
+    BiasField,
     CentreField,
     EdgesField,
     FileReference,
-    FormulasField,
     InitialField,
     MatrixField,
     ModelField,
+    NoiseField,
     Pair,
     PortsField,
     RuleField,
     as_file,
+    at_ports,
     pair,
 )
 from neurovis_spec.language.words import METHODS, Combine, Method, NeuronRole
@@ -172,6 +175,9 @@ def _as_input(node: Node, info: ValidationInfo) -> Located[str]:
     refuse(info, node, "the name of an input", hint)
 
 
+_INPUTS = "the name of an input, or ports with inputs"
+
+
 class GroupModel(Model):
     """A group of neurons, or a single one."""
 
@@ -200,18 +206,19 @@ class GroupModel(Model):
         None,
         description="What arrives is combined by sum or product of w·a, or by distance √Σ(w·a − c)² (default sum).",
     )
-    bias: Annotated[FormulasField, GROUP_DRAWN] | None = Field(
-        None, description="Added to the combined input (default 0)."
+    bias: Annotated[BiasField, GROUP_DRAWN] | None = Field(
+        None, description="Added to the combined input (default 0); or to several ports: {drive: 1, inhibitory: 2}."
     )
     initial: Annotated[InitialField, GROUP_DRAWN] | None = Field(
         None,
         description="The activity at step 0, else computed; or states of the model, too: {v: -65, activity: 0.5}.",
     )
-    input: Annotated[Located[str], Leaf(_as_input, TEXT), naming("input")] | None = Field(
-        None, description="An entry of inputs, added to the combined input."
+    input: Annotated[tuple[AtPort[Located[str]], ...], at_ports(_as_input, TEXT, _INPUTS), naming("input")] | None = (
+        Field(None, description="An entry of inputs, added to the combined input; or to ports: {excitatory: rain}.")
     )
-    noise: Annotated[FormulaField, NOISE] | None = Field(
-        None, description="An expression with normal(m, s) or uniform(a, b), drawn anew and added each step."
+    noise: Annotated[NoiseField, NOISE] | None = Field(
+        None,
+        description="An expression with normal(m, s) or uniform(a, b), drawn anew and added each step; or by ports.",
     )
     position: Annotated[FileReference | AnyList | None, Leaf(_position, Either((TWO, ListOf(TWO), FILE))), GROUP] = (
         Field(None, description="Where the neuron is, as data: [x, y], a list of them, a file. It is no pin.")

@@ -5,8 +5,9 @@ In: nodes. Out: one frozen value each, so that nobody behind this module asks ag
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from collections.abc import Mapping as AnyMapping
-from typing import Annotated, ClassVar, Final, NamedTuple, TypeAlias, TypeVar
+from typing import Annotated, ClassVar, Final, Generic, NamedTuple, TypeAlias, TypeVar
 
 from pydantic import Field, ValidationInfo
 
@@ -32,6 +33,7 @@ from neurovis_spec.language.grammar import (
     Plain,
     Role,
     Row,
+    Shape,
     declaring,
 )
 from neurovis_spec.language.keys import read_keys
@@ -269,26 +271,40 @@ _STATES: Final = Map(
 InitialField = Annotated[Initial, Leaf(as_initial, Either((FORMULA, ListOf(FORMULA), _STATES)))]
 
 
-class PortFactor(NamedTuple):
-    """A port by its name, and what a signal is multiplied by in it; None where it is as it is."""
+class AtPort(NamedTuple, Generic[T]):
+    """What a group gives to a port, or a connection does there. ``port`` is None where none is named: it is drive."""
 
-    name: Located[str]
-    factor: Formula | None = None
+    value: T
+    port: Located[str] | None = None
 
 
-def as_ports(node: Node, info: ValidationInfo) -> tuple[PortFactor, ...]:
+def at_ports(read: Callable[[Node, ValidationInfo], T], shape: Shape, wanted: str) -> Leaf[Node]:
+    """The annotation of a field that takes a value for drive, or a mapping of ports, each with a value."""
+
+    def check(node: Node, info: ValidationInfo) -> tuple[AtPort[T], ...]:
+        if not isinstance(node, Mapping):
+            return (AtPort(read(node, info)),)
+        if not node.entries:
+            refuse(info, node, wanted)
+        return tuple(AtPort(read(one.value, info), Located(one.name, one.key)) for one in node.entries)
+
+    return Leaf(check, Either((shape, Map({}, shape, least=1))))
+
+
+def as_ports(node: Node, info: ValidationInfo) -> tuple[AtPort[Formula | None], ...]:
     """The name of a port, or a mapping of ports and factors."""
-    if isinstance(node, AnyList):
-        refuse(info, node, "a port, or ports with factors", "write {PORT: 1, PORT: 1}")
+    if isinstance(node, AnyList) or (isinstance(node, Mapping) and not node.entries):
+        refuse(info, node, "the name of a port, or ports with factors", "write port: NAME, or {NAME: 1, NAME: 1}")
     if not isinstance(node, Mapping):
-        return (PortFactor(as_text(node, info)),)
-    if not node.entries:
-        refuse(info, node, "a port, or ports with factors", "write port: NAME")
-    return tuple(PortFactor(Located(one.name, one.key), as_formula(one.value, info)) for one in node.entries)
+        return (AtPort(None, as_text(node, info)),)
+    return tuple(AtPort(as_formula(one.value, info), Located(one.name, one.key)) for one in node.entries)
 
 
-_PORTS: Final = Either((TEXT, Map({}, FORMULA, least=1)))
-PortsField = Annotated[tuple[PortFactor, ...], Leaf(as_ports, _PORTS)]
+PortsField = Annotated[tuple[AtPort[Formula | None], ...], Leaf(as_ports, Either((TEXT, Map({}, FORMULA, least=1))))]
+BiasField = Annotated[
+    tuple[AtPort[Formula | FormulaList], ...], at_ports(as_formulas, FORMULAS, "a bias, or ports with biases")
+]
+NoiseField = Annotated[tuple[AtPort[Formula], ...], at_ports(as_formula, FORMULA, "a noise, or ports with noises")]
 
 
 class ParameterModel(Model):

@@ -13,17 +13,18 @@ from functools import partial
 import numpy as np
 
 from neurovis_spec.arrays import Indices
-from neurovis_spec.compiler.levels import default_delay, ports_of, sent_by
+from neurovis_spec.compiler.levels import default_delay, sent_by
+from neurovis_spec.compiler.names.state_references import no_port
 from neurovis_spec.compiler.network import PLAIN_ROUTE, Route
-from neurovis_spec.compiler.neurons.groups import Built, model_is_known
+from neurovis_spec.compiler.neurons.groups import Built, is_written
 from neurovis_spec.compiler.neurons.populate import Census, Models
-from neurovis_spec.compiler.program import MODEL, Definition
+from neurovis_spec.compiler.program import MODEL
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, Home, Undeclared, shorten
-from neurovis_spec.language.located import Located
+from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.sections import ConnectionModel
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
-from neurovis_spec.language.values import PortFactor
+from neurovis_spec.language.values import AtPort
 from neurovis_spec.likeness import suggest
 
 
@@ -45,25 +46,21 @@ def route_of(
 
 def _known(groups: Sequence[Built]) -> list[Built]:
     """The groups whose model is in order."""
-    return [one for one in groups if model_is_known(one)]
+    return [one for one in groups if is_written(one.kind, one.model)]
 
 
-def _ports(written: Sequence[PortFactor], groups: Sequence[Built], constants: Constants) -> Iterator[tuple[str, float]]:
+def _ports(
+    written: Sequence[AtPort[Formula | None]], groups: Sequence[Built], constants: Constants
+) -> Iterator[tuple[str, float]]:
     """The ports with their factors, on which the structure depends."""
-    for name, factor in written:
-        lacking = next((one for one in groups if name.value not in ports_of(one.kind.model.definition)), None)
-        if lacking is not None:
-            report_no_port(name, lacking.name, lacking.kind.model.definition, constants.findings)
+    for factor, port in written:
+        assert port is not None
+        found = (no_port(port.value, one.name, one.kind.model.definition) for one in groups)
+        if (refusal := next(filter(None, found), None)) is not None:
+            findings = constants.findings
+            findings.error("unknown-port", port.span, refusal.message, refusal.hint, undeclared=refusal.undeclared)
         value = 1.0 if factor is None else constants.scalar(factor, structural=True)
-        yield name.value, math.nan if value is UNKNOWN else value
-
-
-def report_no_port(name: Located[str], group: str, model: Definition, findings: Findings) -> None:
-    """That the neurons of a group have no such port."""
-    ports = ports_of(model)
-    message = f"'{group}' has no port '{shorten(name.value)}': its model '{model.name}' has none of that name"
-    lost = Undeclared(name.value, Home((MODEL.section, model.name), ("ports",)))
-    findings.error("unknown-port", name.span, message, partial(suggest, name.value, ports, "ports"), undeclared=lost)
+        yield port.value, math.nan if value is UNKNOWN else value
 
 
 def _sends(name: Located[str], groups: Sequence[Built], findings: Findings) -> str:

@@ -28,6 +28,7 @@ from neurovis_spec.compiler.events.settable import (
     Settable,
     Slot,
     Variable,
+    bias_of,
     table_of,
 )
 from neurovis_spec.compiler.network import Located, Network, Noise
@@ -118,6 +119,7 @@ def _arrays(network: Network) -> Mapping[Key, FloatArray | FloatColumn]:
         CENTRES: connections.centres,
         LOW: connections.low,
         HIGH: connections.high,
+        **{bias_of(port): values for port, values in network.neurons.port_bias.items()},
     }
     for _, use in network.uses:
         arrays |= {Key(use.owner, name): values for name, values in use.parameters.items()}

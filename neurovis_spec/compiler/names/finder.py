@@ -22,7 +22,7 @@ from neurovis_spec.compiler.names.state_references import (
     connections_state,
     model_state,
 )
-from neurovis_spec.compiler.neurons.groups import model_is_known
+from neurovis_spec.compiler.neurons.groups import is_written
 from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.program import Definition
 from neurovis_spec.diagnostics import Findings, shorten
@@ -143,7 +143,7 @@ def _models(census: Census) -> tuple[Holder, ...]:
     models: dict[str, Definition] = {}
     for one in census.groups:
         model = one.kind.model.definition
-        if not model_is_known(one):
+        if not is_written(one.kind, one.model):
             continue
         models[model.name] = model
         members.setdefault(model.name, []).append(one.group.indices)

@@ -12,6 +12,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from neurovis_spec.arrays import Indices, IntArray
+from neurovis_spec.compiler.program import MODEL, Definition, ports_of
 from neurovis_spec.diagnostics import Home, Undeclared, shorten
 from neurovis_spec.language.references import StateName
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
@@ -106,6 +107,15 @@ def no_state(what: Literal["model", "rule"], name: str, of: str, state: str, sta
         return Refusal(f"{owner} has no states")
     lost = Undeclared(state, Home((f"{what}s", name), ("state",)))
     return Refusal(f"{owner} has no state '{shorten(state)}'", suggest(state, states, "its states are"), lost)
+
+
+def no_port(port: str, group: str, model: Definition) -> Refusal | None:
+    """That the neurons of a group have not this port, by their model; None where they have."""
+    known = ports_of(model)
+    if port in known:
+        return None
+    lost = Undeclared(port, Home((MODEL.section, model.name), ("ports",)))
+    return Refusal(f"'{group}' has no port '{shorten(port)}'", suggest(port, known, "ports"), lost)
 
 
 def singles(states: Iterable[StateOf]) -> Iterator[tuple[str, str, int]]:

@@ -6,23 +6,24 @@ neuron.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple, TypeAlias
+from types import MappingProxyType
+from typing import NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray, frozen
-from neurovis_spec.compiler.events.settable import Part
+from neurovis_spec.compiler.events.settable import Part, bias_of
 from neurovis_spec.compiler.limits import PATIENCE, Limits, amount, plural
 from neurovis_spec.compiler.names.references import key_span, known_inputs
 from neurovis_spec.compiler.names.scope import Scope
-from neurovis_spec.compiler.names.state_references import no_state
+from neurovis_spec.compiler.names.state_references import no_port, no_state
 from neurovis_spec.compiler.network import Group, Input
 from neurovis_spec.compiler.neurons.labels import labels_of
 from neurovis_spec.compiler.neurons.positions import positions_of
-from neurovis_spec.compiler.program import ACTIVATION, MODEL, Kind
+from neurovis_spec.compiler.program import ACTIVATION, DRIVE, MODEL, Kind
 from neurovis_spec.compiler.values.arguments import Settled, check_initials, neurons, settled_of, spread
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.definitions import Definitions
@@ -42,11 +43,12 @@ from neurovis_spec.language.located import (
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown, known
-from neurovis_spec.language.values import Choice, FormulaList, Initial
+from neurovis_spec.language.values import AtPort, Choice, FormulaList, Initial
 from neurovis_spec.language.yaml.source import AnyList, Scalar
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 from neurovis_spec.likeness import meant, nearest
 
+T = TypeVar("T")
 _NOISE = formula_at(GroupModel, "noise")
 
 
@@ -60,6 +62,14 @@ class NeuronType(NamedTuple):
     def parts(self) -> tuple[Part, ...]:
         """Which of their parameters follow parameters of a run."""
         return *self.activation.parts, *self.model.parts
+
+
+class WrittenNoise(NamedTuple):
+    """Noise of a group: the port that it is added to, and how it is written and read."""
+
+    port: str
+    formula: Formula
+    tree: Tree | Unknown
 
 
 class Built(NamedTuple):
@@ -87,17 +97,19 @@ class Built(NamedTuple):
     constants: Constants
     #: what states of its model begin with
     starts: Mapping[str, FloatArray]
-    noise: Tree | Unknown
+    noises: tuple[WrittenNoise, ...]
     #: which of its numbers follow parameters: of ``bias``, of ``position`` (x, then y), of those of its kind
     parts: tuple[Part, ...] = ()
+    #: bias and input of ports other than ``drive``
+    port_bias: Mapping[str, FloatArray] = MappingProxyType({})
+    port_input: Mapping[str, IntArray] = MappingProxyType({})
 
 
-def model_is_known(one: Built) -> bool:
+def is_written(kind: NeuronType, model: GroupModel) -> bool:
     """Whether the model of a group is the one that is written: it is another one where that is invalid."""
-    written = one.model
-    if not written.sound and "model" in written.unknown:
+    if not model.sound and "model" in model.unknown:
         return False
-    return written.model is None or written.model.name.value == one.kind.model.definition.name
+    return model.model is None or model.model.name.value == kind.model.definition.name
 
 
 class _Defaults(NamedTuple):
@@ -151,13 +163,13 @@ class Builder:
         names, first_number = (UNKNOWN, None) if _may_lack_names(model) else self._names(name, model, start)
         n = UNKNOWN if names is UNKNOWN else len(names)
         kind = self._kind(name, model, n)
-        bias, bias_parts = self._bias(model, n, name)
+        biases, bias_parts = self._bias(model, n, name, kind)
         given = model.initial or _NO_INITIAL
         initial = UNKNOWN if given.activity is None else self._drawn(given.activity, n, "initial", name)
         starts = self._starts(given, n, name, kind, model) if given.states else _NO_STARTS
-        input_index = self._input(model, n)
+        inputs = self._inputs(model, n, name, kind)
         position, position_parts = self._position(model, n)
-        noise = UNKNOWN if model.noise is None else _noise_of(model.noise, self.constants)
+        noises = self._noises(model, name, kind)
         if names is UNKNOWN or n is UNKNOWN:
             return UNKNOWN
         labels = self._labels(model, names)
@@ -184,24 +196,52 @@ class Builder:
             model=model,
             names=names,
             labels=known(labels, names),
-            bias=_defaults(n).bias if bias is UNKNOWN else bias,
+            bias=biases.pop(DRIVE, _defaults(n).bias),
             initial=_defaults(n).initial if initial is UNKNOWN else initial,
-            input=_defaults(n).input if input_index is UNKNOWN else input_index,
+            input=inputs.pop(DRIVE, _defaults(n).input),
             position=position,
             first=first_number,
             constants=self.constants,
             starts=starts,
-            noise=noise,
+            noises=noises,
             parts=(*kind.parts, *bias_parts, *position_parts),
+            port_bias=biases,
+            port_input=inputs,
         )
 
-    def _bias(self, model: GroupModel, n: int | Unknown, name: str) -> tuple[FloatArray | Unknown, list[Part]]:
-        """The bias, UNKNOWN without one, and what of it follows parameters."""
-        if model.bias is None:
-            return UNKNOWN, []
-        with self.constants.following() as parts:
-            bias = self._drawn(model.bias, n, "bias", name)
-        return bias, [part._replace(field="bias") for part in parts]
+    def _at_ports(
+        self, written: tuple[AtPort[T], ...] | None, name: str, kind: NeuronType, model: GroupModel
+    ) -> Iterator[tuple[str, T]]:
+        """What is written of ports, by their names; those that the model has not are reported."""
+        for value, port in written or ():
+            if port is not None and is_written(kind, model):
+                refusal = no_port(port.value, name, kind.model.definition)
+                if refusal is not None:
+                    message, hint, lost = refusal
+                    self.constants.findings.error("unknown-port", port.span, message, hint, undeclared=lost)
+            yield DRIVE if port is None else port.value, value
+
+    def _bias(
+        self, model: GroupModel, n: int | Unknown, name: str, kind: NeuronType
+    ) -> tuple[dict[str, FloatArray], list[Part]]:
+        """The bias by ports, where there is one, and what of it follows parameters."""
+        result: dict[str, FloatArray] = {}
+        following: list[Part] = []
+        for port, formulas in self._at_ports(model.bias, name, kind, model):
+            with self.constants.following() as parts:
+                bias = self._drawn(formulas, n, "bias", name, None if port == DRIVE else port)
+            if bias is not UNKNOWN:
+                result[port] = bias
+            following += [part._replace(field=bias_of(port).name) for part in parts]
+        return result, following
+
+    def _noises(self, model: GroupModel, name: str, kind: NeuronType) -> tuple[WrittenNoise, ...]:
+        """The noise by ports, as far as it is in order."""
+        found = (
+            WrittenNoise(port, formula, _noise_of(formula, self.constants))
+            for port, formula in self._at_ports(model.noise, name, kind, model)
+        )
+        return tuple(one for one in found if one.tree is not UNKNOWN)
 
     def _position(self, model: GroupModel, n: int | Unknown) -> tuple[FloatArray | Unknown, list[Part]]:
         """The positions, NaN without any, and what of them follows parameters."""
@@ -217,7 +257,7 @@ class Builder:
         """What states of the model begin with, as far as that is given."""
         result: dict[str, FloatArray] = {}
         neuron = kind.model.definition
-        model_known = model.model is None or neuron.name == model.model.name.value  # else it is invalid, and reported
+        model_known = is_written(kind, model)  # else it is invalid, and reported
         states = tuple(state.name for state in neuron.state)
         for state, formulas in given.states:
             if model_known and state.value not in states:
@@ -231,10 +271,11 @@ class Builder:
 
     def _input_name(self, model: GroupModel) -> str | None:
         """The network's name of the input of a group."""
-        if model.input is None:
+        written = next((name for name, port in model.input or () if port is None or port.value == DRIVE), None)
+        if written is None:
             return None
-        found = self.scope.input(model.input.value)
-        return found.name if isinstance(found, Input) else model.input.value
+        found = self.scope.input(written.value)
+        return found.name if isinstance(found, Input) else written.value
 
     def _names(self, name: str, model: GroupModel, start: int) -> tuple[tuple[str, ...] | Unknown, int | None]:
         """The names of the neurons, and of a counted group the first number."""
@@ -327,12 +368,15 @@ class Builder:
             called, what = f"{called}.{state}", state
         return spread(formulas, n, self.constants, f"'{what}'", Stream(self.seed, purpose, called))
 
-    def _input(self, model: GroupModel, n: int | Unknown) -> IntArray | Unknown:
+    def _inputs(self, model: GroupModel, n: int | Unknown, name: str, kind: NeuronType) -> dict[str, IntArray]:
+        """The places of the neurons' inputs in the vector of all inputs, by ports, where they are known."""
+        found = ((port, self._input(text, n)) for port, text in self._at_ports(model.input, name, kind, model))
+        return {port: places for port, places in found if places is not UNKNOWN}
+
+    def _input(self, text: Located[str], n: int | Unknown) -> IntArray | Unknown:
         """The places of the neurons' inputs in the vector of all inputs: one component for all, or one for each;
-        UNKNOWN where it is not known, or none is written."""
-        if model.input is None:
-            return UNKNOWN
-        name = model.input.value
+        UNKNOWN where it is not known."""
+        name = text.value
         found = self.scope.input(name)
         findings = self.constants.findings
         if found is None:
@@ -340,9 +384,7 @@ class Builder:
             found = None if findings.many else self.scope.input(meant(name, known) or "")
             message = f"there is no input '{shorten(name)}'"
             lost = self.scope.undeclared(name)
-            findings.error(
-                "unknown-input", model.input.span, message, lambda: known_inputs(name, known), undeclared=lost
-            )
+            findings.error("unknown-input", text.span, message, lambda: known_inputs(name, known), undeclared=lost)
         if not isinstance(found, Input) or n is UNKNOWN:
             return UNKNOWN
         if found.size == 1:
@@ -350,7 +392,7 @@ class Builder:
         if found.size == n:
             return np.arange(found.start, found.start + n, dtype=np.int64)
         message = f"the input '{name}' has {found.size} components, the group has {plural(n, 'neuron')}"
-        findings.error("wrong-size", model.input.span, message, "an input has one component, or one for each neuron")
+        findings.error("wrong-size", text.span, message, "an input has one component, or one for each neuron")
         return UNKNOWN
 
     def _labels(self, model: GroupModel, names: tuple[str, ...]) -> tuple[str, ...] | Unknown:

@@ -1,28 +1,34 @@
 """Noise: what a group's neurons are given at random, anew at each step.
 
-In: the ``noise`` of the groups. Out: Noises, each with its place in the vector that a step is given.
+In: the ``noise`` of the groups, and of the states of their models. Out: Noises, each with its place in the vector that
+a step is given.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
-from neurovis_spec.arrays import frozen
+from neurovis_spec.arrays import IntArray, frozen
 from neurovis_spec.compiler.events.settable import ParameterFormula, slots_named
 from neurovis_spec.compiler.network import Noise
+from neurovis_spec.compiler.neurons.groups import Built
 from neurovis_spec.compiler.neurons.populate import Census
+from neurovis_spec.compiler.program import DRIVE
 from neurovis_spec.compiler.values.constants import Constants, Value, width_of
 from neurovis_spec.language.expressions.evaluate import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
-from neurovis_spec.language.expressions.tree import Chain, Conditional, Draw, Tree, draws, names
+from neurovis_spec.language.expressions.tree import Chain, Conditional, Draw, Number, Tree, draws, names
 from neurovis_spec.language.located import Formula
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.unknown import UNKNOWN
 
 _NOISE = formula_at(GroupModel, "noise")
+#: normal(0, 1)
+_STANDARD = Draw("normal", Number(0.0), Number(1.0), 0)
 
 
 def make_noises(census: Census, inputs: int) -> tuple[Noise, ...]:
@@ -30,15 +36,29 @@ def make_noises(census: Census, inputs: int) -> tuple[Noise, ...]:
     result: list[Noise] = []
     start = inputs
     for one in census.groups:
-        formula, tree, group, constants = one.model.noise, one.noise, one.group, one.constants
-        if formula is None or tree is UNKNOWN:
-            continue
-        widths = _check_deviations(tree, formula, group.count, constants)
-        members = frozen(np.arange(group.start, group.start + group.count, dtype=np.int64))
-        slots = slots_named(tree, constants.settable)
-        result.append(Noise(group.name, members, start, tree, dict(constants.parameters), slots, widths))
-        start += group.count
+        members = frozen(np.arange(one.group.start, one.group.start + one.group.count, dtype=np.int64))
+        for noise in (*_written(one, members), *_of_states(one, members)):
+            result.append(replace(noise, start=start))
+            start += len(members)
     return tuple(result)
+
+
+def _written(one: Built, members: IntArray) -> Iterator[Noise]:
+    """The noise that a group writes, by ports."""
+    for port, formula, tree in one.noises:
+        if tree is not UNKNOWN:
+            constants = one.constants
+            widths = _check_deviations(tree, formula, one.group.count, constants)
+            name = one.group.name if port == DRIVE else f"{one.group.name}.{port}"
+            slots = slots_named(tree, constants.settable)
+            yield Noise(name, members, 0, tree, dict(constants.parameters), slots, widths, port)
+
+
+def _of_states(one: Built, members: IntArray) -> Iterator[Noise]:
+    """The standard normal numbers that disturb states of a group's model, one after the other as they are declared."""
+    for state in one.kind.model.definition.flows:
+        if state.noise is not None:
+            yield Noise(f"{one.group.name}.{state.name}", members, 0, _STANDARD, {}, port="", state=state.name)
 
 
 def _check_deviations(tree: Tree, formula: Formula, count: int, constants: Constants) -> tuple[ParameterFormula, ...]:

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +29,7 @@ from neurovis_spec.language.located import IDENTIFIER
 from neurovis_spec.language.model import names_of
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 
+Number = TypeVar("Number", np.float64, np.int64)
 #: Characters that no name has.
 _NO_LETTERS = re.compile(r"[^A-Za-z0-9_]+")
 
@@ -236,6 +237,8 @@ def _join(all_groups: list[_ScopeGroups]) -> Census:
         input=frozen(np.concatenate([item.input for item in built] or [empty.astype(np.int64)])),
         position=frozen(np.concatenate([_positions(item) for item in built] or [np.zeros((0, 2))])),
         starts=_starts(built, len(names)),
+        port_bias=_of_ports(built, [one.port_bias for one in built], np.zeros(len(names))),
+        port_input=_of_ports(built, [one.port_input for one in built], np.full(len(names), -1, dtype=np.int64)),
     )
     return Census(neurons, tuple(built), _directories(all_groups, len(names)))
 
@@ -248,6 +251,18 @@ def _starts(built: list[Built], total: int) -> dict[str, FloatArray]:
             array = result.setdefault(state, np.full(total, np.nan))
             array[item.group.start : item.group.start + item.group.count] = values
     return {state: frozen(array) for state, array in result.items()}
+
+
+def _of_ports(
+    built: list[Built], given: list[Mapping[str, npt.NDArray[Number]]], otherwise: npt.NDArray[Number]
+) -> dict[str, npt.NDArray[Number]]:
+    """By ports, what groups are given there, in all neurons, and what holds of those that are given nothing."""
+    result: dict[str, npt.NDArray[Number]] = {}
+    for item, ports in zip(built, given, strict=True):
+        for port, values in ports.items():
+            array = result.setdefault(port, otherwise.copy())
+            array[item.group.start : item.group.start + item.group.count] = values
+    return {port: frozen(array) for port, array in result.items()}
 
 
 def _positions(item: Built) -> FloatArray:
