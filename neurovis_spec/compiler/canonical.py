@@ -47,7 +47,7 @@ SCHEMA: Mapping[type, Content] = {
     ),
     Input: content("Input", "name start size expression table", "slots parts"),
     Output: content("Output", "name neurons scalar", "states"),
-    Quantity: content("Quantity", "name initial each_step each_episode"),
+    Quantity: content("Quantity", "name initial each_step each_episode", "derivative noise unit"),
     Noise: content("Noise", "name members start expression parameters", "slots widths port state"),
 }
 
@@ -136,8 +136,20 @@ def _definition(made: Definition) -> Record:
         return Record("Activation", {**named, "value": made.given.each_step})
     inner = {"let": made.let, "state": sorted(made.state, key=lambda state: state.name)}
     if made.kind == MODEL:
-        return Record("Model", {**named, **inner, "activity": made.given.each_step})
+        return Record("Model", {**named, **inner, "activity": made.given.each_step, **_beyond(made)})
     if made.kind == RULE:
         steps = {"each_step": made.given.each_step, "each_episode": made.given.each_episode}
         return Record("Rule", {**named, "signals": sorted(made.signals), **inner, **steps})
     raise TypeError(f"no schema says what of a {made.kind.name} is content")
+
+
+def _beyond(model: Definition) -> dict[str, object]:
+    """What of a model is content that the first models had not: as far as it is there."""
+    found: dict[str, object] = {
+        "flows": [(one.name, one.derivative, one.noise) for one in sorted(model.flows, key=lambda one: one.name)],
+        "ports": sorted((port.name, port.combine) for port in model.ports),
+        "outputs": [(one.name, one.each_step) for one in sorted(model.outputs, key=lambda one: one.name)],
+        "send": model.send,
+        "per_second": None if model.per_second == 1 else model.per_second,
+    }
+    return {name: value for name, value in found.items() if value}

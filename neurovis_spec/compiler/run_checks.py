@@ -12,6 +12,7 @@ is a formula like others, which every backend computes; most networks have none,
 - What a definition *gives* is its result: a model's activity, a rule's weight. A result is *lasting* where it is kept
   from step to step, as all states and the weight are, and *fleeting* where it is computed anew from the new states, as
   the activity is.
+- What is undefined in a derivative is looked for at the end of the step alone, not at each stage of the integration.
 """
 
 from __future__ import annotations
@@ -139,25 +140,28 @@ class _Checks:
         definition = use.definition
         each_step: list[Hazards] = []
         each_episode: list[Hazards] = []
-        calls: list[Called] = []
         for result in definition.fleeting:
             if result.each_step is not None:
                 each_step.append(_in_terms_of_old_states(hazards(result.each_step, functions=functions), definition))
-                calls += each_step[-1].calls
         for quantity in (*definition.gives, *definition.state) if definition.kind.lasting else definition.state:
             degree = hidden if quantity in definition.gives else Hidden.NOTHING
+            is_replaced = self.network.episode is not None and quantity.each_episode is not None
             if quantity.each_step is not None:
-                is_replaced = self.network.episode is not None and quantity.each_episode is not None
-                each_step.append(hazards(quantity.each_step, Hidden.ALL if is_replaced else degree))
+                each_step.append(hazards(quantity.each_step, Hidden.ALL if is_replaced else degree, None, functions))
+            is_replaced |= quantity.each_step is not None
+            for flow in (quantity.derivative, quantity.noise):
+                if flow is not None:
+                    each_step.append(hazards(flow, Hidden.ALL if is_replaced else degree, None, functions))
             if quantity.each_episode is not None:
                 each_episode.append(hazards(quantity.each_episode, degree))
+        at_step = through_let(each_step, definition.let, functions)
         check = _check(
             f"{definition.kind.name} '{definition.name}'",
-            through_let(each_step, definition.let),
-            through_let(each_episode, definition.let),
+            at_step.found,
+            through_let(each_episode, definition.let, functions).found,
             self.fixed(use),
         )
-        return [] if check is None else [check], calls
+        return [] if check is None else [check], at_step.calls
 
 
 def _with_states(use: Use, states: list[Check]) -> Use:
@@ -165,18 +169,25 @@ def _with_states(use: Use, states: list[Check]) -> Use:
     return replace(use, definition=replace(use.definition, state=(*use.definition.state, *states)))
 
 
-def through_let(formulas: Iterable[Hazards], let: tuple[tuple[str, Tree], ...]) -> list[Hazard]:
-    """The hazards of formulas, and of the intermediate values (``let``) that they read."""
+def through_let(
+    formulas: Iterable[Hazards],
+    let: tuple[tuple[str, Tree], ...],
+    functions: Mapping[str, Tree] = MappingProxyType({}),
+) -> Hazards:
+    """The hazards of formulas, and of the intermediate values (``let``) that they read, together; ``functions`` are
+    those of the place."""
     formulas = list(formulas)
     found = [hazard for formula in formulas for hazard in formula.found]
     reads: list[Read] = [read for formula in formulas for read in formula.names]
+    calls: list[Called] = [call for formula in formulas for call in formula.calls]
     for name, tree in reversed(let):  # the last first, as later ones read earlier ones
         as_read = together(reads, name)
         if as_read is not None:
-            inside = hazards(tree, as_read.hidden, as_read.where)
+            inside = hazards(tree, as_read.hidden, as_read.where, functions)
             found += inside.found
             reads += inside.names
-    return _within_formula_limit(found)
+            calls += inside.calls
+    return Hazards(_within_formula_limit(found), reads, calls)
 
 
 def _in_terms_of_old_states(made: Hazards, definition: Definition) -> Hazards:

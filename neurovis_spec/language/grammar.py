@@ -70,8 +70,9 @@ RULE_SETTING: Final = Role("setting value", "rule", sees=("i", "j", "n_from", "n
 #: What an actuator is told: a formula that names outputs, too.
 COMMAND: Final = Role("formula", "output")
 IN_ACTIVATION: Final = Role("formula", sees=("x",))
-IN_MODEL: Final = Role("formula", sees=("drive", "k", "t"))
-ACTIVITY: Final = Role("formula", sees=("drive", "k", "t"), functions=("f",))
+IN_MODEL: Final = Role("formula", sees=("drive", "k", "t"), functions=("f",))
+#: What of a model is no matter of its activation: how much noise there is, what an episode's end does.
+WITHOUT_F: Final = Role("formula", sees=("drive", "k", "t"))
 #: The activities that a rule sees.
 ACTIVITIES: Final = ("pre", "sent", "post")
 IN_RULE: Final = Role("formula", sees=(*ACTIVITIES, "weight", "k", "t"))

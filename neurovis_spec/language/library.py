@@ -7,16 +7,17 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping as AnyMapping
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, ClassVar, Final, NamedTuple
 
 from pydantic import Field, ValidationInfo
 
 from neurovis_spec.language.grammar import (
-    ACTIVITY,
     IN_ACTIVATION,
     IN_MODEL,
     IN_RULE,
     PLAIN,
+    WITHOUT_F,
+    Needs,
     OneOf,
     Plain,
     declaring,
@@ -33,16 +34,18 @@ from neurovis_spec.language.located import (
     findings_of,
     give_up,
     refuse,
+    value_or,
+    words,
 )
 from neurovis_spec.language.model import Model, Named
 from neurovis_spec.language.unknown import Unknown
-from neurovis_spec.language.values import ParameterField, ParameterModel
+from neurovis_spec.language.values import LOCAL, ParameterField, ParameterModel, PortsField, WrittenPort
+from neurovis_spec.language.words import TimeUnit
 from neurovis_spec.language.yaml.source import Mapping, Node, Scalar
 
 LANGUAGE_VERSION = 1
 VERSION = Plain({"const": LANGUAGE_VERSION})
-#: What is declared in a definition, and known in it alone.
-LOCAL = declaring("local")
+_TIMES: Final = {"s": "Seconds.", "ms": "Milliseconds."}
 
 
 def version_field(node: Node, info: ValidationInfo) -> Located[int]:
@@ -57,8 +60,16 @@ def version_field(node: Node, info: ValidationInfo) -> Located[int]:
     return version
 
 
+class Flow(NamedTuple):
+    """What is written of a state beside what becomes of it at each step: nothing, of a rule."""
+
+    derivative: Formula | None = None
+    noise: Formula | None = None
+    unit: str = ""
+
+
 class StateModel(Model):
-    """A state of a model or of a rule."""
+    """A state: of a rule, and what states of models have in common with that."""
 
     BARE: ClassVar[str] = "initial"
 
@@ -66,10 +77,51 @@ class StateModel(Model):
     each_step: FormulaField | None = Field(None, description="Its new value at each step.")
     each_episode: FormulaField | None = Field(None, description="Its new value at an episode's end.")
 
+    @property
+    def flow(self) -> Flow:
+        """How it changes over the time of a step."""
+        return Flow()
+
+    @classmethod
+    def _foreign(cls, name: str) -> tuple[str, str] | None:
+        if name == "derivative":
+            return "rules have no 'derivative' yet, models have", "write each_step: x + dt*(…), x being the state"
+        return not_yet(name, "on_pre", "on_post")
+
+
+class NeuronStateModel(StateModel):
+    """A state of a model."""
+
+    each_episode: Annotated[FormulaField, WITHOUT_F] | None = Field(
+        None, description="Its new value at an episode's end."
+    )
+    derivative: FormulaField | None = Field(
+        None, description="What it changes by, per second (or millisecond: time), as in an equation dx/dt = …"
+    )
+    noise: Annotated[
+        Annotated[FormulaField, WITHOUT_F] | None,
+        Needs(("derivative",), "'noise' disturbs what has a 'derivative'", "add derivative: 0, or what it changes by"),
+    ] = Field(None, description="What white noise is multiplied by that is added to the derivative.")
+    unit: TextField | None = Field(None, description="Its unit, which is shown.")
+
+    @property
+    def flow(self) -> Flow:
+        """How it changes over the time of a step."""
+        return Flow(self.derivative, self.noise, value_or(self.unit, ""))
+
+    @classmethod
+    def _foreign(cls, name: str) -> tuple[str, str] | None:
+        return not_yet(name, "jump")
+
+
+def not_yet(name: str, *later: str) -> tuple[str, str] | None:
+    """What is said of a key that the language is to have, if it is one of ``later``: a message and a hint."""
+    return (f"'{name}' is not there yet", "a later version of the language has it") if name in later else None
+
 
 class Parts(NamedTuple):
     """What a definition says, whatever its kind: what it gives at each step and at an episode's end, and of what that
-    is made. ``state`` is None where the kind has none."""
+    is made. ``state`` and ``outputs`` are None where the kind has none."""
 
     parameters: AnyMapping[str, ParameterModel]
     let: AnyMapping[str, Formula]
@@ -78,6 +130,10 @@ class Parts(NamedTuple):
     state: AnyMapping[str, StateModel] | None = None
     signals: tuple[Located[str], ...] = ()
     spikes: bool = False
+    ports: tuple[WrittenPort, ...] = ()
+    outputs: AnyMapping[str, Formula] | None = None
+    send: Located[str] | None = None
+    time: TimeUnit = "s"
 
 
 class DefinitionModel(Model):
@@ -110,15 +166,27 @@ class ActivationModel(DefinitionModel):
 class ModelModel(DefinitionModel):
     """A neuron model of one's own: how the activity follows from the drive."""
 
-    parameters: Annotated[Named[ParameterField], LOCAL] = Field(default_factory=dict, description="Names and defaults.")
-    let: Annotated[Named[Annotated[FormulaField, IN_MODEL]], LOCAL] = Field(
-        default_factory=dict, description="Intermediate values, in order."
+    time: Annotated[Located[TimeUnit], words(TimeUnit, abouts=_TIMES)] | None = Field(
+        None, description="The unit of t, dt and derivatives in it: s or ms (default s)."
     )
-    state: Annotated[Named[Annotated[StateModel, IN_MODEL]], LOCAL] = Field(
+    parameters: Annotated[Named[ParameterField], LOCAL] = Field(default_factory=dict, description="Names and defaults.")
+    ports: Annotated[PortsField, LOCAL] = Field(
+        default=(), description="Names of inputs beside drive, or how what arrives at each is combined."
+    )
+    let: Annotated[Named[Annotated[FormulaField, IN_MODEL]], LOCAL] = Field(
+        default_factory=dict, description="Intermediate values; one may read others."
+    )
+    state: Annotated[Named[Annotated[NeuronStateModel, IN_MODEL]], LOCAL] = Field(
         default_factory=dict, description="States, updated together from old values."
     )
-    activity: Annotated[FormulaField, ACTIVITY] = Field(
+    outputs: Annotated[Named[Annotated[FormulaField, IN_MODEL]], LOCAL] = Field(
+        default_factory=dict, description="Further values that can be sent, shown and recorded, as states can."
+    )
+    activity: Annotated[FormulaField, IN_MODEL] = Field(
         description="The activity; f(…) is the neuron's activation, drive is u[t]."
+    )
+    send: TextField | None = Field(
+        None, description="The state or output that connections take unless they say otherwise (default activity)."
     )
     spikes: BoolField | None = Field(
         None,
@@ -128,8 +196,21 @@ class ModelModel(DefinitionModel):
 
     def parts(self) -> Parts:
         """What it says."""
-        spikes = self.spikes is not None and self.spikes.value
-        return Parts(self.parameters, self.let, self.activity, state=self.state, spikes=spikes)
+        return Parts(
+            self.parameters,
+            self.let,
+            self.activity,
+            state=self.state,
+            spikes=value_or(self.spikes, False),
+            ports=self.ports,
+            outputs=self.outputs,
+            send=self.send,
+            time=value_or(self.time, "s"),
+        )
+
+    @classmethod
+    def _foreign(cls, name: str) -> tuple[str, str] | None:
+        return not_yet(name, "spike")
 
 
 class WeightModel(Model):
@@ -143,6 +224,10 @@ class WeightModel(Model):
         None, description="w[t+1], an expression of weight, pre, post, …."
     )
     each_episode: Annotated[FormulaField, IN_RULE] | None = Field(None, description="The weight after an episode.")
+
+    @classmethod
+    def _foreign(cls, name: str) -> tuple[str, str] | None:
+        return not_yet(name, "on_pre", "on_post", "derivative")
 
 
 class RuleModel(DefinitionModel):
@@ -188,6 +273,10 @@ class Library(Model):
     rules: Annotated[Named[RuleModel], declaring("rule")] = Field(
         default_factory=dict, description="Plasticity rules of one's own."
     )
+
+    @classmethod
+    def _foreign(cls, name: str) -> tuple[str, str] | None:
+        return not_yet(name, "synapses")
 
     @property
     def definitions(self) -> AnyMapping[str, AnyMapping[str, DefinitionModel]]:

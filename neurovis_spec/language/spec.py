@@ -98,7 +98,7 @@ class IncludedModel(Library):
     @classmethod
     def _foreign(cls, name: str) -> tuple[str, str] | None:
         if name not in Spec.model_fields:
-            return None
+            return super()._foreign(name)
         message = f"'{name}' is of a network of its own; an included file holds modules and definitions"
         return message, "leave it to the specs that include this file, or make a module of it"
 

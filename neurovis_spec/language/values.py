@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Mapping as AnyMapping
-from typing import Annotated, ClassVar, Final, Generic, NamedTuple, TypeAlias, TypeVar
+from typing import Annotated, ClassVar, Final, Generic, NamedTuple, TypeAlias, TypeVar, cast, get_args
 
 from pydantic import Field, ValidationInfo
 
@@ -35,9 +35,11 @@ from neurovis_spec.language.grammar import (
     Row,
     Shape,
     declaring,
+    words,
 )
 from neurovis_spec.language.keys import read_keys
 from neurovis_spec.language.located import (
+    NAME,
     Formula,
     FormulaField,
     Leaf,
@@ -45,18 +47,23 @@ from neurovis_spec.language.located import (
     TextField,
     as_bool,
     as_formula,
+    as_identifier,
     as_parts,
     as_text,
     each,
     findings_of,
     give_up,
+    one_of,
     refuse,
     value_or,
 )
 from neurovis_spec.language.model import Model, NamedParameters, Short, opening
-from neurovis_spec.language.yaml.source import AnyList, Entry, Mapping, Node, Scalar, Sequence
+from neurovis_spec.language.words import Combine
+from neurovis_spec.language.yaml.source import AnyList, Entry, Mapping, Node, Scalar, Sequence, one_or_more
 
 T = TypeVar("T")
+#: What is declared in a definition, and known in it alone.
+LOCAL = declaring("local")
 
 
 class Choice(NamedTuple):
@@ -320,6 +327,7 @@ class ParameterModel(Model):
     value: FormulaField = Field(description="The value.")
     minimum: FormulaField | None = Field(None, alias="min", description="The least value that it may be given.")
     maximum: FormulaField | None = Field(None, alias="max", description="The greatest value that it may be given.")
+    unit: TextField | None = Field(None, description="Its unit, which is shown.")
     description: TextField | None = Field(None, description="What it is.")
 
     @property
@@ -330,6 +338,53 @@ class ParameterModel(Model):
 
 ParameterField = Annotated[ParameterModel, Short("value", "a number or an expression")]
 ParametersField = Annotated[NamedParameters[ParameterField], declaring("parameter")]
+
+
+_COMBINATIONS: Final = get_args(Combine)
+
+
+class WrittenPort(NamedTuple):
+    """A port that a model declares."""
+
+    name: Located[str]
+    combine: Combine = "sum"
+    unit: str = ""
+
+
+def as_ports(node: Node, info: ValidationInfo) -> tuple[WrittenPort, ...]:
+    """Names, or a mapping from each to how what arrives is combined."""
+    if not isinstance(node, Mapping):
+        return tuple(map(WrittenPort, each(one_or_more(node), as_identifier, info)))
+    return each(node.entries, _port, info)
+
+
+def _port(entry: Entry, info: ValidationInfo) -> WrittenPort:
+    name, node = as_identifier(entry.key, info), entry.value
+    if not isinstance(node, Mapping):
+        return WrittenPort(name, _combine(node, info))
+    keys = read_keys(node, _PORT.known, findings_of(info)).mapping
+    combine, unit = keys.get("combine"), keys.get("unit")
+    return WrittenPort(
+        name,
+        "sum" if combine is None else _combine(combine, info),
+        "" if unit is None else as_text(unit, info).value,
+    )
+
+
+def _combine(node: Node, info: ValidationInfo) -> Combine:
+    return cast(Combine, one_of(*_COMBINATIONS)(node, info).value)
+
+
+_COMBINE: Final = words(*_COMBINATIONS)
+_PORT: Final = Map(
+    {
+        "combine": Key(_COMBINE, "What arrives is combined by sum or product of w·a, or by distance (default sum)."),
+        "unit": Key(UNNAMED, "Its unit, which is shown."),
+    }
+)
+PortsField = Annotated[
+    tuple[WrittenPort, ...], Leaf(as_ports, Either((NAME, ListOf(NAME), Map({}, Either((_COMBINE, _PORT)), LOCAL))))
+]
 
 
 class Reference(NamedTuple):

@@ -9,6 +9,7 @@ from typing import Final, Literal
 Direction = Literal["down", "up", "right", "left"]
 Combine = Literal["sum", "product", "distance"]
 Method = Literal["euler", "heun", "rk4", "exponential", "semi_implicit"]
+TimeUnit = Literal["s", "ms"]
 NeuronRole = Literal["input", "hidden", "output"]
 Reliability = Literal["reliable", "best_effort"]
 Durability = Literal["volatile", "transient_local"]

@@ -42,22 +42,23 @@ def check_undefined(compiled: Compiled, findings: Findings) -> None:
         for learning in (bundle.learning for bundle in bundles if bundle.learning is not None):
             rule, known = learning.rule, clock | dict(learning.parameters)
             made = [hazards(tree, Hidden.ALL) for tree in _at_steps(rule)]
-            _tell(body.plasticity, rule.kind.name, through_let(made, rule.let), known, findings)
+            _tell(body.plasticity, rule.kind.name, through_let(made, rule.let).found, known, findings)
 
 
 def _at_steps(definition: Definition) -> Iterator[Tree]:
     """What a definition computes at each step."""
     for one in (*definition.gives, *definition.state):
-        if one.each_step is not None:
-            yield one.each_step
+        yield from (tree for tree in (one.each_step, one.derivative, one.noise) if tree is not None)
 
 
 def _of_kind(model: Definition, activation: Definition) -> tuple[list[Hazard], list[Hazard]]:
     """What may be undefined in the formulas of a model, and in an activation that it always computes."""
-    made = [hazards(tree, Hidden.ALL, functions=activation.functions) for tree in _at_steps(model)]
-    computed = any(call.where is None for formula in made for call in formula.calls)
+    functions = activation.functions
+    made = [hazards(tree, Hidden.ALL, functions=functions) for tree in _at_steps(model)]
+    found = through_let(made, model.let, functions)
+    computed = any(call.where is None for call in found.calls)
     inside = [hazard for tree in _at_steps(activation) for hazard in hazards(tree, Hidden.ALL).found]
-    return list(through_let(made, model.let)), inside if computed else []
+    return found.found, inside if computed else []
 
 
 def _tell(

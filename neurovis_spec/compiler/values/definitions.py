@@ -9,12 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple, TypeAlias
+from graphlib import CycleError, TopologicalSorter
+from heapq import heappop, heappush
+from types import MappingProxyType
+from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
 from neurovis_spec.compiler.limits import PATIENCE
-from neurovis_spec.compiler.program import ACTIVATION, MODEL, RULE, Definition, Kind, Quantity
+from neurovis_spec.compiler.program import ACTIVATION, DRIVE, MODEL, RULE, Definition, Kind, PortOf, Quantity
 from neurovis_spec.compiler.values.constants import (
     ALWAYS,
     Outside,
@@ -25,10 +28,20 @@ from neurovis_spec.compiler.values.constants import (
     parse_formula,
     value_of,
 )
-from neurovis_spec.diagnostics import Findings, Home, Span
+from neurovis_spec.diagnostics import Findings, Home, Span, shorten
 from neurovis_spec.language.expressions.evaluate import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS, meaning
-from neurovis_spec.language.expressions.tree import ExpressionError, Name, Number, Tree, substitute
+from neurovis_spec.language.expressions.tree import (
+    ExpressionError,
+    Name,
+    Number,
+    Tree,
+    calls,
+    check_extent,
+    names,
+    substitute,
+    with_products,
+)
 from neurovis_spec.language.grammar import Role
 from neurovis_spec.language.library import (
     ActivationModel,
@@ -42,8 +55,10 @@ from neurovis_spec.language.located import IDENTIFIER, Formula, Located, bad_nam
 from neurovis_spec.language.model import names_of
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
-from neurovis_spec.language.values import ParameterModel
+from neurovis_spec.language.values import ParameterModel, WrittenPort
+from neurovis_spec.language.words import TimeUnit
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
+from neurovis_spec.likeness import suggest
 
 
 class Default(NamedTuple):
@@ -66,6 +81,7 @@ class Defined(NamedTuple):
 
 
 _NONE = Names[Defined]()
+_NO_FUNCTIONS: Mapping[str, int] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -102,10 +118,14 @@ _READINGS = (
     Reading(RULE, formula_at(RuleModel, "weight", "each_step")),
 )
 
-#: Keys of a definition that declare what is set where it is used, and those that declare names.
-_SET = frozenset({"parameters", "signals"})
+#: Keys of a definition that declare what is named where it is used, and those that declare names for its formulas.
+_NAMED = frozenset({"parameters", "signals", "ports", "outputs"})
 _SECTIONS = ("parameters", "signals", "let", "state")
-_DECLARING = frozenset(_SECTIONS)
+_DECLARING = frozenset({*_SECTIONS, "ports"})
+#: How many of its unit of time a second has.
+_PER_SECOND: Final[Mapping[TimeUnit, float]] = {"s": 1.0, "ms": 1000.0}
+#: Names that no output has: what is sent and shown by these is something else.
+_NO_OUTPUTS = (MODEL.gives, "spike")
 
 
 #: What to do where a definition reads a parameter of the spec.
@@ -132,19 +152,28 @@ class _Checker:
     """Checks one definition: the names that are taken, and the trees of its formulas."""
 
     def __init__(
-        self, given: tuple[str, ...], model: DefinitionModel, findings: Findings, around: Around, place: tuple[str, str]
+        self, reading: Reading, model: DefinitionModel, findings: Findings, around: Around, place: tuple[str, str]
     ) -> None:
         self.model = model
+        self.parts = model.parts()
         self.findings = findings
-        self.constants = {**CONSTANTS, "dt": around.dt}
+        self.functions = dict.fromkeys(reading.role.functions, 1)
+        self.constants = {**CONSTANTS, "dt": around.dt * _PER_SECOND[self.parts.time]}
         self.outside = around.outside
         self.home = Home(place, _SECTIONS)
         #: where each name is declared; nowhere those that are given
-        self.known = Names[Span | None](dict.fromkeys((*ALWAYS, *given)), not model.unknown.isdisjoint(_DECLARING))
+        self.known = Names[Span | None](
+            dict.fromkeys((*ALWAYS, *reading.role.sees)), not model.unknown.isdisjoint(_DECLARING)
+        )
+        #: whether anything is integrated in it; there x^3 and x^4 are products
+        self.flows = any(one.flow.derivative is not None for one in (self.parts.state or {}).values())
 
     def declare(self, section: str, name: str) -> None:
         """A parameter, state, signal or intermediate value; each name once, and none that is given."""
-        span = self._key(section, name)
+        self.declare_at(self._key(section, name), name)
+
+    def declare_at(self, span: Span, name: str) -> None:
+        """The same of one that is declared at a place."""
         if name in self.known.declared:
             self.findings.error("duplicate-name", span, self.taken(name), "choose another name")
         self.known.declared[name] = span
@@ -164,24 +193,48 @@ class _Checker:
                 return entry.key.span
         return self.model.source.span if node is None else node.span
 
-    def optional(self, formula: Formula | None, functions: Mapping[str, int] | None = None) -> Tree | None:
+    def optional(self, formula: Formula | None, functions: Mapping[str, int] = _NO_FUNCTIONS) -> Tree | None:
         """The tree of a formula that may be left out."""
         return None if formula is None else self.tree(formula, functions)
+
+    def given(self, formula: Formula | None) -> Tree | None:
+        """The tree of what is given. A model's activity may be undefined; who uses the model is warned."""
+        if formula is None or not self.functions:
+            return self.optional(formula)
+        tree = self.read(formula, self.sight(), self.functions)
+        return Number(0.0) if tree is UNKNOWN else tree
 
     def tree(
         self,
         formula: Formula,
-        functions: Mapping[str, int] | None = None,
+        functions: Mapping[str, int] = _NO_FUNCTIONS,
         known: Collection[str] | None = None,
         what: str = "known in this definition",
     ) -> Tree:
         """The tree of a formula over what is declared so far, or what is ``known``; 0 in the place of one that is
         invalid, as nothing is computed with it any more."""
-        sight = Sight(self.known if known is None else known, what, outside=self.outside, home=self.home)
-        tree = parse_formula(formula, sight, self.findings, functions=functions)
-        if tree is not UNKNOWN and not functions and is_constant(tree):
+        tree = self.read(formula, self.sight(known, what), functions)
+        if tree is not UNKNOWN and is_constant(tree) and not calls(tree, functions):
             check_finite(evaluate_array(tree, self.constants), formula, self.findings)
         return Number(0.0) if tree is UNKNOWN else tree
+
+    def sight(self, known: Collection[str] | None = None, what: str = "known in this definition") -> Sight:
+        """What a formula sees: what is declared so far, or what is ``known``."""
+        return Sight(self.known if known is None else known, what, outside=self.outside, home=self.home)
+
+    def read(self, formula: Formula, sight: Sight, functions: Mapping[str, int] = _NO_FUNCTIONS) -> Tree | Unknown:
+        """The tree of a formula; UNKNOWN where it is invalid, which is reported."""
+        tree = parse_formula(formula, sight, self.findings, functions=functions)
+        if tree is UNKNOWN or not self.flows:
+            return tree
+        try:
+            made = with_products(tree)
+            check_extent(made, tree)
+            return made
+        except ExpressionError as error:
+            place = formula.node.at(error.start, error.end)
+            self.findings.error(error.code, place, f"with x^3 as x*x*x, {error.message}", error.hint)
+            return UNKNOWN
 
     def parameters(self, parameters: Mapping[str, ParameterModel]) -> Defaults:
         """Declare the parameters; a default sees those before it."""
@@ -213,19 +266,53 @@ class _Checker:
     def _finite(self, formula: Formula, values: Names[Value]) -> Tree | Unknown:
         """The tree of a default or a bound; UNKNOWN where it is invalid, or its value is known and not finite."""
         what = "known in this default"
-        sight = Sight(values, what, outside=self.outside, home=self.home)
-        tree = parse_formula(formula, sight, self.findings)
+        tree = self.read(formula, self.sight(values, what))
         value = value_of(tree, values)
         return UNKNOWN if value is not UNKNOWN and not check_finite(value, formula, self.findings) else tree
 
     def let(self, let: Mapping[str, Formula]) -> tuple[tuple[str, Tree], ...]:
-        """Declare the intermediate values, in order."""
-        result: list[tuple[str, Tree]] = []
-        for name, formula in names_of(self.model, "let", let).items():
-            if formula is not UNKNOWN:
-                result.append((name, self.tree(formula)))
+        """Declare the intermediate values. They come in the order written, but behind those that they read."""
+        for name in names_of(self.model, "let", let):
             self.declare("let", name)
-        return tuple(result)
+        trees = {name: self.tree(formula, self.functions) for name, formula in let.items()}
+        order, circle = sorted_by_need({name: names(tree) for name, tree in trees.items()})
+        if circle:
+            one = circle[0]
+            message = f"'{one}' needs its own value: {' → '.join([*circle, one])}"
+            hint = "what carries a value from one step to the next is a state"
+            self.findings.error("let-cycle", self._key("let", one), message, hint)
+        return tuple((name, trees[name]) for name in order)
+
+    def ports(self, ports: Sequence[WrittenPort]) -> tuple[PortOf, ...]:
+        """Declare the ports beside ``drive``."""
+        for port in ports:
+            name, span = port.name.value, port.name.span
+            if name == DRIVE:
+                self.findings.error("duplicate-name", span, f"'{name}' is a port of every model", "leave it out")
+            else:
+                self.declare_at(span, name)
+        return tuple(PortOf(port.name.value, port.combine, port.unit) for port in ports)
+
+    def outputs(self, outputs: Mapping[str, Formula]) -> tuple[Quantity, ...]:
+        """The outputs beside the activity, which nothing in the definition reads."""
+        made = tuple(Quantity(name, self.tree(formula, self.functions)) for name, formula in outputs.items())
+        for name in names_of(self.model, "outputs", outputs):
+            if name in _NO_OUTPUTS:
+                message = f"'{name}' is no name for an output: it means something else where outputs are named"
+                self.findings.error("reserved-name", self._key("outputs", name), message, "choose another name")
+            else:
+                self.declare("outputs", name)
+        return made
+
+    def sent(self, send: Located[str] | None, kept: Collection[str]) -> str:
+        """The name of what is sent, of what the model keeps; "" for the activity."""
+        if send is None or send.value == MODEL.gives:
+            return ""
+        if send.value not in kept and not self.known.is_open:
+            message = f"'{shorten(send.value)}' is neither a state nor an output of this model"
+            hint = suggest(send.value, (*kept, MODEL.gives), "what can be sent")
+            self.findings.error("unknown-state", send.span, message, hint)
+        return send.value
 
     def signals(self, signals: Sequence[Located[str]]) -> tuple[str, ...] | Unknown:
         """Declare the signals; UNKNOWN where it is not known which there are."""
@@ -266,9 +353,12 @@ class _Checker:
         return tuple(
             Quantity(
                 name,
-                self.optional(model.each_step),
+                self.optional(model.each_step, self.functions),
                 self.optional(model.each_episode),
-                Number(0.0) if model.initial is None else self.tree(model.initial, None, constant, "known here"),
+                Number(0.0) if model.initial is None else self.tree(model.initial, known=constant, what="known here"),
+                self.optional(model.flow.derivative, self.functions),
+                self.optional(model.flow.noise),
+                model.flow.unit,
             )
             for name, model in state.items()
         )
@@ -302,26 +392,68 @@ def definition_of(
 ) -> Defined | Unknown:
     """A definition; UNKNOWN where it is not known which signals it has, or an intermediate value that is put into
     others is invalid."""
-    kind, parts = reading.kind, model.parts()
-    checker = _Checker(reading.role.sees, model, findings, around, (kind.section, name))
+    kind = reading.kind
+    checker = _Checker(reading, model, findings, around, (kind.section, name))
+    parts = checker.parts
     defaults = checker.parameters(parts.parameters)
     signals = checker.signals(parts.signals)
     if signals is UNKNOWN:
         return UNKNOWN
     for key in () if parts.state is None else names_of(model, "state", parts.state):
         checker.declare("state", key)
+    ports = checker.ports(parts.ports)
     let = checker.let(parts.let)
     state = checker.states(parts.state or {}, defaults)
     unfolded = checker.unfolded(let) if reading.inlined else {}
     if unfolded is UNKNOWN:
         return UNKNOWN
-    functions = dict.fromkeys(reading.role.functions, 1)
-    each_step, each_episode = (checker.optional(one, functions) for one in (parts.each_step, parts.each_episode))
+    each_step, each_episode = checker.given(parts.each_step), checker.given(parts.each_episode)
     if reading.inlined and parts.each_step is not None and each_step is not None:
         let, each_step = (), checker.with_let(each_step, unfolded, parts.each_step.span)
-    given = Quantity(kind.gives, each_step, each_episode)
-    names = tuple(default.name for default in defaults)
-    return Defined(Definition(kind, name, names, (given,), let, state, signals, parts.spikes), defaults)
+    outputs = () if parts.outputs is None else checker.outputs(parts.outputs)
+    definition = Definition(
+        kind=kind,
+        name=name,
+        parameters=tuple(default.name for default in defaults),
+        gives=(Quantity(kind.gives, each_step, each_episode), *outputs),
+        let=let,
+        state=state,
+        signals=signals,
+        spikes=parts.spikes,
+        ports=ports,
+        send=checker.sent(parts.send, [one.name for one in (*state, *outputs)]),
+        per_second=_PER_SECOND[parts.time],
+    )
+    return Defined(definition, defaults)
+
+
+def sorted_by_need(needs: Mapping[str, Collection[str]]) -> tuple[list[str], list[str]]:
+    """Names, each with what it needs, in their order, but each behind those of them that it needs: of all that could
+    come next the first. Where some need each other in a circle they stay in their order, and the circle is given, too:
+    each needs the next, the last the first.
+
+    >>> sorted_by_need({"a": "cx", "b": "", "c": "b"}), sorted_by_need({"a": "", "b": "cb", "c": "b"})[1]
+    ((['b', 'c', 'a'], []), ['b'])
+    """
+    known = [*needs]
+    place = {name: number for number, name in enumerate(known)}
+    sorter = TopologicalSorter(
+        {name: sorted(place.keys() & set(need), key=place.__getitem__) for name, need in needs.items()}
+    )
+    try:
+        sorter.prepare()
+    except CycleError as error:
+        circle = error.args[1][:0:-1]
+        first = circle.index(min(circle, key=place.__getitem__))
+        return known, [*circle[first:], *circle[:first]]
+    order: list[str] = []
+    ready: list[int] = []
+    while sorter.is_active():
+        for name in sorter.get_ready():
+            heappush(ready, place[name])
+        order.append(known[heappop(ready)])
+        sorter.done(order[-1])
+    return order, []
 
 
 def define(library: Library, findings: Findings, builtin: Definitions, around: Around = NOTHING_AROUND) -> Definitions:
@@ -340,5 +472,5 @@ def _defined(reading: Reading, library: Library, findings: Findings, around: Aro
     section = reading.kind.section
     models = library.definitions[section]
     made = {name: definition_of(reading, name, model, findings, around) for name, model in models.items()}
-    sure = {name: made[name] if model.unknown.isdisjoint(_SET) else UNKNOWN for name, model in models.items()}
+    sure = {name: made[name] if model.unknown.isdisjoint(_NAMED) else UNKNOWN for name, model in models.items()}
     return names_of(library, section, sure)

@@ -1,13 +1,14 @@
 """Derivatives of formulas, symbolic and exact: the chain rule over the table of functions.
 
-In: a tree, and one of its names. Out: a tree. What is constant between its jumps (``floor``, comparisons, conditions)
-has the derivative 0; of a conditional it is that of the branch that is taken.
+In: a tree, and one of its names, or the derivatives of several. Out: a tree. What is constant between its jumps
+(``floor``, comparisons, conditions) has the derivative 0; of a conditional it is that of the branch that is taken.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import reduce
+from types import MappingProxyType
 
 from neurovis_spec.language.expressions.emit import simplify
 from neurovis_spec.language.expressions.functions import FUNCTIONS, OPERATORS, Operation
@@ -41,25 +42,39 @@ def derivative(tree: Tree, name: str) -> Tree:
     >>> emit(derivative(parse("a*tanh(x) + x^2"), "x"), {"a": "a", "x": "x"})
     'a*(1.0 - np.square(np.tanh(x))) + 2.0*x'
     """
-    made = simplify(_By(name).of(tree))
+    return slope(tree, {name: _ONE})
+
+
+def slope(tree: Tree, slopes: Mapping[str, Tree], functions: Mapping[str, str] = MappingProxyType({})) -> Tree:
+    """The derivative of a formula by something on which its names depend: ``slopes`` has the derivatives of those that
+    do. ``functions`` gives, by functions of one argument of the place, those that are their derivatives. Raises as
+    ``derivative``.
+
+    >>> from neurovis_spec.language.expressions.emit import emit
+    >>> from neurovis_spec.language.expressions.parser import parse
+    >>> made = slope(parse("a*f(u)", extra_functions={"f": 1}), {"u": Name("du")}, {"f": "g"})
+    >>> emit(made, {"a": "a", "u": "u", "du": "du"}, {"g": "g({})".format})
+    'a*((g(u))*du)'
+    """
+    made = simplify(_By(slopes, functions).of(tree))
     check_extent(made, tree)
     return made
 
 
 class _By(Visitor[Tree]):
-    """The derivatives by one name."""
+    """The derivatives by one variable."""
 
-    def __init__(self, by: str) -> None:
-        self.by = by
+    def __init__(self, slopes: Mapping[str, Tree], functions: Mapping[str, str]) -> None:
+        self.slopes, self.functions = slopes, functions
 
     def of(self, tree: Tree) -> Tree:
-        return super().of(tree) if self.by in names(tree) else _ZERO
+        return _ZERO if self.slopes.keys().isdisjoint(names(tree)) else super().of(tree)
 
     def number(self, node: Number) -> Tree:
         return _ZERO
 
     def name(self, node: Name) -> Tree:
-        return _ONE
+        return self.slopes[node.name]
 
     def negative(self, operand: Tree) -> Tree:
         return Unary("-", self.of(operand))
@@ -87,6 +102,9 @@ class _By(Visitor[Tree]):
         return Conditional(node.condition, self.of(node.then), self.of(node.otherwise))
 
     def call(self, node: Call) -> Tree:
+        if node.function in self.functions:
+            (argument,) = node.arguments
+            return _product(Call(self.functions[node.function], node.arguments), self.of(argument))
         row = FUNCTIONS[node.function]
         first, *others = node.arguments
         if row.most is not None:
@@ -98,7 +116,8 @@ class _By(Visitor[Tree]):
         return slope
 
     def draw(self, node: Draw) -> Tree:
-        raise ValueError(f"a random number that depends on '{self.by}' has no derivative")
+        name = min(names(node) & self.slopes.keys())
+        raise ValueError(f"a random number that depends on '{name}' has no derivative")
 
 
 def _chained(row: Operation, arguments: Sequence[Tree], slopes: Sequence[Tree]) -> Tree:

@@ -46,7 +46,7 @@ GIVEN: Final[Mapping[str, str]] = {
     "distance": "In a connection, how far apart the positions of both neurons are.",
     "x": "In an activation, the combined input.",
     "drive": "In a model, the combined input with bias, input and noise: u[t].",
-    "f": "In the activity of a model, the neuron's activation: f(v).",
+    "f": "In a model, the neuron's activation: f(v).",
     "pre": "In a rule, the signal that reaches the synapse: the source's activity d steps ago, d being the delay.",
     "sent": "In a rule, the source's activity of this step.",
     "post": "In a rule, the target's activity of this step.",

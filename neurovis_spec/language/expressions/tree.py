@@ -13,7 +13,7 @@ their own, of which there may be several.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import ClassVar, Generic, Literal, TypeAlias, TypeVar
@@ -322,6 +322,27 @@ def is_square(tree: Tree) -> Tree | None:
             return base
         case _:
             return None
+
+
+def calls(tree: Tree, functions: Collection[str]) -> bool:
+    """Whether any of these functions is called."""
+    return bool(functions) and any(isinstance(node, Call) and node.function in functions for node in walk(tree))
+
+
+def with_products(tree: Tree) -> Tree:
+    """The tree with powers whose exponent is written as 3 or 4 as products: x·x·x, from left to right, which is quicker
+    than ``pow`` and the same whoever computes it. Raises ExpressionError at the power where that becomes too much.
+
+    >>> with_products(Binary("^", Name("x"), Number(3.0))).operands == (Name("x"),) * 3
+    True
+    """
+    made = tree.having(tuple(with_products(part) for part in tree.parts))
+    match made:
+        case Binary(operator="^", left=base, right=Number(value=3.0 | 4.0 as times)):
+            product = Chain(("*",) * (int(times) - 1), (base,) * int(times), made.start, made.end)
+            check_extent(product, tree)
+            return product
+    return made
 
 
 def substitute(tree: Tree, mapping: Mapping[str, Tree]) -> Tree:

@@ -1,0 +1,122 @@
+"""Flows: what the formulas of a definition read, what of it flows, and how its derivatives depend on its own states.
+
+In: a Definition. Out: names, with intermediate values (``let``) unfolded; and trees.
+
+A state with a derivative *flows*, and so does what is made of such states, parameters, ``t`` and what flows in through
+ports alone: it has a value at each stage of the integration. What reads a state without a derivative, ``k``, or
+something that is held over a step, does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+from neurovis_spec.compiler.program import DRIVE, SLOPE_F, Definition, Quantity
+from neurovis_spec.language.expressions.derivative import derivative, slope
+from neurovis_spec.language.expressions.tree import Name, Number, Tree, names
+
+
+def reads(definition: Definition, trees: Iterable[Tree | None]) -> frozenset[str]:
+    """All names that some formulas of a definition read, those of its intermediate values (which are not among them)
+    with what these read."""
+    let = dict(definition.let)
+    waiting = [name for tree in trees if tree is not None for name in names(tree)]
+    seen: set[str] = set()
+    while waiting:
+        name = waiting.pop()
+        if name not in seen:
+            seen.add(name)
+            waiting += names(let[name]) if name in let else ()
+    return frozenset(seen - let.keys())
+
+
+class PortsRead(NamedTuple):
+    """The ports that are read: by ``flow``, derivatives and noise; by ``update``, what is made anew at the end of a
+    step; and by each of its outputs and the activity."""
+
+    flow: frozenset[str]
+    update: frozenset[str]
+    outputs: Mapping[str, frozenset[str]]
+
+
+def ports_read_by(definition: Definition) -> PortsRead:
+    """Which formulas of a model read which of its ports, ``drive`` among them."""
+    ports = frozenset((DRIVE, *(port.name for port in definition.ports)))
+    flow = reads(definition, (tree for one in definition.flows for tree in (one.derivative, one.noise)))
+    stepped = (tree for one in definition.state for tree in (one.each_step, one.each_episode))
+    outputs = {one.name: reads(definition, [one.each_step]) & ports for one in definition.gives}
+    update = (reads(definition, stepped) & ports).union(*outputs.values())
+    return PortsRead(flow & ports, update, outputs)
+
+
+def flows_by(definition: Definition, sent: str) -> frozenset[str] | None:
+    """The ports that have to flow so that something flows that a model sends: a state or an output by its name, ""
+    what it sends unless a connection says otherwise. None where it does not flow, whatever arrives."""
+    sent = sent or definition.send or definition.given.name
+    flowing = {one.name for one in definition.flows}
+    if any(one.name == sent for one in definition.state):
+        return frozenset() if sent in flowing else None
+    read = reads(definition, [one.each_step for one in definition.gives if one.name == sent])
+    held = {one.name for one in definition.state} - flowing
+    return None if "k" in read or read & held else read & {DRIVE, *(port.name for port in definition.ports)}
+
+
+def plain_flow(definition: Definition, sent: str = "") -> bool:
+    """Whether what a model sends is made of flow states, parameters and ``t`` alone: it flows whatever arrives."""
+    return flows_by(definition, sent) == frozenset()
+
+
+class Jacobian(NamedTuple):
+    """How much each derivative changes with its own state, all else but what depends on this being constant: a formula
+    by each flow state, and further intermediate values that these read, in order, behind those of the definition."""
+
+    let: tuple[tuple[str, Tree], ...]
+    diagonal: Mapping[str, Tree]
+
+
+def jacobian(definition: Definition) -> Jacobian:
+    """The diagonal of the Jacobian of a model, by the chain rule through intermediate values and the activation, whose
+    derivative is the function SLOPE_F (``with_slope``). What arrives at ports counts as constant. Raises
+    ExpressionError where a derivative is more than an expression may be.
+    """
+    let: list[tuple[str, Tree]] = []
+    diagonal: dict[str, Tree] = {}
+    for state in definition.flows:
+        assert state.derivative is not None
+        slopes: dict[str, Tree] = {state.name: Number(1.0)}
+        own: list[tuple[str, Tree]] = []
+        for name, tree in definition.let:
+            made = slope(tree, slopes, _SLOPES)
+            if not isinstance(made, Number):
+                own.append((f"d {name}/d {state.name}", made))
+                slopes[name] = Name(own[-1][0])
+            elif made.value != 0:
+                slopes[name] = made
+        diagonal[state.name] = slope(state.derivative, slopes, _SLOPES)
+        let += _needed(own, diagonal[state.name])
+    return Jacobian(tuple(let), diagonal)
+
+
+_SLOPES = {"f": SLOPE_F}
+
+
+def _needed(let: list[tuple[str, Tree]], by: Tree) -> list[tuple[str, Tree]]:
+    """Of some intermediate values those that a formula needs."""
+    wanted = set(names(by))
+    found: list[tuple[str, Tree]] = []
+    for name, tree in reversed(let):
+        if name in wanted:
+            wanted |= names(tree)
+            found.insert(0, (name, tree))
+    return found
+
+
+def with_slope(activation: Definition) -> Definition:
+    """An activation with its derivative as a further function, SLOPE_F. Raises ExpressionError where that is more than
+    an expression may be."""
+    given = activation.given.each_step
+    if given is None or SLOPE_F in activation.functions:
+        return activation
+    return replace(activation, gives=(*activation.gives, Quantity(SLOPE_F, derivative(given, "x"))))
