@@ -19,43 +19,9 @@ from typing import NamedTuple
 import numpy as np
 
 from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray, IntColumn, frozen, narrow
+from neurovis_spec.compiler.flows import PortsRead, flows_by, plain_flow, ports_read_by
 from neurovis_spec.compiler.network import PLAIN_ROUTE, Route
-from neurovis_spec.compiler.program import DRIVE, MODEL, Definition, ports_of
-from neurovis_spec.language.expressions.functions import CONSTANTS
-from neurovis_spec.language.expressions.tree import Tree, names
-
-#: What formulas read that is the same at all stages, or the time of each.
-_STEADY = frozenset({*CONSTANTS, "t", "dt"})
-
-
-class Reads(NamedTuple):
-    """The names that formulas of a model read, with intermediate values put in."""
-
-    #: of each thing that connections can take: the activity, states, outputs
-    sent: Mapping[str, frozenset[str]]
-    #: of derivatives and noise
-    flow: frozenset[str]
-    #: of what is made once a step
-    update: frozenset[str]
-
-
-def reads_of(model: Definition) -> Reads:
-    """What a model reads."""
-    unfolded: dict[str, frozenset[str]] = {}
-
-    def read(*trees: Tree | None) -> frozenset[str]:
-        found: set[str] = set()
-        for tree in trees:
-            for name in () if tree is None else names(tree):
-                found |= unfolded.get(name, {name})
-        return frozenset(found)
-
-    for name, tree in model.let:
-        unfolded[name] = read(tree)
-    sent = {one.name: frozenset((one.name,)) for one in model.state}
-    sent |= {one.name: read(one.each_step) for one in model.gives}
-    steps = (tree for one in (*model.state, *model.gives) for tree in (one.each_step, one.each_episode))
-    return Reads(sent, read(*(tree for one in model.flows for tree in (one.derivative, one.noise))), read(*steps))
+from neurovis_spec.compiler.program import DRIVE, MODEL, Definition
 
 
 def sent_by(model: Definition, sends: str) -> str:
@@ -63,18 +29,12 @@ def sent_by(model: Definition, sends: str) -> str:
     return sends or model.send or MODEL.gives
 
 
-def _steady(model: Definition) -> frozenset[str]:
-    """What a formula of a model may read that flows or never changes within a step, beside its ports."""
-    return _STEADY.union(model.parameters, (one.name for one in model.flows))
-
-
 def default_delay(source: Definition, sends: str, target: Definition, ports: Sequence[str]) -> int:
     """The delay of a connection that names none, by the models of its ends: 0 where the source has a derivative, what
-    is sent is a function of what flows there, and a derivative of the target reads what arrives; else 1."""
-    if not source.flows or not target.flows or reads_of(target).flow.isdisjoint(ports):
+    is sent is made of what flows there alone, and a derivative of the target reads what arrives; else 1."""
+    if not source.flows or ports_read_by(target).flow.isdisjoint(ports):
         return 1
-    read = reads_of(source).sent.get(sent_by(source, sends))
-    return 0 if read is not None and read <= _steady(source) else 1
+    return 0 if plain_flow(source, sends) else 1
 
 
 class Cycle(NamedTuple):
@@ -175,9 +135,9 @@ class _Coupled:
     held: Mapping[str, BoolArray]
 
     @cached_property
-    def reads(self) -> tuple[Reads, ...]:
-        """What each model reads."""
-        return tuple(map(reads_of, self.models))
+    def reads(self) -> tuple[PortsRead, ...]:
+        """Which ports each model reads."""
+        return tuple(map(ports_read_by, self.models))
 
     @cached_property
     def sources(self) -> Indices:
@@ -219,14 +179,11 @@ class _Coupled:
         """By ports for each neuron whether what is made once a step reads it."""
         return {port: self._of_neurons(port, [one.update for one in self.reads]) for port in self.wired.lines}
 
-    def _of_sent(self, holds: Callable[[Definition, Collection[str]], bool]) -> BoolArray:
-        """For each connection what holds of its source's model and of what is read there for what it takes."""
+    def _of_sent(self, holds: Callable[[int, str], bool]) -> BoolArray:
+        """For each connection what holds of the number of its source's model and of what it takes."""
         table = [
-            [
-                holds(model, reads.sent.get(sent_by(model, route.sends), ()))  # of no such neuron it takes anything
-                for route in self.wired.routes
-            ]
-            for model, reads in zip(self.models, self.reads, strict=True)
+            [holds(number, sent_by(model, route.sends)) for route in self.wired.routes]
+            for number, model in enumerate(self.models)
         ]
         of_both = np.array(table, dtype=np.bool_).reshape(len(self.models), len(self.wired.routes))
         return np.asarray(of_both[self.model[self.sources], self.wired.entry.compact()])
@@ -238,7 +195,7 @@ class _Coupled:
 
     def _reading(self, port: str) -> BoolArray:
         """The same for one port."""
-        return self._of_sent(lambda _, read: port in read)
+        return self._of_sent(lambda number, sent: port in self.reads[number].outputs.get(sent, ()))
 
     @cached_property
     def flowing(self) -> BoolArray:
@@ -249,7 +206,7 @@ class _Coupled:
         for port, values in mixed.items():
             arriving = self._arriving(port)
             values[self.targets[arriving[~self.undelayed[port].among]]] = True
-        flowing = self._of_sent(lambda model, read: _steady(model).union(ports_of(model)).issuperset(read))
+        flowing = self._of_sent(lambda number, sent: flows_by(self.models[number], sent) is not None)
         while True:
             for port, values in mixed.items():
                 flowing &= ~(self.through[port] & values[self.sources])

@@ -62,6 +62,7 @@ from neurovis_spec.language.values import (
     AtPort,
     BiasField,
     CentreField,
+    DestinationsField,
     EdgesField,
     FileReference,
     InitialField,
@@ -69,7 +70,6 @@ from neurovis_spec.language.values import (
     ModelField,
     NoiseField,
     Pair,
-    PortsField,
     RuleField,
     as_file,
     at_ports,
@@ -316,7 +316,7 @@ class ConnectionModel(Model):
     delay: FormulaField | None = Field(
         None, description="Steps the signal travels; 0 is within the same step (default 1)."
     )
-    port: PortsField | None = Field(
+    port: DestinationsField | None = Field(
         None, description="The port of the target, or several with factors: {ampa: 1, nmda: 0.3} (default drive)."
     )
     send: TextField | None = Field(

@@ -298,7 +298,7 @@ def at_ports(read: Callable[[Node, ValidationInfo], T], shape: Shape, wanted: st
     return Leaf(check, Either((shape, Map({}, shape, least=1))))
 
 
-def as_ports(node: Node, info: ValidationInfo) -> tuple[AtPort[Formula | None], ...]:
+def as_destinations(node: Node, info: ValidationInfo) -> tuple[AtPort[Formula | None], ...]:
     """The name of a port, or a mapping of ports and factors."""
     if isinstance(node, AnyList) or (isinstance(node, Mapping) and not node.entries):
         refuse(info, node, "the name of a port, or ports with factors", "write port: NAME, or {NAME: 1, NAME: 1}")
@@ -307,7 +307,9 @@ def as_ports(node: Node, info: ValidationInfo) -> tuple[AtPort[Formula | None], 
     return tuple(AtPort(as_formula(one.value, info), Located(one.name, one.key)) for one in node.entries)
 
 
-PortsField = Annotated[tuple[AtPort[Formula | None], ...], Leaf(as_ports, Either((TEXT, Map({}, FORMULA, least=1))))]
+DestinationsField = Annotated[
+    tuple[AtPort[Formula | None], ...], Leaf(as_destinations, Either((TEXT, Map({}, FORMULA, least=1))))
+]
 BiasField = Annotated[
     tuple[AtPort[Formula | FormulaList], ...], at_ports(as_formulas, FORMULAS, "a bias, or ports with biases")
 ]

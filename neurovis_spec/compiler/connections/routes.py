@@ -69,12 +69,10 @@ def _sends(name: Located[str], groups: Sequence[Built], findings: Findings) -> s
         model = one.kind.model.definition
         having = (MODEL.gives, *(quantity.name for quantity in model.kept))
         if name.value not in having:
-            message = (
-                f"'{one.name}' cannot send '{shorten(name.value)}': its model '{model.name}' has none of that name"
-            )
+            message = f"the model '{model.name}' of '{one.name}' has no state and no output '{shorten(name.value)}'"
             lost = Undeclared(name.value, Home((MODEL.section, model.name), ("state", "outputs")))
             hint = partial(suggest, name.value, having, "it can send")
-            findings.error("unknown-output", name.span, message, hint, undeclared=lost)
+            findings.error("unknown-state", name.span, message, hint, undeclared=lost)
             return ""
     own = all(sent_by(one.kind.model.definition, "") == name.value for one in groups)
     return "" if own else name.value

@@ -69,7 +69,9 @@ def found_in(network: Network, census: Census, bundles: tuple[Bundle, ...]) -> I
 def _found(part: Part, members: IntArray, located: Located) -> Iterator[LocatedPart]:
     """A part of some neurons or connections: of a definition, which may be in use at several populations, or of what
     the network has one of."""
-    if part.name:
+    if part.field == BIAS.name:
+        yield LocatedPart(bias_of(part.name), members, part)
+    elif part.name:
         numbers = located.numbers[members]
         owners = np.unique(numbers).tolist()
         for number in owners:

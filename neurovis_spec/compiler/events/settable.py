@@ -47,11 +47,6 @@ def table_of(number: int) -> Key:
     return Key(Owner("table", number), "")
 
 
-def bias_of(port: str) -> Key:
-    """The array of the biases at a port, one number a neuron."""
-    return BIAS if port == DRIVE else Key(None, f"{BIAS.name}/{port}")
-
-
 class Dependent(Protocol):
     """Something that follows the parameters of a run."""
 

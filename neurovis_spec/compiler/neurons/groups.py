@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeAlias, TypeVar
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray, frozen
-from neurovis_spec.compiler.events.settable import Part, bias_of
+from neurovis_spec.compiler.events.settable import BIAS, Part
 from neurovis_spec.compiler.limits import PATIENCE, Limits, amount, plural
 from neurovis_spec.compiler.names.references import key_span, known_inputs
 from neurovis_spec.compiler.names.scope import Scope
@@ -232,7 +232,7 @@ class Builder:
                 bias = self._drawn(formulas, n, "bias", name, None if port == DRIVE else port)
             if bias is not UNKNOWN:
                 result[port] = bias
-            following += [part._replace(field=bias_of(port).name) for part in parts]
+            following += [part._replace(field=BIAS.name, name=port) for part in parts]
         return result, following
 
     def _noises(self, model: GroupModel, name: str, kind: NeuronType) -> tuple[WrittenNoise, ...]:
