@@ -22,7 +22,7 @@ from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, Rend
 from neurovis_spec.compiler.events.changes import Change
 from neurovis_spec.compiler.events.settable import Binding, ParameterFormula, Part, Settable
 from neurovis_spec.compiler.names.state_references import StateOf
-from neurovis_spec.compiler.program import DRIVE, Each, Holder, Operation, Population, Projection, Use
+from neurovis_spec.compiler.program import DRIVE, Each, Holder, Integrate, Operation, Population, Projection, Use
 from neurovis_spec.compiler.ros_settings import RosSettings
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.language.words import Combine, NeuronRole
@@ -98,6 +98,14 @@ class Neurons:
 
     def __len__(self) -> int:
         return len(self.names)
+
+    def bias_at(self, port: str) -> FloatArray:
+        """The bias of a port of each neuron (n,)."""
+        return self.bias if port == DRIVE else self.port_bias.get(port, np.zeros(len(self)))
+
+    def input_at(self, port: str) -> IntArray:
+        """What is put into a port of each neuron (n,): an index into the vector of all inputs, −1 for nothing."""
+        return self.input if port == DRIVE else self.port_input.get(port, np.full(len(self), -1, dtype=np.int64))
 
 
 class Route(NamedTuple):
@@ -297,8 +305,32 @@ class Network:
 
     @cached_property
     def vector_size(self) -> int:
-        """Length of the vector that a step is given: all inputs, then all noise."""
+        """Length of the vector that a step is given: all inputs, then all noise, then what ``held_inputs`` says."""
+        return self._drawn_end + len(self.held_inputs)
+
+    @property
+    def _drawn_end(self) -> int:
         return self.input_size + sum(len(noise.members) for noise in self.noises)
+
+    @cached_property
+    def held_inputs(self) -> Mapping[str, int]:
+        """Of each input that is a formula and reaches what flows, by its name: where it stands in the vector of a step
+        whether it is held over the step, as it is where a caller gives its value (1); else (0) its formula holds, at
+        each stage."""
+        fed = [
+            self.neurons.input_at(port.name)[population.members]
+            for operation in self.program
+            if isinstance(operation, Integrate)
+            for population in map(self.populations.__getitem__, operation.populations)
+            for port in population.ports
+        ]
+        reached = frozenset(np.concatenate(fed).tolist()) if fed else frozenset()
+        formulas = [
+            entry.name
+            for entry in self.inputs
+            if entry.expression is not None and not reached.isdisjoint(range(entry.start, entry.start + entry.size))
+        ]
+        return {name: self._drawn_end + place for place, name in enumerate(formulas)}
 
     @cached_property
     def noise_index(self) -> IntArray:

@@ -17,6 +17,7 @@ from neurovis_spec.arguments import callers_level
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Integrate
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.state import State
@@ -41,6 +42,8 @@ class Capabilities:
     plasticity: bool = True
     noise: bool = False
     episodes: bool = True
+    #: derivatives; ports, outputs and what is sent beside those that every model has
+    flows: bool = False
     #: the most neurons and connections together, None without a bound
     largest: int | None = None
     #: its numbers are the reference's to the ``bits``, where the C library is the same, or up to ``rounding``
@@ -273,6 +276,17 @@ def _ready_on(network: Network, backend: Backend, why: str = "") -> Ready:
     return Ready(backend.name, stepper, stepper.functions if isinstance(stepper, Computing) else NUMPY, why)
 
 
+def _beyond(network: Network) -> tuple[tuple[str, bool], ...]:
+    """What only a backend has that says so (``Capabilities.flows``), and whether a network asks for it."""
+    ports = [port for population in network.populations for port in population.ports]
+    return (
+        ("derivatives", any(isinstance(operation, Integrate) for operation in network.program)),
+        ("ports", len(ports) > len(network.populations) or any(port.factors is not None for port in ports)),
+        ("outputs of models", any(population.model.definition.outputs for population in network.populations)),
+        ("states that are sent", bool(network.outlets)),
+    )
+
+
 def lacking(network: Network, capabilities: Capabilities) -> tuple[str, ...]:
     """What the network asks for and the backend does not have."""
     size = len(network.neurons) + len(network.connections)
@@ -284,6 +298,7 @@ def lacking(network: Network, capabilities: Capabilities) -> tuple[str, ...]:
         (not capabilities.plasticity and bool(network.projections), "no plasticity"),
         (not capabilities.noise and bool(network.noises), "no noise"),
         (not capabilities.episodes and network.episode is not None, "no episodes"),
+        *((not capabilities.flows and has, f"no {what}") for what, has in _beyond(network)),
         (
             capabilities.largest is not None and size > capabilities.largest,
             f"at most {capabilities.largest} neurons and connections, not {size}",

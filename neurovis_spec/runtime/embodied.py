@@ -49,6 +49,8 @@ class Embodied:
         #: for each input that is sensed, its places in the vector of all inputs, and the columns of what is sensed
         self._wired = _wired(network, self._settings, self.body)
         self._places, self._columns = _joined(self._wired.values())
+        #: where it stands that they are held over a step
+        self._held = [network.held_inputs[name] for name in self._wired if name in network.held_inputs]
         #: the inputs that were given otherwise the last time, and the places and columns of the others
         self._given: tuple[frozenset[str], IntArray, IntArray] = frozenset(), self._places, self._columns
         #: the commands of the spec, by the places of their actuators
@@ -104,6 +106,7 @@ class Embodied:
             _, places, columns = self._given
         vector = vector.copy()
         vector[places] = sensed[columns]
+        vector[self._held] = 1.0
         return vector
 
     def move(self, state: State) -> None:

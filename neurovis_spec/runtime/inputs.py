@@ -18,7 +18,7 @@ from neurovis_spec.arrays import BoolArray, FloatArray
 from neurovis_spec.compiler.events.settable import table_of
 from neurovis_spec.compiler.network import Input, Network, Noise
 from neurovis_spec.compiler.values.draws import Stream
-from neurovis_spec.language.expressions.evaluate import evaluate_array
+from neurovis_spec.language.expressions.evaluate import evaluate, evaluate_array
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.language.expressions.tree import Draw, Tree
 from neurovis_spec.language.expressions.undefined import either, hazards
@@ -109,6 +109,8 @@ class InputReader:
             for name, value in values.items():
                 entry = _entry(self.network, name)
                 row[entry.start : entry.start + entry.size] = _single(entry, value)
+                if name in self.network.held_inputs:
+                    row[self.network.held_inputs[name]] = 1.0
         return row
 
     def _make(self, first: int) -> None:
@@ -117,6 +119,8 @@ class InputReader:
         rows = np.zeros((self._steps, self.network.vector_size))
         for entry in self.network.inputs:
             rows[:, entry.start : entry.start + entry.size] = self._source(entry, steps)
+            if entry.name in self._supplied and entry.name in self.network.held_inputs:
+                rows[:, self.network.held_inputs[entry.name]] = 1.0
         for noise in self.network.noises:
             rows[:, noise.start : noise.start + len(noise.members)] = self._drawn(noise, noise.expression, steps)
         rows.flags.writeable = False
@@ -188,6 +192,20 @@ class InputReader:
             return stream.drawn(node.kind, first, second, (i, 0, step, node.index))
 
         return evaluate_array(tree, known, draw, by=self._by)
+
+
+def at_stage(network: Network, inputs: FloatArray, state: State, t: float) -> list[float]:
+    """The vector of a step as it is at a stage of the integration, at ``t`` seconds: formulas that reach what flows are
+    evaluated then, one by one."""
+    result: list[float] = inputs.tolist()
+    for name, held in network.held_inputs.items():
+        entry = network.input_index[name]
+        if not result[held] and entry.expression is not None:
+            known = {**constants(network.dt), **network.parameters, "k": float(state.k), "t": t}
+            known |= {name: float(state.conditions.parameters[slot]) for name, slot in entry.slots.items()}
+            value = evaluate(entry.expression, known)
+            result[entry.start : entry.start + entry.size] = [value] * entry.size
+    return result
 
 
 def _undefined(formulas: Iterable[Tree | None]) -> Iterator[tuple[int, Tree]]:

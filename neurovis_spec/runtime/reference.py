@@ -7,34 +7,34 @@ right: every other backend is tested against it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import singledispatch
-from types import MappingProxyType
 from typing import NamedTuple
 
+import numpy as np
+
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.compiler.events.settable import BIAS, CENTRES, HIGH, LOW, Variable
+from neurovis_spec.compiler.events.settable import HIGH, LOW
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Gather, Key, Learn, Operation, Population, ReadInputs, Send, Update, Use
+from neurovis_spec.compiler.program import (
+    Diffuse,
+    Gather,
+    Integrate,
+    Learn,
+    Operation,
+    Population,
+    ReadInputs,
+    Send,
+    Update,
+    Use,
+)
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.functions import PLAIN
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.backend import Availability, Capabilities
-from neurovis_spec.runtime.signals import signal_layout
-from neurovis_spec.runtime.state import State, constants
-
-
-class NetworkArray(NamedTuple):
-    """An array of the network, and the variable that it is in a run, where it can be set there."""
-
-    values: FloatArray
-    variable: Variable | None
-
-    def at(self, place: int, state: State) -> float:
-        """One of them, as it is by now."""
-        if self.variable is None:
-            return float(self.values[place])
-        return float(state.conditions.variables[self.variable.start + (place if self.variable.size > 1 else 0)])
+from neurovis_spec.runtime.reference_flows import Flow
+from neurovis_spec.runtime.reference_seen import NO_FUNCTIONS, Functions, NetworkArray, Seen, is_first, with_let
+from neurovis_spec.runtime.state import State
 
 
 class Bounded(NamedTuple):
@@ -45,14 +45,11 @@ class Bounded(NamedTuple):
     high: float
 
 
-_NONE: Mapping[str, Callable[..., float]] = MappingProxyType({})
-
-
 class ReferenceBackend:
     """Executes anything, slowly."""
 
     name = "reference"
-    capabilities = Capabilities(noise=True, exactness="bits")
+    capabilities = Capabilities(noise=True, flows=True, exactness="bits")
 
     def availability(self) -> Availability:
         """Always there."""
@@ -63,30 +60,19 @@ class ReferenceBackend:
         return ReferenceStepper(network)
 
 
-class ReferenceStepper:
+class ReferenceStepper(Seen):
     """One network; ``step`` executes its program once, each operation as it is registered with ``perform``."""
 
     def __init__(self, network: Network) -> None:
-        self.network, self.functions = network, PLAIN
-        self.offsets = signal_layout(network).offsets
+        super().__init__(network)
+        self.functions = PLAIN
         variables, connections = network.settable.variables, network.connections
-        #: the parameters of definitions in use
-        self.settings = {
-            use.owner: [
-                (name, NetworkArray(values, variables.get(Key(use.owner, name))))
-                for name, values in use.parameters.items()
-            ]
-            for _, use in network.uses
-        }
-        # one connection after the other is slow in columns
-        self.sources, self.targets = connections.sources.whole(), connections.targets.whole()
-        self.delays = connections.delays.whole()
-        self.bias = NetworkArray(network.neurons.bias, variables.get(BIAS))
-        self.centres = NetworkArray(connections.centres.whole(), variables.get(CENTRES))
         self.low = NetworkArray(connections.low.whole(), variables.get(LOW))
         self.high = NetworkArray(connections.high.whole(), variables.get(HIGH))
-        #: u[t] of the members of each population, as they were gathered last
-        self.drives: dict[int, list[float]] = {}
+        #: what integrates flow states
+        self.flows = [Flow(self, operation) for operation in network.program if isinstance(operation, Integrate)]
+        #: by populations, then by ports, what each member was given there last
+        self.ports: dict[int, dict[str, list[float]]] = {}
 
     def step(self, state: State, inputs: FloatArray, /) -> None:
         """Execute the operations of the program in order."""
@@ -94,61 +80,40 @@ class ReferenceStepper:
             perform(operation, self, state, inputs)
         state.k += 1
 
-    def gather(self, population: Population, state: State, inputs: FloatArray) -> list[float]:
-        """u[t] of each member: what arrives, combined, + bias + input + noise."""
-        neurons = self.network.neurons
-        arriving: list[list[tuple[float, float]]] = [[] for _ in population.members]
-        for connection, slot in zip(population.drive.incoming.tolist(), population.drive.slots.tolist(), strict=True):
-            if not state.conditions.structure.gone[connection]:
-                signal = self.arriving(connection, state)
-                arriving[slot].append((signal, self.centres.at(connection, state)))
-        drives = []
-        for neuron, signals in zip(population.members.tolist(), arriving, strict=True):
-            drive = combined(population.drive.combine, signals) + self.bias.at(neuron, state)
-            if neurons.input[neuron] >= 0:
-                drive += float(inputs[neurons.input[neuron]])
-            if self.network.noise_index[neuron] >= 0:
-                drive += float(inputs[self.network.noise_index[neuron]])
-            drives.append(drive)
-        return drives
+    def gather(self, population: Population, state: State, inputs: FloatArray) -> dict[str, list[float]]:
+        """What each member is given at each port: what arrives, combined, + bias + input + noise."""
+        return {
+            port.name: self.given(
+                population, port, self.signals(port, range(len(port.incoming)), state), state, inputs.tolist()
+            )
+            for port in population.ports
+        }
 
-    def known(self, use: Use, place: int, state: State) -> dict[str, float]:
-        """What the formulas of a definition in use see, whatever its kind: the clock, and its parameters for one of the
-        members."""
-        known = self.clock(state)
-        for name, numbers in self.settings[use.owner]:
-            known[name] = numbers.at(place, state)
-        return known
-
-    def arriving(self, connection: int, state: State) -> float:
-        """w[t−d]·a[t−d]: of this step for d = 0, else what was sent d steps ago."""
-        delay = int(self.delays[connection])
-        if delay == 0:
-            return float(state.weights[connection]) * float(state.activity[self.sources[connection]])
-        return float(state.signals[self.offsets[connection] + state.k % delay])
-
-    def update(self, number: int, drives: list[float], state: State) -> None:
-        """The states of a population from old states and the drive, then the activities from the new ones."""
-        population, neurons = self.network.populations[number], self.network.neurons
+    def update(self, number: int, ports: Mapping[str, Sequence[float]], state: State) -> None:
+        """The states of a population from old states and the ports, then outputs and activities from the new ones, and
+        what of these is sent."""
+        network = self.network
+        population = network.populations[number]
         for position, neuron in enumerate(population.members.tolist()):
-            initial = float(neurons.initial[neuron])
-            if state.k == 0 and not state.continued and not math.isnan(initial):
+            initial = float(network.neurons.initial[neuron])
+            if is_first(state) and not math.isnan(initial):
                 state.activity[neuron] = initial
             else:
-                state.activity[neuron] = self.advance(number, position, drives[position], state)
+                own = {name: values[position] for name, values in ports.items()}
+                state.activity[neuron] = self.advance(population, position, own, state)
             held = state.conditions.held_at(neuron)
             if held is not None:
                 state.activity[neuron] = held
+        silent = state.conditions.lesioned_neurons[population.members]
+        for outlet in network.outlets:
+            if outlet.population == number:
+                values = np.where(silent, 0.0, state.cells[population.model.owner][outlet.name])
+                state.outlets[outlet.start : outlet.start + len(values)] = values
 
-    def advance(self, number: int, position: int, drive: float, state: State) -> float:
-        """One neuron's step: its states are replaced, its activity is returned."""
-        population = self.network.populations[number]
-        shape = self.known(population.activation, position, state)
-        functions = {
-            name: lambda x, value=value: evaluate(value, shape | {"x": x})
-            for name, value in population.activation.definition.functions.items()
-        }
-        seen = self.known(population.model, position, state) | {population.drive.name: drive}
+    def advance(self, population: Population, position: int, ports: dict[str, float], state: State) -> float:
+        """One neuron's step: its states and outputs are replaced, its activity is returned."""
+        seen = self.known(population.model, position, state) | ports
+        functions = self.functions_of(population, position, state)
         return self.change(population.model, position, seen, state, {}, functions)["activity"]
 
     def change(
@@ -158,34 +123,38 @@ class ReferenceStepper:
         seen: Mapping[str, float],
         state: State,
         lasting: Mapping[str, Bounded],
-        functions: Mapping[str, Callable[..., float]] = _NONE,
+        functions: Functions = NO_FUNCTIONS,
     ) -> dict[str, float]:
         """What becomes of the states of a definition in use, and of what it gives, for one member: all from old values
-        at once, then what does not last from the new states; at an episode's end once more from what these gave.
-        ``lasting`` is what it gives and lasts, within its bounds. States are replaced, all is returned."""
+        at once, then what does not last from the new states; at an episode's end once more from what these gave. What
+        flows begins with its initial states: they stay at step 0. ``lasting`` is what it gives and lasts, within its
+        bounds. States and outputs are replaced, all is returned."""
         definition, cells = use.definition, state.cells[use.owner]
-        old = {name: float(values[position]) for name, values in cells.items()}
+        old = {one.name: float(cells[one.name][position]) for one in definition.state}
         old |= {name: bounded.value for name, bounded in lasting.items()}
-        known = with_let({**seen, **old}, definition.let)
-        new = changed(old, [(one.name, one.each_step) for one in definition.lasting], known, lasting, functions)
+        known = with_let({**seen, **old}, definition.let, functions)
+        begins = definition.flows and is_first(state)
+        steps = [] if begins else [(one.name, one.each_step) for one in definition.lasting]
+        new = changed(old, steps, known, lasting, functions)
         fleeting = [(one.name, one.each_step) for one in definition.fleeting]
         results = changed(new, fleeting, known | new, {}, functions) if fleeting else new
         if self.ends_episode(state):
             ends = [(one.name, one.each_episode) for one in definition.lasting]
-            new = changed(new, ends, with_let({**seen, **new}, definition.let), lasting)
+            new = changed(new, ends, with_let({**seen, **new}, definition.let, functions), lasting, functions)
             results = results | new
         for name, values in cells.items():
-            values[position] = new[name]
+            values[position] = results[name]
         return results
 
     def send(self, state: State) -> None:
         """w[t]·a[t] of every delayed connection leaves; a[t] is remembered."""
+        sent = np.concatenate((state.activity, state.outlets))
         for connection, delay in enumerate(self.delays.tolist()):
             if delay > 0:
-                signal = float(state.weights[connection]) * float(state.activity[self.sources[connection]])
+                signal = float(state.weights[connection]) * float(sent[self.sending[connection]])
                 state.signals[self.offsets[connection] + state.k % delay] = signal
         if len(state.history):
-            state.history[state.k % len(state.history)] = state.activity
+            state.history[state.k % len(state.history)] = sent
 
     def learn(self, number: int, state: State, inputs: FloatArray) -> None:
         """w[t+1] and the states of a rule from old values; at an episode's end, once more from what these gave."""
@@ -205,48 +174,19 @@ class ReferenceStepper:
         state.weights[connection] = self.change(projection.rule, position, seen, state, {"weight": weight})["weight"]
 
     def seen(self, connection: int, state: State) -> dict[str, float]:
-        """``pre`` = a_j[t−d], 0 where what was sent then is lost, ``sent`` = a_j[t] and ``post`` = a_i[t] of a
-        connection from j to i."""
-        source, target = int(self.sources[connection]), int(self.targets[connection])
-        delay = int(self.delays[connection])
-        sent = float(state.activity[source])
+        """``pre``, what is sent at t−d, 0 where that is lost, ``sent``, what is at t, and ``post`` = a_i[t] of a
+        connection from j to i; a_j is sent, unless the connection takes something else."""
+        delay, sent = int(self.delays[connection]), self.sent(connection, state)
         pre = sent
         if delay > 0 and len(state.history):
             lost = state.k - delay < state.conditions.structure.lost[connection]
-            pre = 0.0 if lost else float(state.history[(state.k - delay) % len(state.history), source])
-        return {"pre": pre, "sent": sent, "post": float(state.activity[target])}
-
-    def clock(self, state: State) -> dict[str, float]:
-        """The step, the seconds and the constants."""
-        return constants(self.network.dt) | {"k": float(state.k), "t": state.k * self.network.dt}
+            row = state.history[(state.k - delay) % len(state.history)]
+            pre = 0.0 if lost else float(row[self.sending[connection]])
+        return {"pre": pre, "sent": sent, "post": float(state.activity[self.targets[connection]])}
 
     def ends_episode(self, state: State) -> bool:
         """Whether (t + 1) mod m = 0."""
         return self.network.episode is not None and (state.k + 1) % self.network.episode == 0
-
-
-def combined(combine: str, signals: Iterable[tuple[float, float]]) -> float:
-    """Signals and centres of one neuron as one number, taken in the order of the connections.
-
-    >>> combined("product", []), combined("distance", [(3.0, 0.0), (0.0, 4.0)])
-    (1.0, 5.0)
-    """
-    if combine == "product":
-        product = 1.0
-        for signal, _ in signals:
-            product *= signal
-        return product
-    total = 0.0
-    for signal, centre in signals:
-        total += (signal - centre) * (signal - centre) if combine == "distance" else signal
-    return math.sqrt(total) if combine == "distance" else total
-
-
-def with_let(known: dict[str, float], let: tuple[tuple[str, Tree], ...]) -> dict[str, float]:
-    """The names known, and beside them now the intermediate values, computed in order."""
-    for name, tree in let:
-        known[name] = evaluate(tree, known)
-    return known
 
 
 def changed(
@@ -254,7 +194,7 @@ def changed(
     trees: Iterable[tuple[str, Tree | None]],
     known: dict[str, float],
     bounds: Mapping[str, Bounded],
-    functions: Mapping[str, Callable[..., float]] = _NONE,
+    functions: Functions = NO_FUNCTIONS,
 ) -> dict[str, float]:
     """New values, all from ``known``, within their bounds; what has no expression stays."""
     new = dict(old)
@@ -279,12 +219,24 @@ def _read(operation: ReadInputs, by: ReferenceStepper, state: State, inputs: Flo
 
 @perform.register
 def _gather(operation: Gather, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
-    by.drives[operation.population] = by.gather(by.network.populations[operation.population], state, inputs)
+    by.ports[operation.population] = by.gather(by.network.populations[operation.population], state, inputs)
 
 
 @perform.register
 def _update(operation: Update, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
-    by.update(operation.population, by.drives[operation.population], state)
+    by.update(operation.population, by.ports[operation.population], state)
+
+
+@perform.register
+def _integrate(operation: Integrate, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
+    for flow in by.flows:
+        flow.integrate(state, inputs)
+
+
+@perform.register
+def _diffuse(operation: Diffuse, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
+    for flow in by.flows:
+        flow.diffuse(state, inputs)
 
 
 @perform.register

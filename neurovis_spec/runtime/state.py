@@ -138,15 +138,18 @@ class BodyState:
 class State:
     """What a step reads and writes; n neurons, m connections.
 
-    ``k`` is the step to compute next; ``activity`` (n,) is a[k−1], ``weights`` (m,) is w[k]; ``signals`` as in
-    ``SignalLayout``; row t mod (depth) of ``history`` (depth, n) is a[t], for ``pre``; ``cells[owner][name]`` is a
-    state of a definition in use, as long as its members, in the order of the network's ``uses``.
+    ``k`` is the step to compute next; ``activity`` (n,) is a[k−1], ``weights`` (m,) is w[k]; ``outlets`` are what
+    connections take of the same step beside activities, as ``Network.outlets`` lays them out; ``signals`` as in
+    ``SignalLayout``; row t mod (depth) of ``history`` (depth, n + outlets) is what is sent at t, for ``pre``;
+    ``cells[owner][name]`` is a state or an output of a definition in use, as long as its members, in the order of the
+    network's ``uses``.
     ``conditions`` are what events and callers have changed. ``continued`` says that a[−1] is given, so that
     ``initial`` is not used at step 0; ``drawn`` is how many steps earlier runs had, after which random numbers go on.
     """
 
     k: int
     activity: FloatArray
+    outlets: FloatArray
     weights: FloatArray
     signals: FloatArray
     history: FloatArray
@@ -168,6 +171,7 @@ class State:
         return replace(
             self,
             activity=self.activity.copy(),
+            outlets=self.outlets.copy(),
             weights=self.weights.copy(),
             signals=self.signals.copy(),
             history=self.history.copy(),
@@ -187,9 +191,10 @@ def initial_state(network: Network) -> State:
     return State(
         k=0,
         activity=np.zeros(n),
+        outlets=np.zeros(network.outlet_count),
         weights=np.array(network.connections.weights.whole(), dtype=np.float64),
         signals=np.zeros(signal_layout(network).size),
-        history=np.zeros((history_depth(network), n)),
+        history=np.zeros((history_depth(network), n + network.outlet_count)),
         cells={
             use.owner: initial_states(use, holder.members, network.dt, given_states[use.definition.kind.each])
             for holder, use in network.uses

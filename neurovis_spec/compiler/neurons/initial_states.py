@@ -20,11 +20,12 @@ from neurovis_spec.language.expressions.functions import CONSTANTS, PLAIN
 def initial_states(
     use: Use, members: IntArray, dt: float, given: Mapping[str, FloatArray] = MappingProxyType({})
 ) -> dict[str, FloatArray]:
-    """The initial values of each state by its name, one per member, in new arrays. ``given`` has for each state the
-    value of every neuron of the network, NaN where its group gives none; then it is the definition's."""
-    known: dict[str, Value] = {**CONSTANTS, "dt": dt, **use.parameters}
+    """The initial values of each state and output by its name, one per member, in new arrays. ``given`` has for each
+    state the value of every neuron of the network, NaN where its group gives none; then it is the definition's."""
+    definition = use.definition
+    known: dict[str, Value] = {**CONSTANTS, "dt": dt * definition.per_second, **use.parameters}
     result: dict[str, FloatArray] = {}
-    for state in use.definition.state:
+    for state in definition.kept:
         # by the functions of the C library, whatever computes the steps: all begin in the same state
         initial = evaluate_array(state.initial, known, by=PLAIN)
         values = np.array(np.broadcast_to(initial, members.shape), dtype=np.float64)

@@ -1,0 +1,170 @@
+"""What the formulas of a step see, for the reference: the clock, parameters, activations, and what is given to a port.
+
+In: a Network, a State, the vector of all inputs. Out: numbers, of one neuron or one connection at a time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import NamedTuple, TypeAlias
+
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.events.settable import CENTRES, Variable, bias_of
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Definition, Key, Population, Port, Use
+from neurovis_spec.language.expressions.evaluate import evaluate
+from neurovis_spec.language.expressions.tree import Tree
+from neurovis_spec.runtime.signals import signal_layout
+from neurovis_spec.runtime.state import State, constants
+
+#: What formulas may call, by name.
+Functions: TypeAlias = Mapping[str, Callable[..., float]]
+NO_FUNCTIONS: Functions = MappingProxyType({})
+
+
+class NetworkArray(NamedTuple):
+    """An array of the network, and the variable that it is in a run, where it can be set there."""
+
+    values: FloatArray
+    variable: Variable | None
+
+    def at(self, place: int, state: State) -> float:
+        """One of them, as it is by now."""
+        if self.variable is None:
+            return float(self.values[place])
+        return float(state.conditions.variables[self.variable.start + (place if self.variable.size > 1 else 0)])
+
+
+class Signal(NamedTuple):
+    """What a connection brings to a port: to which member (its position), and the centre where a distance is formed."""
+
+    slot: int
+    value: float
+    centre: float
+
+
+class Seen:
+    """What formulas of one network see."""
+
+    def __init__(self, network: Network) -> None:
+        self.network = network
+        self.offsets = signal_layout(network).offsets
+        variables, connections = network.settable.variables, network.connections
+        #: the parameters of definitions in use
+        self.settings = {
+            use.owner: [
+                (name, NetworkArray(values, variables.get(Key(use.owner, name))))
+                for name, values in use.parameters.items()
+            ]
+            for _, use in network.uses
+        }
+        # one connection after the other is slow in columns
+        self.targets, self.delays = connections.targets.whole(), connections.delays.whole()
+        #: what each connection takes: an index into the activities followed by the outlets
+        self.sending = connections.sources.whole() if network.sending is None else network.sending
+        #: by ports
+        names = {port.name for population in network.populations for port in population.ports}
+        self.bias = {name: NetworkArray(network.neurons.bias_at(name), variables.get(bias_of(name))) for name in names}
+        self.fed = {name: (network.neurons.input_at(name), network.noise_of(name)) for name in names}
+        self.centres = NetworkArray(connections.centres.whole(), variables.get(CENTRES))
+
+    def signals(
+        self, port: Port, places: Iterable[int], state: State, sent: Sequence[float] | None = None
+    ) -> Iterator[Signal]:
+        """What some of the connections bring to a port, ``places`` of its ``incoming``: of what is ``sent`` now where
+        that is given, else by their delays."""
+        for place in places:
+            connection = int(port.incoming[place])
+            if not state.conditions.structure.gone[connection]:
+                value = (
+                    self.arriving(connection, state)
+                    if sent is None
+                    else float(state.weights[connection]) * sent[self.sending[connection]]
+                )
+                if port.factors is not None:
+                    value *= float(port.factors[place])
+                yield Signal(int(port.slots[place]), value, self.centres.at(connection, state))
+
+    def given(
+        self, population: Population, port: Port, signals: Iterable[Signal], state: State, inputs: Sequence[float]
+    ) -> list[float]:
+        """What each member is given at a port: these signals, combined in their order, + bias + input + noise."""
+        arriving: list[list[Signal]] = [[] for _ in population.members]
+        for signal in signals:
+            arriving[signal.slot].append(signal)
+        result = []
+        for neuron, own in zip(population.members.tolist(), arriving, strict=True):
+            value = combined(port.combine, own) + self.bias[port.name].at(neuron, state)
+            for fed in self.fed[port.name]:
+                if fed[neuron] >= 0:
+                    value += inputs[fed[neuron]]
+            result.append(value)
+        return result
+
+    def known(self, use: Use, place: int, state: State, t: float | None = None) -> dict[str, float]:
+        """What the formulas of a definition in use see, whatever its kind: the clock, and its parameters for one of the
+        members. ``t`` are the seconds of a stage, else those of the step."""
+        known = self.clock(state, use.definition, t)
+        for name, numbers in self.settings[use.owner]:
+            known[name] = numbers.at(place, state)
+        return known
+
+    def functions_of(
+        self, population: Population, position: int, state: State, t: float | None = None
+    ) -> dict[str, Callable[..., float]]:
+        """The functions of a neuron's activation, which formulas of its model call."""
+        shape = self.known(population.activation, position, state, t)
+        return {
+            name: lambda x, value=value: evaluate(value, shape | {"x": x})
+            for name, value in population.activation.definition.functions.items()
+        }
+
+    def arriving(self, connection: int, state: State) -> float:
+        """w[t−d]·a[t−d]: of this step for d = 0, else what was sent d steps ago."""
+        delay = int(self.delays[connection])
+        if delay == 0:
+            return float(state.weights[connection]) * self.sent(connection, state)
+        return float(state.signals[self.offsets[connection] + state.k % delay])
+
+    def sent(self, connection: int, state: State) -> float:
+        """What a connection takes now: an activity or an outlet."""
+        index, neurons = self.sending[connection], len(state.activity)
+        return float(state.activity[index] if index < neurons else state.outlets[index - neurons])
+
+    def clock(self, state: State, definition: Definition, t: float | None = None) -> dict[str, float]:
+        """The step, the time and the constants, in the unit of a definition. ``t``: the seconds of a stage."""
+        dt, unit = self.network.dt, definition.per_second
+        return constants(dt * unit) | {"k": float(state.k), "t": (state.k * dt if t is None else t) * unit}
+
+
+def is_first(state: State) -> bool:
+    """Whether the step to come is the first one of all, which no other came before."""
+    return state.k == 0 and not state.continued
+
+
+def combined(combine: str, signals: Iterable[Signal]) -> float:
+    """Signals of one neuron as one number, taken in their order.
+
+    >>> combined("product", []), combined("distance", [Signal(0, 3.0, 0.0), Signal(0, 0.0, 4.0)])
+    (1.0, 5.0)
+    """
+    if combine == "product":
+        product = 1.0
+        for signal in signals:
+            product *= signal.value
+        return product
+    total = 0.0
+    for _, value, centre in signals:
+        total += (value - centre) * (value - centre) if combine == "distance" else value
+    return math.sqrt(total) if combine == "distance" else total
+
+
+def with_let(
+    known: dict[str, float], let: Iterable[tuple[str, Tree]], functions: Functions = NO_FUNCTIONS
+) -> dict[str, float]:
+    """The names known, and beside them now the intermediate values, computed in order."""
+    for name, tree in let:
+        known[name] = evaluate(tree, known, functions)
+    return known

@@ -1,0 +1,151 @@
+"""What a stage of the integration is made of: which outputs are taken at it, what is derived, what these read.
+
+In: a Network, and its operation Integrate. Out: a Part for each population, in the order in which a stage makes them;
+when stages are. All backends ask here, so that they do the same in the same order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple, TypeAlias
+
+import numpy as np
+
+from neurovis_spec.arrays import Indices, IntArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Definition, Integrate, Population, Port
+from neurovis_spec.language.expressions.tree import Name, Tree, names
+
+Let: TypeAlias = tuple[tuple[str, Tree], ...]
+
+#: how far inside a step its ends are seen from, of its length: what jumps on the grid jumps between two steps
+_INSIDE: Final = 2.0**-20
+#: what every model gives
+_ACTIVITY: Final = "activity"
+
+
+class Formulas(NamedTuple):
+    """Formulas of a model that are evaluated together, by names, with the intermediate values and ports they read."""
+
+    trees: tuple[tuple[str, Tree], ...]
+    let: Let
+    ports: tuple[Port, ...]
+
+
+class Taken(NamedTuple):
+    """What connections take of a population at a stage: its activity, an output or a state. ``places`` are where its
+    members stand in the activities of all neurons followed by the outlets."""
+
+    formulas: Formulas
+    places: IntArray
+    is_activity: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """A population at a stage. What is ``taken`` of all populations comes first, then the derivatives of all."""
+
+    number: int
+    population: Population
+    taken: tuple[Taken, ...]
+    derivatives: Formulas
+    #: by states with noise, what their random numbers are multiplied by: at the first stage of a step
+    spread: Formulas
+
+    @property
+    def flows(self) -> tuple[str, ...]:
+        """The names of its flow states."""
+        return tuple(name for name, _ in self.derivatives.trees)
+
+
+class Times(NamedTuple):
+    """When the stages of a step, or of a part of one, are, in seconds."""
+
+    first: float
+    middle: float
+    last: float
+
+
+def times(start: float, h: float) -> Times:
+    """The stages of ``h`` seconds from ``start`` on: the ends are seen from inside."""
+    inside = _INSIDE * h
+    return Times(start + inside, start + h / 2.0, start + h - inside)
+
+
+def parts_of(network: Network, operation: Integrate) -> tuple[Part, ...]:
+    """What is done at a stage, population by population."""
+    taken = _taken(network, operation)
+    parts = []
+    for number in operation.populations:
+        population = network.populations[number]
+        model = population.model.definition
+        own = [(name, places) for (owner, name), places in taken.items() if owner == number]
+        parts.append(
+            Part(
+                number,
+                population,
+                tuple(
+                    Taken(formulas_of(population, [(name, _given(model, name))]), places, name == _ACTIVITY)
+                    for name, places in own
+                ),
+                formulas_of(population, [(one.name, one.derivative) for one in model.flows]),
+                formulas_of(population, [(one.name, one.noise) for one in model.flows]),
+            )
+        )
+    return tuple(parts)
+
+
+def formulas_of(population: Population, trees: Iterable[tuple[str, Tree | None]], more: Let = ()) -> Formulas:
+    """Some formulas of the population's model, with ``more`` intermediate values behind its own."""
+    kept = tuple((name, tree) for name, tree in trees if tree is not None)
+    let: list[tuple[str, Tree]] = []
+    read = set().union(*(names(tree) for _, tree in kept))
+    for name, tree in reversed((*population.model.definition.let, *more)):
+        if name in read:
+            read |= names(tree)
+            let.insert(0, (name, tree))
+    return Formulas(kept, tuple(let), tuple(port for port in population.ports if port.name in read))
+
+
+def apart(port: Port) -> tuple[Sequence[int], Sequence[int]]:
+    """The places of the connections in ``Port.incoming`` whose signals are held over a step, and of those whose signals
+    are made anew at each stage."""
+    staged = set[int]() if port.staged is None else set(port.staged.tolist())
+    places = range(len(port.incoming))
+    return [place for place in places if place not in staged], sorted(staged)
+
+
+def _given(model: Definition, name: str) -> Tree | None:
+    """The formula of the activity or of an output; a state is its own."""
+    formulas = {one.name: one.each_step for one in model.gives}
+    return formulas.get(name, Name(name))
+
+
+def _taken(network: Network, operation: Integrate) -> dict[tuple[int, str], IntArray]:
+    """By population and name what is taken at a stage, and its places."""
+    n, connections = len(network.neurons), network.connections
+    sending: Indices = connections.sources.compact() if network.sending is None else network.sending
+    asked = np.unique(
+        np.concatenate(
+            [
+                np.zeros(0, dtype=np.int64),
+                *(
+                    sending[port.incoming[port.staged]]
+                    for number in operation.populations
+                    for port in network.populations[number].ports
+                    if port.staged is not None
+                ),
+            ]
+        )
+    )
+    found: dict[tuple[int, str], IntArray] = {}
+    for number in operation.populations:
+        members = network.populations[number].members
+        if np.isin(members, asked).any():
+            found[number, _ACTIVITY] = members
+        for outlet in network.outlets:
+            places = n + outlet.start + np.arange(len(members))
+            if outlet.population == number and np.isin(places, asked).any():
+                found[number, outlet.name] = places
+    return found
