@@ -366,9 +366,7 @@ def _held(census: Census, inputs: tuple[Input, ...], noises: tuple[Noise, ...]) 
     """By ports for each neuron whether a number is added there that is the same over a step: a table's, one that is
     supplied, noise."""
     neurons = census.neurons
-    flows = np.concatenate(
-        [np.repeat([one.expression is not None for one in inputs], [one.size for one in inputs]), [True]]
-    )
+    flows = np.array([*(one.expression is not None for one in inputs for _ in range(one.size)), True])
     result = {port: ~flows[given] for port, given in ((DRIVE, neurons.input), *neurons.port_input.items())}
     for noise in noises:
         if not noise.state:
