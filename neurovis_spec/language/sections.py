@@ -175,7 +175,8 @@ def _as_input(node: Node, info: ValidationInfo) -> Located[str]:
     refuse(info, node, "the name of an input", hint)
 
 
-_INPUTS = "the name of an input, or ports with inputs"
+#: An input to drive, or inputs to ports. Who writes one out here means no ports.
+_INPUT = at_ports(_as_input, TEXT, "the name of an input, or ports with inputs", InputModel.model_fields)
 
 
 class GroupModel(Model):
@@ -213,8 +214,8 @@ class GroupModel(Model):
         None,
         description="The activity at step 0, else computed; or states of the model, too: {v: -65, activity: 0.5}.",
     )
-    input: Annotated[tuple[AtPort[Located[str]], ...], at_ports(_as_input, TEXT, _INPUTS), naming("input")] | None = (
-        Field(None, description="An entry of inputs, added to the combined input; or to ports: {excitatory: rain}.")
+    input: Annotated[tuple[AtPort[Located[str]], ...], _INPUT, naming("input")] | None = Field(
+        None, description="An entry of inputs, added to the combined input; or to ports: {excitatory: rain}."
     )
     noise: Annotated[NoiseField, NOISE] | None = Field(
         None,

@@ -5,7 +5,7 @@ In: nodes. Out: one frozen value each, so that nobody behind this module asks ag
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from collections.abc import Mapping as AnyMapping
 from typing import Annotated, ClassVar, Final, Generic, NamedTuple, TypeAlias, TypeVar, cast, get_args
 
@@ -285,11 +285,14 @@ class AtPort(NamedTuple, Generic[T]):
     port: Located[str] | None = None
 
 
-def at_ports(read: Callable[[Node, ValidationInfo], T], shape: Shape, wanted: str) -> Leaf[Node]:
-    """The annotation of a field that takes a value for drive, or a mapping of ports, each with a value."""
+def at_ports(
+    read: Callable[[Node, ValidationInfo], T], shape: Shape, wanted: str, not_ports: Collection[str] = ()
+) -> Leaf[Node]:
+    """The annotation of a field that takes a value for drive, or a mapping of ports, each with a value. A mapping with
+    one of the keys ``not_ports`` is no such mapping."""
 
     def check(node: Node, info: ValidationInfo) -> tuple[AtPort[T], ...]:
-        if not isinstance(node, Mapping):
+        if not isinstance(node, Mapping) or any(node.entry(key) is not None for key in not_ports):
             return (AtPort(read(node, info)),)
         if not node.entries:
             refuse(info, node, wanted)
