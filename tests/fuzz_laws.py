@@ -265,7 +265,7 @@ def _emitted(_: Draw, first: str, second: str) -> str:
 
 #: Where the last bit decides: NumPy and libm may differ in it, and what follows magnifies that.
 _JUMPS = frozenset(
-    {"floor", "ceil", "round", "sign", "step", "tan", "sin", "cos", "exp", "expm1", "sinh", "cosh", "pow"}
+    {"floor", "ceil", "round", "sign", "step", "tan", "sin", "cos", "exp", "expm1", "exprel", "sinh", "cosh", "pow"}
 )
 
 

@@ -113,6 +113,11 @@ def sigmoid(x: float) -> float:
     return divide(1.0, 1.0 + _exp(-x))
 
 
+def exprel(x: float) -> float:
+    """expm1(x)/x, which is 1 where x is 0."""
+    return 1.0 if x == 0 else divide(_expm1(x), x)
+
+
 def minimum(*values: float) -> float:
     """The least; NaN if any is."""
     return reduce(lambda a, b: a if a <= b or a != a else b, values)
@@ -164,6 +169,7 @@ def _unbounded(function: Callable[[float], float], odd: bool = False) -> Scalar:
 
 
 _exp = _unbounded(math.exp)
+_expm1 = _unbounded(math.expm1)
 
 
 class Hidden(IntEnum):
@@ -265,6 +271,10 @@ def _step(x: FloatArray) -> FloatArray:
 
 def _sigmoid(x: FloatArray) -> FloatArray:
     return np.reciprocal(1.0 + np.exp(np.negative(x)))
+
+
+def _exprel(x: FloatArray) -> FloatArray:
+    return np.where(np.equal(x, 0), 1.0, np.divide(np.expm1(x), x))
 
 
 def _folded(function: np.ufunc) -> Vector:
@@ -384,8 +394,19 @@ _ROWS = (
         undefined=(Undefined("takes the logarithm of a number that is not above 0", "x <= -1"),),
     ),
     Function(
-        "expm1(x)", _unbounded(math.expm1), np.expm1, "np.expm1({0})", "expm1{s}({0})", ("exp(x)",),
+        "expm1(x)", _expm1, np.expm1, "np.expm1({0})", "expm1{s}({0})", ("exp(x)",),
         about="exp(x) − 1, exact for small x.", hides=Hidden.INFINITY,
+    ),
+    Function(
+        # the argument is computed once
+        "exprel(x)", exprel, _exprel,
+        "np.where(np.equal((_x := {0}), 0.0), 1.0, np.divide(np.expm1(_x), _x))", "nv_exprel({0})",
+        ("0.5 + x/3 if abs(x) < 1e-5 else (exp(x) - exprel(x))/x",),
+        about="(exp(x) − 1)/x, which is 1 where x is 0.", hides=Hidden.INFINITY,
+        helper="""static {real} nv_exprel({real} x)
+{{
+    return x == 0.0{s} ? 1.0{s} : expm1{s}(x) / x;
+}}""",
     ),
     Function(
         "pow(x, exponent)", power, np.float_power, "np.float_power({0}, {1})", "pow{s}({0}, {1})",
