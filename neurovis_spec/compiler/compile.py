@@ -18,6 +18,7 @@ from neurovis_spec.arrays import BoolArray
 from neurovis_spec.compiler.body_settings import BodySettings
 from neurovis_spec.compiler.canonical import content_hash
 from neurovis_spec.compiler.checks.compiled import Compiled
+from neurovis_spec.compiler.checks.definitions import check_dt
 from neurovis_spec.compiler.checks.warnings import warn
 from neurovis_spec.compiler.connections.connect import Connected, connect, join
 from neurovis_spec.compiler.connections.entries import Bundle
@@ -177,6 +178,7 @@ def _declare(spec: Spec, request: Request, findings: Findings) -> _Declared:
     expander = Expander(library, request.root, findings, constants.dt, files={**request.files}, limits=request.limits)
     expansion = expander.expand(spec, constants, request.base)
     census = populate(expansion.scopes, request.limits, seed)
+    check_dt(spec, (file.model for file in request.includes.files), census.groups, findings)
     _check_modules_without_instance(expander, request.limits, seed)
     if not len(census.neurons):
         _report_no_neurons(spec, census, findings)

@@ -93,7 +93,7 @@ class _Checks:
     def fixed(self, use: Use) -> dict[str, Value]:
         """The values of the names that do not change in a run: constants, and settings that nobody can set."""
         settings = {name: values for name, values in use.parameters.items() if not self.is_set(Key(use.owner, name))}
-        return {**CONSTANTS, "dt": self.network.dt, **settings}
+        return {**CONSTANTS, "dt": self.network.dt * use.definition.per_second, **settings}
 
     def is_set(self, array: Key) -> bool:
         """Whether an array can be set in a run."""

@@ -7,7 +7,7 @@ declared, or where they are named.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from collections.abc import Mapping as AnyMapping
 from typing import NamedTuple
 
@@ -15,6 +15,8 @@ import numpy as np
 
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.names.references import key_of, key_span
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.neurons.groups import Built
 from neurovis_spec.compiler.program import ACTIVATION, MODEL, RULE, Kind
 from neurovis_spec.compiler.values.builtin import installed
 from neurovis_spec.compiler.values.constants import value_of
@@ -25,23 +27,26 @@ from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.parser import parse
 from neurovis_spec.language.expressions.tree import Tree, names
 from neurovis_spec.language.grammar import ACTIVITIES
-from neurovis_spec.language.library import DefinitionModel
+from neurovis_spec.language.library import DefinitionModel, Library, Parts
 from neurovis_spec.language.located import Formula
+from neurovis_spec.language.spec import Spec
 from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.language.values import Choice
 from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
 
 #: What the result of definitions of a kind is, in the author's words.
 _RESULT_NOUN: AnyMapping[Kind, str] = {ACTIVATION: "the value", MODEL: "the activity", RULE: "the weight"}
-_NOUNS = {"let": "intermediate value", "signals": "signal", "parameters": "parameter"}
+_NOUNS = {"let": "intermediate value", "signals": "signal", "parameters": "parameter", "ports": "port"}
 
 
 def check_definitions(compiled: Compiled, findings: Findings) -> None:
     """Warn of all such definitions."""
+    shown = _shown(compiled.network)
     for library in compiled.libraries:
         for kind, result_noun in _RESULT_NOUN.items():
             for name, model in library.definitions[kind.section].items():
                 _check_parts(model, result_noun, findings)
+                _check_flows(model, shown, findings)
                 if kind.lasting:
                     _check_replaced(model, compiled.library.definitions.of(kind).known()[name], findings)
     _check_unused(compiled, findings)
@@ -75,11 +80,14 @@ def _parts_of(definition: DefinitionModel) -> dict[str, _Part]:
     for name, formula in parts.let.items():
         reads["let", name] = _names_read(formula)
     for name, state in (parts.state or {}).items():
-        reads["state", name] = _names_read(state.initial, state.each_step, state.each_episode)
+        flow = state.flow
+        read = _names_read(state.initial, state.each_step, state.each_episode, flow.derivative, flow.noise)
+        reads["state", name] = read
     found = {
         name: _Part(section, key_of(definition.source, section, name).span, read)
         for (section, name), read in reads.items()
     }
+    found |= {port.name.value: _Part("ports", port.name.span, frozenset()) for port in parts.ports}
     return found | {signal.value: _Part("signals", signal.span, frozenset()) for signal in parts.signals}
 
 
@@ -100,7 +108,7 @@ def _check_parts(definition: DefinitionModel, result_noun: str, findings: Findin
     whoever runs the network, can record them. A part that only such parts read is not reported: that follows from
     these."""
     parts, written = _parts_of(definition), definition.parts()
-    wanted = _names_read(written.each_step, written.each_episode)
+    wanted = _given(written)
     states = [name for name, part in parts.items() if part.section == "state"]
     used = _reached([*wanted, *states], parts)
     unused = {name: part for name, part in parts.items() if name not in used}
@@ -112,6 +120,56 @@ def _check_parts(definition: DefinitionModel, result_noun: str, findings: Findin
             findings.warning("unused-parameter", span, message, "remove it, or use it")
         else:
             findings.warning("unused-part", span, message, "remove it, or use it")
+
+
+def _given(written: Parts) -> frozenset[str]:
+    """What the formulas read that say what a definition gives."""
+    return _names_read(written.each_step, written.each_episode, *(written.outputs or {}).values())
+
+
+# Derivatives
+
+
+def _shown(network: Network) -> frozenset[str]:
+    """The names of states that somebody outside their model asks for: a connection, an output, a picture."""
+    found = {route.sends for route in network.connections.routes}
+    found |= {state.state for output in network.outputs for state in output.states}
+    return frozenset(found.union(curve.state for panel in network.render.figure for curve in panel.shown or ()))
+
+
+def _check_flows(definition: DefinitionModel, shown: Collection[str], findings: Findings) -> None:
+    """Warn of each state with a derivative on which nothing depends: neither what the definition gives or sends, nor
+    another state."""
+    parts, written = _parts_of(definition), definition.parts()
+    states = written.state or {}
+    for name, state in states.items():
+        derivative = state.flow.derivative
+        if derivative is None or name in shown or (written.send is not None and written.send.value == name):
+            continue
+        others = frozenset().union(*(parts[other].reads for other in states if other != name))
+        if name not in _reached(_given(written) | others, {key: parts[key] for key in parts if key not in states}):
+            message = f"nothing depends on the state '{name}': it is integrated for nobody"
+            hint = "let the activity, an output or another state read it, send it, or remove it"
+            findings.warning("derivative-unread", parts[name].span, message, hint)
+
+
+def check_dt(spec: Spec, included: Iterable[Library], groups: Iterable[Built], findings: Findings) -> None:
+    """Report a derivative in use where nothing says how long a step is."""
+    if "time" in spec.unknown or (spec.time is not None and (spec.time.dt or "dt" in spec.time.unknown)):
+        return
+    group = next((group for group in groups if group.kind.model.definition.flows), None)
+    if group is None:
+        return
+    model = group.kind.model.definition
+    first = model.flows[0].name
+    own = next((one.models[model.name] for one in (spec, *included) if model.name in one.models), None)
+    written = None if own is None else own.state[first].derivative
+    if written is None:  # the model is a built-in one
+        written = group.model.model and group.model.model.name
+    unit = "second" if model.per_second == 1 else "millisecond"
+    message = f"the derivative of '{first}' is per {unit}, and no 'dt' says how long a step is"
+    hint = "say it at the top, in seconds: time: {dt: 0.001}"
+    findings.error("dt-needed", group.model.source.span if written is None else written.span, message, hint)
 
 
 # Weights that are replaced where a change is meant

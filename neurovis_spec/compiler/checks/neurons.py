@@ -9,7 +9,7 @@ without a single connection is a sketch: of its neurons only those are reported 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -17,15 +17,16 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import Indices, IntArray
 from neurovis_spec.compiler.checks.compiled import Compiled
-from neurovis_spec.compiler.events.settable import BIAS
+from neurovis_spec.compiler.events.settable import bias_of
 from neurovis_spec.compiler.names.references import key_span
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.initial_states import initial_states
-from neurovis_spec.compiler.program import Definition, Population
+from neurovis_spec.compiler.program import DRIVE, Definition, Population
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.sections import GroupModel
+from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 
 Mask = npt.NDArray[np.bool_]
 #: So many steps from what is active are taken for all connections at once; what lies farther is followed by its ways.
@@ -108,7 +109,7 @@ def _ignored(model: Definition, reads: _Reads, group: GroupModel) -> Iterator[tu
         return
     for key in _DRIVING:
         entry = group.source.entry(key)
-        if entry is not None:
+        if entry is not None and not (isinstance(entry.value, SourceMapping) and entry.value.entry(DRIVE) is None):
             message = f"the model '{model.name}' does not read its drive: '{key}' changes nothing"
             yield entry.key.span, message, "remove it, or take a model that reads 'drive'"
 
@@ -117,21 +118,25 @@ def _idle(network: Network) -> Mask:
     """Whether each neuron is idle."""
     neurons, connections = network.neurons, network.connections
     quiet: Mask = (neurons.input < 0) & (neurons.bias == 0) & np.isnan(neurons.initial)
+    for bias in neurons.port_bias.values():
+        quiet &= bias == 0
+    for places in neurons.port_input.values():
+        quiet &= places < 0
     for noise in network.noises:
         quiet[noise.members] = False
-    for population in network.populations:
-        if population.drive.combine == "distance":  # |c| away from a signal of 0
-            quiet[connections.targets[population.drive.incoming]] = False
+    for port in (port for population in network.populations for port in population.ports):
+        if port.combine == "distance":  # |c| away from a signal of 0
+            quiet[connections.targets[port.incoming]] = False
     if not len(connections):
         quiet &= _needed(network)
     if not quiet.any():
         return quiet
     for population in network.populations:
         quiet[population.members] &= _stays_at_zero(population, network)
-    owners = set()
+    owners, biases = set(), {bias_of(port) for port in (DRIVE, *neurons.port_bias)}
     for binding in network.set_by_events:  # what an event makes of a neuron is not checked
         owners.add(binding.array.owner)
-        if binding.array == BIAS:
+        if binding.array in biases:
             quiet[binding.places] = False
     for population in network.populations if owners else ():
         if any(use.owner in owners for use in population.uses):
@@ -235,29 +240,33 @@ def _stays_at_zero(population: Population, network: Network) -> Mask:
     """Whether the neurons of a population, never driven, surely keep their states and an activity of 0: then all that
     their formulas read stays what it is at the first step."""
     count, model = len(population.members), population.model.definition
-    if population.drive.combine == "product" or not model.read.isdisjoint(("k", "t")):
+    if any(port.combine == "product" for port in population.ports) or not model.read.isdisjoint(("k", "t")):
         return np.zeros(count, dtype=np.bool_)
     result = np.ones(count, dtype=np.bool_)
-    values: dict[str, Value] = {**CONSTANTS, "dt": network.dt, **population.model.parameters, "drive": 0.0}
+    dt = network.dt * model.per_second
+    values: dict[str, Value] = {**CONSTANTS, "dt": dt, **population.model.parameters}
+    values |= dict.fromkeys((port.name for port in population.ports), 0.0)
     states = initial_states(population.model, population.members, network.dt, network.neurons.starts)
     values |= states
+    functions = _functions(population, {**CONSTANTS, "dt": network.dt, **population.activation.parameters})
     for name, tree in model.let:
-        values[name] = evaluate_array(tree, values)
+        values[name] = evaluate_array(tree, values, functions=functions)
     for state in model.state:
-        for change in (state.each_step, state.each_episode):
+        old = states[state.name]
+        for change, still in ((state.each_step, old), (state.each_episode, old), (state.derivative, 0.0)):
             if change is not None:
-                result &= np.broadcast_to(evaluate_array(change, values) == states[state.name], (count,))
-    result &= np.broadcast_to(_activity(population, values) == 0, (count,))
+                result &= np.broadcast_to(evaluate_array(change, values, functions=functions) == still, (count,))
+        if network.outlets:  # it may be sent
+            result &= states[state.name] == 0
+    for given in model.gives:
+        assert given.each_step is not None
+        result &= np.broadcast_to(evaluate_array(given.each_step, values, functions=functions) == 0, (count,))
     return result
 
 
-def _activity(population: Population, values: dict[str, Value]) -> Value:
-    """The model's activity; f is the neurons' activation."""
-    given = {**values, **population.activation.parameters}
-    functions = {
-        name: lambda x, tree=tree: evaluate_array(tree, {**given, "x": x})
+def _functions(population: Population, known: Mapping[str, Value]) -> Mapping[str, Callable[[Value], Value]]:
+    """What formulas of the model may call: the neurons' activation."""
+    return {
+        name: lambda x, tree=tree: evaluate_array(tree, {**known, "x": x})
         for name, tree in population.activation.definition.functions.items()
     }
-    activity = population.model.definition.given.each_step
-    assert activity is not None
-    return evaluate_array(activity, values, functions=functions)

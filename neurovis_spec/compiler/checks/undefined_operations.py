@@ -8,13 +8,14 @@ conditional is not checked: the branch may never be taken. What depends on what 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.program import Definition
 from neurovis_spec.compiler.run_checks import through_let
+from neurovis_spec.compiler.values.arguments import Settled
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS, Hidden
@@ -25,7 +26,6 @@ from neurovis_spec.language.values import Choice
 
 def check_undefined(compiled: Compiled, findings: Findings) -> None:
     """Warn at each choice of a definition with such an operation."""
-    clock: dict[str, Value] = {**CONSTANTS, "dt": compiled.network.dt}
     found: dict[tuple[str, str], tuple[list[Hazard], list[Hazard]]] = {}
     for kind, group in compiled.models:
         choices = group.model, group.activation
@@ -37,12 +37,12 @@ def check_undefined(compiled: Compiled, findings: Findings) -> None:
             found[key] = _of_kind(model, activation)
         for hidden, used, choice in zip(found[key], (kind.model, kind.activation), choices, strict=True):
             if hidden:
-                _tell(choice, used.definition.kind.name, hidden, clock | dict(used.parameters), findings)
+                _tell(choice, used, hidden, compiled.network.dt, findings)
     for _, body, bundles in compiled.entries.values():
         for learning in (bundle.learning for bundle in bundles if bundle.learning is not None):
-            rule, known = learning.rule, clock | dict(learning.parameters)
-            made = [hazards(tree, Hidden.ALL) for tree in _at_steps(rule)]
-            _tell(body.plasticity, rule.kind.name, through_let(made, rule.let).found, known, findings)
+            made = [hazards(tree, Hidden.ALL) for tree in _at_steps(learning.rule)]
+            hidden = through_let(made, learning.rule.let).found
+            _tell(body.plasticity, learning.settled, hidden, compiled.network.dt, findings)
 
 
 def _at_steps(definition: Definition) -> Iterator[Tree]:
@@ -61,10 +61,10 @@ def _of_kind(model: Definition, activation: Definition) -> tuple[list[Hazard], l
     return found.found, inside if computed else []
 
 
-def _tell(
-    choice: Choice | None, what: str, found: Iterable[Hazard], known: Mapping[str, Value], findings: Findings
-) -> None:
+def _tell(choice: Choice | None, used: Settled, found: Iterable[Hazard], dt: float, findings: Findings) -> None:
     """Warn of the first hazard that is always computed, and undefined for one neuron or connection at least."""
+    what = used.definition.kind.name
+    known: dict[str, Value] = {**CONSTANTS, "dt": dt * used.definition.per_second, **used.parameters}
     for hazard in found if choice is not None else ():
         condition = hazard.condition
         if hazard.where is None and names(condition) <= known.keys() and np.any(evaluate_array(condition, known)):

@@ -151,7 +151,7 @@ def _models(census: Census) -> tuple[Holder, ...]:
         Holder(
             np.fromiter(chain.from_iterable(members[name]), np.int64),
             name,
-            tuple(quantity.name for quantity in model.state),
+            tuple(quantity.name for quantity in model.kept),
         )
         for name, model in models.items()
     )

@@ -24,7 +24,7 @@ from neurovis_spec.compiler.network import Group, Input
 from neurovis_spec.compiler.neurons.labels import labels_of
 from neurovis_spec.compiler.neurons.positions import positions_of
 from neurovis_spec.compiler.program import ACTIVATION, DRIVE, MODEL, Kind
-from neurovis_spec.compiler.values.arguments import Settled, check_initials, neurons, settled_of, spread
+from neurovis_spec.compiler.values.arguments import Settled, as_states, check_initials, neurons, settled_of, spread
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.definitions import Definitions
 from neurovis_spec.compiler.values.draws import Stream
@@ -164,7 +164,7 @@ class Builder:
         n = UNKNOWN if names is UNKNOWN else len(names)
         kind = self._kind(name, model, n)
         biases, bias_parts = self._bias(model, n, name, kind)
-        given = model.initial or _NO_INITIAL
+        given = as_states(model.initial or _NO_INITIAL, kind.model.definition, findings)
         initial = UNKNOWN if given.activity is None else self._drawn(given.activity, n, "initial", name)
         starts = self._starts(given, n, name, kind, model) if given.states else _NO_STARTS
         inputs = self._inputs(model, n, name, kind)

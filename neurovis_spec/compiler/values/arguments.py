@@ -17,16 +17,16 @@ from neurovis_spec.compiler.events.settable import Assembled, Dependent, Paramet
 from neurovis_spec.compiler.limits import PATIENCE, plural
 from neurovis_spec.compiler.program import Definition, Kind
 from neurovis_spec.compiler.values.constants import Constants, Randomness, Value, value_of
-from neurovis_spec.compiler.values.definitions import Default, Defaults, Defined, Definitions, check_bounds
+from neurovis_spec.compiler.values.definitions import Default, Defined, Definitions, check_bounds
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Findings, Hint, Home, Undeclared, shorten
 from neurovis_spec.language.expressions.evaluate import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import Name, Tree, names
 from neurovis_spec.language.keys import settings_of
-from neurovis_spec.language.located import IDENTIFIER, Formula, formula_of
+from neurovis_spec.language.located import IDENTIFIER, Formula, Located, formula_of
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
-from neurovis_spec.language.values import Choice, FormulaList
+from neurovis_spec.language.values import Choice, FormulaList, Initial
 from neurovis_spec.language.yaml.source import AnyList, Entry, Scalar, one_or_more
 from neurovis_spec.likeness import did_you_mean, meant, suggest
 
@@ -95,7 +95,7 @@ def settled_of(
     home = Home((kind.section, definition.name), ("parameters", "signals"))
     entries = settings_of(choice.settings, known, "parameter", "it has no parameters", constants.findings, home)
     with constants.following() as parts:
-        values = _parameters(choice, defined.defaults, n, constants, entries, each)
+        values = _parameters(choice, defined, n, constants, entries, each)
     if values is UNKNOWN:
         return Settled(definition, {}, (), entries, sound=False)
     return Settled(definition, values, tuple(part._replace(field=kind.name) for part in parts), entries)
@@ -198,13 +198,14 @@ def _formulas(entry: Entry, constants: Constants) -> Formula | FormulaList | Unk
 
 
 def _parameters(
-    choice: Choice, defaults: Defaults, n: int | Unknown, constants: Constants, entries: Names[Entry], each: Each
+    choice: Choice, defined: Defined, n: int | Unknown, constants: Constants, entries: Names[Entry], each: Each
 ) -> dict[str, FloatArray] | Unknown:
     """The value of every parameter of a definition with these settings, for ``each`` of n; UNKNOWN where one is. A
     parameter may follow parameters of the run by its setting, by its default (which may use parameters before it that
     do), or by its bounds alone; in the last case its value stays, and is checked again when the bounds change."""
     findings = constants.findings
-    values: dict[str, Value | Unknown] = {**CONSTANTS, "dt": constants.dt}
+    definition, defaults = defined
+    values: dict[str, Value | Unknown] = {**CONSTANTS, "dt": constants.dt * definition.per_second}
     result: dict[str, FloatArray] = {}
     following: dict[str, list[Part]] = {}
     for default in defaults:
@@ -286,9 +287,30 @@ def _assembled(
     return ParameterFormula(tree, {}, known)
 
 
+def as_states(given: Initial, model: Definition, findings: Findings) -> Initial:
+    """What neurons begin with, in states alone where their model has a derivative: the activity follows from these. One
+    that is a state is given by that; else there is a finding."""
+    written = given.activity
+    if written is None or not model.flows:
+        return given
+    activity = model.given.each_step
+    state = next((one.name for one in model.state if isinstance(activity, Name) and one.name == activity.name), None)
+    if state is None:
+        message = f"the activity of the model '{model.name}' follows from its states"
+        findings.error("initial-activity", written.span, message, f"write initial: {{{model.flows[0].name}: …}}")
+    elif any(name.value == state for name, _ in given.states):
+        message = f"the activity of the model '{model.name}' is the state '{state}', which is given, too"
+        findings.error("conflicting-keys", written.span, message, "leave one of them out")
+    else:
+        name = Located(state, Scalar(state, written.span))
+        return Initial(None, (*given.states, (name, written)))
+    return Initial(None, given.states)
+
+
 def check_initials(used: Settled, choice: Choice, constants: Constants) -> bool:
     """Whether the states of a definition begin with finite numbers; a finding where one does not."""
-    known: dict[str, Value] = {**CONSTANTS, "dt": constants.dt, **used.parameters}
+    dt = constants.dt * used.definition.per_second
+    known: dict[str, Value] = {**CONSTANTS, "dt": dt, **used.parameters}
     for state in used.definition.state:
         if not np.isfinite(evaluate_array(state.initial, known)).all():
             message = f"with these settings the state '{state.name}' does not begin with a finite number"

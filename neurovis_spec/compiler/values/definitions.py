@@ -175,7 +175,8 @@ class _Checker:
     def declare_at(self, span: Span, name: str) -> None:
         """The same of one that is declared at a place."""
         if name in self.known.declared:
-            self.findings.error("duplicate-name", span, self.taken(name), "choose another name")
+            such = "" if isinstance(self.known[name], Span) else f", such as '{name}_0'"
+            self.findings.error("duplicate-name", span, self.taken(name), f"choose another name{such}")
         self.known.declared[name] = span
 
     def taken(self, name: str) -> str:
