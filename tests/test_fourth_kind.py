@@ -35,6 +35,7 @@ from neurovis_spec.language.values import Choice, ParameterField
 from neurovis_spec.language.yaml.reader import read_text
 from neurovis_spec.language.yaml.source import Scalar
 from neurovis_spec.runtime import c_step, numpy_operations, reference
+from neurovis_spec.runtime.numpy_arrivals import Step
 from neurovis_spec.runtime.numpy_code import Cell, emit_change
 from neurovis_spec.runtime.simulation import Simulation
 from neurovis_spec.runtime.state import State
@@ -85,7 +86,7 @@ def _perform(operation: Echo, by: reference.ReferenceStepper, state: State, inpu
 
 
 @numpy_operations.emit.register
-def _emit(operation: Echo, step: numpy_operations.Step) -> None:
+def _emit(operation: Echo, step: Step) -> None:
     code, projection = step.code, step.network.projections[operation.projection]
     (use,) = projection.uses
     states = {one.name: code.state(use, one.name) for one in use.definition.state}

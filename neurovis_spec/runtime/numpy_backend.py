@@ -9,12 +9,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
+import numpy as np
+
 from neurovis_spec.arrays import FloatArray, subscript
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Population
+from neurovis_spec.compiler.program import Population, Port
 from neurovis_spec.runtime.backend import Availability, Capabilities
+from neurovis_spec.runtime.numpy_arrivals import Step
 from neurovis_spec.runtime.numpy_code import Code
-from neurovis_spec.runtime.numpy_operations import Step, emit
+from neurovis_spec.runtime.numpy_operations import emit
 from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.state import Mask, State, Structure
@@ -71,7 +74,7 @@ class NumpyBackend:
     """Array code made from the update program."""
 
     name = "numpy"
-    capabilities = Capabilities(noise=True)
+    capabilities = Capabilities(noise=True, flows=True)
 
     def availability(self) -> Availability:
         """Always there."""
@@ -88,7 +91,7 @@ def step_code(network: Network, structure: Structure) -> Code:
         populations = tuple(_without(population, structure.gone) for population in network.populations)
         network = replace(network, populations=populations)
     code = Code(network.dt, network.settable.variables)
-    step = Step(code, network, structure, signal_layout(network), history_depth(network), {})
+    step = Step(code, network, structure, signal_layout(network), history_depth(network), {}, {})
     for operation in network.program:
         emit(operation, step)
     return code
@@ -96,11 +99,20 @@ def step_code(network: Network, structure: Structure) -> Code:
 
 def _without(population: Population, gone: Mask) -> Population:
     """A population without some connections."""
-    keep = [~gone[port.incoming] for port in population.ports]
-    if all(some.all() for some in keep):
+    if not any(gone[port.incoming].any() for port in population.ports):
         return population
-    ports = (
-        replace(port, incoming=port.incoming[some], slots=port.slots[some])
-        for port, some in zip(population.ports, keep, strict=True)
+    return replace(population, ports=tuple(_port_without(port, ~gone[port.incoming]) for port in population.ports))
+
+
+def _port_without(port: Port, keep: Mask) -> Port:
+    """A port with those of its connections alone that it keeps."""
+    factors, staged = port.factors, port.staged
+    if staged is not None:
+        staged = (np.cumsum(keep) - 1)[staged[keep[staged]]]
+    return replace(
+        port,
+        incoming=port.incoming[keep],
+        slots=port.slots[keep],
+        factors=None if factors is None else factors[keep],
+        staged=staged,
     )
-    return replace(population, ports=tuple(ports))

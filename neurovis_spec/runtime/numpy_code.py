@@ -39,6 +39,9 @@ signals arrive, c7 the biases.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import partial
+from types import MappingProxyType
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -49,6 +52,7 @@ from neurovis_spec.compiler.events.settable import Variable
 from neurovis_spec.compiler.program import Definition, Key, Use
 from neurovis_spec.language.expressions.emit import defined, emit
 from neurovis_spec.language.expressions.tree import Name, Tree, Unary, names
+from neurovis_spec.runtime.stages import unfolded
 from neurovis_spec.runtime.state import State, constants
 
 _NONE: Mapping[Key, Variable] = {}
@@ -58,17 +62,22 @@ Steps: TypeAlias = Callable[[State, Iterable[FloatArray]], Iterator[None]]
 
 
 #: the arrays of a state, by which the text names them
-_PARTS = ("activity", "weights", "signals", "history", "cells")
+_PARTS = ("activity", "outlets", "weights", "signals", "history", "cells")
 #: the numbers that can be set, in the conditions of the state
 _VARIABLES = "variables"
+#: whether the step is the first one of all, which no other came before
+FIRST = "k == 0 and not state.continued"
 
 
 class Code:
     """Lines of a step, one level deep, and what they need."""
 
     def __init__(self, dt: float, variables: Mapping[Key, Variable] = _NONE) -> None:
-        self._variables = variables
-        self.namespace: dict[str, object] = {"np": np, "bincount": np.bincount, "multiply": np.multiply}
+        self.dt, self._variables = dt, variables
+        self.namespace: dict[str, object] = {"np": np, "bincount": np.bincount, "multiply": np.multiply, "add": np.add}
+        self.namespace["concatenate"] = np.concatenate
+        #: lines before the steps: arrays that these work in, functions that they call
+        self.before: list[str] = []
         self.lines: list[str] = []
         self.indent = 1
         #: lines at the head of a step, which depend on its number alone
@@ -103,8 +112,44 @@ class Code:
         return name
 
     def parameters(self, use: Use, some: IntArray | None = None) -> dict[str, str]:
-        """The parameters of a definition in use, of ``some`` of its members or of all."""
-        return {name: self.numbers(Key(use.owner, name), array, some) for name, array in use.parameters.items()}
+        """The parameters of a definition in use, of ``some`` of its members or of all; and the time, where it is in
+        another unit there."""
+        numbers = {name: self.numbers(Key(use.owner, name), array, some) for name, array in use.parameters.items()}
+        return numbers | self._time(use.definition)
+
+    def _time(self, definition: Definition) -> dict[str, str]:
+        unit = definition.per_second
+        if unit == 1.0:
+            return {}
+        if "t" in definition.read:
+            self._tell_time()
+            self.head_lines.add(f"t_{unit:.0f} = t_ * {unit!r}")
+        return {"dt": self.constant(np.float64(self.dt * unit)), "t": f"t_{unit:.0f}"}
+
+    def functions(self, use: Use, seen: Mapping[str, str] = MappingProxyType({})) -> Functions:
+        """The functions of an activation in use, which formulas of a model call; in these ``seen`` goes before what
+        they see otherwise."""
+
+        def call(tree: Tree, argument: str) -> str:
+            # the argument gets an identifier, so that it is computed once
+            x = argument if argument.isidentifier() else self.let("x", argument)
+            return self.expression(tree, self.parameters(use) | {**seen, "x": x})
+
+        return {name: partial(call, tree) for name, tree in use.definition.functions.items()}
+
+    @contextmanager
+    def function(self, name: str, *arguments: str) -> Iterator[None]:
+        """What is written meanwhile is the body of a function that the steps can call."""
+        outer, indent, self.lines, self.indent = self.lines, self.indent, [], 1
+        yield
+        body, self.lines, self.indent = self.lines, outer, indent
+        self.before += [f"    def {name}({', '.join(arguments)}):", *(f"    {line}" for line in body)]
+
+    def array(self, prefix: str, code: str) -> str:
+        """An array to work in, made before the steps."""
+        name = self.name(prefix)
+        self.before.append(f"    {name} = {code}")
+        return name
 
     def state(self, use: Use, name: str) -> str:
         """A state of a definition in use. It is looked up once, before the steps."""
@@ -164,9 +209,11 @@ class Code:
     def expression(self, tree: Tree, known: Mapping[str, str], functions: Functions | None = None) -> str:
         """An expression as code."""
         if names(tree) & {"k", "t"}:
-            self.head_lines.add("k_ = float64(k)")
-            self.head_lines.add(f"t_ = k_ * {self.common_names['dt']}")
+            self._tell_time()
         return emit(tree, {**self.common_names, **known}, functions or {})
+
+    def _tell_time(self) -> None:
+        self.head_lines |= {"k_ = float64(k)", f"t_ = k_ * {self.common_names['dt']}"}
 
     def fresh(self, prefix: str, tree: Tree, known: Mapping[str, str], functions: Functions | None = None) -> str:
         """The value of an expression under a new identifier, and never an alias of an array that changes."""
@@ -178,14 +225,15 @@ class Code:
         views = [f"    {name} = {code}" for code, name in self._views.items()]
         # sorted, as the line of t_ reads k_
         body = [*(f"    {text}" for text in sorted(self.head_lines)), *self.lines, "    state.k = k + 1", "    yield"]
-        lookups = [f"    {name} = state.{name}" for name in _PARTS if any(name in line for line in [*views, *body])]
+        text = [*views, *self.before, *body]
+        lookups = [f"    {name} = state.{name}" for name in _PARTS if any(name in line for line in text)]
         lookups += [
             f"    {name} = state.conditions.{name}"
             for name in (_VARIABLES, "holds")
-            if any(name in line for line in [*views, *body])
+            if any(name in line for line in text)
         ]
         loop = ["    for k, s in enumerate(vectors, state.k):", *(f"    {line}" for line in body), ""]
-        return "\n".join(["def steps(state, vectors):", *lookups, *views, *loop])
+        return "\n".join(["def steps(state, vectors):", *lookups, *views, *self.before, *loop])
 
     def compiled(self) -> Steps:
         """The steps as a function. The text holds our own identifiers only."""
@@ -217,15 +265,16 @@ def emit_change(
 ) -> dict[str, str]:
     """Emit the new value of all that lasts of a definition, from old values at once, then its change at an episode's
     end. Gives the identifiers of what does not last, which is made from the new states. ``seen``: what formulas see
-    besides their own."""
+    besides their own. What flows begins with its initial states: they stay at the first step."""
     each_step = {one.name: one.each_step for one in definition.lasting}
     fleeting = {one.name: one.each_step for one in definition.fleeting}
-    fleeting_names = _emit_replace(code, definition, seen, cells, each_step, fleeting, functions)
+    stay = FIRST if definition.flows else ""
+    fleeting_names = _emit_replace(code, definition, seen, cells, each_step, fleeting, functions, stay)
     ends = {one.name: one.each_episode for one in definition.lasting}
     if episode is not None and any(tree is not None for tree in ends.values()):
         code.line(f"if (k + 1) % {episode} == 0:")
         code.indent += 1
-        _emit_replace(code, definition, seen, cells, ends, {}, None)
+        _emit_replace(code, definition, seen, cells, ends, {}, functions)
         code.indent -= 1
     return fleeting_names
 
@@ -238,22 +287,29 @@ def _emit_replace(
     trees: Mapping[str, Tree | None],
     fleeting: Mapping[str, Tree | None],
     functions: Functions | None,
+    stay: str = "",
 ) -> dict[str, str]:
-    """Emit all right-hand sides, then all changes; gives the identifiers of what is ``fleeting``."""
+    """Emit all right-hand sides, then all changes; gives the identifiers of what is ``fleeting``. Where what ``stay``
+    says is true what lasts keeps its value."""
     known = dict(seen)
-    known |= {name: cell.now if cell.now.isidentifier() else code.let("v", cell.now) for name, cell in cells.items()}
-    wanted = all_names([*trees.values(), *fleeting.values(), *(tree for _, tree in definition.let)])
-    for name, tree in definition.let:
-        if name in wanted:
-            known[name] = code.fresh("m", tree, known)
+    known |= {
+        name: cell.now if cell.now.isidentifier() else code.let("v", cell.now)
+        for name, cell in cells.items()
+        if name not in fleeting
+    }
+    for name, value in unfolded(definition.let, [*trees.values(), *fleeting.values()]).let:
+        known[name] = code.fresh("m", value, known, functions)
     new = {name: code.fresh("n", tree, known, functions) for name, tree in trees.items() if tree is not None}
+    if stay:
+        new = {name: code.let("n", f"np.array({known[name]}) if {stay} else {value}") for name, value in new.items()}
     fleeting_names = {
         name: code.let("y", code.expression(tree, known | new, functions))
         for name, tree in fleeting.items()
         if tree is not None
     }
-    for name, value in new.items():
-        code.line(f"{cells[name].place} = {cells[name].kept(value)}")
+    for name, made in (new | fleeting_names).items():
+        if name in cells:
+            code.line(f"{cells[name].place} = {cells[name].kept(made)}")
     return fleeting_names
 
 
@@ -274,8 +330,3 @@ def shared(array: FloatArray) -> FloatArray | np.float64:
 def any_given(array: npt.NDArray[np.float64]) -> bool:
     """Whether a number is not 0 (NaN counts)."""
     return bool((array != 0).any())
-
-
-def all_names(trees: Iterable[Tree | None]) -> frozenset[str]:
-    """All names that occur in some of these."""
-    return frozenset().union(*(names(tree) for tree in trees if tree is not None))

@@ -6,7 +6,7 @@ when stages are. All backends ask here, so that they do the same in the same ord
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, NamedTuple, TypeAlias
 
@@ -23,6 +23,31 @@ Let: TypeAlias = tuple[tuple[str, Tree], ...]
 _INSIDE: Final = 2.0**-20
 #: what every model gives
 _ACTIVITY: Final = "activity"
+
+
+class Unfolded(NamedTuple):
+    """What formulas need: the intermediate values among these, in their order, and all names that both read."""
+
+    let: Let
+    names: frozenset[str]
+
+
+def unfolded(let: Let, trees: Iterable[Tree | None]) -> Unfolded:
+    """What some formulas need of the intermediate values of their definition, which are in order."""
+    read = frozenset[str]().union(*(names(tree) for tree in trees if tree is not None))
+    needed: list[tuple[str, Tree]] = []
+    for name, tree in reversed(let):
+        if name in read:
+            read |= names(tree)
+            needed.append((name, tree))
+    return Unfolded(tuple(reversed(needed)), read)
+
+
+def read_in_step(definition: Definition) -> frozenset[str]:
+    """All names that a definition reads where its members are updated: what is read of derivatives and of their noise
+    alone is not among them."""
+    quantities = (*definition.state, *definition.gives)
+    return unfolded(definition.let, [tree for one in quantities for tree in (one.each_step, one.each_episode)]).names
 
 
 class Formulas(NamedTuple):
@@ -52,6 +77,12 @@ class Part:
     derivatives: Formulas
     #: by states with noise, what their random numbers are multiplied by: at the first stage of a step
     spread: Formulas
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """The ports that are read at a stage."""
+        formulas = (*(taken.formulas for taken in self.taken), self.derivatives, self.spread)
+        return tuple({port.name: port for one in formulas for port in one.ports}.values())
 
     @property
     def flows(self) -> tuple[str, ...]:
@@ -99,21 +130,17 @@ def parts_of(network: Network, operation: Integrate) -> tuple[Part, ...]:
 def formulas_of(population: Population, trees: Iterable[tuple[str, Tree | None]], more: Let = ()) -> Formulas:
     """Some formulas of the population's model, with ``more`` intermediate values behind its own."""
     kept = tuple((name, tree) for name, tree in trees if tree is not None)
-    let: list[tuple[str, Tree]] = []
-    read = set().union(*(names(tree) for _, tree in kept))
-    for name, tree in reversed((*population.model.definition.let, *more)):
-        if name in read:
-            read |= names(tree)
-            let.insert(0, (name, tree))
-    return Formulas(kept, tuple(let), tuple(port for port in population.ports if port.name in read))
+    let, read = unfolded((*population.model.definition.let, *more), [tree for _, tree in kept])
+    return Formulas(kept, let, tuple(port for port in population.ports if port.name in read))
 
 
-def apart(port: Port) -> tuple[Sequence[int], Sequence[int]]:
+def apart(port: Port) -> tuple[IntArray, IntArray]:
     """The places of the connections in ``Port.incoming`` whose signals are held over a step, and of those whose signals
     are made anew at each stage."""
-    staged = set[int]() if port.staged is None else set(port.staged.tolist())
-    places = range(len(port.incoming))
-    return [place for place in places if place not in staged], sorted(staged)
+    anew = np.zeros(len(port.incoming), dtype=np.bool_)
+    if port.staged is not None:
+        anew[port.staged] = True
+    return np.flatnonzero(~anew), np.flatnonzero(anew)
 
 
 def _given(model: Definition, name: str) -> Tree | None:
@@ -122,10 +149,14 @@ def _given(model: Definition, name: str) -> Tree | None:
     return formulas.get(name, Name(name))
 
 
+def taken_by(network: Network) -> Indices:
+    """What each connection takes (m,): an index into the activities of all neurons followed by the outlets."""
+    return network.connections.sources.compact() if network.sending is None else network.sending
+
+
 def _taken(network: Network, operation: Integrate) -> dict[tuple[int, str], IntArray]:
     """By population and name what is taken at a stage, and its places."""
-    n, connections = len(network.neurons), network.connections
-    sending: Indices = connections.sources.compact() if network.sending is None else network.sending
+    n, sending = len(network.neurons), taken_by(network)
     asked = np.unique(
         np.concatenate(
             [

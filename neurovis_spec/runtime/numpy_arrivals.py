@@ -1,0 +1,184 @@
+"""What is given to a port, as NumPy code: signals, combined in the order of the reference, + bias + input + noise.
+
+In: a Step in the making. Out: code, or identifiers of what it gives. Sums are made by ``bincount``, which adds in the
+order of the connections from 0.0 on, and products by ``multiply.reduceat``, which multiplies from left to right. What
+is made of some connections first (``held``) comes before those of the others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from neurovis_spec.arrays import Indices, IntArray
+from neurovis_spec.compiler.events.settable import CENTRES, bias_of
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Population, Port
+from neurovis_spec.runtime.numpy_code import Code, any_given
+from neurovis_spec.runtime.signals import SignalLayout
+from neurovis_spec.runtime.state import Structure
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A step in the making."""
+
+    code: Code
+    #: without the connections that the structure leaves out
+    network: Network
+    structure: Structure
+    #: where signals are under way
+    layout: SignalLayout
+    #: how many past activities are remembered
+    depth: int
+    #: by populations and names of ports the identifiers of what was gathered there
+    ports: dict[int, dict[str, str]]
+    #: by populations and states, those of what their noise is multiplied by
+    spread: dict[tuple[int, str], str]
+
+
+def gathered(step: Step, number: int, port: Port) -> str:
+    """What is at a port of a population: what arrives there, combined, + bias + input + noise."""
+    population = step.network.populations[number]
+    arriving = ""
+    if len(port.incoming):
+        signals = signals_at(step, number, port, np.arange(len(port.incoming)))
+        arriving = step.code.let("u", combined(step, population, port, signals))
+    return with_step_values(step, population, port, with_bias(step, population, port, arriving))
+
+
+def with_bias(step: Step, population: Population, port: Port, arriving: str) -> str:
+    """What arrives, "" for nothing, and the bias."""
+    code, nothing = step.code, 1.0 if port.combine == "product" else 0.0
+    biases, key = step.network.neurons.bias_at(port.name), bias_of(port.name)
+    bias = biases[population.members]
+    if not arriving and not code.is_set(key):
+        return code.constant(nothing + bias)
+    # a sum that begins with 0.0 is never −0.0, so adding 0.0 changes nothing; a product may be
+    if arriving and not (code.is_set(key) or any_given(bias) or port.combine == "product"):
+        return arriving
+    return code.let("u", f"{arriving or nothing} + {code.numbers(key, biases, population.members, share=False)}")
+
+
+def with_step_values(step: Step, population: Population, port: Port, drive: str, vector: str = "s") -> str:
+    """What is at a port, and then input and noise: numbers of the step's vector, or of another one like it."""
+    network = step.network
+    for indices in (network.neurons.input_at(port.name), network.noise_of(port.name)):
+        drive = _plus(step.code, network, indices[population.members], drive, vector)
+    return drive
+
+
+def _plus(code: Code, network: Network, index_in_s: IntArray, drive: str, vector: str) -> str:
+    """The drive and, for each member, the number of the step's vector that ``index_in_s`` points to (−1: none)."""
+    fed_members = np.flatnonzero(index_in_s >= 0)
+    if not len(fed_members):
+        return drive
+    values = code.select(vector, index_in_s[fed_members], network.vector_size, broadcast=True)
+    if len(fed_members) == len(index_in_s):
+        return code.let("u", f"{drive} + {values}")
+    drive = code.let("u", f"np.array({drive})")
+    code.line(f"{drive}{code.position(fed_members, len(index_in_s))} += {values}")
+    return drive
+
+
+def signals_at(step: Step, number: int, port: Port, places: Indices) -> str:
+    """What the connections at these places of a port bring, in their order: the values of each delay, put together."""
+    code, connections = step.code, step.network.connections
+    incoming = port.incoming[places]
+    delays = connections.delays[incoming]
+    by_delay: dict[int, str] = {}
+    undelayed = incoming[delays == 0]
+    if len(undelayed):
+        weights = code.select("weights", undelayed, len(connections))
+        by_delay[0] = f"{weights} * {sent_by(step, undelayed)}"
+    for delay_class in step.layout.classes:
+        inside = np.flatnonzero(delay_class.populations == number)  # they lie next to each other
+        if len(inside):
+            start, stop = (delay_class.start + delay_class.delay * int(i) for i in (inside[0], inside[-1] + 1))
+            slots = slots_of(code, start, stop, delay_class.delay)
+            arriving = np.isin(delay_class.connections[inside], incoming)
+            if not arriving.any():  # a lesion, or another port: what is under way there does not arrive here
+                continue
+            if not arriving.all():
+                slots = code.select(code.let("g", slots), np.flatnonzero(arriving), len(arriving))
+            by_delay[delay_class.delay] = slots
+    if len(by_delay) == 1:
+        signals = code.let("g", next(iter(by_delay.values())))
+    else:
+        signals = code.let("g", f"np.empty({len(delays)})")
+        for delay, values in by_delay.items():
+            code.line(f"{signals}{code.position(np.flatnonzero(delays == delay), len(delays))} = {values}")
+    return with_factors(code, port, places, signals)
+
+
+def with_factors(code: Code, port: Port, places: Indices, signals: str) -> str:
+    """Signals times what they are multiplied by at a port."""
+    if port.factors is None:
+        return signals
+    return code.let("g", f"{signals} * {code.constant(np.array(port.factors[places]))}")
+
+
+def sent_by(step: Step, connections: Indices, broadcast: bool = False) -> str:
+    """What connections take now: activities, outlets, or some of both; an index of n or more is an outlet's."""
+    code, network = step.code, step.network
+    n, outlets = len(network.neurons), network.outlet_count
+    if network.sending is None:
+        return code.select("activity", network.connections.sources[connections], n, broadcast)
+    taken = network.sending[connections]
+    if (taken < n).all():
+        return code.select("activity", taken, n, broadcast)
+    if (taken >= n).all():
+        return code.select("outlets", taken - n, outlets, broadcast)
+    return code.select("np.concatenate((activity, outlets))", taken, n + outlets)
+
+
+def slots_of(code: Code, start: int, stop: int, delay: int) -> str:
+    """The slots of this step of connections that are stored next to each other: ``signals[4:8]`` with a delay of 1,
+    else every ``delay``-th, ``signals[4 + r3:16:3]`` with r3 = k % 3."""
+    if delay == 1:
+        return code.view("signals", f"{start}:{stop}")
+    return f"signals[{start} + {code.slot(delay)}:{stop}:{delay}]"
+
+
+def combined(step: Step, population: Population, port: Port, signals: str) -> str:
+    """What arrives at each member from all connections as one number."""
+    return finished(port, accumulated(step, population, port, np.arange(len(port.incoming)), signals))
+
+
+def finished(port: Port, arrived: str) -> str:
+    """What arrives as one number: of squares of a distance the root."""
+    return f"np.sqrt({arrived})" if port.combine == "distance" else arrived
+
+
+def accumulated(step: Step, population: Population, port: Port, places: Indices, signals: str, held: str = "") -> str:
+    """The sum, the product, or the sum of the squares of signals, of the connections at these places, at each member;
+    ``held`` is that of the connections before them."""
+    code, network, count = step.code, step.network, len(population.members)
+    slots = port.slots[places]
+    if port.combine == "distance":
+        centres = network.connections.centres.whole()
+        if code.is_set(CENTRES) or any_given(centres[port.incoming[places]]):
+            centre = code.numbers(CENTRES, centres, port.incoming[places], share=False)
+            signals = code.let("g", f"{signals} - {centre}")
+        signals = f"{signals} * {signals}"
+    if held:
+        slots = np.concatenate((np.arange(count), slots))
+        signals = code.let("g", f"concatenate(({held}, {signals}))")
+    if port.combine == "product":
+        return _product(code, slots, count, signals)
+    return f"bincount({code.constant(np.ascontiguousarray(slots, dtype=np.intp))}, {signals}, {count})"
+
+
+def _product(code: Code, slots: Indices, count: int, signals: str) -> str:
+    """The product of what arrives at each member, 1.0 where nothing does. ``reduceat`` multiplies what lies between two
+    starts, so the signals are sorted by member, and members without any are left out."""
+    order = np.argsort(slots, kind="stable")  # equal ones keep the order of the connections
+    filled, starts = np.unique(slots[order], return_index=True)
+    sorted_signals = code.select(signals, order, len(order))
+    product = f"multiply.reduceat({sorted_signals}, {code.constant(starts.astype(np.intp))})"
+    if len(filled) == count:
+        return product
+    whole = code.let("u", f"np.ones({count})")
+    code.line(f"{whole}{code.position(filled, count)} = {product}")
+    return whole

@@ -1,0 +1,336 @@
+"""The flow as NumPy code: states with a derivative, integrated together, a stage at a time.
+
+In: a Step in the making. Out: lines in its ``Code``. While they are integrated, the flow states of all populations lie
+one behind the other in one array, so that a method computes with all at once. What of a port is held over the step is
+made once, before the first stage; a stage is a function of the time. A state v of two neurons gives, with euler,
+
+    f1 = np.empty(2)                             # the states at the beginning of the step, …
+    f2 = np.empty(2)                             # … where a stage looks, …
+    f3 = np.empty(2)                             # … and its derivatives
+    def stage(t):
+        f3[0:2] = c4 - f2[0:2]
+    …
+        if not (k == 0 and not state.continued):
+            f1[0:2] = v0_
+            t = (k - 1) * 0.1
+            f2[:] = f1
+            stage(t + 9.5367431640625e-08)
+            multiply(f3, 0.1, f3)
+            add(f1, f3, f1)
+            v0_[:] = f1[0:2]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Final
+
+import numpy as np
+
+from neurovis_spec.compiler.program import Diffuse, Integrate, Method, Port
+from neurovis_spec.runtime.numpy_arrivals import (
+    Step,
+    accumulated,
+    finished,
+    signals_at,
+    with_bias,
+    with_factors,
+    with_step_values,
+)
+from neurovis_spec.runtime.numpy_code import FIRST, shared
+from neurovis_spec.runtime.stages import Formulas, Part, apart, parts_of, taken_by, times
+
+
+def integrate(operation: Integrate, step: Step) -> None:
+    """The flow states of some populations, over a step."""
+    _Flow(step, operation).emit()
+
+
+def diffuse(operation: Diffuse, step: Step) -> None:
+    """x + g·√dt·ξ of each flow state with noise."""
+    code, network = step.code, step.network
+    with _unless_first(step):
+        for number in operation.populations:
+            population = network.populations[number]
+            root = float(np.sqrt(network.dt * population.model.definition.per_second))
+            for one in population.model.definition.flows:
+                if one.noise is not None:
+                    drawn = network.noise_of(state=one.name)[population.members]
+                    cells = code.state(population.model, one.name)
+                    numbers = code.select("s", drawn, network.vector_size)
+                    code.line(f"{cells} += ({step.spread[number, one.name]} * {root!r}) * {numbers}")
+
+
+@contextmanager
+def _unless_first(step: Step) -> Iterator[None]:
+    """At any step but the first one of all."""
+    step.code.line(f"if not ({FIRST}):")
+    step.code.indent += 1
+    yield
+    step.code.indent -= 1
+
+
+class _Flow:
+    """The integration of some populations in the making."""
+
+    def __init__(self, step: Step, operation: Integrate) -> None:
+        self.step, self.code, self.network, self.operation = step, step.code, step.network, operation
+        self.parts = parts_of(step.network, operation)
+        #: where each flow state, by its population and name, lies among all of them
+        self.places: dict[tuple[int, str], slice] = {}
+        #: where in what is taken at a stage each activity and each outlet lies, −1 for the others
+        self.taken = np.full(len(self.network.neurons) + self.network.outlet_count, -1, dtype=np.int64)
+        size = count = 0
+        for part in self.parts:
+            members = len(part.population.members)
+            for name in part.flows:
+                self.places[part.number, name] = slice(size, size + members)
+                size += members
+            for taken in part.taken:
+                self.taken[taken.places] = count + np.arange(members)
+                count += members
+        self.size, self.taken_count = size, count
+        #: the states at the beginning of the step, those where a stage looks, the derivatives there
+        self.x, self.y, self.slopes = self.temporary(), self.temporary(), self.temporary()
+        self.sent = self.code.array("f", f"np.empty({count})") if count else ""
+        #: each state where a stage looks
+        self.now = {key: self.code.array("f", f"{self.y}[{_text(place)}]") for key, place in self.places.items()}
+        #: by population and port what is made of it once a step, before the stages: all that is at the port, where that
+        #: is held over the step, else what arrives there and is held
+        self.whole: dict[tuple[int, str], str] = {}
+        self.held: dict[tuple[int, str], str] = {}
+
+    def temporary(self) -> str:
+        """An array to work in, as long as all flow states."""
+        return self.code.array("f", f"np.empty({self.size})")
+
+    def numbers(self, value: Callable[[float], float]) -> str:
+        """What a method makes of the length of its steps, for each number in the time of its definition."""
+        made = np.empty(self.size)
+        for part in self.parts:
+            h = self.network.dt * part.population.model.definition.per_second / self.operation.substeps
+            for name in part.flows:
+                made[self.places[part.number, name]] = value(h)
+        return self.code.constant(shared(made))
+
+    def emit(self) -> None:
+        """The whole integration, and what the noise behind it is multiplied by."""
+        code, substeps, h = self.code, self.operation.substeps, self.network.dt / self.operation.substeps
+        stage = code.name("stage")
+        with _unless_first(self.step):
+            cells = {
+                (part.number, name): code.state(part.population.model, name)
+                for part in self.parts
+                for name in part.flows
+            }
+            for key, place in self.places.items():
+                code.line(f"{self.x}[{_text(place)}] = {cells[key]}")
+            for part in self.parts:
+                for port in part.ports:
+                    self.hold(part, port)
+            code.line(f"t = (k - 1) * {self.network.dt!r}")
+            self.emit_spread(f"t + {times(0.0, h).first!r}")
+            with code.function(stage, "t"):
+                _Stage(self).emit()
+            if substeps > 1:
+                code.line("start = t")
+                code.line(f"for substep in range({substeps}):")
+                code.indent += 1
+                code.line(f"t = start + substep * {h!r}")
+            inside = times(0.0, h).first
+            calls = [f"{stage}(t + {inside!r})", f"{stage}(t + {h / 2.0!r})", f"{stage}(t + {h!r} - {inside!r})"]
+            for line in _METHODS[self.operation.method](self, *calls):
+                code.line(line)
+            code.indent -= substeps > 1
+            for key, place in self.places.items():
+                code.line(f"{cells[key]}[:] = {self.x}[{_text(place)}]")
+
+    def emit_spread(self, t: str) -> None:
+        """What the noise of the flow states is multiplied by, at the first stage."""
+        keys = [(part.number, name) for part in self.parts for name, _ in part.spread.trees]
+        if not keys:
+            return
+        function = self.code.name("spread")
+        with self.code.function(function, "t"):
+            stage = _Stage(self)
+            values = [value for part in self.parts for value in stage.values(part, part.spread).values()]
+            self.code.line(f"return {', '.join(values)},")
+        self.step.spread.update((key, self.code.name("g")) for key in keys)
+        self.code.line(f"{self.y}[:] = {self.x}")
+        self.code.line(f"{', '.join(self.step.spread[key] for key in keys)}, = {function}({t})")
+
+    def hold(self, part: Part, port: Port) -> None:
+        """What of a port is made before the stages."""
+        held, staged = apart(port)
+        key, step, arriving = (part.number, port.name), self.step, ""
+        if key in self.whole or key in self.held:
+            return
+        if len(held):
+            signals = signals_at(step, part.number, port, held)
+            arriving = self.code.let("h", accumulated(step, part.population, port, held, signals))
+        if len(staged) or self.reads_formulas(part, port):
+            self.held[key] = arriving
+        else:
+            self.whole[key] = self.given(part, port, arriving)
+
+    def given(self, part: Part, port: Port, arriving: str, vector: str = "s") -> str:
+        """All that is at a port, of what arrives there, "" for nothing."""
+        if arriving:
+            arriving = self.code.let("u", finished(port, arriving))
+        drive = with_bias(self.step, part.population, port, arriving)
+        return with_step_values(self.step, part.population, port, drive, vector)
+
+    def reads_formulas(self, part: Part, port: Port) -> bool:
+        """Whether inputs that are formulas are put into a port."""
+        fed = self.network.neurons.input_at(port.name)[part.population.members]
+        entries = map(self.network.input_index.__getitem__, self.network.held_inputs)
+        return any(((fed >= entry.start) & (fed < entry.start + entry.size)).any() for entry in entries)
+
+
+class _Stage:
+    """What a stage does, in the making: the lines of a function of the time ``t``."""
+
+    def __init__(self, flow: _Flow) -> None:
+        self.flow, self.step, self.code, self.network = flow, flow.step, flow.code, flow.network
+        #: the names that formulas of a population see, and the functions, as far as they are known
+        self.known: dict[int, dict[str, str]] = {}
+        self.functions = {
+            part.number: self.code.functions(part.population.activation, {"t": "t"}) for part in flow.parts
+        }
+        self.vector = self.emit_inputs()
+        self.sent = False
+
+    def emit(self) -> None:
+        """The derivatives of all flow states."""
+        for part in self.flow.parts:
+            for name, value in self.values(part, part.derivatives).items():
+                self.code.line(f"{self.flow.slopes}[{_text(self.flow.places[part.number, name])}] = {value}")
+
+    def emit_inputs(self) -> str:
+        """The vector of the step, in which inputs that are formulas are made anew."""
+        if not self.network.held_inputs:
+            return "s"
+        vector = self.code.let("s", "s.copy()")
+        for name, held in self.network.held_inputs.items():
+            entry = self.network.input_index[name]
+            if entry.expression is not None:
+                known = {name: self.code.constant(value) for name, value in self.network.parameters.items()}
+                known |= {name: f"state.conditions.parameters[{slot}]" for name, slot in entry.slots.items()}
+                value = self.code.expression(entry.expression, known | {"t": "t"})
+                place = f"{entry.start}:{entry.start + entry.size}"
+                self.code.line(f"if not s[{held}]: {vector}[{place}] = {value}")
+        return vector
+
+    def emit_taken(self) -> None:
+        """What connections take at the stage, population by population, once."""
+        if self.sent:
+            return
+        self.sent, count = True, 0
+        for part in self.flow.parts:
+            for taken in part.taken:
+                place = f"{self.flow.sent}[{count}:{count + len(taken.places)}]"
+                (value,) = self.values(part, taken.formulas).values()
+                self.code.line(f"{place} = {value}")
+                if taken.is_activity:
+                    held = f"holds[{part.number}]"
+                    positions = self.code.constant(self.flow.taken)
+                    self.code.line(f"if holds and {held}: {self.flow.sent}[{positions}[{held}[0]]] = {held}[1]")
+                count += len(taken.places)
+
+    def values(self, part: Part, formulas: Formulas) -> dict[str, str]:
+        """The code of formulas by their names; the intermediate values and ports that they need are written once."""
+        known, functions = self.seen(part), self.functions[part.number]
+        for port in formulas.ports:
+            if port.name not in known:
+                known[port.name] = self.port(part, port)
+        for name, tree in formulas.let:
+            if name not in known:
+                known[name] = self.code.let("m", self.code.expression(tree, known, functions))
+        return {name: self.code.expression(tree, known, functions) for name, tree in formulas.trees}
+
+    def seen(self, part: Part) -> dict[str, str]:
+        """What all formulas of a population see: parameters, the time, states."""
+        if part.number not in self.known:
+            model = part.population.model
+            known = self.code.parameters(model)
+            unit = model.definition.per_second
+            known["t"] = "t" if unit == 1.0 else f"(t * {unit!r})"
+            for one in model.definition.state:
+                key = part.number, one.name
+                known[one.name] = self.flow.now[key] if key in self.flow.now else self.code.state(model, one.name)
+            self.known[part.number] = known
+        return self.known[part.number]
+
+    def port(self, part: Part, port: Port) -> str:
+        """What is at a port."""
+        flow, key = self.flow, (part.number, port.name)
+        if key in flow.whole:
+            return flow.whole[key]
+        arriving, (_, staged) = flow.held[key], apart(port)
+        if len(staged):
+            self.emit_taken()
+            connections = port.incoming[staged]
+            weights = self.code.select("weights", connections, len(self.network.connections))
+            taken = flow.taken[taken_by(self.network)[connections]]
+            sent = self.code.select(flow.sent, taken, flow.taken_count)
+            signals = with_factors(self.code, port, staged, self.code.let("g", f"{weights} * {sent}"))
+            arriving = accumulated(self.step, part.population, port, staged, signals, arriving)
+        return flow.given(part, port, arriving, self.vector)
+
+
+def _text(place: slice) -> str:
+    return f"{place.start}:{place.stop}"
+
+
+def _euler(flow: _Flow, first: str, middle: str, last: str) -> Iterator[str]:
+    x, y, k = flow.x, flow.y, flow.slopes
+    yield f"{y}[:] = {x}"
+    yield first
+    yield f"multiply({k}, {flow.numbers(float)}, {k})"
+    yield f"add({x}, {k}, {x})"
+
+
+def _heun(flow: _Flow, first: str, middle: str, last: str) -> Iterator[str]:
+    x, y, k, total = flow.x, flow.y, flow.slopes, flow.temporary()
+    yield f"{y}[:] = {x}"
+    yield first
+    yield f"{total}[:] = {k}"
+    yield from _moved(flow, flow.numbers(float))
+    yield last
+    yield f"add({total}, {k}, {total})"
+    yield f"multiply({total}, {flow.numbers(lambda h: h / 2.0)}, {total})"
+    yield f"add({x}, {total}, {x})"
+
+
+def _rk4(flow: _Flow, first: str, middle: str, last: str) -> Iterator[str]:
+    x, y, k, total = flow.x, flow.y, flow.slopes, flow.temporary()
+    half, h = flow.numbers(lambda h: h / 2.0), flow.numbers(float)
+    yield f"{y}[:] = {x}"
+    yield first
+    yield f"{total}[:] = {k}"
+    for _ in range(2):
+        yield from _moved(flow, half)
+        yield middle
+        yield f"multiply({k}, 2.0, {y})"
+        yield f"add({total}, {y}, {total})"
+    yield from _moved(flow, h)
+    yield last
+    yield f"add({total}, {k}, {total})"
+    yield f"multiply({total}, {flow.numbers(lambda h: h / 6.0)}, {total})"
+    yield f"add({x}, {total}, {x})"
+
+
+def _moved(flow: _Flow, h: str) -> Iterator[str]:
+    """The next stage looks so far along the derivatives of the last one."""
+    yield f"multiply({flow.slopes}, {h}, {flow.y})"
+    yield f"add({flow.x}, {flow.y}, {flow.y})"
+
+
+#: What a method makes of the states at the beginning of a step and of derivatives at stages; ``first``, ``middle`` and
+#: ``last`` evaluate these there.
+_METHODS: Final[Mapping[Method, Callable[[_Flow, str, str, str], Iterator[str]]]] = {
+    "euler": _euler,
+    "heun": _heun,
+    "rk4": _rk4,
+}
