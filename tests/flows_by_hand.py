@@ -16,13 +16,13 @@ from neurovis_spec.compiler.program import (
     Gather,
     Integrate,
     Learn,
-    Method,
     Operation,
     Quantity,
     ReadInputs,
     Send,
     Update,
 )
+from neurovis_spec.language.words import Method
 
 
 def flowing(

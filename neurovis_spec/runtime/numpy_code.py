@@ -65,6 +65,8 @@ Steps: TypeAlias = Callable[[State, Iterable[FloatArray]], Iterator[None]]
 _PARTS = ("activity", "outlets", "weights", "signals", "history", "cells")
 #: the numbers that can be set, in the conditions of the state
 _VARIABLES = "variables"
+#: the functions of NumPy that are called so often that they are looked up beforehand
+_CALLED = ("bincount", "concatenate", "add", "subtract", "multiply", "divide", "minimum")
 #: whether the step is the first one of all, which no other came before
 FIRST = "k == 0 and not state.continued"
 
@@ -74,8 +76,7 @@ class Code:
 
     def __init__(self, dt: float, variables: Mapping[Key, Variable] = _NONE) -> None:
         self.dt, self._variables = dt, variables
-        self.namespace: dict[str, object] = {"np": np, "bincount": np.bincount, "multiply": np.multiply, "add": np.add}
-        self.namespace["concatenate"] = np.concatenate
+        self.namespace: dict[str, object] = {"np": np, **{name: getattr(np, name) for name in _CALLED}}
         #: lines before the steps: arrays that these work in, functions that they call
         self.before: list[str] = []
         self.lines: list[str] = []

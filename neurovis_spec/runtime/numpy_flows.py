@@ -28,7 +28,9 @@ from typing import Final
 
 import numpy as np
 
-from neurovis_spec.compiler.program import Diffuse, Integrate, Method, Port
+from neurovis_spec.compiler.program import Diffuse, Integrate, Port
+from neurovis_spec.language.expressions.functions import FUNCTIONS
+from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.numpy_arrivals import (
     Step,
     accumulated,
@@ -91,8 +93,9 @@ class _Flow:
                 self.taken[taken.places] = count + np.arange(members)
                 count += members
         self.size, self.taken_count = size, count
-        #: the states at the beginning of the step, those where a stage looks, the derivatives there
-        self.x, self.y, self.slopes = self.temporary(), self.temporary(), self.temporary()
+        #: the states at the beginning of the step, those where a stage looks, the derivatives there, their slopes
+        self.x, self.y, self.k = self.temporary(), self.temporary(), self.temporary()
+        self.j = self.temporary() if any(part.slopes.trees for part in self.parts) else ""
         self.sent = self.code.array("f", f"np.empty({count})") if count else ""
         #: each state where a stage looks
         self.now = {key: self.code.array("f", f"{self.y}[{_text(place)}]") for key, place in self.places.items()}
@@ -202,10 +205,11 @@ class _Stage:
         self.sent = False
 
     def emit(self) -> None:
-        """The derivatives of all flow states."""
+        """The derivatives of all flow states, and how much they change with these, where the method looks at that."""
         for part in self.flow.parts:
-            for name, value in self.values(part, part.derivatives).items():
-                self.code.line(f"{self.flow.slopes}[{_text(self.flow.places[part.number, name])}] = {value}")
+            for array, formulas in ((self.flow.k, part.derivatives), (self.flow.j, part.slopes)):
+                for name, value in self.values(part, formulas).items():
+                    self.code.line(f"{array}[{_text(self.flow.places[part.number, name])}] = {value}")
 
     def emit_inputs(self) -> str:
         """The vector of the step, in which inputs that are formulas are made anew."""
@@ -284,7 +288,7 @@ def _text(place: slice) -> str:
 
 
 def _euler(flow: _Flow, first: str, middle: str, last: str) -> Iterator[str]:
-    x, y, k = flow.x, flow.y, flow.slopes
+    x, y, k = flow.x, flow.y, flow.k
     yield f"{y}[:] = {x}"
     yield first
     yield f"multiply({k}, {flow.numbers(float)}, {k})"
@@ -292,7 +296,7 @@ def _euler(flow: _Flow, first: str, middle: str, last: str) -> Iterator[str]:
 
 
 def _heun(flow: _Flow, first: str, middle: str, last: str) -> Iterator[str]:
-    x, y, k, total = flow.x, flow.y, flow.slopes, flow.temporary()
+    x, y, k, total = flow.x, flow.y, flow.k, flow.temporary()
     yield f"{y}[:] = {x}"
     yield first
     yield f"{total}[:] = {k}"
@@ -304,7 +308,7 @@ def _heun(flow: _Flow, first: str, middle: str, last: str) -> Iterator[str]:
 
 
 def _rk4(flow: _Flow, first: str, middle: str, last: str) -> Iterator[str]:
-    x, y, k, total = flow.x, flow.y, flow.slopes, flow.temporary()
+    x, y, k, total = flow.x, flow.y, flow.k, flow.temporary()
     half, h = flow.numbers(lambda h: h / 2.0), flow.numbers(float)
     yield f"{y}[:] = {x}"
     yield first
@@ -323,8 +327,29 @@ def _rk4(flow: _Flow, first: str, middle: str, last: str) -> Iterator[str]:
 
 def _moved(flow: _Flow, h: str) -> Iterator[str]:
     """The next stage looks so far along the derivatives of the last one."""
-    yield f"multiply({flow.slopes}, {h}, {flow.y})"
+    yield f"multiply({flow.k}, {h}, {flow.y})"
     yield f"add({flow.x}, {flow.y}, {flow.y})"
+
+
+def _exponential(flow: _Flow, first: str, middle: str, last: str) -> Iterator[str]:
+    x, y, k, j, h = flow.x, flow.y, flow.k, flow.j, flow.numbers(float)
+    yield f"{y}[:] = {x}"
+    yield first
+    yield f"multiply(minimum({j}, 0.0), {h}, {j})"
+    yield f"multiply({h}, {FUNCTIONS['exprel'].code.format(j)}, {j})"
+    yield f"multiply({j}, {k}, {k})"
+    yield f"add({x}, {k}, {x})"
+
+
+def _semi_implicit(flow: _Flow, first: str, middle: str, last: str) -> Iterator[str]:
+    x, y, k, j, h = flow.x, flow.y, flow.k, flow.j, flow.numbers(float)
+    yield f"{y}[:] = {x}"
+    yield first
+    yield f"multiply(minimum({j}, 0.0), {h}, {j})"
+    yield f"subtract(1.0, {j}, {j})"
+    yield f"multiply({k}, {h}, {k})"
+    yield f"divide({k}, {j}, {k})"
+    yield f"add({x}, {k}, {x})"
 
 
 #: What a method makes of the states at the beginning of a step and of derivatives at stages; ``first``, ``middle`` and
@@ -333,4 +358,6 @@ _METHODS: Final[Mapping[Method, Callable[[_Flow, str, str, str], Iterator[str]]]
     "euler": _euler,
     "heun": _heun,
     "rk4": _rk4,
+    "exponential": _exponential,
+    "semi_implicit": _semi_implicit,
 }

@@ -13,8 +13,10 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple, TypeAlias
 
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.compiler.program import Integrate, Method, Port
+from neurovis_spec.compiler.program import Integrate, Port
 from neurovis_spec.language.expressions.evaluate import evaluate
+from neurovis_spec.language.expressions.functions import FUNCTIONS, divide, minimum
+from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.inputs import at_stage
 from neurovis_spec.runtime.reference_seen import Seen, is_first, with_let
 from neurovis_spec.runtime.stages import Formulas, Part, Times, apart, parts_of, times
@@ -30,8 +32,6 @@ class Place(NamedTuple):
 
 #: Numbers of flow states, of each one a member.
 Numbers: TypeAlias = Mapping[Place, Sequence[float]]
-#: The derivatives of flow states, which are given, at a time (seconds).
-Slopes: TypeAlias = Callable[[Numbers, float], Numbers]
 
 
 @dataclass
@@ -45,6 +45,10 @@ class Stage:
     inputs: Sequence[float]
     sent: list[float]
     ports: dict[tuple[int, str], list[float]] = field(default_factory=dict)
+
+
+#: The stage of flow states, which are given, at a time (seconds).
+Look: TypeAlias = Callable[[Numbers, float], Stage]
 
 
 class Flow:
@@ -64,14 +68,10 @@ class Flow:
         x: Numbers = {place: values.tolist() for place, values in cells.items()}
         start, h = (state.k - 1) * self.network.dt, self.network.dt / self.operation.substeps
         stage = self.stage(state, x, times(start, h).first, inputs)
-        self.spread = {
-            Place(part.number, name): values
-            for part in self.parts
-            for name, values in self.values(part, part.spread, stage).items()
-        }
+        self.spread = self.all_values(stage, lambda part: part.spread)
         for substep in range(self.operation.substeps):
             at = times(start + substep * h, h)
-            x = METHODS[self.operation.method](self, x, at, lambda x, t: self.slopes(self.stage(state, x, t, inputs)))
+            x = METHODS[self.operation.method](self, x, at, lambda x, t: self.stage(state, x, t, inputs))
         for place, values in cells.items():
             values[:] = x[place]
 
@@ -103,12 +103,20 @@ class Flow:
                     sent[taken.places[position]] = 0.0 if state.conditions.lesioned_neurons[neuron] else value
         return stage
 
-    def slopes(self, stage: Stage) -> Numbers:
+    def derivatives(self, stage: Stage) -> Numbers:
         """All derivatives at a stage."""
+        return self.all_values(stage, lambda part: part.derivatives)
+
+    def slopes(self, stage: Stage) -> Numbers:
+        """How much each derivative changes with its own state at a stage."""
+        return self.all_values(stage, lambda part: part.slopes)
+
+    def all_values(self, stage: Stage, formulas: Callable[[Part], Formulas]) -> Numbers:
+        """The values of formulas of all parts."""
         return {
             Place(part.number, name): values
             for part in self.parts
-            for name, values in self.values(part, part.derivatives, stage).items()
+            for name, values in self.values(part, formulas(part), stage).items()
         }
 
     def values(self, part: Part, formulas: Formulas, stage: Stage) -> dict[str, list[float]]:
@@ -153,28 +161,44 @@ class Flow:
         return result
 
 
-def _euler(flow: Flow, x: Numbers, at: Times, slopes: Slopes) -> Numbers:
-    return flow.combine(lambda h, x, k: x + h * k, x, slopes(x, at.first))
+def _euler(flow: Flow, x: Numbers, at: Times, look: Look) -> Numbers:
+    return flow.combine(lambda h, x, k: x + h * k, x, flow.derivatives(look(x, at.first)))
 
 
-def _heun(flow: Flow, x: Numbers, at: Times, slopes: Slopes) -> Numbers:
-    k1 = slopes(x, at.first)
-    k2 = slopes(flow.combine(lambda h, x, k: x + h * k, x, k1), at.last)
+def _heun(flow: Flow, x: Numbers, at: Times, look: Look) -> Numbers:
+    k1 = flow.derivatives(look(x, at.first))
+    k2 = flow.derivatives(look(flow.combine(lambda h, x, k: x + h * k, x, k1), at.last))
     return flow.combine(lambda h, x, k1, k2: x + (h / 2.0) * (k1 + k2), x, k1, k2)
 
 
-def _rk4(flow: Flow, x: Numbers, at: Times, slopes: Slopes) -> Numbers:
-    k1 = slopes(x, at.first)
-    k2 = slopes(flow.combine(lambda h, x, k: x + (h / 2.0) * k, x, k1), at.middle)
-    k3 = slopes(flow.combine(lambda h, x, k: x + (h / 2.0) * k, x, k2), at.middle)
-    k4 = slopes(flow.combine(lambda h, x, k: x + h * k, x, k3), at.last)
+def _rk4(flow: Flow, x: Numbers, at: Times, look: Look) -> Numbers:
+    k1 = flow.derivatives(look(x, at.first))
+    k2 = flow.derivatives(look(flow.combine(lambda h, x, k: x + (h / 2.0) * k, x, k1), at.middle))
+    k3 = flow.derivatives(look(flow.combine(lambda h, x, k: x + (h / 2.0) * k, x, k2), at.middle))
+    k4 = flow.derivatives(look(flow.combine(lambda h, x, k: x + h * k, x, k3), at.last))
     return flow.combine(
         lambda h, x, k1, k2, k3, k4: x + (h / 6.0) * (((k1 + 2.0 * k2) + 2.0 * k3) + k4), x, k1, k2, k3, k4
     )
 
 
-METHODS: Final[Mapping[Method, Callable[[Flow, Numbers, Times, Slopes], Numbers]]] = {
+def _exponential(flow: Flow, x: Numbers, at: Times, look: Look) -> Numbers:
+    stage, exprel = look(x, at.first), FUNCTIONS["exprel"].scalar
+    return flow.combine(
+        lambda h, x, k, j: x + (h * exprel(h * minimum(j, 0.0))) * k, x, flow.derivatives(stage), flow.slopes(stage)
+    )
+
+
+def _semi_implicit(flow: Flow, x: Numbers, at: Times, look: Look) -> Numbers:
+    stage = look(x, at.first)
+    return flow.combine(
+        lambda h, x, k, j: x + divide(h * k, 1.0 - h * minimum(j, 0.0)), x, flow.derivatives(stage), flow.slopes(stage)
+    )
+
+
+METHODS: Final[Mapping[Method, Callable[[Flow, Numbers, Times, Look], Numbers]]] = {
     "euler": _euler,
     "heun": _heun,
     "rk4": _rk4,
+    "exponential": _exponential,
+    "semi_implicit": _semi_implicit,
 }

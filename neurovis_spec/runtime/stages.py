@@ -7,20 +7,24 @@ when stages are. All backends ask here, so that they do the same in the same ord
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
 from neurovis_spec.arrays import Indices, IntArray
+from neurovis_spec.compiler.flows import jacobian, with_slope
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Definition, Integrate, Population, Port
 from neurovis_spec.language.expressions.tree import Name, Tree, names
+from neurovis_spec.language.words import Method
 
 Let: TypeAlias = tuple[tuple[str, Tree], ...]
 
 #: how far inside a step its ends are seen from, of its length: what jumps on the grid jumps between two steps
 _INSIDE: Final = 2.0**-20
+#: the methods that look at how much a derivative changes with its own state
+_BY_SLOPE: Final[frozenset[Method]] = frozenset(("exponential", "semi_implicit"))
 #: what every model gives
 _ACTIVITY: Final = "activity"
 
@@ -75,13 +79,15 @@ class Part:
     population: Population
     taken: tuple[Taken, ...]
     derivatives: Formulas
+    #: how much each derivative changes with its own state, where the method looks at that
+    slopes: Formulas
     #: by states with noise, what their random numbers are multiplied by: at the first stage of a step
     spread: Formulas
 
     @property
     def ports(self) -> tuple[Port, ...]:
         """The ports that are read at a stage."""
-        formulas = (*(taken.formulas for taken in self.taken), self.derivatives, self.spread)
+        formulas = (*(taken.formulas for taken in self.taken), self.derivatives, self.slopes, self.spread)
         return tuple({port.name: port for one in formulas for port in one.ports}.values())
 
     @property
@@ -109,8 +115,12 @@ def parts_of(network: Network, operation: Integrate) -> tuple[Part, ...]:
     taken = _taken(network, operation)
     parts = []
     for number in operation.populations:
-        population = network.populations[number]
+        population, diagonal, let = network.populations[number], dict[str, Tree](), Let()
         model = population.model.definition
+        if operation.method in _BY_SLOPE:
+            let, diagonal = jacobian(model)
+            activation = replace(population.activation, definition=with_slope(population.activation.definition))
+            population = replace(population, activation=activation)
         own = [(name, places) for (owner, name), places in taken.items() if owner == number]
         parts.append(
             Part(
@@ -121,6 +131,7 @@ def parts_of(network: Network, operation: Integrate) -> tuple[Part, ...]:
                     for name, places in own
                 ),
                 formulas_of(population, [(one.name, one.derivative) for one in model.flows]),
+                formulas_of(population, diagonal.items(), let),
                 formulas_of(population, [(one.name, one.noise) for one in model.flows]),
             )
         )
