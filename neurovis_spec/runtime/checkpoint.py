@@ -117,6 +117,7 @@ def _arrays(state: State) -> dict[str, Array]:
     now = state.conditions
     return {
         "activity": state.activity,
+        **({"outlets": state.outlets} if len(state.outlets) else {}),
         "weights": state.weights,
         "signals": state.signals,
         "history": state.history,
@@ -138,6 +139,7 @@ def _fill(state: State, saved: Mapping[str, Array]) -> None:
     now = state.conditions
     state.activity, state.weights = _floats(saved["activity"]), _floats(saved["weights"])
     state.signals, state.history = _floats(saved["signals"]), _floats(saved["history"])
+    state.outlets = _floats(saved.get("outlets", state.outlets))
     for kept, arrays in by_kind(state.cells).items():
         ends = np.cumsum([len(array) for array in arrays])
         for array, values in zip(arrays, np.split(_floats(saved[kept]), ends), strict=False):

@@ -150,7 +150,7 @@ def _probe(network: Network, wanted: list[tuple[str, str, int]]) -> Probe:
             located[what] = network.located("neuron" if what == "neuron" else "connection")
         holders, numbers, positions = located[what]
         uses = holders[int(numbers[index])].uses
-        owner = next(use.owner for use in uses if any(one.name == state for one in use.definition.state))
+        owner = next(use.owner for use in uses if any(one.name == state for one in use.definition.kept))
         members, columns = places.setdefault((owner, state), ([], []))
         members.append(int(positions[index]))
         columns.append(column)

@@ -28,6 +28,7 @@ import numpy as np
 
 from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.events.settable import HIGH, LOW
+from neurovis_spec.compiler.flows import ports_read_by
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import (
     Diffuse,
@@ -43,7 +44,7 @@ from neurovis_spec.compiler.program import (
 from neurovis_spec.runtime.numpy_arrivals import Step, gathered, sent_by, slots_of
 from neurovis_spec.runtime.numpy_code import FIRST, Cell, Code, emit_change
 from neurovis_spec.runtime.numpy_flows import diffuse, integrate
-from neurovis_spec.runtime.stages import read_in_step, taken_by
+from neurovis_spec.runtime.stages import taken_by
 from neurovis_spec.runtime.state import NEVER_LOST
 
 
@@ -62,7 +63,7 @@ def _read(operation: ReadInputs, step: Step) -> None:
 def _gather(operation: Gather, step: Step) -> None:
     """What is at each port of a population that its step reads."""
     population = step.network.populations[operation.population]
-    read = read_in_step(population.model.definition)
+    read = ports_read_by(population.model.definition).update
     step.ports[operation.population] = {
         port.name: gathered(step, operation.population, port) for port in population.ports if port.name in read
     }

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple, TypeAlias
 import numpy as np
 
 from neurovis_spec.arrays import Indices, IntArray
-from neurovis_spec.compiler.flows import jacobian, with_slope
+from neurovis_spec.compiler.flows import Jacobian, jacobian, with_slope
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Definition, Integrate, Population, Port
 from neurovis_spec.language.expressions.tree import Name, Tree, names
@@ -45,13 +45,6 @@ def unfolded(let: Let, trees: Iterable[Tree | None]) -> Unfolded:
             read |= names(tree)
             needed.append((name, tree))
     return Unfolded(tuple(reversed(needed)), read)
-
-
-def read_in_step(definition: Definition) -> frozenset[str]:
-    """All names that a definition reads where its members are updated: what is read of derivatives and of their noise
-    alone is not among them."""
-    quantities = (*definition.state, *definition.gives)
-    return unfolded(definition.let, [tree for one in quantities for tree in (one.each_step, one.each_episode)]).names
 
 
 class Formulas(NamedTuple):
@@ -115,10 +108,10 @@ def parts_of(network: Network, operation: Integrate) -> tuple[Part, ...]:
     taken = _taken(network, operation)
     parts = []
     for number in operation.populations:
-        population, diagonal, let = network.populations[number], dict[str, Tree](), Let()
+        population, slopes = network.populations[number], Jacobian((), {})
         model = population.model.definition
         if operation.method in _BY_SLOPE:
-            let, diagonal = jacobian(model)
+            slopes = jacobian(model)
             activation = replace(population.activation, definition=with_slope(population.activation.definition))
             population = replace(population, activation=activation)
         own = [(name, places) for (owner, name), places in taken.items() if owner == number]
@@ -131,7 +124,7 @@ def parts_of(network: Network, operation: Integrate) -> tuple[Part, ...]:
                     for name, places in own
                 ),
                 formulas_of(population, [(one.name, one.derivative) for one in model.flows]),
-                formulas_of(population, diagonal.items(), let),
+                formulas_of(population, slopes.diagonal.items(), slopes.let),
                 formulas_of(population, [(one.name, one.noise) for one in model.flows]),
             )
         )

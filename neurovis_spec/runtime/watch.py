@@ -82,12 +82,13 @@ class Watch:
         for holder, use in network.uses:
             of_neurons = use.definition.kind.each == "neuron"
             when = f"{'at' if of_neurons else 'after'} step {step}"
-            for quantity in use.definition.state:
+            for quantity in use.definition.kept:
                 values = state.cells[use.owner][quantity.name]
                 for member, value in ((holder.members[index], values[index]) for index in _wrong(values)):
                     name = names[member] if of_neurons else network.connection_names[member]
                     if not isinstance(quantity, Check):
-                        yield f"the state '{quantity.name}' of {name} is {value} {when}"
+                        what = "output" if quantity in use.definition.outputs else "state"
+                        yield f"the {what} '{quantity.name}' of {name} is {value} {when}"
                     # of a check the name says all; what a lesioned neuron computes is for nobody
                     elif not (of_neurons and lesioned[member]):
                         yield f"{quantity.name} for {name} {when}, {_HIDDEN}"
