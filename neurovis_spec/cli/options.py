@@ -300,7 +300,8 @@ start_option = click.option(
     "start",
     metavar="RECORDING",
     shell_complete=paths,
-    help="Begin with the last weights and activities of this recording; states of models begin anew.",
+    help="Begin with the last weights and activities of this recording; states of models begin anew, but in a network "
+    "with derivatives, where the recording has them (run --states all).",
 )
 
 

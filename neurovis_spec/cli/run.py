@@ -79,7 +79,8 @@ keeping_options: Final = as_one(
         "--states",
         metavar="REF",
         multiple=True,
-        help="Record a state of models (K.v) or rules ('(K -> O).eligibility') as well. Repeatable.",
+        help="Record a state or output of models (K.v) or a state of rules ('(K -> O).eligibility') as well, or 'all'. "
+        "Repeatable.",
     ),
     click.option(
         "--neurons", metavar="REFS", multiple=True, help="Record these neurons only, such as 'O + K'; default: all."

@@ -17,7 +17,7 @@ from neurovis_spec.compiler.names.state_references import (
     model_state,
 )
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import MODEL, RULE, Kind
+from neurovis_spec.compiler.program import MODEL, RULE, Check, Kind
 from neurovis_spec.language.references import Arrow, Part, Sum, parse, parse_sum, state_of
 from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.likeness import suggest
@@ -62,10 +62,23 @@ def _between(network: Network, arrow: Arrow, names: Names) -> IntArray:
 
 
 def find_states(network: Network, reference: str, names: Names | None = None) -> tuple[StateOf, ...]:
-    """The states of a reference (``K.v``, ``(K -> O).eligibility``, several joined with ``+``). Raises KeyError with
-    the nearest names."""
+    """The states of a reference (``K.v``, ``(K -> O).eligibility``, several joined with ``+``, or ``all``), outputs of
+    models among them. Raises KeyError with the nearest names."""
     names = names_of(network) if names is None else names
+    if reference == "all" and isinstance(names.find(reference), str):
+        return all_states(network)
     return tuple(_state(network, part, names) for part in parse_sum(reference))
+
+
+def all_states(network: Network) -> tuple[StateOf, ...]:
+    """All that models and rules keep, outputs of models among it."""
+    none: IntArray = np.zeros(0, dtype=np.int64)
+    return tuple(
+        StateOf(one.name, *((holder.members, none) if use.definition.kind.each == "neuron" else (none, holder.members)))
+        for holder, use in network.uses
+        for one in use.definition.kept
+        if not isinstance(one, Check)
+    )
 
 
 def _state(network: Network, part: Part, names: Names) -> StateOf:
@@ -88,7 +101,7 @@ def _state(network: Network, part: Part, names: Names) -> StateOf:
 def _holders_of(network: Network, kind: Kind) -> tuple[Holder, ...]:
     """The states of all definitions of a kind, with those that have them."""
     return tuple(
-        Holder(holder.members, use.definition.name, tuple(state.name for state in use.definition.state))
+        Holder(holder.members, use.definition.name, tuple(one.name for one in use.definition.kept))
         for holder, use in network.uses
         if use.definition.kind == kind
     )

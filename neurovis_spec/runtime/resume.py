@@ -10,18 +10,23 @@ rows, as far back as the delays reach and consecutive steps were recorded (what 
 taken again.
 
 Steps count from 0, so inputs, events and episodes begin anew; random numbers go on behind the steps that were made.
-Clamps, stopped rules and the states of models and rules are no part of a recording.
+Clamps and stopped rules are no part of a recording. States of models and rules begin anew, but where something flows:
+there those that the recording has (``--states all``) are taken, and what of the signals under way is known then.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arguments import callers_level
+from neurovis_spec.arrays import BoolArray, FloatArray, IntArray
 from neurovis_spec.compiler.events.patch import PatchError
+from neurovis_spec.compiler.names.state_references import StateOf
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Holder, Integrate, Key, Use
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.controls import Controls, lose
@@ -29,6 +34,7 @@ from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.fitting import of_table
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.signals import signal_layout
+from neurovis_spec.runtime.stages import taken_by
 from neurovis_spec.runtime.state import State, initial_state
 
 
@@ -48,11 +54,16 @@ def resumed_state(network: Network, recording: Recording, functions: Library = N
     _lesion_again(network, recording, state, controls)
     depth = int(network.connections.delays.kept.max(initial=1))
     theirs, ours = _same_connections(network, recording)
+    kept = _Kept(network, recording) if any(isinstance(one, Integrate) for one in network.program) else None
     for ago, row in _last_rows(recording, depth):
         weights = state.weights.copy()
         weights[ours] = recording.all_weights(row)[theirs]
-        _send(network, state, -ago, recording.activity[row][column_of], weights)
+        activity = recording.activity[row][column_of]
+        sent, known = (activity, np.True_) if kept is None else kept.sent(activity, row)
+        _send(network, state, -ago, sent, known, weights)
     lose(network, state, np.flatnonzero(state.conditions.structure.gone))
+    if kept is not None:
+        kept.restore(state)
     state.activity = recording.activity[-1][column_of]
     state.weights[learned] = recording.weights_after[columns]
     return state
@@ -101,17 +112,85 @@ def _last_rows(recording: Recording, depth: int) -> list[tuple[int, int]]:
     return rows
 
 
-def _send(network: Network, state: State, step: int, activity: FloatArray, weights: FloatArray) -> None:
-    """Send what was sent at a step before 0 and has not arrived by then: −1 was the last step before the run."""
-    connections = network.connections
-    under_way = np.flatnonzero(connections.delays.whole() >= -step)
+class _Kept:
+    """The states that a recording has, of a network in which something flows; a warning says whose flow states it has
+    not, which begin anew."""
+
+    def __init__(self, network: Network, recording: Recording) -> None:
+        self.network, self.states = network, recording.states
+        self._columns = {name: column for column, name in enumerate(recording.state_names)}
+        #: the columns of what the recording has of all members of an owner
+        self.found: dict[Key, IntArray] = {}
+        for holder, use in network.uses:
+            for one in use.definition.kept:
+                columns = self._columns_of(holder, use, one.name)
+                if (columns >= 0).all():
+                    self.found[Key(use.owner, one.name)] = columns
+        #: the populations whose flow begins anew
+        self.anew = [
+            one
+            for one in network.populations
+            if not all(Key(one.model.owner, flow.name) in self.found for flow in one.model.definition.flows)
+        ]
+        if self.anew:
+            flows = sorted({network.neurons.names[int(one.members[0])] for one in self.anew})
+            warnings.warn(
+                f"the recording lacks states with a derivative, as of {flows[0]}, which begin anew: record them "
+                "(run --states all)",
+                stacklevel=callers_level(),
+            )
+
+    def _columns_of(self, holder: Holder, use: Use, state: str) -> IntArray:
+        """The columns of a state of all members, −1 where it was not recorded."""
+        none: IntArray = np.zeros(0, dtype=np.int64)
+        members = np.asarray(holder.members, dtype=np.int64)
+        one = StateOf(state, *((members, none) if use.definition.kind.each == "neuron" else (none, members)))
+        return np.array([self._columns.get(name, -1) for name in self.network.state_names([one])], dtype=np.int64)
+
+    def sent(self, activity: FloatArray, row: int) -> tuple[FloatArray, BoolArray]:
+        """What was sent in a row: activities, then outlets; and which of it is known, and not of what begins anew."""
+        network, n = self.network, len(activity)
+        sent, known = np.concatenate((activity, np.zeros(network.outlet_count))), np.ones(n, dtype=np.bool_)
+        for one in self.anew:
+            known[one.members] = False
+        known = np.concatenate((known, np.zeros(network.outlet_count, dtype=np.bool_)))
+        for outlet in network.outlets:
+            population = network.populations[outlet.population]
+            columns = self.found.get(Key(population.model.owner, outlet.name))
+            if columns is not None:
+                place = slice(n + outlet.start, n + outlet.start + len(columns))
+                sent[place], known[place] = self.states[row][columns], known[population.members]
+        return sent, known
+
+    def restore(self, state: State) -> None:
+        """Have a state what was kept behind the last step."""
+        for key, columns in self.found.items():
+            assert key.owner is not None
+            state.cells[key.owner][key.name][:] = self.states[-1][columns]
+        for outlet in self.network.outlets:
+            values = state.cells[self.network.populations[outlet.population].model.owner][outlet.name]
+            state.outlets[outlet.start : outlet.start + len(values)] = values
+
+
+def _send(
+    network: Network,
+    state: State,
+    step: int,
+    sent: FloatArray,
+    known: BoolArray | np.bool_,
+    weights: FloatArray,
+) -> None:
+    """Send what was sent at a step before 0, as far as it is known, and has not arrived by then: −1 was the last step
+    before the run."""
+    connections, taken = network.connections, taken_by(network)
+    under_way = np.flatnonzero((connections.delays.whole() >= -step) & np.broadcast_to(known, sent.shape)[taken])
     offsets = signal_layout(network).offsets[under_way]
     with np.errstate(all="ignore"):
-        signals = weights[under_way] * activity[connections.sources[under_way]]
+        signals = weights[under_way] * sent[taken[under_way]]
     # a step is negative here; its remainder is a slot ≥ 0 all the same
     state.signals[offsets + step % connections.delays[under_way]] = signals
     if -step < len(state.history):
-        state.history[step % len(state.history)] = activity
+        state.history[step % len(state.history)] = np.where(known, sent, 0.0)
 
 
 def _matching_neurons(network: Network, recording: Recording) -> IntArray:

@@ -293,8 +293,6 @@ def _directories(all_groups: list[_ScopeGroups], total: int) -> tuple[Directory,
             inputs=groups.scope.section.inputs,
             scope=index,
             module=groups.scope.module,
-            states={
-                item.name: tuple(state.name for state in item.kind.model.definition.state) for item in groups.built
-            },
+            states={item.name: tuple(one.name for one in item.kind.model.definition.kept) for item in groups.built},
         )
     return tuple(made[index] for index in range(len(all_groups)))
