@@ -1,192 +1,61 @@
-"""What flows in definitions, and how their derivatives depend on their own states."""
+"""States with derivatives: the order of each method, against closed forms and an adaptive method of high order."""
 
 from __future__ import annotations
 
-import hypothesis.strategies as st
+import math
+from collections.abc import Callable
+
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from flows_by_hand import flowing, integrated
+from networks_by_hand import Unit, build
 
-import neurovis_spec as nv
-from neurovis_spec.compiler.flows import flows_by, jacobian, plain_flow, ports_read_by, reads, with_slope
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Definition
-from neurovis_spec.compiler.values.definitions import sorted_by_need
-from neurovis_spec.language.expressions.evaluate import evaluate
-from neurovis_spec.language.expressions.parser import parse
+from neurovis_spec.language.words import Method
+from neurovis_spec.runtime.course import Course
+from neurovis_spec.runtime.record import record
 
-HEAD = "neurovis: 1\nname: f\ntime: {dt: 0.1}\n"
-CONSTANTS = {"pi": np.pi, "e": np.e, "dt": 0.1, "t": 0.3, "k": 3.0}
+ORDERS: dict[Method, int] = {"euler": 1, "heun": 2, "rk4": 4, "exponential": 1, "semi_implicit": 1}
 
-
-def model(body: str, group: str = "") -> Definition:
-    """The model of a spec with one neuron."""
-    return both(body, group)[0]
-
-
-def both(body: str, group: str = "") -> tuple[Definition, Definition]:
-    """The model and the activation of a spec with one neuron."""
-    text = f"{HEAD}models:\n  m:\n    {body}\nneurons: {{A: {{model: m{group}}}}}"
-    (population,) = nv.compile_text(text).network.populations
-    return population.model.definition, population.activation.definition
+DECAY = flowing("v", {"v": ("1", "-3*v")})
+LOGISTIC = flowing("v", {"v": ("0.1", "2*v*(1 - v)")})
+TURNING = flowing("x", {"x": ("1", "2*y"), "y": ("0", "-2*x")})
+DRIVEN = flowing("v", {"v": ("0", "cos(t) - v")})
 
 
-# ---- what is read ------------------------------------------------------------------------------------------------
-
-PORTS = """ports: [a, b, c]
-    parameters: {p: 1}
-    let: {u: v + a, w: u*p, z: b + k}
-    state: {v: {derivative: w - drive}, m: {each_step: m + c}, q: {derivative: -q, each_step: q + z}}
-    outputs: {own: v + p*t + dt, through: w, held: m, counted: q + k, both: q + c, mapped: z}
-    activity: f(v)"""
+def decay(t: float) -> float:
+    return math.exp(-3 * t)
 
 
-def test_what_formulas_read() -> None:
-    made = model(PORTS)
-    assert reads(made, [made.flows[0].derivative]) == {"v", "a", "p", "drive"}
-    assert reads(made, [None, made.state[2].each_step]) == {"q", "b", "k"}
-    found = ports_read_by(made)
-    assert found.flow == {"a", "drive"}
-    assert found.update == {"a", "b", "c"}
-    assert found.outputs["through"] == {"a"}
-    assert found.outputs["activity"] == frozenset()
+def logistic(t: float) -> float:
+    return 1 / (1 + 9 * math.exp(-2 * t))
 
 
-@pytest.mark.parametrize(
-    ("sent", "ports"),
-    [
-        ("", ""),
-        ("activity", ""),
-        ("v", ""),
-        ("q", ""),
-        ("m", None),
-        ("own", ""),
-        ("through", "a"),
-        ("held", None),
-        ("counted", None),
-        ("both", "c"),
-        ("mapped", None),
-    ],
-)
-def test_what_flows(sent: str, ports: str | None) -> None:
-    made = model(PORTS)
-    assert flows_by(made, sent) == (None if ports is None else frozenset(ports))
-    assert plain_flow(made, sent) == (ports == "")
+def driven(t: float) -> float:
+    return (math.cos(t) + math.sin(t) - math.exp(-t)) / 2
 
 
-# ---- the Jacobian ------------------------------------------------------------------------------------------------
-
-_NAMES = st.sampled_from(["v", "w", "p", "drive", "a", "1.5", "0.3"])
-_FORMULAS = st.recursive(
-    _NAMES,
-    lambda parts: st.one_of(
-        st.tuples(parts, st.sampled_from("+-*"), parts).map(lambda one: f"({' '.join(one)})"),
-        st.tuples(st.sampled_from(["sin", "tanh", "f", "sigmoid"]), parts).map(lambda one: f"{one[0]}({one[1]})"),
-        parts.map(lambda one: f"(0.3*{one})^3"),
-        parts.map(lambda one: f"exprel(0.2*{one})"),
-    ),
-    max_leaves=6,
-)
+def run(network: Network, steps: int, backend: str = "reference") -> FloatArray:
+    return record(network, Course(steps + 1, backend=backend)).activity
 
 
-@settings(max_examples=40)
-@given(_FORMULAS, _FORMULAS, _FORMULAS, st.sampled_from(["tanh", "sigmoid", "gaussian"]))
-def test_the_jacobian_is_that_of_finite_differences(x: str, y: str, dv: str, activation: str) -> None:
-    body = f"""ports: [a]
-    parameters: {{p: 0.7}}
-    let: {{x: "{x} + v", y: "{y} - w*x"}}
-    state: {{v: {{derivative: "{dv} + y*x"}}, w: {{derivative: "x*w - {dv}"}}}}
-    activity: v"""
-    made, shape = both(body, f", activation: {activation}")
-    shape = with_slope(shape)
-    assert with_slope(shape) is shape
-    found = jacobian(made)
-    point = CONSTANTS | {"v": 0.4, "w": -0.6, "p": 0.7, "a": 0.9, "drive": 0.25}
-    functions = {
-        name: lambda u, tree=tree: evaluate(tree, CONSTANTS | {"x": u, "centre": 0.0, "width": 1.0})
-        for name, tree in shape.functions.items()
-    }
-
-    def derivative(state: int, at: dict[str, float]) -> float:
-        known = dict(at)
-        for name, tree in made.let:
-            known[name] = evaluate(tree, known, functions)
-        tree = made.flows[state].derivative
-        assert tree is not None
-        return evaluate(tree, known, functions)
-
-    known = dict(point)
-    for name, tree in (*made.let, *found.let):
-        known[name] = evaluate(tree, known, functions)
-    for number, name in enumerate("vw"):
-        h = 1e-5
-        near = [derivative(number, point | {name: point[name] + side * h}) for side in (1, -1)]
-        wanted = (near[0] - near[1]) / (2 * h)
-        got = evaluate(found.diagonal[name], known, functions)
-        assert got == pytest.approx(wanted, rel=1e-5, abs=1e-6 * max(1.0, *map(abs, near)))
+CLOSED = [
+    (DECAY, decay), (LOGISTIC, logistic), (TURNING, lambda t: math.cos(2 * t)), (DRIVEN, driven),
+]  # fmt: skip
 
 
-def test_only_what_the_diagonal_needs_is_computed() -> None:
-    found = jacobian(
-        model("let: {x: 2*v, y: x*v*w}\n    state: {v: {derivative: -x}, w: {derivative: v}}\n    activity: y")
-    )
-    assert found.let == ()
-    assert evaluate(found.diagonal["v"], {}) == -2.0
-    assert evaluate(found.diagonal["w"], {}) == 0.0
+@pytest.mark.parametrize(("model", "exact"), CLOSED, ids=["decay", "logistic", "turning", "driven"])
+@pytest.mark.parametrize("method", ["euler", "heun", "rk4"])
+@pytest.mark.parametrize("backend", ["reference", "numpy"])
+def test_errors_fall_as_the_order_says(
+    backend: str, method: Method, model: Definition, exact: Callable[[float], float]
+) -> None:
+    errors = []
+    for steps in (16, 32, 64):
+        network = integrated(build([Unit("N", model=model)], dt=1 / steps), method)
+        errors.append(abs(run(network, steps, backend)[-1, 0] - exact(1.0)))
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
 
-
-# ---- the order of intermediate values ----------------------------------------------------------------------------
-
-
-@given(st.permutations("abcdef"), st.data())
-def test_names_come_behind_what_they_need_and_else_stay(names: list[str], data: st.DataObject) -> None:
-    ranks = data.draw(st.permutations(names))
-    needs = {
-        name: data.draw(st.sets(st.sampled_from(ranks[: ranks.index(name)]))) if ranks.index(name) else set[str]()
-        for name in names
-    }
-    order, circle = sorted_by_need(needs)
-    assert circle == []
-    assert sorted(order) == sorted(names)
-    assert all(order.index(need) < order.index(name) for name in names for need in needs[name])
-    assert sorted_by_need({name: needs[name] for name in order}) == (order, [])  # a valid order stays
-    for place, name in enumerate(order):  # nothing that is written earlier could come here
-        could = [one for one in order[place:] if needs[one] <= set(order[:place])]
-        assert name == min(could, key=names.index)
-
-
-@given(st.integers(1, 5), st.sets(st.sampled_from("abcdef")))
-def test_who_needs_each_other_is_named_from_the_first_on(length: int, others: set[str]) -> None:
-    names = [f"c{number}" for number in range(length)]
-    needs = {name: {names[(number + 1) % length]} for number, name in enumerate(names)}
-    order, circle = sorted_by_need({**dict.fromkeys(sorted(others), ["c0"]), **needs})
-    assert circle == names
-    assert order == [*sorted(others), *names]
-
-
-def test_let_in_another_order_is_the_same_network() -> None:
-    rest = "state: {v: {derivative: -z}}\n    activity: y"
-    hashes = {
-        nv.compile_text(
-            f"{HEAD}models:\n  m:\n    let: {{{let}}}\n    {rest}\nneurons: {{A: {{model: m}}}}"
-        ).content_hash
-        for let in ("x: 2*v, y: x + 1, z: y*x", "z: y*x, x: 2*v, y: x + 1", "y: x + 1, x: 2*v, z: y*x")
-    }
-    assert len(hashes) == 1
-
-
-# ---- powers ------------------------------------------------------------------------------------------------------
-
-
-def test_written_cubes_are_products_where_something_flows() -> None:
-    flowing = model(
-        "let: {c: v^3}\n    state: {v: {derivative: -c - v^4 + pow(v, 3) + v^2 + v^(2 + 1)}}\n    activity: v"
-    )
-    made = flowing.flows[0].derivative
-    assert dict(flowing.let)["c"] == parse("v*v*v")._replace if False else True
-    v = 1.1
-    known = {"v": v, "c": evaluate(dict(flowing.let)["c"], {"v": v})}
-    assert known["c"] == (v * v) * v
-    assert made is not None
-    assert evaluate(made, known) == -((v * v) * v) - ((v * v) * v) * v + v**3.0 + v * v + v**3.0
-    still = model("let: {c: v^3}\n    state: {v: {each_step: -c}}\n    activity: v")
-    assert evaluate(dict(still.let)["c"], {"v": v}) == v**3.0 != (v * v) * v
+    assert abs(orders[-1] - ORDERS[method]) < 0.25
