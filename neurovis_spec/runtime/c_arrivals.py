@@ -1,22 +1,22 @@
 """What arrives at the neurons of a population, as C: sums of terms, each in the order of its connections.
 
-In: a Network, one of its populations. Out: lines of C. The sums of a full matrix, and those of neurons with many
-connections, go on beside each other, since an addition need not wait for the one before in another sum.
+In: a Network, a port of one of its populations. Out: lines of C. The sums of a full matrix, and those of neurons with
+many connections, go on beside each other, since an addition need not wait for the one before in another sum.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from neurovis_spec.arrays import Indices, IntArray, width
+from neurovis_spec.arrays import FloatArray, Indices, IntArray, width
 from neurovis_spec.compiler.events.settable import CENTRES
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Population
+from neurovis_spec.compiler.program import Port
 from neurovis_spec.language.expressions.emit_c import Value
 from neurovis_spec.runtime.c_code import Code, Form, Place
 from neurovis_spec.runtime.signals import SignalLayout
@@ -79,30 +79,47 @@ class Incoming:
     can_be_fused: bool
     #: whether they are a full matrix, row by row
     full: bool
-    #: how sums go on beside each other, and the connections as they are read then; None where neurons have few
+    #: how sums go on beside each other, and in which order the connections are read then; None where neurons have few
     lanes: tuple[_Lanes, Indices] | None
+    #: what each signal is multiplied by; None where that is 1
+    factors: FloatArray | None
 
 
-def incoming_of(network: Network, population: Population) -> Incoming:
-    """What arrives at a population: worked out once, read by each form of a step."""
-    connections, count = network.connections, len(population.members)
-    incoming, slots = population.drive.incoming, population.drive.slots
+def incoming_of(network: Network, port: Port, count: int, fusible: bool = True) -> Incoming:
+    """What arrives at a port of a population of ``count`` neurons: worked out once, read by each form of a step.
+    ``fusible``: whether it may be formed where it arrives."""
+    connections, incoming, slots = network.connections, port.incoming, port.slots
     delays, rules = connections.delays.some(incoming), connections.rules.some(incoming)
     order = np.argsort(slots, kind="stable")
     own, ends = incoming[order], np.searchsorted(slots[order], np.arange(count + 1)).astype(np.int64)
     degrees = np.diff(ends)
     degree = int(degrees[0]) if (degrees == degrees[0]).all() else -1
-    full = population.drive.combine == "sum" and degree > 1 and 1 < count <= _BESIDE and len(_different(delays)) == 1
+    full = port.combine == "sum" and degree > 1 and 1 < count <= _BESIDE and len(_different(delays)) == 1
     if full:
         rows, sources = own.reshape(count, degree), connections.sources[own].reshape(count, degree)
         regular = rows[0, 0] + np.arange(degree) * count + np.arange(count).reshape(-1, 1)
-        full = bool((rows == regular).all() and (sources == sources[0]).all())
+        full = bool((rows == regular).all() and (sources == sources[0]).all()) and port.factors is None
     lanes = None
     if not 0 <= degree <= _FEW:
         beside, read = _in_lanes(ends)
-        lanes = beside, own[read]
-    fused = len(delays) > 0 and bool((delays == 1).all() and (rules < 0).all())
-    return Incoming(own, ends, degree, fused, full, lanes)
+        lanes = beside, read
+    fused = fusible and len(delays) > 0 and bool((delays == 1).all() and (rules < 0).all())
+    factors = None if port.factors is None else port.factors[order]
+    return Incoming(own, ends, degree, fused, full, lanes, factors)
+
+
+def taken(network: Network, code: Code, connections: Indices, place: Place) -> str:
+    """What one of some connections takes: the activity of its source, or an outlet."""
+    if network.sending is None:
+        return f"activity[{code.at(network.connections.sources.some(connections), place)}]"
+    n, index = len(network.neurons), network.sending[connections]
+    own = index if not isinstance(place, int) else index[place : place + 1]
+    if (own < n).all():
+        return f"activity[{code.at(index, place)}]"
+    if (own >= n).all():
+        return f"outlets[{code.at(index - n, place)}]"
+    where = code.at(index, place)
+    return f"({where} < {n} ? activity[{where}] : outlets[{where} - {n}])"
 
 
 def _different(delays: Indices) -> list[int]:
@@ -112,27 +129,55 @@ def _different(delays: Indices) -> list[int]:
 
 
 class Arrivals:
-    """What arrives at the neurons of a population: their connections, in the order in which they are read: neuron by
-    neuron, or as ``lanes`` says. What arrives at one neuron is put together in the order of its connections."""
+    """What arrives at a port of the neurons of a population: their connections, in the order in which they are read:
+    neuron by neuron, or as ``lanes`` says. What arrives at one neuron is put together in the order of its connections.
+    ``begins`` gives the code of what the sum of a neuron begins with, by its place, and ``sent`` that of what a
+    connection without delay takes; left out, they are nothing and the activity."""
 
     def __init__(
-        self, network: Network, population: Population, incoming: Incoming, code: Code, form: Form, layout: SignalLayout
+        self,
+        network: Network,
+        port: Port,
+        count: int,
+        incoming: Incoming,
+        code: Code,
+        form: Form,
+        layout: SignalLayout,
+        begins: Callable[[Place], Value] | None = None,
+        sent: Callable[[Indices, Place], str] | None = None,
     ) -> None:
-        self.network, self.population, self.code, self.form = network, population, code, form
+        self.network, self.combine, self.count, self.code, self.form = network, port.combine, count, code, form
         #: where the weights begin among those packed
         self.begin = 0
         self.can_be_fused, self.ends, self.degree = incoming.can_be_fused, incoming.ends, incoming.degree
         #: whether it is formed here, not sent
         self.fused = form.fused and incoming.can_be_fused
+        self._begins, self._sent = begins, sent
+        #: whether nothing is added any more to what is put together here
+        self.finished = True
         #: whether the sums of all neurons go on beside each other, each in its own order
         self.dense = incoming.full and not (form.gone or form.written_out)
         self.lanes: _Lanes | None = None
-        self.connections = incoming.connections
+        self.connections, self.factors = incoming.connections, incoming.factors
         if incoming.lanes is not None and not (form.written_out or self.dense):
-            self.lanes, self.connections = incoming.lanes
+            self.lanes, read = incoming.lanes
+            self.connections = self.connections[read]
+            self.factors = None if self.factors is None else self.factors[read]
         self.sources = network.connections.sources.some(self.connections)
         self.delays = network.connections.delays.some(self.connections)
         self._layout = layout
+
+    def start(self, place: Place) -> Value:
+        """What the sum, or product, of a neuron begins with."""
+        if self._begins is not None:
+            return self._begins(place)
+        return 1.0 if self.combine == "product" else 0.0
+
+    def sent(self, column: slice, edge: Place) -> str:
+        """What a connection without delay takes."""
+        if self._sent is not None:
+            return self._sent(self.connections[column], edge)
+        return taken(self.network, self.code, self.connections[column], edge)
 
     @cached_property
     def offsets(self) -> IntArray:
@@ -148,10 +193,9 @@ class Arrivals:
     def beside(self, lanes: _Lanes) -> Iterator[tuple[Place, str]]:
         """The body of a loop over all neurons of the population: the place of one, and what arrives at it."""
         code, count = self.code, len(lanes.neurons)
-        start: Value = 1.0 if self.population.drive.combine == "product" else 0.0
         begins, rests = code.tables.name(lanes.begins), code.tables.name(lanes.rests)
         with code.block(code.loop("g", len(lanes.begins) - 1)):
-            totals = [code.variable("u", start) for _ in range(_LANES)]
+            totals = [code.variable("u", self._start_of_lane(lanes, lane)) for lane in range(_LANES)]
             with code.block(code.loop("e", f"{begins}[g + 1]", f"{begins}[g]", _LANES)):
                 for lane, total in enumerate(totals):
                     self._add(total, f"(e + {lane})" if lane else "e", slice(None))
@@ -177,18 +221,19 @@ class Arrivals:
                 u1[p] += weights[0 + 2*q + p]*a;
         }
         """
-        code, count = self.code, len(self.population.members)
+        code, count = self.code, self.count
         name = code.name("u")
         code.line(f"{code.real} {name}[{count}];")
         code.line(code.loop("p", count))
-        code.line(f"    {name}[p] = {code.text(0.0)};")
+        code.line(f"    {name}[p] = {code.text(self.start('p'))};")
         delay = int(self.delays[0])
         first, offset = int(self.connections[0]), int(self.offsets[0])
         with code.block(code.loop("q", self.degree)):
             direct = delay == 0 or self.fused
             if direct:
-                source = code.at(self.sources[: self.degree], "q")
-                code.line(f"const {code.real} a = {'activity' if delay == 0 else 'before'}[{source}];")
+                # each row is of the same sources
+                source = f"before[{code.at(self.sources[: self.degree], 'q')}]"
+                code.line(f"const {code.real} a = {self.sent(slice(self.degree), 'q') if delay == 0 else source};")
             code.line(code.loop("p", count))
             if direct:
                 code.line(f"    {name}[p] += weights[{first} + {count}*q + p]*a;")
@@ -202,10 +247,9 @@ class Arrivals:
     def combined(self, place: Place) -> Value:
         """All that arrives at one neuron as one number. In a loop (of neurons with equally many connections) the c-th
         connection of each is the column ``c::degree``."""
-        combine = self.population.drive.combine
-        start: Value = 1.0 if combine == "product" else 0.0
+        start = self.start(place)
         if not len(self.connections):
-            return start
+            return self._finished(self.code.text(start)) if self._begins is not None else start
         if isinstance(place, int):
             edges: list[Place] = list(range(int(self.ends[place]), int(self.ends[place + 1])))
             return self._terms(start, edges, [slice(None)] * len(edges)) if edges else start
@@ -215,7 +259,7 @@ class Arrivals:
 
     def _terms(self, start: Value, edges: list[Place], columns: list[slice]) -> Value:
         """The terms of some connections, one after the other, combined."""
-        if not self.form.gone and self.population.drive.combine == "sum":
+        if not self.form.gone and self.combine == "sum":
             terms = [self.term(edge, column) for edge, column in zip(edges, columns, strict=True)]
             return " + ".join([self.code.text(start), *terms])
         total = self.code.variable("u", start)
@@ -230,7 +274,7 @@ class Arrivals:
             code.line(f"if (!gone[{code.at(self.connections[column], edge)}]) {{")
             code.indent += 1
         term = self.term(edge, column)
-        match self.population.drive.combine:
+        match self.combine:
             case "sum":
                 code.line(f"{total} += {term};")
             case "product":
@@ -251,9 +295,24 @@ class Arrivals:
 
     def _finished(self, total: str) -> Value:
         """What a neuron gets of its sum: the root of a sum of squares, else the sum itself."""
-        return f"sqrt{self.code.emitter.suffix}({total})" if self.population.drive.combine == "distance" else total
+        return f"sqrt{self.code.emitter.suffix}({total})" if self.combine == "distance" and self.finished else total
+
+    def _start_of_lane(self, lanes: _Lanes, lane: int) -> Value:
+        """What the sum of a lane of a group begins with; behind the last neuron there are lanes for nobody."""
+        if self._begins is None:
+            return self.start(0)
+        last = len(lanes.neurons) - 1
+        index = f"({_LANES}*g + {lane} < {last} ? {_LANES}*g + {lane} : {last})"
+        return self.start(str(self.code.at(lanes.neurons, index)))
 
     def term(self, edge: Place, column: slice) -> str:
+        """What a connection brings: its signal, times its factor."""
+        signal = self._signal(edge, column)
+        if self.factors is None:
+            return signal
+        return f"{signal}*{self._operand(self.code.number(self.factors[column], edge))}"
+
+    def _signal(self, edge: Place, column: slice) -> str:
         """w[t−d]·a[t−d] of a connection: ``weights[3]*activity[1]`` without a delay, ``signals[5 + r2]`` with one of
         2, and a choice of both in a loop over connections of which some have none."""
         code = self.code
@@ -264,8 +323,7 @@ class Arrivals:
             return f"packed[{code.at(places, edge)}]*before[{code.at(self.sources[column], edge)}]"
         now = ""
         if kinds[0] == 0:
-            weight, source = code.at(self.connections[column], edge), code.at(self.sources[column], edge)
-            now = f"weights[{weight}]*activity[{source}]"
+            now = f"weights[{code.at(self.connections[column], edge)}]*{self.sent(column, edge)}"
         if kinds == [0]:
             return now
         offset = code.at(self.offsets[column], edge)

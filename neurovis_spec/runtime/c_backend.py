@@ -25,11 +25,10 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.expressions.emit_c import Emitter
 from neurovis_spec.language.expressions.functions import Library
-from neurovis_spec.runtime import c_functions, c_library
+from neurovis_spec.runtime import c_flows, c_functions, c_library
 from neurovis_spec.runtime.backend import Availability, BackendError, Capabilities
-from neurovis_spec.runtime.c_arrivals import incoming_of
 from neurovis_spec.runtime.c_code import Code, Form, Table, Tables, function, state_name, words_of
-from neurovis_spec.runtime.c_step import StepCode
+from neurovis_spec.runtime.c_step import StepCode, begins_otherwise, incoming_in
 from neurovis_spec.runtime.state import Conditions, Mask, State, Structure
 
 #: neurons and connections up to which a network is written out one by one
@@ -43,10 +42,10 @@ _AT_ONCE = 1 << 22
 _PLAIN, _GENERAL, _FIRST = 0, 1, 2
 _FORMS = tuple(ctypes.c_int32(form) for form in (_PLAIN, _GENERAL, _FIRST))
 
-#: ``nv_state``: of a State ``activity``, ``weights``, ``signals``, ``history``, and ``cells``, one pointer for each
-#: state of a model or a rule; ``x``: the numbers that can be set; ``s``: the inputs of the step; ``held``, ``holding``,
-#: ``gone``, ``still``, ``lost``, ``before``, ``packed``: as ``Form`` says; ``given``: the tables that are too long for
-#: the text.
+#: ``nv_state``: of a State ``activity``, ``weights``, ``signals``, ``history``, ``outlets``, and ``cells``, one pointer
+#: for each state or output of a model or a rule; ``x``: the numbers that can be set; ``parameters``; ``s``: the inputs
+#: of the step; ``held``, ``holding``, ``lesioned``, ``gone``, ``still``, ``lost``, ``before``, ``packed``: as ``Form``
+#: says; ``given``: the tables that are too long for the text; ``work``: what an integration keeps.
 #:
 #: ``nv_course``: ``steps`` steps from ``k`` on, the first in ``form``, the others in the form ``then``; the inputs of
 #: each are a row of ``rows``. Steps that ``every`` divides are kept: a row of ``activity``, and one of ``weights`` with
@@ -64,13 +63,13 @@ _HEAD: Final = """#include <math.h>
 #endif
 
 typedef struct {
-    double *activity, *weights, *signals, *history;
-    const double *x, *s, *holding;
-    const uint8_t *held, *gone, *still;
+    double *activity, *weights, *signals, *history, *outlets;
+    const double *x, *parameters, *s, *holding;
+    const uint8_t *held, *lesioned, *gone, *still;
     const int64_t *lost;
     const void *const *given;
     double *const *cells;
-    double *before, *packed;
+    double *before, *packed, *work;
 } nv_state;
 
 typedef struct {
@@ -197,7 +196,7 @@ def _write(network: Network) -> Written:
     pointer_lines = _pointer_lines(network)
     watched = bool(network.projections) and not small
     # a network that is written out is in registers, and nothing is gained
-    incoming = [incoming_of(network, population) for population in network.populations]
+    incoming = incoming_in(network)
     whole = StepCode(network, Code(emitter, tables, network.dt, {}), Form(), incoming)
     fused = not small and bool(whole.fuses.any())
     for type_, name, form, write, parameters, of_fused in _functions(small, watched):
@@ -238,13 +237,14 @@ def _functions(small: bool, watched: bool) -> tuple[_Function, ...]:
 def _pointer_lines(network: Network) -> dict[str, str]:
     """For each array of the state, and for what is handed over, the line that gives it its name."""
     kinds = (
-        ("double", ("activity", "weights", "signals", "history", "packed")),
-        ("const double", ("x", "holding", "before")),
-        ("const uint8_t", ("held", "gone", "still")),
+        ("double", ("activity", "weights", "signals", "history", "outlets", "packed")),
+        ("const double", ("x", "parameters", "holding", "before")),
+        ("const uint8_t", ("held", "lesioned", "gone", "still")),
         ("const int64_t", ("lost",)),
     )
     lines = {name: f"{kind} *restrict const {name} = p->{name};" for kind, names in kinds for name in names}
-    names = [state_name(use.owner, i) for _, use in network.uses for i in range(len(use.definition.state))]
+    names = [state_name(use.owner, i) for _, use in network.uses for i in range(len(use.definition.kept))]
+    lines |= c_flows.pointer_lines(network, "double", "restrict", "p->work")
     return lines | {name: f"double *restrict const {name} = p->cells[{at}];" for at, name in enumerate(names)}
 
 
@@ -255,15 +255,15 @@ def _look(network: Network) -> tuple[str, str]:
         tests["connection"].append(f"nv_odd(p->weights, {len(network.connections)})")
     cell = 0
     for holder, use in network.uses:
-        for _ in use.definition.state:
+        for _ in use.definition.kept:
             tests[use.definition.kind.each].append(f"nv_odd(p->cells[{cell}], {len(holder.members)})")
             cell += 1
     return " || ".join(tests["neuron"]), " || ".join(tests["connection"]) or "0"
 
 
 _POINTERS: Final = (
-    *("activity", "weights", "signals", "history", "x", "s", "holding"),
-    *("held", "gone", "still", "lost", "given", "cells", "before", "packed"),
+    *("activity", "weights", "signals", "history", "outlets", "x", "parameters", "s", "holding"),
+    *("held", "lesioned", "gone", "still", "lost", "given", "cells", "before", "packed", "work"),
 )
 
 
@@ -298,7 +298,9 @@ class CStepper:
         self._run.argtypes, self._run.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
         self._long_tables = made.long_tables
         self._vector = np.zeros(network.vector_size)
-        self._initial = bool((~np.isnan(network.neurons.initial)).any())
+        #: whether the first step of a run is another one
+        self._initial = begins_otherwise(network)
+        self._work = np.zeros(c_flows.work_size(network))
         self._changing = np.ascontiguousarray(network.changing, dtype=np.int64)
         # whether the weights that are recorded lie next to each other
         count = len(self._changing)
@@ -311,11 +313,12 @@ class CStepper:
         self._table_addresses = _addresses(self._long_tables)
         self._before, self._packed = np.zeros(len(network.neurons)), np.zeros(made.packed)
         self._pointers.before, self._pointers.packed = self._before.ctypes.data, self._packed.ctypes.data
+        self._pointers.work = self._work.ctypes.data
         self._pointers.given = ctypes.addressof(self._table_addresses)
         #: the state whose arrays the struct points to, these arrays, and the objects that say what holds in it: where
         #: each is still the same one, nothing has changed
         self._known_state: State | None = None
-        self._activity = self._weights = self._signals = self._history = self._variables = self._vector
+        self._activity = self._weights = self._signals = self._history = self._variables = self._outlets = self._vector
         self._holds: object = None
         self._structure: Structure | None = None
         self._general = False
@@ -332,6 +335,7 @@ class CStepper:
             or state.weights is not self._weights
             or state.signals is not self._signals
             or state.history is not self._history
+            or state.outlets is not self._outlets
         ):
             self._point_to(state)
         k = state.k
@@ -379,20 +383,20 @@ class CStepper:
     def _point_to(self, state: State) -> None:
         """Note where the arrays of a state lie, and what is held and left out."""
         now, pointers = state.conditions, self._pointers
-        for name in ("activity", "weights", "signals", "history"):
+        for name in ("activity", "weights", "signals", "history", "outlets"):
             array = getattr(state, name)
             if not (array.flags.c_contiguous and array.flags.writeable and array.dtype == np.float64):
                 array = np.array(array, dtype=np.float64)
                 setattr(state, name, array)
             setattr(pointers, name, array.ctypes.data)
-        pointers.x = now.variables.ctypes.data
+        pointers.x, pointers.parameters = now.variables.ctypes.data, now.parameters.ctypes.data
         self._cells = _addresses([array for own in state.cells.values() for array in own.values()])
         pointers.cells = ctypes.addressof(self._cells)
         if now.holds is not self._holds or now.structure is not self._structure:
             self._take_conditions(now)
         self._known_state = state  # what is kept alive cannot be mistaken for another array at the same address
         self._activity, self._weights, self._variables = state.activity, state.weights, now.variables
-        self._signals, self._history = state.signals, state.history
+        self._signals, self._history, self._outlets = state.signals, state.history, state.outlets
 
     def _take_conditions(self, now: Conditions) -> None:
         n, pointers = len(self.network.neurons), self._pointers
@@ -404,6 +408,8 @@ class CStepper:
                 neurons, values = hold
                 self._held[neurons] = 1
                 self._holding[neurons] = values
+        self._lesioned = _bytes(now.lesioned_neurons)
+        pointers.lesioned = self._lesioned.ctypes.data
         self._gone, self._still = (_bytes(mask) for mask in (now.structure.gone, now.structure.still))
         pointers.held, pointers.holding = self._held.ctypes.data, self._holding.ctypes.data
         self._lost = np.ascontiguousarray(now.structure.lost, dtype=np.int64)
@@ -424,7 +430,7 @@ class CBackend:
     """C made from the update program, compiled for this machine."""
 
     name = "c"
-    capabilities = Capabilities(noise=True, exactness="bits")
+    capabilities = Capabilities(noise=True, flows=True, exactness="bits")
 
     def availability(self) -> Availability:
         """Whether there is a compiler."""

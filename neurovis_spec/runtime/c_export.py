@@ -25,13 +25,13 @@ from neurovis_spec.compiler.run_checks import without_checks
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.language.expressions.emit_c import Emitter, Value
 from neurovis_spec.language.expressions.tree import Draw
-from neurovis_spec.runtime.c_arrivals import incoming_of
+from neurovis_spec.runtime import c_flows
 from neurovis_spec.runtime.c_backend import SMALL
 from neurovis_spec.runtime.c_code import Code, Form, Tables, function, state_name, words_of
 from neurovis_spec.runtime.c_draws import drawing
 from neurovis_spec.runtime.c_names import LONGEST_STRING, identifiers, prefix, string, words
 from neurovis_spec.runtime.c_settable import ExportError, fixed, formula, write_follow
-from neurovis_spec.runtime.c_step import StepCode
+from neurovis_spec.runtime.c_step import StepCode, begins_otherwise, incoming_in
 from neurovis_spec.runtime.columns import probe_of
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.signals import signal_layout
@@ -140,7 +140,7 @@ class Exported:
         network, state = self.network, self.state
         # the state may have checks of a run, which this network has not
         cells = {
-            use.owner: {quantity.name: state.cells[use.owner][quantity.name] for quantity in use.definition.state}
+            use.owner: {quantity.name: state.cells[use.owner][quantity.name] for quantity in use.definition.kept}
             for _, use in network.uses
         }
         members = [
@@ -148,6 +148,7 @@ class Exported:
             Member("weights", state.weights, "w[k] of all connections"),
             Member("signals", state.signals, "what is under way on delayed connections"),
             Member("history", state.history.ravel(), "past activities, for rules"),
+            Member("outlets", state.outlets, "what connections take beside activities"),
             *(
                 Member(kept, np.concatenate([np.zeros(0), *arrays]), _STATES.get(kept, "states"))
                 for kept, arrays in by_kind(cells).items()
@@ -155,6 +156,7 @@ class Exported:
             Member("parameters", state.conditions.parameters, "parameters of the spec and of its instances"),
             Member("variables", state.conditions.variables, "numbers that follow parameters"),
             Member("vector", np.zeros(network.vector_size), "the inputs and the noise of a step"),
+            Member("work", np.zeros(c_flows.work_size(network)), "what an integration keeps between stages"),
         ]
         if self.holding:
             members.append(Member("holding", np.zeros(len(network.neurons)), "what neurons are held at"))
@@ -162,8 +164,8 @@ class Exported:
 
     @property
     def takes_initial(self) -> bool:
-        """Whether neurons take ``initial`` at step 0."""
-        return not self.state.continued and bool((~np.isnan(self.network.neurons.initial)).any())
+        """Whether neurons take ``initial`` at step 0, or are not integrated there."""
+        return not self.state.continued and begins_otherwise(self.network)
 
     # ---- the header --------------------------------------------------------------------------------------------
 
@@ -237,6 +239,8 @@ void {name}_step({name}_state *state, const {name}_inputs *in, {name}_outputs *o
             fields.append("int32_t phase; /* events that have happened */")
         if self.holding:
             fields.append(f"unsigned char held[{len(self.network.neurons)}]; /* neurons that are held */")
+            if self.network.outlets:
+                fields.append(f"unsigned char lesioned[{len(self.network.neurons)}]; /* neurons that are lesioned */")
         return fields
 
     def _setter(self, parameter: str, c_name: str) -> str:
@@ -300,15 +304,17 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
         network, real, quick = self.network, self.real, f"{self.macro}_RESTRICT"
         pointer_lines = {
             name: f"{real} *{quick} const {name} = state->{name};"
-            for name in ("activity", "weights", "signals", "history")
+            for name in ("activity", "weights", "signals", "history", "outlets")
         }
+        pointer_lines |= c_flows.pointer_lines(network, real, quick, "state->work")
+        pointer_lines["lesioned"] = f"const unsigned char *{quick} const lesioned = state->lesioned;"
         pointer_lines["x"] = f"{real} *{quick} const x = state->variables;"
         pointer_lines["s"] = f"const {real} *{quick} const s = state->vector;"
         pointer_lines["holding"] = f"const {real} *{quick} const holding = state->holding;"
         pointer_lines["held"] = f"const unsigned char *{quick} const held = state->held;"
         pointer_lines["parameters"] = f"const {real} *const parameters = state->parameters;"
         for _, use in network.uses:
-            for i, quantity in enumerate(use.definition.state):
+            for i, quantity in enumerate(use.definition.kept):
                 name, (kept, start) = state_name(use.owner, i), self._state_starts[use.owner, quantity.name]
                 pointer_lines[name] = f"{real} *{quick} const {name} = state->{kept} + {start};"
         return pointer_lines
@@ -320,7 +326,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
         lengths: dict[str, int] = {}
         for holder, use in self.network.uses:
             kept = kept_as(use.owner.kind)
-            for quantity in use.definition.state:
+            for quantity in use.definition.kept:
                 starts[use.owner, quantity.name] = kept, lengths.get(kept, 0)
                 lengths[kept] = lengths.get(kept, 0) + len(holder.members)
         return starts
@@ -349,7 +355,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             still="still" in left_out,
             lost="lost" in left_out,
         )
-        StepCode(network, code, form, [incoming_of(network, population) for population in network.populations]).write()
+        StepCode(network, code, form, incoming_in(network)).write()
         before: list[str] = []
         for name in sorted(left_out.keys() & words_of(code.lines)):  # what never learns asks for none that is still
             kind, phases = left_out[name]
@@ -374,6 +380,8 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
         """What neurons are held at, by the parameters of now."""
         code = self._code()
         code.line("memset(state->held, 0, sizeof state->held);")
+        if self.network.outlets:
+            code.line("memset(state->lesioned, 0, sizeof state->lesioned);")
         switch = len(self.phases) > 1
         for number, phase in enumerate(self.phases):
             order = np.array(phase.order)
@@ -386,6 +394,9 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
                     self._hold_at(code, np.flatnonzero(order == clamp), value)
                 if phase.lesioned.any():
                     self._hold_at(code, np.flatnonzero(phase.lesioned), code.text(0.0))
+                    if self.network.outlets:
+                        with code.block(code.loop("i", int(phase.lesioned.sum()))):
+                            code.line(f"state->lesioned[{code.at(np.flatnonzero(phase.lesioned), 'i')}] = 1;")
         return self._function(code, "What neurons are held at.", "void nv_hold", self._pointer_lines())
 
     def _hold_at(self, code: Code, neurons: IntArray, value: str) -> None:

@@ -14,20 +14,26 @@ of a larger one, each population is a loop. So K -> O after one step, O with a b
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from functools import partial, singledispatch
+from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import Indices, IntArray
-from neurovis_spec.compiler.events.settable import BIAS, HIGH, LOW
+from neurovis_spec.arrays import FloatArray, Indices, IntArray
+from neurovis_spec.compiler.events.settable import BIAS, HIGH, LOW, bias_of
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import (
+    DRIVE,
     Definition,
     Gather,
+    Key,
     Learn,
     Operation,
     Population,
+    Port,
     Projection,
     ReadInputs,
     Send,
@@ -35,27 +41,34 @@ from neurovis_spec.compiler.program import (
     Use,
 )
 from neurovis_spec.language.expressions.emit_c import Made, Value
-from neurovis_spec.language.expressions.tree import Tree, names
-from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming
+from neurovis_spec.language.expressions.tree import Name, Tree, names
+from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, incoming_of, taken
 from neurovis_spec.runtime.c_code import Code, Form, Place, state_name
 from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import SignalLayout, signal_layout
 from neurovis_spec.runtime.state import Mask
 
 _NONE: Mapping[str, Made] = {}
+_NO_TOTALS: Mapping[int, str] = {}
 #: connections whose rule is written side by side in a loop: a compiler makes vectors of them
 _RULES_SIDE_BY_SIDE = 4
 
 
 class StepCode:
-    """Writes the body of a step; ``incoming`` is what arrives at each population, which all forms of a step share."""
+    """Writes the body of a step; ``incoming`` is what arrives at each port of each population, which all forms of a
+    step share."""
 
-    def __init__(self, network: Network, code: Code, form: Form, incoming: Sequence[Incoming]) -> None:
+    def __init__(self, network: Network, code: Code, form: Form, incoming: Sequence[Sequence[Incoming]]) -> None:
         self.network, self.code, self.form = network, code, form
         self.layout: SignalLayout = signal_layout(network)
         self.depth = history_depth(network)
+        #: what ports have beside what arrives, by their names
+        self.own = {port.name: _own(network, port.name) for one in network.populations for port in one.ports}
         self.arrivals = [
-            Arrivals(network, population, own, code, form, self.layout)
+            [
+                Arrivals(network, port, len(population.members), one, code, form, self.layout)
+                for port, one in zip(population.ports, own, strict=True)
+            ]
             for population, own in zip(network.populations, incoming, strict=True)
         ]
         #: connections that are fused, (m,)
@@ -69,7 +82,7 @@ class StepCode:
             for number in learn
             if _common_delay(network.connections.delays[network.projections[number].members]) > 0
         )
-        for arrivals in self.arrivals:
+        for arrivals in chain(*self.arrivals):
             if arrivals.can_be_fused:
                 self.fuses[arrivals.connections] = True
                 arrivals.begin = self.count
@@ -78,7 +91,7 @@ class StepCode:
     def pack(self) -> None:
         """The weights of fused populations in the order in which they are read, where they do not lie so."""
         code = self.code
-        for arrivals in self.arrivals:
+        for arrivals in chain(*self.arrivals):
             if len(arrivals.packed):
                 code.line(code.loop("e", len(arrivals.packed)))
                 code.line(f"    packed[{arrivals.begin} + e] = weights[{code.at(arrivals.packed, 'e')}];")
@@ -94,26 +107,64 @@ class StepCode:
 
     def population(self, number: int) -> None:
         """The neurons of a population."""
-        population, code = self.network.populations[number], self.code
-        arrivals = self.arrivals[number]
-        if self.form.written_out:
-            for place in range(len(population.members)):
-                with code.block(""):
-                    self.neuron(number, place, arrivals)
-        elif arrivals.dense and self.reads_drive(population):
-            with code.block(""):
-                sums = arrivals.matrix()
-                with code.block(code.loop("p", len(population.members))):
-                    self.neuron(number, "p", arrivals, f"{sums}[p]")
-        elif arrivals.lanes is not None and self.reads_drive(population):
-            with arrivals.beside(arrivals.lanes) as (where, total):
-                self.neuron(number, where, arrivals, total)
-        else:
-            with code.block(code.loop("p", len(population.members))):
-                self.neuron(number, "p", arrivals)
+        population = self.network.populations[number]
+        read = self.read_at_update(population)
+        arrivals = {
+            one: own
+            for one, (port, own) in enumerate(zip(population.ports, self.arrivals[number], strict=True))
+            if port.name in read
+        }
+        self.each(len(population.members), arrivals, partial(self.neuron, number))
 
-    def neuron(self, number: int, place: Place, arrivals: Arrivals, total: str = "") -> None:
-        """One neuron's step; ``total`` is what arrives at it, where that was summed before."""
+    def each(
+        self, count: int, arrivals: Mapping[int, Arrivals], body: Callable[[Place, Mapping[int, str]], None]
+    ) -> None:
+        """The body of each neuron of a population, by its place and what arrives at it, by the numbers of ports, where
+        that is summed before: of the first port beside the neurons, of others in a loop of their own."""
+        code = self.code
+        if self.form.written_out:
+            for place in range(count):
+                with code.block(""):
+                    body(place, _NO_TOTALS)
+            return
+        ahead = {one: own for one, own in arrivals.items() if own.dense or own.lanes is not None}
+        first = next(iter(ahead), None)
+        beside = first is not None and ahead[first].lanes is not None
+        summed = {one: own for one, own in ahead.items() if one != first or not beside}
+        with code.block("") if summed else nullcontext():
+            sums = {one: self.summed(own, count) for one, own in summed.items()}
+            if first is not None and beside:
+                lanes = ahead[first].lanes
+                assert lanes is not None
+                with ahead[first].beside(lanes) as (where, total):
+                    body(where, {first: total, **{one: f"{name}[{where}]" for one, name in sums.items()}})
+            else:
+                with code.block(code.loop("p", count)):
+                    body("p", {one: f"{name}[p]" for one, name in sums.items()})
+
+    def summed(self, arrivals: Arrivals, count: int) -> str:
+        """What arrives at a port of all neurons of a population, combined: the name of an array."""
+        if arrivals.dense:
+            return arrivals.matrix()
+        assert arrivals.lanes is not None
+        name = self.code.name("u")
+        self.code.line(f"{self.code.real} {name}[{count}];")
+        with arrivals.beside(arrivals.lanes) as (where, total):
+            self.code.line(f"{name}[{where}] = {total};")
+        return name
+
+    @contextmanager
+    def unless_first(self) -> Iterator[None]:
+        """Lines that are left out at the first step of a run."""
+        if not self.form.first:
+            yield
+            return
+        with self.code.block("if (!first)"):
+            yield
+
+    def neuron(self, number: int, place: Place, totals: Mapping[int, str] = _NO_TOTALS) -> None:
+        """One neuron's step; ``totals`` are what arrives at its ports, by their numbers, where that was summed
+        before."""
         population, code = self.network.populations[number], self.code
         neuron = code.at(population.members, place)
         initial = self.network.neurons.initial[population.members]
@@ -127,68 +178,130 @@ class StepCode:
             code.line(f"    activity[{neuron}] = {value};")
             code.line("} else {")
             code.indent += 1
-        drive = self.drive(population, place, arrivals, total) if self.reads_drive(population) else 0.0
-        self.advance(number, place, neuron, drive)
+        read = self.read_at_update(population)
+        ports: dict[str, Value] = {}
+        for one, port in enumerate(population.ports):
+            total = totals.get(one, "")
+            ports[port.name] = self.at_port(number, one, place, total) if port.name in read else 0.0
+        self.advance(number, place, neuron, ports)
         if may_take:
             code.indent -= 1
             code.line("}")
         if self.form.held:
             code.line(f"if (held[{neuron}])")
             code.line(f"    activity[{neuron}] = holding[{neuron}];")
+        self.let_out(number, place, neuron)
 
-    def reads_drive(self, population: Population) -> bool:
-        """Whether the model of a population takes what arrives."""
-        return population.drive.name in population.model.definition.read
+    def let_out(self, number: int, place: Place, neuron: Place) -> None:
+        """What connections take of a neuron beside its activity; nothing of one that is lesioned."""
+        code, population = self.code, self.network.populations[number]
+        stored = self.states(population.model, place)
+        for outlet in self.network.outlets:
+            if outlet.population == number:
+                value = stored[outlet.name]
+                if self.form.held:
+                    value = f"lesioned[{neuron}] ? {code.text(0.0)} : {value}"
+                at = outlet.start + place if isinstance(place, int) else f"{outlet.start} + {place}"
+                code.line(f"outlets[{at}] = {value};")
 
-    def drive(self, population: Population, place: Place, arrivals: Arrivals, total: str) -> Value:
-        """u[t]: what arrives, combined, + bias + input + noise."""
-        code, network = self.code, self.network
-        drive: Value = total or arrivals.combined(place)
-        bias = code.settable(BIAS, network.neurons.bias, population.members, place)
-        if isinstance(drive, float) and isinstance(bias, float):
-            drive += bias
-        elif isinstance(drive, float) or population.drive.combine == "product" or bias != 0.0:
+    def read_at_update(self, population: Population) -> set[str]:
+        """The names that are read when a population is updated, derivatives left out."""
+        made = population.model.definition
+        if not made.flows:
+            return {*made.read}
+        ends = [] if self.network.episode is None else [one.each_episode for one in made.lasting]
+        return read_through(made.let, [*(one.each_step for one in (*made.lasting, *made.fleeting)), *ends])
+
+    def at_port(self, number: int, port_number: int, place: Place, total: str) -> Value:
+        """A port at u[t]: what arrives, combined, + bias + input + noise."""
+        code, population = self.code, self.network.populations[number]
+        port = population.ports[port_number]
+        value: Value = total or self.arrivals[number][port_number].combined(place)
+        return code.let("u", self.with_own(population, port, place, value, self.step_value))
+
+    def with_own(
+        self,
+        population: Population,
+        port: Port,
+        place: Place,
+        total: Value,
+        step_value: Callable[[IntArray, Place], str],
+    ) -> Value:
+        """What arrives at a port, + bias + input + noise; ``step_value`` gives the code of a number of the step."""
+        code, members = self.code, population.members
+        own = self.own[port.name]
+        bias = 0.0 if own.bias is None else code.settable(own.key, own.bias, members, place)
+        value = total
+        if isinstance(value, float) and isinstance(bias, float):
+            value += bias
+        elif isinstance(value, float) or port.combine == "product" or bias != 0.0:
             # a sum that begins with 0 is never −0, so adding 0 changes nothing; a product may be
-            drive = f"{code.text(drive)} + {code.text(bias)}"
-        for fed in (network.neurons.input[population.members], network.noise_index[population.members]):
-            drive = self._plus_step_value(drive, fed, place)
-        return code.let("u", drive)
+            value = f"{code.text(value)} + {code.text(bias)}"
+        for fed in (own.input, own.noise):
+            if fed is not None:
+                value = self._plus_step_value(value, fed[members], place, step_value)
+        return value
 
-    def _plus_step_value(self, drive: Value, index_in_s: IntArray, place: Place) -> Value:
-        """The drive, and the number of ``s`` that ``index_in_s`` points to, −1 for none."""
+    def step_value(self, index_in_s: IntArray, place: Place) -> str:
+        """A number of the vector of the step."""
+        return f"s[{self.code.at(index_in_s, place)}]"
+
+    def _plus_step_value(
+        self, drive: Value, index_in_s: IntArray, place: Place, step_value: Callable[[IntArray, Place], str]
+    ) -> Value:
+        """A port, and the number of ``s`` that ``index_in_s`` points to, −1 for none."""
         code = self.code
         if isinstance(place, int):
-            return f"{code.text(drive)} + s[{int(index_in_s[place])}]" if index_in_s[place] >= 0 else drive
+            return f"{code.text(drive)} + {step_value(index_in_s, place)}" if index_in_s[place] >= 0 else drive
         if (index_in_s >= 0).all():
-            return f"{code.text(drive)} + s[{code.at(index_in_s, place)}]"
+            return f"{code.text(drive)} + {step_value(index_in_s, place)}"
         if (index_in_s < 0).all():
             return drive
-        name, index = code.variable("u", drive), code.at(index_in_s, place)
-        code.line(f"if ({index} >= 0)")
-        code.line(f"    {name} += s[{index}];")
+        name = code.variable("u", drive)
+        code.line(f"if ({code.at(index_in_s, place)} >= 0)")
+        code.line(f"    {name} += {step_value(index_in_s, place)};")
         return name
 
-    def advance(self, number: int, place: Place, neuron: Place, drive: Value) -> None:
-        """The states of a neuron from old ones and the drive, its activity from the new ones; the episode's end."""
+    def advance(self, number: int, place: Place, neuron: Place, ports: Mapping[str, Value]) -> None:
+        """The states of a neuron from old ones and its ports, its activity and its outputs from the new ones; the
+        episode's end. Those of a model with derivatives stay as they are at the first step."""
         code, population = self.code, self.network.populations[number]
+        made, stored = population.model.definition, self.states(population.model, place)
+        seen: Mapping[str, Value] = {**code.parameters(population.model, place), **self.clock(made), **ports}
+        states = {one.name: stored[one.name] for one in made.state}
 
-        def activation(x: Value, formula: Tree) -> Value:
-            parameters = code.parameters(population.activation, place)
-            known = parameters | ({"x": code.let("x", x)} if "x" in names(formula) else {})
-            return code.let("y", code.value(formula, known))
-
-        functions = {
-            name: partial(activation, formula=tree) for name, tree in population.activation.definition.functions.items()
-        }
-        seen = code.parameters(population.model, place) | {population.drive.name: drive}
-        stored = self.states(population.model, place)
-        new, given = self.change(population.model.definition, seen, stored, functions)
+        begins = bool(made.flows) and self.form.first
+        new, given = self.change(made, seen, states, self.activation(population, place), begins=begins)
         self.store([(stored[name], value) for name, value in new.items()])
+        self.store([(stored[one.name], given[one.name]) for one in made.outputs])
         self.store([(f"activity[{neuron}]", given["activity"])])
 
+    def activation(
+        self, population: Population, place: Place, formulas: Mapping[str, Tree] | None = None
+    ) -> dict[str, Made]:
+        """The functions of the activation of a neuron, or these, for formulas of its model."""
+        code = self.code
+
+        def called(x: Value, formula: Tree) -> Value:
+            parameters = code.parameters(population.activation, place)
+            seen = parameters | ({"x": code.let("x", x)} if "x" in names(formula) else {})
+            return code.let("y", code.value(formula, seen))
+
+        known = population.activation.definition.functions if formulas is None else formulas
+        return {name: partial(called, formula=tree) for name, tree in known.items()}
+
+    def clock(self, made: Definition) -> dict[str, Value]:
+        """``t`` and ``dt`` where they are in another unit than seconds."""
+        if made.per_second == 1.0:
+            return {}
+        code = self.code
+        code.value(Name("t"), {})  # ``tu`` reads td
+        code.head["tu"] = f"const {code.real} tu = td * {code.text(made.per_second)};"
+        return {"t": "tu", "dt": self.network.dt * made.per_second}
+
     def states(self, use: Use, place: Place) -> dict[str, str]:
-        """The states of a definition in use, of one member."""
-        return {one.name: f"{state_name(use.owner, i)}[{place}]" for i, one in enumerate(use.definition.state)}
+        """The states of a definition in use, and its outputs, of one member."""
+        return {one.name: f"{state_name(use.owner, i)}[{place}]" for i, one in enumerate(use.definition.kept)}
 
     def change(
         self,
@@ -197,17 +310,21 @@ class StepCode:
         stored: Mapping[str, str],
         functions: Mapping[str, Made] = _NONE,
         bounded: Callable[[str, Value], Value] = lambda name, value: value,
+        begins: bool = False,
     ) -> tuple[dict[str, Value], dict[str, Value]]:
         """What becomes of all that lasts of a definition, which is ``stored`` there, from old values at once, and once
         more at an episode's end, ``bounded``; and what does not last, made from the new states. Nothing is stored
-        yet."""
+        yet. With ``begins`` all stays as it is at the first step."""
         code = self.code
         steps = {one.name: one.each_step for one in made.lasting}
         ends = {one.name: one.each_episode for one in made.lasting}
         fleeting = {one.name: one.each_step for one in made.fleeting}
-        known = self.let(made.let, {**seen, **stored}, [*steps.values(), *fleeting.values()])
+        readers = [*steps.values(), *fleeting.values()]
+        known = self.let(made.let, {**seen, **stored}, readers, functions)
         new = self.values(steps, known, "n", functions)
         new = {name: bounded(name, value) for name, value in new.items()}
+        if begins:
+            new = {name: code.let("n", f"first ? {stored[name]} : {code.text(new[name])}") for name in new}
         given = self.values(fleeting, known | new, "y", functions)
         if self.network.episode is None or not any(tree is not None for tree in ends.values()):
             return new, given
@@ -217,7 +334,8 @@ class StepCode:
             changed = needed = set(stored)
         variables = {name: code.variable("e", new.get(name, cell)) for name, cell in stored.items() if name in needed}
         with code.block(f"if ({self.ends_episode()})"):
-            last = self.values(ends, self.let(made.let, {**seen, **variables}, list(ends.values())), "n")
+            within_end = self.let(made.let, {**seen, **variables}, list(ends.values()), functions)
+            last = self.values(ends, within_end, "n", functions)
             self.store([(variables[name], value) for name, value in last.items()])
             for name in last:
                 within = bounded(name, variables[name])
@@ -246,14 +364,18 @@ class StepCode:
         return "ends"
 
     def let(
-        self, let: tuple[tuple[str, Tree], ...], known: Mapping[str, Value], readers: list[Tree | None]
+        self,
+        let: tuple[tuple[str, Tree], ...],
+        known: Mapping[str, Value],
+        readers: Sequence[Tree | None],
+        functions: Mapping[str, Made] = _NONE,
     ) -> dict[str, Value]:
         """The intermediate values that somebody reads, in order, beside the names known."""
         wanted = read_through(let, readers)
         result = dict(known)
         for name, tree in let:
             if name in wanted:
-                result[name] = self.code.let("m", self.code.value(tree, result))
+                result[name] = self.code.let("m", self.code.value(tree, result, functions))
         return result
 
     # ---- signals -----------------------------------------------------------------------------------------------
@@ -266,9 +388,11 @@ class StepCode:
             which[self.network.projections[number].members] = False
         self.leave(which)
         if self.depth:
-            n = len(self.network.neurons)
-            row = f"(size_t)(k % {self.depth})*{n}"
+            n, beside = len(self.network.neurons), self.network.outlet_count
+            row = f"(size_t)(k % {self.depth})*{n + beside}"
             code.line(f"memcpy(history + {row}, activity, {n}*sizeof(activity[0]));")
+            if beside:
+                code.line(f"memcpy(history + {row} + {n}, outlets, {beside}*sizeof(outlets[0]));")
 
     def leave(self, which: Mask) -> None:
         """The signals of some connections (m,) leave."""
@@ -288,9 +412,10 @@ class StepCode:
         """The signal of one of some connections, all of one delay: its slot, and what leaves."""
         code, connections = self.code, self.network.connections
         delay = int(connections.delays[members[0]])
-        slot, source = code.at(self.layout.offsets[members], place), code.at(connections.sources[members], place)
+        slot = code.at(self.layout.offsets[members], place)
         shift = "" if delay == 1 else f" + {code.remainder(delay)}"
-        return f"signals[{slot}{shift}]", f"weights[{code.at(members, place)}]*activity[{source}]"
+        signal = f"weights[{code.at(members, place)}]*{taken(self.network, code, members, place)}"
+        return f"signals[{slot}{shift}]", signal
 
     # ---- connections -------------------------------------------------------------------------------------------
 
@@ -380,34 +505,33 @@ class StepCode:
     def seen(self, projection: Projection, place: Place) -> dict[str, Value]:
         """What a rule may read besides its own: pre, sent, post, the signals."""
         code, connections, members = self.code, self.network.connections, projection.members
-        sources, targets = connections.sources[members], connections.targets[members]
-        source, read = code.at(sources, place), projection.read
-        seen: dict[str, Value] = {
-            "sent": f"activity[{source}]",
-            "post": f"activity[{code.at(targets, place)}]",
-            "pre": f"activity[{source}]",
-        }
+        targets, read = connections.targets[members], projection.read
+        sent = taken(self.network, code, members, place)
+        seen: dict[str, Value] = {"sent": sent, "post": f"activity[{code.at(targets, place)}]", "pre": sent}
         if self.depth and "pre" in read:
-            seen["pre"] = self.remembered(projection, source, place)
+            seen["pre"] = self.remembered(projection, sent, place)
         for name, indices in projection.signals.items():
             seen[name] = self.signal(indices, place)
         return {name: value for name, value in seen.items() if name in read}
 
-    def remembered(self, projection: Projection, source: Place, place: Place) -> Value:
-        """a_j[t−d], 0 where what was sent then is lost."""
+    def remembered(self, projection: Projection, sent: str, place: Place) -> Value:
+        """What was taken d steps ago, 0 where that is lost; ``sent`` is what is taken now."""
         code, delays = self.code, self.network.connections.delays[projection.members]
         own = delays if not isinstance(place, int) else delays[place : place + 1]
         if not own.any():
-            return f"activity[{source}]"
-        past = self.past(delays, own, source, place)
+            return sent
+        past = self.past(projection, delays, own, place)
         if not self.form.lost:
             return past
         lost = f"lost[{code.at(projection.members, place)}]"
         return code.let("a", f"k - ({code.at(delays, place)}) < {lost} ? {code.text(0.0)} : {past}")
 
-    def past(self, delays: IntArray, own: IntArray, source: Place, place: Place) -> str:
-        """a_j[t−d], from the history."""
-        code, n = self.code, len(self.network.neurons)
+    def past(self, projection: Projection, delays: IntArray, own: IntArray, place: Place) -> str:
+        """a_j[t−d], from the history, whose rows have all activities and outlets."""
+        code, network = self.code, self.network
+        n = len(network.neurons) + network.outlet_count
+        sending = network.connections.sources if network.sending is None else network.sending
+        source = code.at(sending[projection.members], place)
         if (own == own[0]).all():
             name, row = f"h{own[0]}", f"(size_t)((k + {self.depth - own[0]}) % {self.depth})*{n}"
             code.head[name] = f"const {code.real} *const {name} = history + {row};"
@@ -428,12 +552,52 @@ class StepCode:
         return f"({index} < {n} ? activity[{index}] : s[{index} - {n}])"
 
 
+class _Own(NamedTuple):
+    """What a port has beside what arrives, each (n,): its bias, and what that is called; where its input and its noise
+    stand in the vector of the step, −1 for nowhere. None where no neuron has any."""
+
+    key: Key
+    bias: FloatArray | None
+    input: IntArray | None
+    noise: IntArray | None
+
+
+def _own(network: Network, port: str) -> _Own:
+    neurons = network.neurons
+    if port == DRIVE:
+        return _Own(BIAS, neurons.bias, neurons.input, network.noise_index)
+    return _Own(bias_of(port), neurons.port_bias.get(port), neurons.port_input.get(port), network.noise_of(port))
+
+
+def begins_otherwise(network: Network) -> bool:
+    """Whether the first step of a run is another one than all others: of neurons with ``initial``, or where anything
+    flows."""
+    flows = any(population.model.definition.flows for population in network.populations)
+    return flows or bool((~np.isnan(network.neurons.initial)).any())
+
+
+def incoming_in(network: Network) -> list[list[Incoming]]:
+    """What arrives at each port of each population."""
+    return [
+        [
+            incoming_of(network, port, len(population.members), fusible=network.sending is None and _plain(population))
+            for port in population.ports
+        ]
+        for population in network.populations
+    ]
+
+
+def _plain(population: Population) -> bool:
+    """Whether nothing but ``drive`` is an input of its neurons, and nothing flows in them."""
+    return len(population.ports) == 1 and not population.model.definition.flows
+
+
 def _common_delay(delays: IntArray) -> int:
     """The delay that all of these connections have; 0 where they differ, and where there are none."""
     return int(delays[0]) if len(delays) and (delays == delays[0]).all() else 0
 
 
-def read_through(let: tuple[tuple[str, Tree], ...], readers: list[Tree | None]) -> set[str]:
+def read_through(let: tuple[tuple[str, Tree], ...], readers: Iterable[Tree | None]) -> set[str]:
     """The names that expressions read, by themselves or through intermediate values."""
     wanted: set[str] = set().union(*(names(tree) for tree in readers if tree is not None))
     for name, tree in reversed(let):
