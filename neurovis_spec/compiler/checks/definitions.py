@@ -163,13 +163,16 @@ def check_dt(spec: Spec, included: Iterable[Library], groups: Iterable[Built], f
     model = group.kind.model.definition
     first = model.flows[0].name
     own = next((one.models[model.name] for one in (spec, *included) if model.name in one.models), None)
-    written = None if own is None else own.state[first].derivative
-    if written is None:  # the model is a built-in one
-        written = group.model.model and group.model.model.name
+    derivative = None if own is None else own.state[first].derivative
+    choice = group.model.model
+    if derivative is not None:
+        span = derivative.span
+    else:  # the model is a built-in one
+        span = group.model.source.span if choice is None else choice.name.span
     unit = "second" if model.per_second == 1 else "millisecond"
     message = f"the derivative of '{first}' is per {unit}, and no 'dt' says how long a step is"
     hint = "say it at the top, in seconds: time: {dt: 0.001}"
-    findings.error("dt-needed", group.model.source.span if written is None else written.span, message, hint)
+    findings.error("dt-needed", span, message, hint)
 
 
 # Weights that are replaced where a change is meant

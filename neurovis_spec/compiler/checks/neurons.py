@@ -25,6 +25,7 @@ from neurovis_spec.compiler.program import DRIVE, Definition, Population
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
+from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 
@@ -264,9 +265,10 @@ def _stays_at_zero(population: Population, network: Network) -> Mask:
     return result
 
 
-def _functions(population: Population, known: Mapping[str, Value]) -> Mapping[str, Callable[[Value], Value]]:
+def _functions(population: Population, known: Mapping[str, Value]) -> Mapping[str, Callable[..., Value]]:
     """What formulas of the model may call: the neurons' activation."""
-    return {
-        name: lambda x, tree=tree: evaluate_array(tree, {**known, "x": x})
-        for name, tree in population.activation.definition.functions.items()
-    }
+
+    def of(tree: Tree) -> Callable[..., Value]:
+        return lambda x: evaluate_array(tree, {**known, "x": x})
+
+    return {name: of(tree) for name, tree in population.activation.definition.functions.items()}
