@@ -25,7 +25,7 @@ from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
 from neurovis_spec.compiler.drawing.sections import layout_settings, render_settings
 from neurovis_spec.compiler.events.bound import found_in, make_settable, own_weights
-from neurovis_spec.compiler.levels import Cycle, Order, order_of
+from neurovis_spec.compiler.levels import Cycle, Order, order_of, sent_by
 from neurovis_spec.compiler.limits import MOST_SIGNALS, MOST_SUBSTEPS, Limits, amount
 from neurovis_spec.compiler.lower import Integration, make_populations, make_program, make_projections
 from neurovis_spec.compiler.names.expand import Expander, constants_of
@@ -348,20 +348,29 @@ def _order(
     if not isinstance(order, Cycle):
         return order
     names = (*census.neurons.names, "the integration")
-    path = [names[node] for node in order.neurons]
-    shown = path if len(path) <= 12 else [*path[:6], "…", *path[-5:]]
-    ends = np.cumsum(connected.sizes)
-    key = connected.bundles[int(np.searchsorted(ends, order.connection, side="right"))].key
     if order.algebraic:
-        message = f"what these neurons send reads each other within one stage: {' -> '.join(shown)}"
+        names = _outputs_of(order, connected, census)
+    path = [names[node] for node in order.neurons]
+    shown = " -> ".join(path if len(path) <= 12 else [*path[:6], "…", *path[-5:]])
+    key = connected.bundle_of(order.closing).key
+    if order.algebraic:
+        message = f"what these neurons send reads each other within one stage: {shown}"
         findings.error("algebraic-loop", key, message, "a state with a derivative, or delay: 1, breaks it")
         return None
-    message = f"these neurons wait for each other within one step: {' -> '.join(shown)}"
     hint = "give one of these connections a delay of at least 1"
     if len(census.neurons) in order.neurons:
         hint += "; what reaches a derivative without delay, and does not flow itself, is made before the integration"
-    findings.error("delay-0-cycle", key, message, hint)
+    findings.error("delay-0-cycle", key, f"these neurons wait for each other within one step: {shown}", hint)
     return None
+
+
+def _outputs_of(cycle: Cycle, connected: Connected, census: Census) -> tuple[str, ...]:
+    """What all neurons are called, those of a cycle with what they send along it: ``K1.rate``."""
+    names = [*census.neurons.names]
+    for neuron, connection in zip(cycle.neurons, cycle.connections, strict=False):
+        model = census.models.different[census.models.of[neuron]]
+        names[neuron] = f"{names[neuron]}.{sent_by(model, connected.bundle_of(connection).route.sends)}"
+    return tuple(names)
 
 
 def _held(census: Census, inputs: tuple[Input, ...], noises: tuple[Noise, ...]) -> Mapping[str, BoolArray]:

@@ -38,13 +38,18 @@ def default_delay(source: Definition, sends: str, target: Definition, ports: Seq
 
 
 class Cycle(NamedTuple):
-    """Neurons that wait for each other: the first is named again at the end; ``connection`` closes the cycle. The
-    number behind those of all neurons is the integration. ``algebraic``: it is their outputs that read each other
-    within a stage."""
+    """Neurons that wait for each other: the first is named again at the end. The number behind those of all neurons is
+    the integration. ``connections`` lead from one to the next, −1 where none does. ``algebraic``: it is their outputs
+    that read each other within a stage."""
 
     neurons: tuple[int, ...]
-    connection: int
+    connections: tuple[int, ...]
     algebraic: bool = False
+
+    @property
+    def closing(self) -> int:
+        """The connection that closes the cycle."""
+        return next(one for one in reversed(self.connections) if one >= 0)
 
 
 class Stages(NamedTuple):
@@ -336,4 +341,4 @@ def _cycle(connections: Indices, begins: Indices, ends: Indices, waiting: list[i
         node = source_of[node]
     ring = path[place_in_path[node] :]
     forward = (ring[0], *reversed(ring))
-    return Cycle(forward, next(connection_into[one] for one in ring if connection_into[one] >= 0))
+    return Cycle(forward, tuple(connection_into[one] for one in forward[1:]))

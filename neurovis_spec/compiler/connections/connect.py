@@ -58,6 +58,10 @@ class Connected:
         """How many connections each entry makes."""
         return np.array([len(bundle.sources) for bundle in self.bundles], dtype=np.int64)
 
+    def bundle_of(self, connection: int) -> Bundle:
+        """The entry that makes a connection."""
+        return self.bundles[int(np.searchsorted(np.cumsum(self.sizes), connection, side="right"))]
+
     @cached_property
     def wired(self) -> Wired:
         """The connections as levels go by them."""
