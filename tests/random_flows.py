@@ -1,0 +1,139 @@
+"""Random specs in which something flows: derivatives and maps mixed, ports, factors, outputs, delays, noise, events."""
+
+from __future__ import annotations
+
+import random
+
+from hypothesis import strategies as st
+from random_specs import Plain, Spec
+
+from neurovis_spec.language.expressions.functions import FUNCTIONS
+
+#: by name, and what they have beside ``drive`` and the activity
+MODELS: dict[str, Plain] = {
+    "leaky": {
+        "parameters": {"tau": 0.7},
+        "state": {"v": {"initial": 0.2, "derivative": "(f(drive) - v)/tau"}},
+        "activity": "v",
+    },
+    "rate": {
+        "parameters": {"tau": {"value": 700}},
+        "time": "ms",
+        "ports": ["gate"],
+        "let": {"r": "f(v)", "leak": "0.3 - v"},
+        "state": {
+            "v": {"initial": 0.4, "derivative": "(leak + (1 - r)*gate + drive)/tau", "noise": 0.01},
+            "w": {"initial": "0.1*dt", "derivative": "0.001*(r - w) + 0.0001*sin(0.01*t)"},
+        },
+        "outputs": {"rate": "r", "both": "v - w"},
+        "activity": "r",
+        "send": "rate",
+    },
+    "mixed": {
+        "ports": {"gain": {"combine": "product"}, "far": {"combine": "distance"}},
+        "state": {
+            "x": {"initial": 0.3, "derivative": "y - 0.3*x + 0.1*gain", "each_step": "clip(x, -1.5, 1.5)"},
+            "y": {"initial": -0.2, "derivative": "-x - 0.1*y*count + 0.2*far", "noise": "0.05*x"},
+            "count": {"initial": 1, "each_step": "0.9*count + 0.1*drive^2", "each_episode": "1"},
+        },
+        "outputs": {"phase": "x*y + 0.1*drive"},
+        "activity": "f(x + drive)",
+    },
+    "through": {"state": {"z": {"derivative": "drive - 2*z"}}, "activity": "f(drive)", "outputs": {"half": "z/2"}},
+}
+#: what of each model can be sent, and to which ports what is sent can be brought
+SENT: dict[str, list[str]] = {
+    "leaky": ["", "v"],
+    "rate": ["", "activity", "v", "both"],
+    "mixed": ["", "x", "y", "count", "phase"],
+    "through": ["", "z", "half"],
+    "static": [""],
+    "leaky_integrator": ["", "v"],
+}
+PORTS: dict[str, list[Plain]] = {
+    "leaky": ["drive"],
+    "rate": ["drive", "gate", {"drive": 0.5, "gate": -0.3}],
+    "mixed": ["drive", "gain", "far", {"gain": 0.7, "far": 1.2}, {"drive": -0.4, "far": 1}],
+    "through": ["drive"],
+    "static": ["drive"],
+    "leaky_integrator": ["drive"],
+}
+METHODS = ["euler", "heun", "rk4", *(["exponential", "semi_implicit"] if "exprel" in FUNCTIONS else [])]
+
+
+@st.composite
+def flowing_specs(draw: st.DrawFn) -> Spec:
+    """A spec as a mapping; it may hold a cycle without delay, which the compiler refuses."""
+    chooser = random.Random(draw(st.integers(0, 2**32)))
+    kinds = {f"G{letter}": chooser.choice(list(SENT)) for letter in "abcd"[: draw(st.integers(1, 4))]}
+    kinds["Ga"] = chooser.choice(list(MODELS))
+    sizes = {name: chooser.choice([1, 2, 3]) for name in kinds}
+    neurons: dict[str, Plain] = {name: _group(chooser, kind, sizes[name]) for name, kind in kinds.items()}
+    connections: dict[str, Plain] = {}
+    for source in kinds:
+        for target in kinds:
+            if chooser.random() < 0.6:
+                connections[f"{source} -> {target}"] = _connection(chooser, kinds, sizes, source, target)
+    spec: Spec = {
+        "neurovis": 1,
+        "name": "random",
+        "seed": chooser.randrange(100),
+        "time": {
+            "dt": 0.1,
+            "integrate": {"method": chooser.choice(METHODS), "substeps": chooser.choice([1, 1, 2, 3])},
+            **({"episode": 5} if chooser.random() < 0.3 else {}),
+        },
+        "parameters": {"level": 0.4, "w": 0.6},
+        "inputs": {
+            "wave": {"expression": "level*sin(3*t) if t >= 0.3 else 0"},
+            "rows": {"values": [[0.1, -0.2, 0.3], [0.4, 0.1, 0]]},
+        },
+        "models": MODELS,
+        "neurons": neurons,
+        "connections": connections,
+        "events": [
+            {"at": 4, "set": {"level": 0.7, "w": -0.5}},
+            {"from": 3, "to": 7, "clamp": {"Ga": 0.25}},
+            {"at": 6, "lesion": [list(kinds)[-1]]},
+            {"at": 9, "mend": [list(kinds)[-1]]},
+        ],
+    }  # fmt: skip
+    return spec
+
+
+def _group(chooser: random.Random, kind: str, size: int) -> Plain:
+    group: dict[str, Plain] = {"model": kind, "activation": chooser.choice(["tanh", "sigmoid", "identity"])}
+    if kind == "leaky_integrator":
+        group["model"] = {kind: {"leak": 0.3}}
+    if kind == "leaky" and size > 1:
+        group["model"] = {kind: {"tau": [0.5 + 0.1 * i for i in range(size)]}}
+    if size > 1:
+        group["count"] = size
+    port = chooser.choice([one for one in PORTS[kind] if isinstance(one, str)])
+    if chooser.random() < 0.5:
+        group["bias"] = {port: 0.3} if chooser.random() < 0.5 else 0.2
+    if chooser.random() < 0.5:
+        source = "rows" if size == 3 and chooser.random() < 0.5 else "wave"
+        group["input"] = {port: source} if chooser.random() < 0.5 else source
+    if chooser.random() < 0.3:
+        group["noise"] = {port: "normal(0, 0.1)"} if chooser.random() < 0.5 else "normal(0, 0.1)"
+    return group
+
+
+def _connection(
+    chooser: random.Random, kinds: dict[str, str], sizes: dict[str, int], source: str, target: str
+) -> Plain:
+    body: dict[str, Plain] = {"weight": chooser.choice(["w*(1 + i - j)/3", 0.5, -0.7])}
+    if sizes[source] > 1 or sizes[target] > 1:
+        body["pattern"] = "all_to_all"
+    delay = chooser.choice([None, None, 0, 1, 3])
+    if delay is not None:
+        body["delay"] = delay
+    sent = chooser.choice(SENT[kinds[source]])
+    if sent:
+        body["send"] = sent
+    if chooser.random() < 0.7:
+        body["port"] = chooser.choice(PORTS[kinds[target]])
+    if chooser.random() < 0.3:
+        body["plasticity"] = {"oja": {"rate": 0.01}}
+    return body

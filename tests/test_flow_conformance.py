@@ -1,0 +1,130 @@
+"""What flows, in every backend and however it is run: each step as the reference makes it, pieces as the whole."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import Phase, assume, given, settings
+from hypothesis import strategies as st
+from random_flows import flowing_specs
+from random_specs import Spec
+
+import neurovis_spec as nv
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.diagnostics import SpecError
+from neurovis_spec.runtime.columns import Keep
+from neurovis_spec.runtime.controls import Controls
+from neurovis_spec.runtime.course import Course
+from neurovis_spec.runtime.inputs import InputReader
+from neurovis_spec.runtime.numpy_backend import NumpyBackend
+from neurovis_spec.runtime.record import record
+from neurovis_spec.runtime.reference import ReferenceBackend
+from neurovis_spec.runtime.simulation import Simulation
+from neurovis_spec.runtime.state import State, initial_state
+
+STEPS = 12
+
+
+def compiled(spec: Spec) -> Network:
+    """The network of a spec, unless connections without delay form a cycle in it."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return nv.compile(spec).network
+    except SpecError as error:
+        assume(all(one.code not in ("delay-0-cycle", "algebraic-loop") for one in error.diagnostics))
+        raise
+
+
+def arrays(state: State) -> dict[str, FloatArray]:
+    """All numbers of a state, by what they are."""
+    cells = {f"{owner}.{name}": values for owner, own in state.cells.items() for name, values in own.items()}
+    return {
+        "activity": state.activity, "outlets": state.outlets, "weights": state.weights, "signals": state.signals,
+        "history": state.history, **cells,
+    }  # fmt: skip
+
+
+@settings(max_examples=60, deadline=None)
+@given(spec=flowing_specs())
+def test_each_step_begun_in_the_references_state_agrees(spec: Spec) -> None:
+    network = compiled(spec)
+    plain, fast, reader = ReferenceBackend().prepare(network), NumpyBackend().prepare(network), InputReader(network)
+    state, controls = initial_state(network), Controls(network)
+    with np.errstate(all="ignore"):
+        for k in range(STEPS):
+            controls.begin(state)
+            reader.use(state)
+            other = state.copy()
+            plain.step(state, reader.at(k))
+            fast.step(other, reader.at(k))
+            for (name, expected), found in zip(arrays(state).items(), arrays(other).values(), strict=True):
+                np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12, err_msg=f"{name} at {k}")
+
+
+@settings(max_examples=15, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(spec=flowing_specs(), backend=st.sampled_from(["reference", "numpy"]), cut=st.integers(1, STEPS - 1))
+def test_a_run_in_pieces_is_the_whole_one(
+    spec: Spec, backend: str, cut: int, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """Stepped, gone on from a checkpoint, gone back: bit for bit what a run makes at once."""
+    network, checkpoint = compiled(spec), tmp_path_factory.mktemp("pieces") / "state"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        whole = record(network, Course(STEPS, backend=backend, keep=Keep(states=("all",))))
+        simulation, other = Simulation(network, backend), Simulation(network, backend)
+        for k in range(STEPS):
+            if k == cut:
+                simulation.save_state(checkpoint)
+                other.restore(checkpoint)
+            simulation.step()
+            np.testing.assert_array_equal(simulation.activity, whole.activity[k])
+        kept = simulation.state()
+        simulation.restore(other.state())
+        for one in (simulation, other):
+            for _ in range(cut, STEPS):
+                one.step()
+            for found, expected in zip(arrays(one.state()).values(), arrays(kept).values(), strict=True):
+                np.testing.assert_array_equal(found, expected)
+
+
+CHAIN = """
+neurovis: 1
+name: chain
+time: {dt: 0.05}
+inputs: {wave: {expression: sin(9*t)}}
+models:
+  source: {state: {x: {initial: 0.3, derivative: "drive - 0.2*x"}}, activity: x, outputs: {twice: 2*x}}
+  through: {state: {z: {initial: 0.1, derivative: "drive - 2*z"}}, activity: f(drive), outputs: {sum: drive + z}}
+neurons:
+  D: {count: 2, model: through, activation: sigmoid}
+  C: {count: 2, activation: tanh, combine: product}
+  B: {count: 3, model: through, activation: tanh, input: wave}
+  A: {count: 2, model: source}
+connections:
+  A -> B: {weight: 0.8, pattern: all_to_all, send: twice}
+  B -> C: {weight: 1.3, pattern: all_to_all, delay: 0, send: sum}
+  C -> D: {weight: 0.5, pattern: one_to_one, delay: 0}
+  D -> A: {weight: -0.9, pattern: all_to_all, delay: 0}
+  C -> A: {weight: 0.1, pattern: one_to_one, delay: 3}
+"""
+
+
+def test_outputs_that_read_each_other_at_a_stage_are_made_in_order() -> None:
+    """A chain of neurons whose outputs read their ports, some without a state, closed by a derivative alone."""
+    network = nv.compile_text(CHAIN).network
+    assert sorted(population.stage for population in network.populations) == [0, 1, 2, 3]
+    runs = [record(network, Course(60, backend=backend)).activity for backend in ("reference", "numpy")]
+    np.testing.assert_allclose(runs[1], runs[0], rtol=1e-12, atol=1e-12)
+    # of the fourth order, so that all are seen where they are at a stage
+    flowing = CHAIN.replace("{weight: 0.1, pattern: one_to_one, delay: 3}", "{weight: 0, pattern: one_to_one}")
+
+    def after_half_a_second(steps: int) -> FloatArray:
+        network = nv.compile_text(flowing.replace("0.05", str(0.5 / steps))).network
+        return record(network, Course(steps + 1, backend="numpy")).activity[-1:]
+
+    coarse, fine, finest = map(after_half_a_second, (40, 80, 640))
+    assert 13 < np.abs(coarse - finest).max() / np.abs(fine - finest).max() < 20
