@@ -209,7 +209,7 @@ class Code:
 
     def expression(self, tree: Tree, known: Mapping[str, str], functions: Functions | None = None) -> str:
         """An expression as code."""
-        if names(tree) & {"k", "t"}:
+        if (names(tree) & {"k", "t"}) - known.keys():
             self._tell_time()
         return emit(tree, {**self.common_names, **known}, functions or {})
 
