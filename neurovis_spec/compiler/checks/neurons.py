@@ -162,6 +162,8 @@ class _Ways:
         self._starts, self._ends = starts_of(begins, n), np.empty_like(ends)
         for some, places in sorting(begins, self._starts):
             self._ends[places] = ends[some]
+        #: of each neuron a place among those just found
+        self._last = np.zeros(n, dtype=np.int64)
 
     def follow(self, reached: Mask, begin: list[int]) -> None:
         """Mark neurons as reached, and all to which a way leads from them through neurons that are not yet."""
@@ -190,9 +192,11 @@ class _Ways:
             # each neuron's ends are a run of _ends: the positions of all these runs, one after the other
             positions = np.repeat(first - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
             ends = self._ends[positions]
-            new = np.unique(ends[~reached[ends]])
-            reached[new] = True
-            found += new.tolist()
+            ends = ends[~reached[ends]]
+            reached[ends] = True
+            place = np.arange(len(ends))
+            self._last[ends] = place
+            found += ends[self._last[ends] == place].tolist()  # each neuron once
         return found
 
 
@@ -205,14 +209,9 @@ def _unreached(quiet: Mask, sources: Indices, targets: Indices) -> Mask:
             reached[ends[reached[begins]]] = True
         if int(reached.sum()) == before:
             return ~reached
-    rest = _among(~reached, targets)  # connections that may still lead somewhere
+    rest = np.concatenate([~reached[ends] for ends in pieces(targets)])  # what may still lead somewhere
     _Ways(len(quiet), sources[rest], targets[rest]).follow(reached, np.flatnonzero(reached).tolist())
     return ~reached
-
-
-def _among(some: Mask, neurons: Indices) -> Mask:
-    """Which of many neurons are among some."""
-    return np.concatenate([some[piece] for piece in pieces(neurons)])
 
 
 def _first_causes(idle: Mask, sources: Indices, targets: Indices) -> Mask:
@@ -223,14 +222,16 @@ def _first_causes(idle: Mask, sources: Indices, targets: Indices) -> Mask:
     neuron after the other that was not reached yet; the second does so once more, beginning with the last of these.
     Those that it has not reached yet are on cycles without sources, one on each, and the whole cycle is what leads to
     it."""
-    inside = _among(idle, sources) & _among(idle, targets) & (sources != targets)
-    begins, ends = (sources, targets) if inside.all() else (sources[inside], targets[inside])
-    del inside  # there may be millions of connections
-    behind = np.diff(starts_of(ends, len(idle))) > 0
+    both = [idle[begins] & idle[ends] for begins, ends in zip(pieces(sources), pieces(targets), strict=True)]
+    inside = slice(None) if all(piece.all() for piece in both) else np.concatenate(both)
+    sources, targets = sources[inside], targets[inside]
+    behind = np.zeros(len(idle), dtype=np.bool_)
+    for begins, ends in zip(pieces(sources), pieces(targets), strict=True):
+        behind[ends[begins != ends]] = True
     if not behind.any():
         return idle
     result = idle & ~behind
-    ways, reached = _Ways(len(idle), begins, ends), ~idle
+    ways, reached = _Ways(len(idle), sources, targets), ~idle
     ways.follow(reached, np.flatnonzero(result).tolist())
     reached_again = reached.copy()
     starts: list[int] = []
@@ -245,7 +246,7 @@ def _first_causes(idle: Mask, sources: Indices, targets: Indices) -> Mask:
             causes.append(neuron)
     if causes:
         del ways
-        _Ways(len(idle), ends, begins).follow(result, causes)
+        _Ways(len(idle), targets, sources).follow(result, causes)
     return result
 
 
