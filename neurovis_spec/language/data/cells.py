@@ -85,7 +85,8 @@ def _with_line_feeds(parts: Iterable[bytes]) -> Iterator[bytes]:
         for begin in range(start, len(part), STRETCH):
             some = held + part[begin : begin + STRETCH]
             held = b"\r" if some.endswith(b"\r") else b""  # a line feed may follow
-            yield some.removesuffix(held).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+            some = some.removesuffix(held)
+            yield some.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in some else some
     if held:
         yield b"\n"
 
@@ -157,12 +158,13 @@ def below(stretches: Iterable[bytes], number: int) -> Iterator[tuple[int, bytes]
     quote on, which may hold ends of lines, all at once."""
     rest, above = iter(stretches), number
     for stretch in rest:
-        count, lines = stretch.count(b"\n") + 1, stretch
-        if count <= above:
-            above -= count
-            continue
+        lines = stretch
         if above:
-            lines, above = stretch.split(b"\n", above)[above], 0
+            first = stretch.split(b"\n", above)
+            if len(first) <= above:
+                above -= len(first)
+                continue
+            lines, above = first[above], 0
         if b'"' in lines:
             lines = b"\n".join((lines, *rest))
         yield number + 1, lines

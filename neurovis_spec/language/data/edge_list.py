@@ -262,9 +262,9 @@ class _Reader:
 
     def take(self, lines: bytes, number: int) -> None:
         """Take lines, of which the first has this number. Raises CellError where there is no reading on."""
-        width, count = len(self._places), lines.count(b"\n") + 1
-        marks = (b"," * (width - 1) + b"\n") * count
-        if b'"' not in lines and lines.translate(None, _NO_MARKS) == marks[:-1]:
+        width, marks = len(self._places), lines.translate(None, _NO_MARKS) + b"\n"
+        count = len(marks) // width
+        if b'"' not in lines and marks == (b"," * (width - 1) + b"\n") * count:
             text = np.frombuffer(lines + b"\n" + bytes(8 * _WORDS), dtype=np.uint8)
             ends = np.flatnonzero((text == ord(",")) | (text == ord("\n")))
             begins = np.concatenate(([0], ends[:-1] + 1))
