@@ -21,7 +21,7 @@ import numpy as np
 
 from neurovis_spec.arrays import Indices, IntArray
 from neurovis_spec.compiler.events.settable import BIAS, HIGH, LOW
-from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.network import Input, Network
 from neurovis_spec.compiler.program import (
     Definition,
     Gather,
@@ -82,6 +82,17 @@ class StepCode:
             if len(arrivals.packed):
                 code.line(code.loop("e", len(arrivals.packed)))
                 code.line(f"    packed[{arrivals.begin} + e] = weights[{code.at(arrivals.packed, 'e')}];")
+
+    def read(self) -> None:
+        """The inputs that are expressions, those that are asked for (``reads``), into ``s``; ``odd`` as of a step."""
+        code, network = self.code, self.network
+        expressions = [(number, one) for number, one in enumerate(network.inputs) if one.expression is not None]
+        if expressions:
+            code.line(f"{code.real} odd = {code.text(0.0)};")
+        for number, entry in expressions:
+            with code.block(f"if (reads[{number}])"):
+                value = write_input(code, network, entry, "s")
+                code.line(f"odd += {value} - {value};")
 
     def write(self) -> None:
         """All operations in order."""
@@ -442,6 +453,17 @@ def read_through(let: tuple[tuple[str, Tree], ...], readers: list[Tree | None]) 
     return wanted
 
 
+def write_input(code: Code, network: Network, entry: Input, vector: str) -> str:
+    """An input that is an expression, by the parameters as they are by now, into its places of the ``vector`` of all
+    inputs. Gives the identifier of its value."""
+    assert entry.expression is not None
+    slots: dict[str, Value] = {name: f"parameters[{slot}]" for name, slot in entry.slots.items()}
+    value = code.variable("n", code.value(entry.expression, {**network.parameters, **slots}))
+    code.line(code.loop("i", entry.size))
+    code.line(f"    {vector}[{entry.start} + i] = {value};")
+    return value
+
+
 @singledispatch
 def write(operation: Operation, step: StepCode) -> None:
     """The lines of an operation of the program. Raises TypeError for one that is not registered."""
@@ -451,7 +473,8 @@ def write(operation: Operation, step: StepCode) -> None:
 @write.register(ReadInputs)
 @write.register(Gather)
 def _together(operation: ReadInputs | Gather, step: StepCode) -> None:
-    """Nothing: ``s`` holds the inputs, and what a population gathers is computed neuron by neuron, with its update."""
+    """Nothing: ``s`` holds the inputs (``StepCode.read``), and what a population gathers is computed neuron by neuron,
+    with its update."""
 
 
 @write.register
