@@ -27,6 +27,7 @@ import neurovis_spec as nv  # noqa: E402
 from neurovis_spec.layout import LayoutProblem  # noqa: E402
 from neurovis_spec.layout.metrics import metrics  # noqa: E402
 from neurovis_spec.layout.problem import problem_of  # noqa: E402
+from neurovis_spec.runtime.recording import Recording  # noqa: E402
 from neurovis_spec.scene.film import scene_of_step  # noqa: E402
 from neurovis_spec.scene.renderers import drawing  # noqa: E402
 from neurovis_spec.scene.shown import LeftOut  # noqa: E402
@@ -315,6 +316,15 @@ def compiled(spec: str) -> nv.CompiledNetwork:
     return nv.compile(HERE / "specs" / f"{spec}.yaml")
 
 
+@cache
+def recorded(spec: str) -> Recording | None:
+    """A run that the stills of a spec show; None where there is one alone, which runs as far as it needs."""
+    stills = [one for one in PICTURES if one.spec == spec and not one.frames]
+    network = compiled(spec)
+    steps = max(network.network.steps if one.views else one.step + 1 for one in stills)
+    return network.run(steps) if len(stills) > 1 else None
+
+
 def draw(picture: Picture, path: Path) -> None:
     """Draw one."""
     network, before = compiled(picture.spec), path.read_bytes() if path.exists() else b""
@@ -329,6 +339,7 @@ def draw(picture: Picture, path: Path) -> None:
             network.render(
                 path,
                 step=picture.step,
+                recording=recorded(picture.spec),
                 theme=picture.theme,
                 view=views,
                 window=picture.window,

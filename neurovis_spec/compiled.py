@@ -43,7 +43,6 @@ from neurovis_spec.keywords import (
     still_of,
 )
 from neurovis_spec.progress import Progress
-from neurovis_spec.runtime.files import replacing
 
 if TYPE_CHECKING:
     from neurovis_spec.arrays import FloatArray
@@ -406,6 +405,8 @@ class NetworkLayout:
 
     def save(self, path: str | Path) -> None:
         """Write the layout file."""
+        from neurovis_spec.runtime.files import replacing
+
         with replacing(arguments.path("path", path)) as file:
             file.write(self.dump().encode())
 

@@ -40,7 +40,6 @@ from neurovis_spec.language.shape import read_spec
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.language.yaml.reader import read_file, read_text
 from neurovis_spec.progress import Progress
-from neurovis_spec.runtime.files import replacing
 
 if TYPE_CHECKING:
     from neurovis_spec.layout.model import Layout, LayoutProblem
@@ -171,6 +170,7 @@ def run_of(of: Compilation, look: Look, inputs: Mapping[str, npt.ArrayLike] | No
 
 def draw(of: Compilation, look: Look, run: Run, path: Path, progress: Progress | None = None) -> None:
     """A picture of a run as a file. Warns of what it leaves out. Raises RendererError, and what ``filmed`` raises."""
+    from neurovis_spec.runtime.files import replacing
     from neurovis_spec.scene.files import content_of, noting
     from neurovis_spec.scene.renderers import renderer_for, streaming_renderer
 

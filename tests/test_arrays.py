@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from neurovis_spec.arrays import Column, FloatArray, integers, reals
+from neurovis_spec import arrays
+from neurovis_spec.arrays import Column, FloatArray, integers, reals, sorting, starts_of
 from neurovis_spec.compiler.digest import digest
 
 NUMBERS = st.sampled_from([0.0, -0.0, 1.5, np.nan, np.inf, 1e300])
@@ -61,3 +62,15 @@ def test_integers_are_kept_in_the_least_width(most: int, size: int) -> None:
 def test_what_is_equal_over_a_stretch_is_kept_once() -> None:
     column = reals(np.full(1000, 0.5), np.broadcast_to(np.float64(0.5), (1 << 40,)), np.arange(5.0))
     assert (len(column), column.kept.tolist()) == (1000 + (1 << 40) + 5, [0.5, 0.0, 1.0, 2.0, 3.0, 4.0])
+
+
+@given(st.lists(st.integers(0, 9), max_size=40), st.integers(10, 12), st.integers(1, 30))
+def test_sorting_by_counting_is_stable(given: list[int], below: int, piece: int) -> None:
+    numbers = np.array(given, dtype=np.int8)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(arrays, "PIECE", piece)
+        starts, order = starts_of(numbers, below), np.full(len(numbers), -1)
+        for some, places in sorting(numbers, starts):
+            order[places] = np.arange(some.start, some.stop)
+    assert order.tolist() == np.argsort(numbers, kind="stable").tolist()
+    assert starts.tolist() == [sum(one < number for one in given) for number in range(below + 1)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -24,19 +25,30 @@ connections: {A -> B: {matrix: {file: d/m.csv}}}
 LAYOUT = "layout small.yaml -o small.layout.yaml"
 
 
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "small.yaml").write_text(SPEC)
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A spec, what it reads, and what is made of it."""
+    path = tmp_path_factory.mktemp("made")
+    (path / "small.yaml").write_text(SPEC)
     for name in ("d", "parts"):
-        (tmp_path / name).mkdir()
-    (tmp_path / "d/m.csv").write_text("1,2\n3,4\n")
-    (tmp_path / "d/in.csv").write_text("1\n2\n")
-    (tmp_path / "parts/more.yaml").write_text("neurovis: 1\nactivations: {mine: {value: x + 1}}\n")
-    np.save(tmp_path / "w.npy", np.ones((3, 1)))
-    (tmp_path / "w.csv").write_text("1\n2\n")
-    for arguments in (LAYOUT, "run small.yaml -o x.npz", "run small.yaml -o x.csv"):
-        assert call(arguments).exit_code == 0
+        (path / name).mkdir()
+    (path / "d/m.csv").write_text("1,2\n3,4\n")
+    (path / "d/in.csv").write_text("1\n2\n")
+    (path / "parts/more.yaml").write_text("neurovis: 1\nactivations: {mine: {value: x + 1}}\n")
+    np.save(path / "w.npy", np.ones((3, 1)))
+    (path / "w.csv").write_text("1\n2\n")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(path)
+        for arguments in (LAYOUT, "run small.yaml -o x.npz", "run small.yaml -o x.csv"):
+            assert call(arguments).exit_code == 0
+    return path
+
+
+@pytest.fixture
+def folder(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of it, as the working folder."""
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
     return tmp_path
 
 

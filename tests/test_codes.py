@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -53,35 +54,42 @@ ELSEWHERE = {"wrong-type", "conflicting-keys", "yaml-syntax", "no-comprehensions
 SHAPE = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)+|alias|anchor|directive|internal|tag|transposed")
 
 
+@cache
+def nodes() -> tuple[tuple[str, ast.Call | ast.Constant], ...]:
+    """The calls and constants of the source, each with the name of its file."""
+    return tuple(
+        (path.name, node)
+        for path in SOURCES
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call | ast.Constant)
+    )
+
+
 def emitted() -> Iterator[tuple[str, str]]:
     """Code and place of every finding that the source can note. A name in place of the code passes one on."""
-    for path in SOURCES:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if not isinstance(node, ast.Call):
-                continue
-            function = node.func
-            name = function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
-            place = EMITTERS.get(name)
-            if place is None:
-                continue
-            given = [keyword.value for keyword in node.keywords if keyword.arg == "code"]
-            given += node.args[place : place + 1]
-            for value in given[:1]:
-                for part in ast.walk(value):
-                    if isinstance(part, ast.Constant) and isinstance(part.value, str) and SHAPE.fullmatch(part.value):
-                        yield part.value, f"{path.name}:{node.lineno}"
-                if isinstance(value, ast.JoinedStr) and SHAPE.match(ast.unparse(value)[2:].replace("{", "x")):
-                    for made in MADE[ast.unparse(value)]:
-                        yield made, f"{path.name}:{node.lineno}"
+    for file, node in nodes():
+        if isinstance(node, ast.Constant):
+            continue
+        function = node.func
+        name = function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
+        place = EMITTERS.get(name)
+        if place is None:
+            continue
+        given = [keyword.value for keyword in node.keywords if keyword.arg == "code"]
+        given += node.args[place : place + 1]
+        for value in given[:1]:
+            for part in ast.walk(value):
+                if isinstance(part, ast.Constant) and isinstance(part.value, str) and SHAPE.fullmatch(part.value):
+                    yield part.value, f"{file}:{node.lineno}"
+            if isinstance(value, ast.JoinedStr) and SHAPE.match(ast.unparse(value)[2:].replace("{", "x")):
+                for made in MADE[ast.unparse(value)]:
+                    yield made, f"{file}:{node.lineno}"
 
 
 def texts() -> frozenset[str]:
     """Every text constant of the source."""
     return frozenset(
-        node.value
-        for path in SOURCES
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        node.value for _, node in nodes() if isinstance(node, ast.Constant) and isinstance(node.value, str)
     )
 
 

@@ -12,7 +12,7 @@ from small_specs import compiled, network_of, wires
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.data.files import NamedFile, Room, Table, read_table
 from neurovis_spec.language.unknown import Unknown
-from neurovis_spec.language.yaml.opening import FileFault, read_bytes
+from neurovis_spec.language.yaml.opening import FileFault, read_parts
 
 NEURONS = "neurons: {A: {count: 2, bias: 1}, B: {count: 3}, D: {count: 3, combine: distance, activation: gaussian}}\n"
 WEIGHTS = np.array([[1.0, 2, 3], [4, 5, 6]])
@@ -88,11 +88,11 @@ def test_events_read_no_file_again(folder: Path, monkeypatch: pytest.MonkeyPatch
     """What an event sets is no compilation of its own."""
     opened: list[str] = []
 
-    def reading(path: Path, most: int) -> bytes | FileFault:
+    def reading(path: Path, most: int, size: int | None) -> list[bytes] | FileFault:
         opened.append(path.name)
-        return read_bytes(path, most)
+        return read_parts(path, most, size)
 
-    monkeypatch.setattr("neurovis_spec.language.data.files.read_bytes", reading)
+    monkeypatch.setattr("neurovis_spec.language.data.files.read_parts", reading)
     (folder / "s.csv").write_text("1\n2\n", encoding="utf-8")
     (folder / "e.csv").write_text("from,to,weight\nA1,B1,1\n", encoding="utf-8")
     text = "parameters: {gain: 1}\ninputs: {s: {file: s.csv}}\nmodules: {leg: {neurons: {M: {}}}}\n" + NEURONS

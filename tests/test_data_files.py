@@ -256,9 +256,10 @@ def test_nothing_but_its_own_error_leaves_a_parser(noise: bytes, at: int, patch:
             continue
         assert np.isfinite(values).all()
     for data in (noise, b"from,to,weight\n" + noise):
-        for parse in (parse_numbers, parse_edges):
-            with suppress(CellError):
-                parse(data)
+        with suppress(CellError):
+            parse_numbers(data)
+        with suppress(CellError):
+            parse_edges([data])
 
 
 def edges(folder: Path, data: str) -> tuple[EdgeTable | Unknown, tuple[Diagnostic, ...]]:
@@ -275,7 +276,7 @@ def test_edges_by_the_names_of_the_columns(tmp_path: Path) -> None:
     assert got.targets == ("O1", "O2")
     assert got.weights.tolist() == [0.5, 1.0]
     assert got.delays.tolist() == [-1, 3]
-    assert got.rows.tolist() == [2, 3]
+    assert [*map(got.row, range(len(got)))] == [2, 3]
 
 
 def test_edges_without_delays(tmp_path: Path) -> None:
@@ -330,7 +331,7 @@ def told(name: str, data: str, folder: Path) -> list[str]:
 def test_all_faults_of_a_csv_are_told_in_their_order(
     tmp_path: Path, mark: str, stretch: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("neurovis_spec.language.data.cells._STRETCH", stretch)
+    monkeypatch.setattr("neurovis_spec.language.data.cells.STRETCH", stretch)
     data = f"{mark}1{mark},x,nan\n4,y\n1,2,3\n1,2,3,4\n5,6,nan\n\nz,1,inf\n"
     assert told("a.csv", data, tmp_path) == [
         "row 1, column 2: 'x' is no number",
@@ -367,7 +368,7 @@ def test_all_faults_of_edges_are_told_and_those_in_order_are_kept(tmp_path: Path
     ]
     assert got is not UNKNOWN
     assert got.targets == ("B", "C", "B")
-    assert got.rows.tolist() == [2, 5, 6]
+    assert [*map(got.row, range(len(got)))] == [2, 5, 6]
 
 
 def test_all_faults_of_an_mtx_are_told_by_line(tmp_path: Path) -> None:
@@ -468,7 +469,7 @@ def test_a_huge_file_is_refused_by_its_size(tmp_path: Path) -> None:
 
 
 def test_all_faults_of_a_large_edge_file_are_told() -> None:
-    found = parse_edges(b"from,to,weight\nA,B,x\n" + b"A,B,1\n" * 200_000 + b"A\nA,B,1,2,3,4\n")
+    found = parse_edges([b"from,to,weight\nA,B,x\n" + b"A,B,1\n" * 200_000 + b"A\nA,B,1,2,3,4\n"])
     assert found.fault is not None
     assert [str(fault) for fault in (found.fault, *found.fault.others)] == [
         "row 2, column 3: 'x' is no number",

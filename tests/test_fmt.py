@@ -15,6 +15,7 @@ import yaml
 from click.testing import CliRunner, Result
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from laws import examples
 from random_specs import Plain, Spec, section, specs
 
 import neurovis_spec as nv
@@ -374,7 +375,7 @@ def test_formatting_keeps_values_hash_and_comments(spec: Spec, seed: int, end: s
 
 
 @given(specs(), specs(), st.integers(0, 2**32), st.booleans())
-@settings(max_examples=40, deadline=None)
+@examples(12)
 def test_modules_and_included_files_keep_values_hash_and_comments(
     folder_of_specs: Path, one: Spec, other: Spec, seed: int, included: bool
 ) -> None:

@@ -25,13 +25,13 @@ from neurovis_spec.compiler.values.definitions import Definitions, Reading, defi
 from neurovis_spec.compiler.values.parameters import make_parameters
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.grammar import IN_RULE
-from neurovis_spec.language.library import LOCAL, DefinitionModel, Parts, StateModel
+from neurovis_spec.language.library import DefinitionModel, Parts, StateModel
 from neurovis_spec.language.located import FormulaField, Located
 from neurovis_spec.language.model import Named, names_of
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.shape import read_shape, read_spec
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
-from neurovis_spec.language.values import Choice, ParameterField
+from neurovis_spec.language.values import LOCAL, Choice, ParameterField
 from neurovis_spec.language.yaml.reader import read_text
 from neurovis_spec.language.yaml.source import Scalar
 from neurovis_spec.runtime import c_step, numpy_operations, reference

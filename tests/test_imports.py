@@ -81,7 +81,7 @@ def test_validating_imports_nothing_that_runs_lays_out_or_draws() -> None:
     parts = ("engines", "foreseen", "geometry", "labels", "makes", "model", "naming", "problem", "refusals")
     asking = {f"layout.{name}" for name in parts}
     found = {name.removeprefix("neurovis_spec.") for name in modules}
-    assert not {name for name in found if name.startswith(later)} - {"runtime.files", "runtime.parts"} - asking
+    assert not {name for name in found if name.startswith(later)} - asking
 
 
 def test_validating_asks_no_engine_where_the_spec_names_none() -> None:
@@ -90,12 +90,24 @@ def test_validating_asks_no_engine_where_the_spec_names_none() -> None:
 
 
 def test_validating_imports_no_more_than_the_spec_needs() -> None:
-    """This spec has no events, no comment that allows, one table as ``.csv`` and no mistake."""
+    """This spec has no events, no body, no comment that allows, one table as ``.csv`` and no mistake."""
     modules = loaded(command("validate", "specs/cpg_rbf.yaml"))
     kinds = {f"neurovis_spec.language.data.{kind}" for kind in ("edge_list", "mtx", "npy")}
-    assert not modules & (
-        kinds | {"neurovis_spec.compiler.events.events", "neurovis_spec.language.allow", "difflib", "json"}
-    )
+    own = {f"neurovis_spec.{name}" for name in ("compiler.events.events", "compiler.body_settings", "language.allow")}
+    assert not modules & (kinds | own | {"difflib", "json", "numpy.ma"})
+
+
+def test_a_command_looks_for_no_plug_in_of_pydantic(tmp_path: Path) -> None:
+    """That would read what every installed package says of itself, before each command."""
+    folder = tmp_path / "acme-1.dist-info"
+    folder.mkdir()
+    (folder / "METADATA").write_text("Name: acme\nVersion: 1\n", encoding="utf-8")
+    (folder / "entry_points.txt").write_text("[pydantic]\nacme = acme_plugin\n", encoding="utf-8")
+    (tmp_path / "acme_plugin.py").write_text("new_schema_validator = lambda *_: (None, None, None)\n", encoding="utf-8")
+    found = f"import sys\nsys.path.insert(0, {str(tmp_path)!r})\n"
+    assert "acme_plugin" in loaded(f"{found}import neurovis_spec.language.spec")
+    called = "sys.argv[1:] = ['schema']\nfrom neurovis_spec.cli import main\ntry: main()\nexcept SystemExit: pass"
+    assert "acme_plugin" not in loaded(found + called)
 
 
 def test_running_imports_nothing_that_lays_out_or_draws() -> None:

@@ -8,8 +8,9 @@ from itertools import combinations
 
 import layout_conformance as suite
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from laws import examples
 
 import neurovis_spec as nv
 from neurovis_spec.layout import Point
@@ -137,7 +138,7 @@ def test_rings_that_two_lines_hold_at_different_heights_give_way() -> None:
     assert all(len(heights(at, line)) == 1 for line in lines)
 
 
-@settings(max_examples=20, deadline=None)
+@examples(10)
 @given(st.data())
 def test_lines_hold_in_any_network_and_the_order_of_the_spec_does_not_show(data: st.DataObject) -> None:
     sizes = {group: data.draw(st.integers(1, 4)) for group in "ABC"}

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import layout_conformance as suite
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
+from laws import examples
 from test_layout_compound import attempt, walkers
 from test_layout_reciprocal import pairs, together
 
@@ -131,7 +132,7 @@ layout: {{direction: {direction}, arrange: {{A: row, B: column, C: grid, D: ring
     assert over_discs(lay_out_problem(problem_of(nv.compile_text(text).network), "layered")) == []
 
 
-@settings(max_examples=25, deadline=None)
+@examples(10)
 @given(problem=walkers(mirrored=True))
 def test_arcs_between_images_are_never_on_each_other(problem: LayoutProblem) -> None:
     layout, _ = attempt(problem)

@@ -6,8 +6,9 @@ from itertools import combinations
 
 import layout_conformance as suite
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from laws import examples
 
 import neurovis_spec as nv
 from neurovis_spec.layout import Direction, Layout, LayoutProblem, Point
@@ -62,7 +63,7 @@ def drawn(layout: Layout, problem: LayoutProblem, number: int) -> tuple[list[Poi
 
 
 @pytest.mark.parametrize("engine", ["grid", "circular"])
-@settings(max_examples=25, deadline=None)
+@examples(10)
 @given(problem=bodies())
 def test_instances_of_one_make_are_one_drawing_and_walls(engine: str, problem: LayoutProblem) -> None:
     layout = suite.check(problem, engine)
@@ -83,7 +84,7 @@ def test_instances_of_one_make_are_one_drawing_and_walls(engine: str, problem: L
 
 
 @pytest.mark.parametrize("engine", ["grid", "circular"])
-@settings(max_examples=25, deadline=None)
+@examples(10)
 @given(problem=bodies(pinned=True))
 def test_pins_bend_only_the_instances_that_they_are_in(engine: str, problem: LayoutProblem) -> None:
     layout = suite.check(problem, engine)

@@ -7,8 +7,9 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from laws import examples
 from neurovis_layouts.layered.box_columns import Strips, straightened, tied, with_spines
 from neurovis_layouts.layered.levels import Levels, levels_of
 from neurovis_layouts.layered.order import ordered
@@ -119,7 +120,7 @@ def built(problem: LayoutProblem, rank: list[int], units: list[Unit]) -> tuple[L
     return (levels, order or [], columns)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(25)
 @given(cases())
 def test_what_hangs_together_is_on_one_side_of_a_column(case: tuple[LayoutProblem, list[int], list[Unit]]) -> None:
     levels, order, columns = built(*case)
@@ -138,7 +139,7 @@ def test_what_hangs_together_is_on_one_side_of_a_column(case: tuple[LayoutProble
                 assert None in ends or ends[0] == ends[1]
 
 
-@settings(max_examples=60, deadline=None)
+@examples(25)
 @given(cases(), st.lists(st.floats(-20, 20), min_size=60, max_size=60))
 def test_strips_keep_every_distance(case: tuple[LayoutProblem, list[int], list[Unit]], wishes: list[float]) -> None:
     levels, order, columns = built(*case)

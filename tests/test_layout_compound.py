@@ -9,8 +9,9 @@ from typing import TypeVar
 
 import layout_conformance as suite
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from laws import examples
 
 import neurovis_spec as nv
 from neurovis_spec.layout import Arrangement, Direction, Layout, LayoutProblem, LayoutRefusalError, Point
@@ -103,7 +104,7 @@ def attempt(problem: LayoutProblem) -> tuple[Layout | None, str]:
         return None, refusal.code
 
 
-@settings(max_examples=20, deadline=None)
+@examples(10)
 @given(problem=walkers())
 def test_instances_of_one_make_are_one_drawing(problem: LayoutProblem) -> None:
     layout = suite.check(problem, "layered")
@@ -119,7 +120,7 @@ def test_instances_of_one_make_are_one_drawing(problem: LayoutProblem) -> None:
         assert (first, ours) == (second, theirs) or (reflected(first, axis), turned) == (second, theirs)
 
 
-@settings(max_examples=30, deadline=None)
+@examples(12)
 @given(problem=walkers(mirrored=True))
 def test_mirror_images_are_exact(problem: LayoutProblem) -> None:
     layout = lay_out_problem(problem, "layered")
@@ -129,7 +130,7 @@ def test_mirror_images_are_exact(problem: LayoutProblem) -> None:
     assert metrics(layout, problem)["symmetry"] == 1
 
 
-@settings(max_examples=25, deadline=None)
+@examples(10)
 @given(problem=walkers(pinned=True))
 def test_pins_hold_and_everything_else_gives_way(problem: LayoutProblem) -> None:
     layout, refusal = attempt(problem)
@@ -144,7 +145,7 @@ def test_pins_hold_and_everything_else_gives_way(problem: LayoutProblem) -> None
     assert all(distance(a, b) >= 0.6 - 1e-9 for a, b in combinations(points, 2))
 
 
-@settings(max_examples=20, deadline=None)
+@examples(8)
 @given(problem=walkers(), seed=st.integers(0, 1000))
 def test_the_order_of_the_input_does_not_show(problem: LayoutProblem, seed: int) -> None:
     shuffle = random.Random(seed).sample

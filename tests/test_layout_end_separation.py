@@ -7,8 +7,9 @@ from itertools import combinations
 
 import layout_conformance as suite
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from laws import examples
 from neurovis_layouts.routing.bows import bow
 from neurovis_layouts.routing.improve import improved
 from neurovis_layouts.routing.route_cost import Drawn
@@ -88,7 +89,7 @@ def test_a_new_connection_arrives_where_no_old_one_leaves() -> None:
     assert min(meetings(later.value, problem_of(network.network), 8)) >= (0.12,)
 
 
-@settings(max_examples=20, deadline=None)
+@examples(10)
 @given(problem=st.one_of(suite.problems(), walkers(mirrored=True)))
 def test_where_ends_are_few_none_arrives_where_another_leaves(problem: LayoutProblem) -> None:
     layout, _ = attempt(problem)

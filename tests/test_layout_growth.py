@@ -27,7 +27,7 @@ def legs(count: int, engine: str = "grid") -> nv.CompiledNetwork:
 
 @pytest.mark.parametrize("engine", ["grid", "circular"])
 def test_among_many_frames_no_route_enters_a_foreign_one(engine: str) -> None:
-    network = legs(150, engine)
+    network = legs(80, engine)
     layout = network.layout()
     assert suite.through_frames(layout.value, problem_of(network.network)) == []
     assert layout.metrics()["edges_over_neurons"] == 0

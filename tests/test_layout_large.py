@@ -62,8 +62,8 @@ def along(kind: str) -> list[tuple[int, int]]:
         pairs = [(int(random.random() * i), i) for i in range(1, 400)]
         return [pair if random.random() < 0.5 else (pair[1], pair[0]) for pair in pairs]
     if kind == "ladder":
-        return [(i, i + 2) for i in range(798)] + [(i, i + 1) for i in range(0, 800, 2)]
-    return [(i, i + 1) for i in range(2000)] + [(i, i + 40) for i in range(0, 1960, 20) if kind == "skips"]
+        return [(i, i + 2) for i in range(398)] + [(i, i + 1) for i in range(0, 400, 2)]
+    return [(i, i + 1) for i in range(800)] + [(i, i + 40) for i in range(0, 760, 20) if kind == "skips"]
 
 
 @pytest.mark.parametrize("kind", ["chain", "skips", "ladder", "tree"])

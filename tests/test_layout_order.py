@@ -10,6 +10,7 @@ from random import Random
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from laws import examples
 from neurovis_layouts.layered.crossings import Ints, Segments, inversions
 from neurovis_layouts.layered.levels import Halves, Levels, Node, Segment
 from neurovis_layouts.layered.order import Exchange, Order, crossings, ordered, places
@@ -124,7 +125,7 @@ def test_what_is_turned_has_its_ports_the_other_way_round(levels: Levels, random
 
 
 @given(some_levels(most=4, ranks=3))
-@settings(deadline=None, max_examples=40, derandomize=True)
+@examples(20)
 def test_tiny_graphs_are_ordered_as_well_as_can_be(levels: Levels) -> None:
     every = product(*map(permutations, levels.ranks))
     best = min(by_pairs(levels, [list(rank) for rank in order]) for order in every)
@@ -132,7 +133,7 @@ def test_tiny_graphs_are_ordered_as_well_as_can_be(levels: Levels) -> None:
 
 
 @given(some_levels(boxes=True, kin=True))
-@settings(deadline=None, max_examples=40, derandomize=True)
+@examples(20)
 def test_every_rank_keeps_its_nodes_and_its_boxes_together(levels: Levels) -> None:
     order = ordered(levels)[1]
     assert [sorted(rank) for rank in order] == levels.ranks
@@ -162,7 +163,7 @@ def test_complete_layers_stay_in_the_order_of_their_numbers() -> None:
 
 
 @given(some_levels(ports=False))
-@settings(deadline=None, max_examples=40, derandomize=True)
+@examples(15)
 def test_the_order_of_segments_does_not_show(levels: Levels) -> None:
     turned = Levels(levels.nodes, levels.ranks, [gap[::-1] for gap in levels.segments])
     assert [*map(set, ordered(turned)[1])] == [*map(set, levels.ranks)]
@@ -193,7 +194,7 @@ def test_exchanges_of_mirror_images_save_what_they_say(levels: Levels) -> None:
 
 
 @given(symmetric_levels())
-@settings(deadline=None, max_examples=40, derandomize=True)
+@examples(20)
 def test_symmetric_ranks_are_ordered_as_well_as_can_be(levels: Levels) -> None:
     order = ordered(levels)[1]
     assert_symmetric(levels, order)

@@ -7,6 +7,8 @@ from random import Random
 import layout_conformance as suite
 import numpy as np
 import pytest
+from hypothesis import given
+from laws import examples
 
 from neurovis_spec.layout import Direction, LayoutProblem, LayoutRefusalError
 from neurovis_spec.layout.arrange import lay_out_problem
@@ -68,11 +70,23 @@ def test_boxes_are_compact_and_pins_stay() -> None:
     assert all(layout.positions[problem.neurons[5]] == (3.3, 4.4) for layout in layouts)
 
 
-@pytest.mark.parametrize("engine", ["organic", "large"])
-def test_parts_do_not_overlap_however_small_the_spacing(engine: str) -> None:
+@examples(8)
+@given(suite.problems())
+def test_large_draws_what_organic_draws(problem: LayoutProblem) -> None:
+    """So that it suffices to hold one of them to what an engine promises."""
+    drawn: list[object] = []
+    for engine in ("organic", "large"):
+        try:
+            drawn.append(replace(lay_out_problem(problem, engine), engine=""))
+        except LayoutRefusalError as refusal:
+            drawn.append(str(refusal).replace(engine, ""))
+    assert drawn[0] == drawn[1]
+
+
+def test_parts_do_not_overlap_however_small_the_spacing() -> None:
     names = suite.members("N", 12)
     edges = suite.named([("N1", "N2"), ("N3", "N4"), ("N4", "N5"), ("N5", "N3")])
-    suite.check(NamedProblem("parts", names, edges=edges, spacing=(0.2, 0.5)).canonical(), engine)
+    suite.check(NamedProblem("parts", names, edges=edges, spacing=(0.2, 0.5)).canonical(), "organic")
 
 
 def two_sided(sides: int, middle: int, connections: int, *, seed: int, direction: Direction = "down") -> LayoutProblem:
@@ -94,7 +108,7 @@ def two_sided(sides: int, middle: int, connections: int, *, seed: int, direction
 
 
 @pytest.mark.parametrize("direction", ["down", "left"])
-@pytest.mark.parametrize(("sides", "middle", "connections"), [(3, 1, 8), (12, 5, 80), (40, 20, 300)])
+@pytest.mark.parametrize(("sides", "middle", "connections"), [(3, 1, 8), (12, 5, 80), (25, 12, 160)])
 def test_mirror_images_are_exact(sides: int, middle: int, connections: int, direction: Direction) -> None:
     problem = two_sided(sides, middle, connections, seed=sides, direction=direction)
     layout = suite.check(problem, "organic")

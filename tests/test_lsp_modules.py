@@ -7,8 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from laws import examples
 from lsp_marks import marked
 
 from neurovis_spec.lsp.check import check
@@ -448,7 +449,7 @@ def somewhere(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@settings(deadline=None, max_examples=60)
+@examples(40)
 @given(st.data())
 def test_nothing_breaks_on_whatever_somebody_is_typing(somewhere: Path, data: st.DataObject) -> None:
     name = data.draw(st.sampled_from(["spec.yaml", "library/legs.yaml", "library/knees.yaml"]))
@@ -474,7 +475,7 @@ def test_nothing_breaks_on_whatever_somebody_is_typing(somewhere: Path, data: st
     check(document)
 
 
-@settings(deadline=None, max_examples=10)
+@examples(5)
 @given(st.data())
 def test_a_rename_there_and_back_changes_nothing(somewhere: Path, data: st.DataObject) -> None:
     """Whatever is renamed, wherever it is named: what is said stays, and the way back leads to the very same texts."""

@@ -9,15 +9,16 @@ import re
 import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from laws import examples
 from random_specs import Plain, Spec, section, specs
 
 import neurovis_spec as nv
 from neurovis_spec.runtime.recording import Recording
 
 STEPS = 40
-LAW = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+LAW = settings(examples(20), suppress_health_check=[HealthCheck.too_slow])
 #: A layout takes longer than all else; that of any problem is held to the laws of test_layout_engines.py as well.
-LAID_OUT = settings(LAW, max_examples=12)
+LAID_OUT = settings(examples(6), suppress_health_check=[HealthCheck.too_slow])
 
 
 def by_name(recording: Recording) -> tuple[dict[str, list[float]], dict[str, list[float]]]:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from examples import EXAMPLES, shipped
 from hypothesis import HealthCheck, given, settings
+from laws import examples
 from random_specs import Spec, specs
 
 import neurovis_spec as nv
@@ -16,7 +17,7 @@ from neurovis_spec.layout.file import parse
 from neurovis_spec.scene.probe import probe_steps
 
 
-@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(examples(6), suppress_health_check=[HealthCheck.too_slow])
 @given(specs())
 def test_a_layout_file_reads_back_exactly(spec: Spec) -> None:
     layout = nv.compile(spec).layout()

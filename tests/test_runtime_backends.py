@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from laws import examples
 from networks_by_hand import (
     GAUSSIAN,
     LEAKY,
@@ -137,7 +138,7 @@ def parts(state: State) -> list[FloatArray]:
     return [state.activity, state.weights, state.signals, state.history, *inner]
 
 
-@settings(max_examples=150, deadline=None)
+@examples(60)
 @given(networks())
 def test_each_step_begun_in_the_reference_state_agrees(network: Network) -> None:
     plain, fast, reader = ReferenceBackend().prepare(network), NumpyBackend().prepare(network), InputReader(network)

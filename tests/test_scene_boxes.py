@@ -58,7 +58,7 @@ def test_a_box_that_would_lie_on_what_is_not_its_own_has_no_frame() -> None:
     assert {box.path for box in drawn(LINES)} == {"leg", "alone", "both"}
 
 
-@pytest.mark.parametrize("engine", ["circular", "grid", "layered", "organic", "large"])
+@pytest.mark.parametrize("engine", ["circular", "grid", "layered", "organic"])
 @pytest.mark.parametrize("counts", [(6, 6, 6), (4, 5, 3), (9, 2, 2), (2, 12, 12)])
 def test_no_two_frames_of_boxes_lie_on_each_other(engine: str, counts: tuple[int, int, int]) -> None:
     text = RING.replace("ENGINE", engine)

@@ -189,8 +189,8 @@ def test_what_is_drawn_by_default_is_the_network_itself() -> None:
 
 
 def test_instances_that_are_not_collapsed_keep_their_frames_where_all_is_laid_out_anew(tmp_path: Path) -> None:
-    network = nv.compile(Path(__file__).parents[1] / "specs" / "hexapod" / "hexapod.yaml")
-    network.render(tmp_path / "x.svg", step=1, collapse=["left", "right2", "DL"])
+    network = nv.compile_text(MODULES.replace("module: leg, count: 2", "module: leg, count: 3"))
+    network.render(tmp_path / "x.svg", step=1, collapse=["left", "right2", "P"])
     said = {"".join(text.itertext()) for text in ET.parse(tmp_path / "x.svg").iterfind(".//{*}text")}
     assert {"right1", "right3"} <= said
 

@@ -324,7 +324,7 @@ def test_names_that_begin_alike_are_cut_in_front() -> None:
     assert cut.shorten("photoreceptor", 10, 700) == "photoreceptor"
 
 
-@pytest.mark.parametrize("engine", ["auto", "organic", "large"])
+@pytest.mark.parametrize("engine", ["auto", "organic"])
 def test_a_box_has_its_frame_its_title_and_its_tint_in_every_engine(engine: str) -> None:
     network = connectome(30, 80, 5, seed=4, more=f"layout: {{engine: {engine}}}")
     scene = scene_at(network)

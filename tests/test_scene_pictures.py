@@ -12,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from examples import EXAMPLES, shipped
-from hypothesis import given, settings
+from hypothesis import given
+from laws import examples
 from random_specs import Spec, specs
 from scenes import scene_of
 
@@ -150,7 +151,7 @@ def test_hard_networks_touch_nothing_they_should_not(name: str) -> None:
     check(hard(name).scene)
 
 
-@settings(max_examples=15)
+@examples(6)
 @given(specs())
 def test_any_network_touches_nothing_it_should_not(spec: Spec) -> None:
     check(drawn(nv.compile_text(json.dumps(spec)), step=2).scene)

@@ -222,7 +222,7 @@ def test_a_bead_lies_on_the_middle_of_its_line() -> None:
 
 
 def test_beads_that_are_too_small_to_be_seen_are_not_explained() -> None:
-    case = grid(120, 100)
+    case = grid(100, 60)
     made = replace(case.network, connections=replace(case.network.connections, delays=_some_delayed(case.network)))
     scene = small(made, case.layout)
     assert not [s for g in scene.groups if "connection" in g.data for s in g.shapes if isinstance(s, Rectangle)]

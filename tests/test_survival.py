@@ -12,10 +12,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner, Result
 from small_specs import compiled
 
 import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray
+from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.runtime import parts, stream
 from neurovis_spec.runtime.errors import RecordingError
@@ -44,6 +46,13 @@ def start(*arguments: object) -> subprocess.Popen[bytes]:
     slow = ("--backend", "numpy") if arguments[0] == "run" and "--backend" not in arguments else ()
     command = [sys.executable, "-m", "neurovis_spec", *map(str, arguments), *slow]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+
+def called(*arguments: object) -> Result:
+    """A command that nothing ends, in this process."""
+    result = CliRunner().invoke(neurovis, [str(argument) for argument in arguments])
+    assert result.exit_code == 0
+    return result
 
 
 def ended(process: subprocess.Popen[bytes], number: int) -> str:
@@ -94,27 +103,24 @@ def test_a_signal_ends_a_run_with_what_was_recorded(folder: Path, number: signal
         np.testing.assert_array_equal(recording.weights_after, longer.weights[-1])
 
 
-@pytest.mark.parametrize("suffix", ["npz", "csv", "mcap"])
-def test_what_is_killed_can_be_read_and_is_taken_over(folder: Path, suffix: str) -> None:
-    """Twice, at other moments: the part is read, and the next run makes the file of it before it begins."""
+@pytest.mark.parametrize(("suffix", "wait"), [("npz", 0.0), ("npz", 0.1), ("csv", 0.1), ("mcap", 0.0)])
+def test_what_is_killed_can_be_read_and_is_taken_over(folder: Path, suffix: str, wait: float) -> None:
+    """The part is read, and the next run makes the file of it before it begins."""
     path, part = folder / f"x.{suffix}", folder / f".x.{suffix}.part"
-    for wait in (0.0, 0.1):
-        process = start("run", "long.yaml", "--every", 20, "-o", path.name)
-        until_it_records(part)
-        time.sleep(wait)
-        ended(process, signal.SIGKILL)
-        assert files(folder) == [part.name, "long.yaml"]
-        with pytest.warns(UserWarning, match=r"its run did not come to its end; what was recorded, up to step"):
-            read = nv.load(path)
-        assert_begins_like_it(read)
-        assert len(nv.load(part)) == len(read)
-        again = start("run", "long.yaml", "--steps", 5, "-o", path.name)
-        _, said = again.communicate(timeout=60)
-        words = f"x.{suffix}: what an earlier run recorded before it broke off, up to step {read.step[-1]}, is in it"
-        assert said.decode() == f"warning: {words} until this run is at its end\n"
-        assert files(folder) == ["long.yaml", path.name]
-        assert len(nv.load(path)) == 5
-        path.unlink()
+    process = start("run", "long.yaml", "--every", 20, "-o", path.name)
+    until_it_records(part)
+    time.sleep(wait)
+    ended(process, signal.SIGKILL)
+    assert files(folder) == [part.name, "long.yaml"]
+    with pytest.warns(UserWarning, match=r"its run did not come to its end; what was recorded, up to step"):
+        read = nv.load(path)
+    assert_begins_like_it(read)
+    assert len(nv.load(part)) == len(read)
+    again = called("run", "long.yaml", "--steps", 5, "-o", path.name)
+    words = f"x.{suffix}: what an earlier run recorded before it broke off, up to step {read.step[-1]}, is in it"
+    assert again.stderr == f"warning: {words} until this run is at its end\n"
+    assert files(folder) == ["long.yaml", path.name]
+    assert len(nv.load(path)) == 5
 
 
 @pytest.mark.parametrize("suffix", ["npz", "csv", "mcap"])
@@ -160,8 +166,7 @@ def test_two_writers_do_not_destroy_each_other(folder: Path, suffix: str) -> Non
     until_it_records(folder / f".x.{suffix}.2.part")
     with pytest.warns(UserWarning, match="its run is still going on"):
         assert len(nv.load(path)) > 0
-    third = start("run", "long.yaml", "--steps", 4, "-o", path.name)
-    assert third.communicate(timeout=60)[1] == b""
+    assert called("run", "long.yaml", "--steps", 4, "-o", path.name).stderr == ""
     assert len(nv.load(path)) == 4
     for process in (first, second):
         ended(process, signal.SIGTERM)
@@ -277,8 +282,9 @@ def test_a_new_recording_has_the_permissions_of_the_one_before(folder: Path) -> 
     assert Path("y.npz").stat().st_mode & 0o777 == 0o640
 
 
-@pytest.mark.parametrize("number", SIGNALS)
-@pytest.mark.parametrize("command", ["render", "animate"])
+@pytest.mark.parametrize(
+    ("command", "number"), [*(("render", number) for number in SIGNALS), ("animate", signal.SIGTERM)]
+)
 def test_other_commands_end_at_a_signal_and_leave_nothing(folder: Path, command: str, number: signal.Signals) -> None:
     process = start(command, "long.yaml", "-o", "x.svg")
     while b"numpy" not in Path(f"/proc/{process.pid}/maps").read_bytes():  # then the process is at work

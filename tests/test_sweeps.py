@@ -179,7 +179,7 @@ def test_inputs_steps_and_values_are_those_given(folder: Path) -> None:
     wanted = nv.compile("noisy.yaml", gain=0.25, seed=3).run(20, {"pull": rows})["A"].mean()
     for source in ("noisy.yaml", "-"):
         result = call("sweep", source, "--over", "seed=3,4", "--metric", "mean(A)", "--set", "gain=0.25", "--steps", 20,
-                      "--input", "pull=pull.csv", "--backend", "reference", stdin=SPEC)  # fmt: skip
+                      "--input", "pull=pull.csv", "--backend", "reference", "--jobs", 1, stdin=SPEC)  # fmt: skip
         assert (result.exit_code, result.stderr) == (0, "")
         assert float(result.stdout.splitlines()[1].split(",")[1]) == pytest.approx(wanted, rel=1e-12)
 
@@ -342,7 +342,7 @@ def test_rows_outlive_what_ends_the_sweep(folder: Path, number: signal.Signals) 
         assert err.decode() == f"\nstopped; x.csv holds {held} of 12 rows\n"
     wait_for(lambda: not alive(process.pid))
     assert 2 <= held < 12
-    result = call(*command[3:])
+    result = call(*command[3:], "--jobs", 1)
     assert (result.exit_code, result.stderr) == (0, "")
     assert (folder / "x.csv").read_text() == str(nv.sweep("noisy.yaml", {"seed": "0..11"}, "K1", steps=4000))
 

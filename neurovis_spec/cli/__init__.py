@@ -9,6 +9,7 @@ is imported when it is called.
 from __future__ import annotations
 
 import gc
+import os
 import sys
 
 from neurovis_spec.interrupts import Ended, raise_at_signals
@@ -17,6 +18,8 @@ from neurovis_spec.interrupts import Ended, raise_at_signals
 def main() -> None:
     """Run ``neurovis`` on the arguments of the process; ends it."""
     gc.set_threshold(200_000, 20, 100)  # a process that soon ends need not look for cycles all the time
+    # pydantic would look for plug-ins in the metadata of every package installed; none has anything to do with a spec
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
         raise_at_signals()
         from neurovis_spec.cli.commands import neurovis

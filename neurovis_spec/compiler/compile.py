@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from neurovis_spec.arrays import BoolArray
-from neurovis_spec.compiler.body_settings import BodySettings
 from neurovis_spec.compiler.canonical import content_hash
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.checks.definitions import check_dt
@@ -53,6 +52,7 @@ from neurovis_spec.language.unknown import UNKNOWN, known
 from neurovis_spec.language.yaml.opening import read_bytes
 
 if TYPE_CHECKING:
+    from neurovis_spec.compiler.body_settings import BodySettings
     from neurovis_spec.compiler.events.events import Event
 
 

@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.arrays import Column
+from neurovis_spec.arrays import Column, pieces
 from neurovis_spec.language.expressions import tree
 from neurovis_spec.language.located import Located
 
@@ -68,8 +68,6 @@ TREES: Mapping[type, Content] = {
 
 #: Pieces that are fed to the hash together.
 _MANY = 4096
-#: Numbers of an array that are made into bytes together.
-_PIECE = 1 << 16
 
 
 class _Writer:
@@ -112,9 +110,7 @@ class _Writer:
         elif isinstance(value, (bool, int)):
             self.put("integer", str(int(value)).encode())
         elif isinstance(value, np.ndarray):
-            flat = value.reshape(-1)
-            pieces = (flat[start : start + _PIECE] for start in range(0, len(flat), _PIECE))
-            self._array(value.shape, value.dtype.kind, pieces)
+            self._array(value.shape, value.dtype.kind, pieces(value.reshape(-1)))
         elif isinstance(value, Column):  # as the array that it stands for
             self._array((len(value),), value.kept.dtype.kind, value.pieces())
         elif isinstance(value, (list, tuple)) and not isinstance(value, Located):
@@ -139,14 +135,14 @@ class _Writer:
         else:
             raise TypeError(f"no schema says what of a {kind.__name__} is content")
 
-    def _array(self, shape: tuple[int, ...], kind: str, pieces: Iterable[npt.NDArray[np.generic]]) -> None:
+    def _array(self, shape: tuple[int, ...], kind: str, parts: Iterable[npt.NDArray[np.generic]]) -> None:
         """An array of numbers of eight bytes, some of it at a time: it may be large."""
         form = "<f8" if kind == "f" else "<i8"
         self._add(b"array%b%b:%d:" % (str(shape).encode(), form.encode(), 8 * math.prod(shape)))
-        for piece in pieces:
-            if len(piece) > _MANY:
+        for part in parts:
+            if len(part) > _MANY:
                 self.flush()
-            self._add(np.ascontiguousarray(piece, dtype=form).tobytes())
+            self._add(np.ascontiguousarray(part, dtype=form).tobytes())
 
     def _common(self, kind: type, value: object) -> bytes:
         """The piece of a text, an integer or nothing, of which a network has very many, most of them alike."""

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, Indices, IntArray, frozen, narrow, width
+from neurovis_spec.arrays import FloatArray, Indices, IntArray, frozen, narrow, sorting, starts_of, width
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.connections.plasticity import Learning
 from neurovis_spec.compiler.levels import Order, Stages, Wired
@@ -159,9 +159,10 @@ def _split(populations: Indices, count: int) -> list[Indices]:
     kind = width(0, len(populations))
     if count == 1:
         return [np.arange(len(populations), dtype=kind)]
-    order = np.argsort(populations, kind="stable").astype(kind)
-    ends = np.cumsum([0, *np.bincount(populations, minlength=count).tolist()]).tolist()
-    return [order[start:end].copy() for start, end in pairwise(ends)]
+    starts, order = starts_of(populations, count), np.empty(len(populations), dtype=kind)
+    for some, places in sorting(populations, starts):
+        order[places] = np.arange(some.start, some.stop)
+    return [order[start:end].copy() for start, end in pairwise(starts.tolist())]
 
 
 def _use(population: int, members: IntArray, group_of: IntArray, groups: Sequence[Built], which: int) -> Use:

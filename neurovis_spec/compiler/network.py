@@ -11,12 +11,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, FloatColumn, IntArray, IntColumn, frozen
-from neurovis_spec.compiler.body_settings import BodySettings
 from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
 from neurovis_spec.compiler.events.changes import Change
@@ -26,6 +25,9 @@ from neurovis_spec.compiler.program import DRIVE, Each, Holder, Integrate, Opera
 from neurovis_spec.compiler.ros_settings import RosSettings
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.language.words import Combine, NeuronRole
+
+if TYPE_CHECKING:
+    from neurovis_spec.compiler.body_settings import BodySettings
 
 
 @dataclass(frozen=True, slots=True)

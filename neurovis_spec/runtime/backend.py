@@ -88,17 +88,29 @@ class Computing(Protocol):
 class Runner(Protocol):
     """A Stepper that makes many steps in one call."""
 
-    @property
-    def at_once(self) -> int:
-        """How many steps are well made in one call, so that a run can be stopped between two."""
-        ...
-
     def run(
         self, state: State, vectors: FloatArray, activity: FloatArray, weights: FloatArray, every: int, look: bool
     ) -> int:
         """Make a step for each row of ``vectors``, at least one; keep those that ``every`` divides: a[t] in the first
         rows of ``activity``, the w[t] that change in those of ``weights``. With ``look``, end behind the first step
         after which something is not finite. Gives the number of steps made."""
+        ...
+
+
+@runtime_checkable
+class Reading(Protocol):
+    """A Stepper that can compute inputs that are expressions as a part of the step, and sees what is not finite."""
+
+    #: the inputs of the step that was made last; may be given as those of a step whose inputs are all computed
+    vector: FloatArray
+
+    def advance(self, state: State, inputs: FloatArray, computed: frozenset[str], /) -> bool:
+        """Make a step, of whose inputs those that are ``computed`` are not given; whether something is not finite
+        behind it, an input, too."""
+        ...
+
+    def read(self, computed: frozenset[str]) -> None:
+        """In the runs that follow (``Runner``) compute these inputs, and put them into ``vectors``."""
         ...
 
 

@@ -35,22 +35,22 @@ from neurovis_spec.runtime.state import Conditions, Mask, State, Structure
 SMALL = 600
 #: items of a table that stands in the text; longer ones are handed over
 LONGEST = 1024
-#: neurons, connections and steps of one call together: some tens of milliseconds
-_AT_ONCE = 1 << 22
 #: the forms of a step, as ``nv_once`` and ``nv_run`` take them: nothing held, left out or still; any of it; and in
 #: addition neurons that take ``initial``
 _PLAIN, _GENERAL, _FIRST = 0, 1, 2
-_FORMS = tuple(ctypes.c_int32(form) for form in (_PLAIN, _GENERAL, _FIRST))
+_NO_INPUTS: Final[frozenset[str]] = frozenset()
 
 #: ``nv_state``: of a State ``activity``, ``weights``, ``signals``, ``history``, ``outlets``, and ``cells``, one pointer
 #: for each state or output of a model or a rule; ``x``: the numbers that can be set; ``parameters``; ``s``: the inputs
-#: of the step; ``held``, ``holding``, ``lesioned``, ``gone``, ``still``, ``lost``, ``before``, ``packed``: as ``Form``
-#: says; ``given``: the tables that are too long for the text; ``work``: what an integration keeps.
+#: of the step; ``reads``: of each input whether the step computes it by its expression; ``held``, ``holding``,
+#: ``lesioned``, ``gone``, ``still``, ``lost``, ``before``, ``packed``: as ``Form`` says; ``given``: the tables that are
+#: too long for the text; ``work``: what an integration keeps. ``k`` and ``form``: the step that ``nv_once`` makes, and
+#: its form.
 #:
 #: ``nv_course``: ``steps`` steps from ``k`` on, the first in ``form``, the others in the form ``then``; the inputs of
-#: each are a row of ``rows``. Steps that ``every`` divides are kept: a row of ``activity``, and one of ``weights`` with
-#: those that are ``changing``, which lie next to each other if ``beside``. With ``look`` it ends behind the first step
-#: after which something is not finite.
+#: each are a row of ``rows``, but for those that the step computes, which it puts there. Steps that ``every`` divides
+#: are kept: a row of ``activity``, and one of ``weights`` with those that are ``changing``, which lie next to each
+#: other if ``beside``. With ``look`` it ends behind the first step after which something is not finite.
 _HEAD: Final = """#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -63,34 +63,27 @@ _HEAD: Final = """#include <math.h>
 #endif
 
 typedef struct {
-    double *activity, *weights, *signals, *history, *outlets;
-    const double *x, *parameters, *s, *holding;
-    const uint8_t *held, *lesioned, *gone, *still;
+    double *activity, *weights, *signals, *history, *outlets, *s;
+    const double *x, *parameters, *holding;
+    const uint8_t *reads, *held, *lesioned, *gone, *still;
     const int64_t *lost;
     const void *const *given;
     double *const *cells;
     double *before, *packed, *work;
+    int64_t k, form;
 } nv_state;
 
 typedef struct {
     int64_t k, steps, every, form, then, look, beside;
-    const double *rows;
-    double *activity, *weights;
+    double *rows, *activity, *weights;
     const int64_t *changing;
 } nv_course;
 """
 
-#: ``nv_odd``: whether a number is not finite. Its exponent is all ones then; one more overflows into bit 63. In
+#: ``nv_odd``: whether a number is not finite. Its exponent is all ones then; one more overflows into bit 63.
+#: ``nv_once`` makes a step, after which ``k`` is that of the next, and gives whether something is not finite. In
 #: ``nv_run`` ``wait`` is the number of steps until one is kept.
 _TAIL: Final = """
-NV_PUBLIC void nv_once(const nv_state *p, int64_t k, int32_t form)
-{
-    if (form == 0)
-        nv_plain(p, k, p->s);
-    else
-        nv_general(p, k, p->s, form == 2);
-}
-
 static uint64_t nv_odd(const double *values, int64_t count)
 {
     uint64_t found = 0;
@@ -102,10 +95,20 @@ static uint64_t nv_odd(const double *values, int64_t count)
     return found >> 63;
 }
 
+NV_PUBLIC int64_t nv_once(nv_state *p)
+{
+    double odd = nv_read(p, p->k, p->s);
+    if (p->form == 0)
+        odd += nv_plain(p, p->k, p->s);
+    else
+        nv_general(p, p->k, p->s, p->form == 2);
+    p->k++;
+    return odd != 0.0 || nv_odd(p->s, INPUTS) || LOOK_NEURONS || ((!WATCHED || p->form) && LOOK_CONNECTIONS);
+}
+
 NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
 {
-    const double *s = c->rows;
-    double *activity = c->activity, *weights = c->weights;
+    double *s = c->rows, *activity = c->activity, *weights = c->weights;
     const int fused = FUSED && c->then == 0 && c->steps > 3;
     int64_t made = 0;
     if (fused)
@@ -124,13 +127,13 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
         }
         wait--;
         const int64_t form = i ? c->then : c->form;
-        double odd = 0.0;
+        double odd = nv_read(p, c->k + i, s);
         if (form)
             nv_general(p, c->k + i, s, form == 2);
         else if (fused && i)
-            odd = nv_fused(p, c->k + i, s);
+            odd += nv_fused(p, c->k + i, s);
         else
-            odd = nv_plain(p, c->k + i, s);
+            odd += nv_plain(p, c->k + i, s);
         if (fused)
             memcpy(p->before, p->activity, sizeof(double)*NEURONS);
         if (kept) {
@@ -221,11 +224,12 @@ def _write(network: Network) -> Written:
 
 def _functions(small: bool, watched: bool) -> tuple[_Function, ...]:
     """The functions that ``nv_once`` and ``nv_run`` call. Those of type double give ``odd``."""
-    of_step = ", int64_t k, const double *restrict s"
+    of_inputs, of_step = ", int64_t k, double *restrict s", ", int64_t k, const double *restrict s"
     plain = Form(written_out=small, watched=watched)
     general = Form(first=True, held=True, gone=True, still=True, lost=True)
     fused = Form(fused=True)
     return (
+        _Function("double", "nv_read", Form(watched=True), StepCode.read, of_inputs),
         _Function("double", "nv_plain", plain, StepCode.write, of_step),
         _Function("void", "nv_general", general, StepCode.write, f"{of_step}, int first"),
         _Function("double", "nv_fused", replace(fused, watched=watched), StepCode.write, of_step, of_fused=True),
@@ -239,7 +243,7 @@ def _pointer_lines(network: Network) -> dict[str, str]:
     kinds = (
         ("double", ("activity", "weights", "signals", "history", "outlets", "packed")),
         ("const double", ("x", "parameters", "holding", "before")),
-        ("const uint8_t", ("held", "lesioned", "gone", "still")),
+        ("const uint8_t", ("reads", "held", "lesioned", "gone", "still")),
         ("const int64_t", ("lost",)),
     )
     lines = {name: f"{kind} *restrict const {name} = p->{name};" for kind, names in kinds for name in names}
@@ -262,15 +266,15 @@ def _look(network: Network) -> tuple[str, str]:
 
 
 _POINTERS: Final = (
-    *("activity", "weights", "signals", "history", "outlets", "x", "parameters", "s", "holding"),
-    *("held", "lesioned", "gone", "still", "lost", "given", "cells", "before", "packed", "work"),
+    *("activity", "weights", "signals", "history", "outlets", "s", "x", "parameters", "holding"),
+    *("reads", "held", "lesioned", "gone", "still", "lost", "given", "cells", "before", "packed", "work"),
 )
 
 
 class _State(ctypes.Structure):
     """``nv_state``: where the arrays of a State lie, and those of the stepper."""
 
-    _fields_ = [(name, ctypes.c_void_p) for name in _POINTERS]
+    _fields_ = [*((name, ctypes.c_void_p) for name in _POINTERS), ("k", ctypes.c_int64), ("form", ctypes.c_int64)]
 
 
 class _Course(ctypes.Structure):
@@ -294,10 +298,14 @@ class CStepper:
         #: what computes formulas beside the steps
         self.functions: Library = c_functions.library()
         self._step, self._run = library.nv_once, library.nv_run
-        self._step.restype = None
+        self._step.restype = ctypes.c_int64
         self._run.argtypes, self._run.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
         self._long_tables = made.long_tables
-        self._vector = np.zeros(network.vector_size)
+        #: the inputs of the step that is made: what it computes of them stands there behind it
+        self.vector = np.zeros(network.vector_size)
+        #: the inputs that a step computes, and of each input whether it is one
+        self._computed = _NO_INPUTS
+        self._reads = np.zeros(len(network.inputs), dtype=np.uint8)
         #: whether the first step of a run is another one
         self._initial = begins_otherwise(network)
         self._work = np.zeros(c_flows.work_size(network))
@@ -306,10 +314,11 @@ class CStepper:
         count = len(self._changing)
         self._contiguous = count > 0 and bool((np.diff(self._changing) == 1).all())
         self._pointers = _State()
-        self._pointers.s = self._vector.ctypes.data
+        self._pointers.s, self._pointers.reads = self.vector.ctypes.data, self._reads.ctypes.data
         self._address = ctypes.addressof(self._pointers)
-        #: arguments of ``nv_once`` that need not be converted anew: where the struct is, and the step
-        self._struct, self._step_number = ctypes.c_void_p(self._address), ctypes.c_int64(0)
+        #: what ``nv_once`` takes, which need not be converted anew; and the step and the form that stand there
+        self._struct = ctypes.c_void_p(self._address)
+        self._k, self._form_there = 0, _PLAIN
         self._table_addresses = _addresses(self._long_tables)
         self._before, self._packed = np.zeros(len(network.neurons)), np.zeros(made.packed)
         self._pointers.before, self._pointers.packed = self._before.ctypes.data, self._packed.ctypes.data
@@ -318,19 +327,30 @@ class CStepper:
         #: the state whose arrays the struct points to, these arrays, and the objects that say what holds in it: where
         #: each is still the same one, nothing has changed
         self._known_state: State | None = None
-        self._activity = self._weights = self._signals = self._history = self._variables = self._outlets = self._vector
+        self._activity = self._weights = self._signals = self._history = self._outlets = self.vector
+        self._variables = self._parameters = self.vector
         self._holds: object = None
         self._structure: Structure | None = None
         self._general = False
 
+    def read(self, computed: frozenset[str]) -> None:
+        """Compute these inputs, which are expressions, in the runs that follow."""
+        self._computed = computed
+        self._reads[:] = [one.name in computed for one in self.network.inputs]
+
     def step(self, state: State, inputs: FloatArray, /) -> None:
         """Advance the state by a step."""
+        self.advance(state, inputs, _NO_INPUTS)
+
+    def advance(self, state: State, inputs: FloatArray, computed: frozenset[str], /) -> bool:
+        """Advance the state by a step that computes some inputs; whether something is not finite behind it."""
         now = state.conditions
         if (
             state is not self._known_state
             or now.holds is not self._holds
             or now.structure is not self._structure
             or now.variables is not self._variables
+            or now.parameters is not self._parameters
             or state.activity is not self._activity
             or state.weights is not self._weights
             or state.signals is not self._signals
@@ -338,11 +358,19 @@ class CStepper:
             or state.outlets is not self._outlets
         ):
             self._point_to(state)
+        if computed is not self._computed:
+            self.read(computed)
         k = state.k
-        self._vector[:] = inputs
-        self._step_number.value = k
-        self._step(self._struct, self._step_number, _FORMS[self._form(state) if k == 0 or self._general else _PLAIN])
-        state.k = k + 1
+        if k != self._k:
+            self._pointers.k = k
+        form = self._form(state) if k == 0 or self._general else _PLAIN
+        if form != self._form_there:
+            self._pointers.form = self._form_there = form
+        if inputs is not self.vector:
+            self.vector[:] = inputs
+        odd: int = self._step(self._struct)
+        state.k = self._k = k + 1
+        return odd != 0
 
     def run(
         self, state: State, vectors: FloatArray, activity: FloatArray, weights: FloatArray, every: int, look: bool
@@ -351,7 +379,7 @@ class CStepper:
         rows of ``activity`` and ``weights``. With ``look`` it ends behind the first step after which something is not
         finite. Gives the number of steps made."""
         self._point_to(state)
-        rows = np.ascontiguousarray(vectors, dtype=np.float64)
+        rows = vectors if _as_c_has_it(vectors) else np.array(vectors, dtype=np.float64)
         course = _Course(
             k=state.k,
             steps=len(rows),
@@ -369,11 +397,6 @@ class CStepper:
         state.k += made
         return made
 
-    @property
-    def at_once(self) -> int:
-        """Steps that are well made in one call, so that a run can be stopped."""
-        return max(1, _AT_ONCE // (len(self.network.neurons) + len(self.network.connections) + 1))
-
     def _form(self, state: State) -> int:
         """The form of the step to come."""
         if state.k == 0 and not state.continued and self._initial:
@@ -385,7 +408,7 @@ class CStepper:
         now, pointers = state.conditions, self._pointers
         for name in ("activity", "weights", "signals", "history", "outlets"):
             array = getattr(state, name)
-            if not (array.flags.c_contiguous and array.flags.writeable and array.dtype == np.float64):
+            if not _as_c_has_it(array):
                 array = np.array(array, dtype=np.float64)
                 setattr(state, name, array)
             setattr(pointers, name, array.ctypes.data)
@@ -395,7 +418,8 @@ class CStepper:
         if now.holds is not self._holds or now.structure is not self._structure:
             self._take_conditions(now)
         self._known_state = state  # what is kept alive cannot be mistaken for another array at the same address
-        self._activity, self._weights, self._variables = state.activity, state.weights, now.variables
+        self._activity, self._weights = state.activity, state.weights
+        self._variables, self._parameters = now.variables, now.parameters
         self._signals, self._history, self._outlets = state.signals, state.history, state.outlets
 
     def _take_conditions(self, now: Conditions) -> None:
@@ -420,6 +444,11 @@ class CStepper:
 def _addresses(arrays: Sequence[npt.NDArray[np.generic]]) -> ctypes.Array[ctypes.c_void_p]:
     """Where arrays lie, as an array; a room more, so that it is never empty."""
     return (ctypes.c_void_p * (len(arrays) + 1))(*(array.ctypes.data for array in arrays), None)
+
+
+def _as_c_has_it(array: FloatArray) -> bool:
+    """Whether C can read and write an array where it lies."""
+    return array.flags.c_contiguous and array.flags.writeable and array.dtype == np.float64
 
 
 def _bytes(mask: Mask) -> npt.NDArray[np.uint8]:

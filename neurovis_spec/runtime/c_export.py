@@ -31,7 +31,7 @@ from neurovis_spec.runtime.c_code import Code, Form, Tables, function, state_nam
 from neurovis_spec.runtime.c_draws import drawing
 from neurovis_spec.runtime.c_names import LONGEST_STRING, identifiers, prefix, string, words
 from neurovis_spec.runtime.c_settable import ExportError, fixed, formula, write_follow
-from neurovis_spec.runtime.c_step import StepCode, begins_otherwise, incoming_in
+from neurovis_spec.runtime.c_step import StepCode, begins_otherwise, incoming_in, write_input
 from neurovis_spec.runtime.columns import probe_of
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.signals import signal_layout
@@ -471,13 +471,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
         code, network = self._code(), self.network
         for number, entry in enumerate(network.inputs):
             if entry.expression is not None:
-                known: dict[str, Value] = {
-                    **network.parameters,
-                    **{n: f"parameters[{slot}]" for n, slot in entry.slots.items()},
-                }
-                value = code.variable("n", code.value(entry.expression, known))
-                code.line(code.loop("i", entry.size))
-                code.line(f"    v[{entry.start} + i] = {value};")
+                write_input(code, network, entry, "v")
             elif entry.table is not None:
                 self._row(code, number, entry)
         for c_name, entry in zip(self.input_names, self.inputs, strict=True):

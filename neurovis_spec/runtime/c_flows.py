@@ -43,7 +43,7 @@ from neurovis_spec.language.expressions.tree import Name
 from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.c_arrivals import Arrivals, incoming_of
 from neurovis_spec.runtime.c_code import Place, words_of
-from neurovis_spec.runtime.c_step import StepCode, write
+from neurovis_spec.runtime.c_step import StepCode, write, write_input
 from neurovis_spec.runtime.stages import Formulas, Part, Taken, parts_of
 
 #: Of a substep of the length 1, when the stages of a method are: just behind the beginning, in the middle, just before
@@ -378,14 +378,8 @@ class _Integration:
         """Inputs that are formulas, at the time of a stage, but those that somebody has given for the step."""
         code, network = self.code, self.network
         for name, given in network.held_inputs.items():
-            entry = network.input_index[name]
-            assert entry.expression is not None
-            slots: dict[str, Value] = {name: f"parameters[{slot}]" for name, slot in entry.slots.items()}
-            known: dict[str, Value] = {**network.parameters, **slots, "t": "ts"}
             with code.block(f"if (s[{given}] == {code.text(0.0)})"):
-                value = code.let("n", code.value(entry.expression, known))
-                code.line(code.loop("i", entry.size))
-                code.line(f"    fv[{entry.start} + i] = {code.text(value)};")
+                write_input(code, network, network.input_index[name], "fv", {"t": "ts"})
 
     def neurons(
         self, part: Part, formulas: Formulas, body: Callable[[Place, Mapping[str, Value], Mapping[str, Made]], None]

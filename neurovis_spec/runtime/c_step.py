@@ -24,7 +24,7 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray, Indices, IntArray
 from neurovis_spec.compiler.events.settable import BIAS, HIGH, LOW, bias_of
-from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.network import Input, Network
 from neurovis_spec.compiler.program import (
     DRIVE,
     Definition,
@@ -50,6 +50,7 @@ from neurovis_spec.runtime.state import Mask
 
 _NONE: Mapping[str, Made] = {}
 _NO_TOTALS: Mapping[int, str] = {}
+_NO_CLOCK: Mapping[str, Value] = {}
 #: connections whose rule is written side by side in a loop: a compiler makes vectors of them
 _RULES_SIDE_BY_SIDE = 4
 
@@ -95,6 +96,17 @@ class StepCode:
             if len(arrivals.packed):
                 code.line(code.loop("e", len(arrivals.packed)))
                 code.line(f"    packed[{arrivals.begin} + e] = weights[{code.at(arrivals.packed, 'e')}];")
+
+    def read(self) -> None:
+        """The inputs that are expressions, those that are asked for (``reads``), into ``s``; ``odd`` as of a step."""
+        code, network = self.code, self.network
+        expressions = [(number, one) for number, one in enumerate(network.inputs) if one.expression is not None]
+        if expressions:
+            code.line(f"{code.real} odd = {code.text(0.0)};")
+        for number, entry in expressions:
+            with code.block(f"if (reads[{number}])"):
+                value = write_input(code, network, entry, "s")
+                code.line(f"odd += {value} - {value};")
 
     def write(self) -> None:
         """All operations in order."""
@@ -606,6 +618,17 @@ def read_through(let: tuple[tuple[str, Tree], ...], readers: Iterable[Tree | Non
     return wanted
 
 
+def write_input(code: Code, network: Network, entry: Input, vector: str, clock: Mapping[str, Value] = _NO_CLOCK) -> str:
+    """An input that is an expression, by the parameters as they are by now, into its places of the ``vector`` of all
+    inputs. Gives the identifier of its value. ``clock``: the time where it is not that of the step."""
+    assert entry.expression is not None
+    slots: dict[str, Value] = {name: f"parameters[{slot}]" for name, slot in entry.slots.items()}
+    value = code.variable("n", code.value(entry.expression, {**network.parameters, **slots, **clock}))
+    code.line(code.loop("i", entry.size))
+    code.line(f"    {vector}[{entry.start} + i] = {value};")
+    return value
+
+
 @singledispatch
 def write(operation: Operation, step: StepCode) -> None:
     """The lines of an operation of the program. Raises TypeError for one that is not registered."""
@@ -615,7 +638,8 @@ def write(operation: Operation, step: StepCode) -> None:
 @write.register(ReadInputs)
 @write.register(Gather)
 def _together(operation: ReadInputs | Gather, step: StepCode) -> None:
-    """Nothing: ``s`` holds the inputs, and what a population gathers is computed neuron by neuron, with its update."""
+    """Nothing: ``s`` holds the inputs (``StepCode.read``), and what a population gathers is computed neuron by neuron,
+    with its update."""
 
 
 @write.register

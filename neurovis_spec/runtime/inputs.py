@@ -1,15 +1,17 @@
 """Inputs: s[t] as one vector, from expressions, tables and what the caller supplies; behind them the noise.
 
-In: a Network and the caller's values. Out: for each step the vector of all inputs. Expressions are evaluated a stretch
-of steps at a time, the same stretches however one runs, so that stepping and running give the same bits, by the
-functions that compute the steps; rows are made from them for as many of these steps as make a fixed number of values,
-so that memory does not grow with the steps.
+In: a Network and the caller's values. Out: for each step the vector of all inputs. Expressions are *left* to a stepper
+that computes them itself, but for those in which something undefined may hide. Else they are evaluated a stretch of
+steps at a time, the same stretches however one runs, so that stepping and running give the same bits, by the functions
+that compute the steps; rows are made from them for as many of these steps as make a fixed number of values, so that
+memory does not grow with the steps.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from math import isfinite
 
 import numpy as np
 import numpy.typing as npt
@@ -23,10 +25,10 @@ from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.language.expressions.tree import Draw, Tree
 from neurovis_spec.language.expressions.undefined import either, hazards
 from neurovis_spec.likeness import suggest
+from neurovis_spec.runtime.backend import Reading, Stepper
+from neurovis_spec.runtime.rows import STRETCH
 from neurovis_spec.runtime.state import State, constants
 
-#: steps of a stretch, a power of two
-STRETCH = 256
 #: values of rows that are made together, at least one row
 _MOST_VALUES = 1 << 16
 
@@ -63,8 +65,15 @@ class InputReader:
         #: the rows made last, and the step of the first of them
         self._first = -1
         self._rows: FloatArray = np.zeros((0, network.vector_size))
-        together = min(STRETCH, max(1, _MOST_VALUES // max(1, network.vector_size)))
-        self._steps = 1 << (together.bit_length() - 1)  # a power of two, too: no rows are of two stretches
+        #: how many rows are made together at most, and where no more are asked for: powers of two, too, so that no
+        #: rows are of two stretches
+        self._most = 1 << (max(1, _MOST_VALUES // max(1, network.vector_size)).bit_length() - 1)
+        self._steps = min(STRETCH, self._most)
+        #: the inputs that are left to the stepper, and whether these are all numbers of the vector
+        self.left: frozenset[str] = frozenset()
+        self.all_left = False
+        #: some names of inputs that were given, and the inputs that are left beside them (``left_beside``)
+        self._left_beside = self.left, self.left
         #: the values of expressions over a stretch, by input, and where the stretch begins
         self._expressions: dict[str, tuple[int, FloatArray]] = {}
         #: where something is undefined, as a formula, by the number of the input or of the noise
@@ -74,6 +83,22 @@ class InputReader:
             formulas = (None if entry.name in self._supplied else entry.expression for entry in network.inputs)
             self._undefined = dict(_undefined(formulas))
             self._undefined_noise = dict(_undefined(noise.expression for noise in network.noises))
+
+    def leave(self, stepper: Stepper, but: Collection[str] = ()) -> None:
+        """Leave to a stepper the inputs that it can compute itself, ``but`` those of these names."""
+        if not isinstance(stepper, Reading):
+            return
+        kept = {*self._supplied, *but, *(self.network.inputs[number].name for number in self._undefined)}
+        self.left = frozenset(one.name for one in self.network.inputs if one.expression is not None) - kept
+        self.all_left = not self.network.noises and len(self.left) == len(self.network.inputs)
+        self._left_beside = frozenset(), self.left
+        stepper.read(self.left)
+
+    def left_beside(self, given: Mapping[str, object]) -> frozenset[str]:
+        """The inputs that are left but those that are given; the same set as long as these have the same names."""
+        if given.keys() != self._left_beside[0]:
+            self._left_beside = frozenset(given), self.left.difference(given)
+        return self._left_beside[1]
 
     def use(self, state: State) -> None:
         """Take parameters as a state has them by now; what depends on those that have changed is made anew."""
@@ -94,38 +119,50 @@ class InputReader:
             yield from part
 
     def parts(self, first: int, stop: int) -> Iterator[FloatArray]:
-        """The same, as many at a time as are made together: (steps, inputs)."""
+        """The same, as many at a time as are made together: (steps, inputs). The numbers of inputs that are left are
+        to be put there."""
         while first < stop:
             if not self._first <= first < self._first + len(self._rows):
-                self._make(first - first % self._steps)
+                self._make(first, stop)
             yield self._rows[first - self._first : stop - self._first]
             first = self._first + len(self._rows)
 
     def at(self, k: int, values: Mapping[str, npt.ArrayLike] | None = None) -> FloatArray:
         """The vector of step k; ``values`` replace the sources for this step only."""
-        row = next(self.rows(k, k + 1))
+        if not self._first <= k < self._first + len(self._rows):
+            self._make(k, k + 1)
+        row: FloatArray = self._rows[k - self._first]
         if values:
             row = row.copy()
             for name, value in values.items():
                 entry = _entry(self.network, name)
-                row[entry.start : entry.start + entry.size] = _single(entry, value)
+                if isinstance(value, float) and entry.size == 1 and isfinite(value):
+                    row[entry.start] = value
+                else:
+                    row[entry.start : entry.start + entry.size] = _single(entry, value)
                 if name in self.network.held_inputs:
                     row[self.network.held_inputs[name]] = 1.0
         return row
 
-    def _make(self, first: int) -> None:
-        """Make the rows of ``_steps`` steps from ``first`` on."""
-        steps = np.arange(first, first + self._steps)
-        rows = np.zeros((self._steps, self.network.vector_size))
+    def _make(self, first: int, stop: int) -> None:
+        """Make the rows of steps from the beginning of a stretch before ``first`` on, as far as ``stop`` where nothing
+        depends on how many are made together."""
+        count = self._steps
+        first -= first % count
+        if self.left:  # by functions that give the same bits whatever stands beside a number
+            count = min(self._most, -(-(stop - first) // count) * count)
+        steps = np.arange(first, first + count)
+        rows = np.zeros((count, self.network.vector_size))
         for entry in self.network.inputs:
-            rows[:, entry.start : entry.start + entry.size] = self._source(entry, steps)
+            if entry.name not in self.left:
+                rows[:, entry.start : entry.start + entry.size] = self._source(entry, steps)
             if entry.name in self._supplied and entry.name in self.network.held_inputs:
                 rows[:, self.network.held_inputs[entry.name]] = 1.0
         for noise in self.network.noises:
             rows[:, noise.start : noise.start + len(noise.members)] = self._drawn(noise, noise.expression, steps)
-        rows.flags.writeable = False
+        rows.flags.writeable = bool(self.left)
         self._first, self._rows = first, rows
-        if self._on_rows is not None:
+        if self._on_rows is not None and not self.all_left:
             self._on_rows(first, rows, self._hidden(steps))
 
     def _hidden(self, steps: npt.NDArray[np.int64]) -> BoolArray | None:
@@ -149,6 +186,8 @@ class InputReader:
             return chosen.reshape(len(steps), -1)
         if entry.expression is None:
             return 0.0
+        if len(steps) > STRETCH:
+            return np.broadcast_to(self._evaluated(entry, entry.expression, steps), len(steps)).reshape(-1, 1)
         within = int(steps[0]) % STRETCH
         begin = int(steps[0]) - within
         kept = self._expressions.get(entry.name)

@@ -23,10 +23,6 @@ from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.state import Mask, State, Structure
 from neurovis_spec.runtime.watch import all_finite, carried_by
 
-#: neurons, connections and steps of one call together, and how many of these an operation takes the time of: some tens
-#: of milliseconds
-_AT_ONCE, _OPERATION = 1 << 22, 1 << 10
-
 
 class NumpyStepper:
     """The function of one network, made anew where the structure of a step is another."""
@@ -35,9 +31,6 @@ class NumpyStepper:
         self.network = network
         self._structure: Structure | None = None
         self._changing = subscript(network.changing)
-        operations = len(network.populations) + len(network.projections)
-        size = len(network.neurons) + len(network.connections) + _OPERATION * operations
-        self.at_once = max(1, _AT_ONCE // (size + 1))
 
     def step(self, state: State, inputs: FloatArray, /) -> None:
         """Advance the state by a step."""

@@ -6,10 +6,11 @@ rows on to a RowSink while it runs.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import NamedTuple, Protocol
+from time import monotonic
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
@@ -27,17 +28,24 @@ from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.embodied import Embodied
 from neurovis_spec.runtime.errors import RecordingError
-from neurovis_spec.runtime.inputs import STRETCH, InputReader
+from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.memory import check_room
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.resume import resumed_state
-from neurovis_spec.runtime.rows import After, Rows, RowSink, Steps, Widths
+from neurovis_spec.runtime.rows import STRETCH, After, Rows, RowSink, Steps, Widths
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.runtime.until import Watched
 from neurovis_spec.runtime.watch import Watch
 
 #: A run as long as the spec says, of which everything is kept.
 AS_IT_IS = Course()
+
+#: seconds that a block of steps takes, behind which it is asked whether the run is to end
+_BLOCK: Final = 0.1
+#: neurons and connections times steps of the first block, and its steps at most: how long one takes is not known yet
+_FIRST_SIZE, _FIRST_STEPS = 1 << 20, 1 << 12
+#: how many times as long as the one before a block is at most
+_GROWTH: Final = 16
 
 
 def record(network: Network, course: Course = AS_IT_IS, progress: Progress | None = None) -> Recording:
@@ -195,6 +203,7 @@ def run_steps(network: Network, state: State, course: Course, rows: RowSink, pro
     reader, stepper = InputReader(network, course.inputs, watch.take_inputs, backend.functions), backend.stepper
     hands = _Hands(course.every, rows, reader, watch)
     make: _Make = _OneByOne(hands, columns, stepper, body, frozenset(course.inputs or ()))
+    pace = _Pace(STRETCH, STRETCH)
     # a runner gives the activities of all neurons and all changing weights, and nothing else
     plain = columns.neurons is None and not columns.probe.names and len(columns.weights) == len(network.changing)
     if (
@@ -203,7 +212,10 @@ def run_steps(network: Network, state: State, course: Course, rows: RowSink, pro
         and body is None
         and (course.until is None or course.until.measure.together)
     ):
+        reader.leave(stepper)
         make = _Together(hands, stepper, watched)
+        size = len(network.neurons) + len(network.connections) + 1
+        pace = _Pace(max(1, min(_FIRST_STEPS, _FIRST_SIZE // size)), None if watched is None else STRETCH)
     controls, origin, last = Controls(network, backend.functions), state.k, state.k + steps
     changes = [change for change in network.changes if origin <= change.at < last]
     _check_events(controls, state, changes)
@@ -213,11 +225,15 @@ def run_steps(network: Network, state: State, course: Course, rows: RowSink, pro
         for begin, end in pairwise(edges):
             controls.begin(state)
             reader.use(state)
-            for first, stop in _stretches(begin, end):
+            first = begin
+            while first < end:
+                stop = pace.stop(first, end)
                 if rows.over() or not make.steps(state, first, stop):
                     return
+                pace.made()
                 if progress is not None:
                     progress(stop - origin, steps)
+                first = stop
 
 
 class _Hands(NamedTuple):
@@ -229,8 +245,31 @@ class _Hands(NamedTuple):
     watch: Watch
 
 
+class _Pace:
+    """How many steps of a run are a block: ``first`` of the first one, then as many as take ``_BLOCK`` seconds by how
+    long those before have taken, ``most`` at most. No number of a run depends on it. With ``most``, blocks end where
+    stretches of so many steps do."""
+
+    def __init__(self, first: int, most: int | None) -> None:
+        self._count, self._most = first, most
+        self._begun, self._going = 0.0, 0
+
+    def stop(self, first: int, end: int) -> int:
+        """Where a block ends that begins with this step now, ``end`` at most."""
+        stop = min(first + self._count, end)
+        if self._most is not None:
+            stop = min(stop, first - first % self._most + self._most)
+        self._begun, self._going = monotonic(), stop - first
+        return stop
+
+    def made(self) -> None:
+        """The block is made."""
+        fitting = _BLOCK / max(monotonic() - self._begun, 1e-6) * self._going
+        self._count = max(1, min(int(fitting), _GROWTH * self._count))
+
+
 class _Make(Protocol):
-    """A way to make the steps of a stretch."""
+    """A way to make the steps of a block."""
 
     def steps(self, state: State, first: int, stop: int) -> bool:
         """Make the steps from ``first`` to ``stop``; False where the rows say that the run is over."""
@@ -299,28 +338,37 @@ class _Together:
     watched: Watched | None = None
 
     def steps(self, state: State, first: int, stop: int) -> bool:
+        every, rows = self.hands.every, self.hands.rows
+        k = first
+        while k < stop:
+            activity, weights, *_ = rows.begin(_rows_between(k, stop, every))
+            # as far as there is room for rows
+            until = min(stop, -(-k // every) * every + len(activity) * every) if len(activity) else stop
+            made = self._fill(state, k, until, activity, weights)
+            rows.end(_rows_between(k, made, every))
+            k = made
+            if rows.over():
+                return False
+        return True
+
+    def _fill(self, state: State, first: int, stop: int, activity: FloatArray, weights: FloatArray) -> int:
+        """Make steps, until rows are to be handed on at the latest. Gives the step behind them."""
         every, rows, reader, watch = self.hands
-        rows_left, most = _rows_between(first, stop, every), self.runner.at_once
-        activity, weights, *_ = rows.begin(rows_left)
         row, k = 0, first
         for part in reader.parts(first, stop):
             begin = k
             while k < begin + len(part):
-                until = watch.next_stop(k, min(k + most, begin + len(part)))
+                until = watch.next_stop(k, begin + len(part))
                 vectors = part[k - begin : until - begin]
                 made = self._run(state, vectors, activity[row:], weights[row:], every, not watch.warned)
                 row += _rows_between(k, k + made, every)
                 k += made
+                if reader.left and not watch.warned:
+                    watch.take_inputs_at(k - 1, vectors[made - 1], ())
                 watch.check(state)
                 if rows.due() if self.watched is None else self.watched.asked():
-                    rows.end(row)
-                    if rows.over():
-                        return False
-                    rows_left -= row
-                    activity, weights, *_ = rows.begin(rows_left)
-                    row = 0
-        rows.end(row)
-        return True
+                    return k
+        return k
 
     def _run(
         self, state: State, vectors: FloatArray, activity: FloatArray, weights: FloatArray, every: int, look: bool
@@ -364,12 +412,3 @@ def _check_events(controls: Controls, state: State, changes: Sequence[Change]) -
             except PatchError as error:
                 message = f"the parameters of the recording do not fit the events: from step {change.at} on {error}"
                 raise RecordingError(message) from None
-
-
-def _stretches(begin: int, end: int) -> Iterator[tuple[int, int]]:
-    """The steps from ``begin`` to ``end`` in the stretches that an InputReader makes at a time."""
-    first = begin
-    while first < end:
-        stop = min(first - first % STRETCH + STRETCH, end)
-        yield first, stop
-        first = stop

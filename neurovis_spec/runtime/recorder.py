@@ -22,10 +22,9 @@ from neurovis_spec.runtime.columns import Numbers, columns_of, recording_of
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.formats import StreamingFormat, load, take_over_parts
-from neurovis_spec.runtime.inputs import STRETCH
 from neurovis_spec.runtime.parts import files_beside
 from neurovis_spec.runtime.recording import Recording, for_path
-from neurovis_spec.runtime.rows import After, Rows, RowWriter, Steps
+from neurovis_spec.runtime.rows import STRETCH, After, Rows, RowWriter, Steps
 from neurovis_spec.runtime.state import State
 from neurovis_spec.runtime.stream import OFTEN, empty_recording
 

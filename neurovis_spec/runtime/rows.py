@@ -18,6 +18,12 @@ from neurovis_spec.arrays import FloatArray, IntArray
 KINDS: Final = ("activity", "weights", "states", "sensors", "pose")
 
 
+#: steps of a stretch, a power of two: what is computed beside the steps is computed a stretch at a time
+STRETCH: Final = 1 << 8
+#: numbers of rows that are well handed on together
+_HANDED_ON: Final = 1 << 19
+
+
 class Widths(NamedTuple):
     """How many numbers of a row are activities, changing weights, states of models and rules, sensors of a body, and
     its pose."""
@@ -42,6 +48,12 @@ class Rows(NamedTuple):
     def room(cls, widths: Widths, count: int) -> Rows:
         """Room for so many rows."""
         return cls(*(np.empty((count, width)) for width in widths))
+
+    @classmethod
+    def lent(cls, widths: Widths) -> Rows:
+        """Room for as many rows as are well handed on at once: some hundred thousand numbers, and a stretch of steps
+        at least."""
+        return cls.room(widths, max(STRETCH, _HANDED_ON // max(1, sum(widths))))
 
     def part(self, rows: slice) -> Rows:
         """Some of the rows; no array is copied."""
@@ -100,7 +112,7 @@ class RowSink(Protocol):
     """Where rows go, a stretch of the run at a time."""
 
     def begin(self, count: int) -> Rows:
-        """Arrays for the next ``count`` rows."""
+        """Arrays for the next ``count`` rows, or for the first of these; for a stretch of steps always for all."""
         ...
 
     def end(self, count: int) -> None:

@@ -28,7 +28,7 @@ from neurovis_spec.compiler.events.settable import ParameterFormula
 from neurovis_spec.compiler.network import Network, Output
 from neurovis_spec.language.expressions.tree import Number
 from neurovis_spec.likeness import suggest
-from neurovis_spec.runtime.backend import Backend, Ready, ready
+from neurovis_spec.runtime.backend import Backend, Reading, Ready, ready
 from neurovis_spec.runtime.columns import ALL, Keep, Probe, probe_of
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.course import Course
@@ -42,7 +42,7 @@ from neurovis_spec.runtime.references import find_neurons, find_parts
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.rows import After
 from neurovis_spec.runtime.state import State, initial_state
-from neurovis_spec.runtime.watch import Watch
+from neurovis_spec.runtime.watch import Checked, Watch
 
 if TYPE_CHECKING:
     from neurovis_spec.runtime.recorder import Recorder
@@ -73,6 +73,7 @@ class Simulation:
         self.network = network
         self._asked_backend, self._inputs, self._watch = backend, inputs, Watch(network)
         self._body = embodied(network) if body is None else body
+        self._eventful = bool(network.changes)
         #: the inputs that the caller gives for the whole run; the body does not sense these
         self._given = frozenset(inputs or ())
         self._use_backend("" if start is None else start.backend)
@@ -89,8 +90,10 @@ class Simulation:
     def _use_backend(self, before: str) -> None:
         """Have the backend that is asked for make the steps to come, else the one that made those ``before``."""
         self._backend = ready(self.network, self._asked_backend, before)
-        self._stepper = self._backend.stepper
+        stepper = self._backend.stepper
+        self._stepper = stepper if isinstance(stepper, Reading) else Checked(self.network, stepper)
         self._reader = InputReader(self.network, self._inputs, self._watch.take_inputs, self._backend.functions)
+        self._reader.leave(stepper, () if self._body is None else self._body.inputs)
         self._controls = Controls(self.network, self._backend.functions)
 
     @property
@@ -144,9 +147,9 @@ class Simulation:
         return names_of(self.network)
 
     @cached_property
-    def _outputs(self) -> Mapping[str, Callable[[State], np.float64 | FloatArray]]:
-        """How each output is read."""
-        return {entry.name: _reader(self.network, entry) for entry in self.network.outputs}
+    def _outputs(self) -> tuple[tuple[str, Callable[[State], np.float64 | FloatArray]], ...]:
+        """How each output is read, by its name."""
+        return tuple((entry.name, _reader(self.network, entry)) for entry in self.network.outputs)
 
     def _apply(self, state: State) -> bool:
         """What events change at the step to come; whether they do."""
@@ -256,28 +259,33 @@ class Simulation:
         none. Raises InputError, and then no step was made; ParameterError where events of the step to come cannot set
         what they say with what was set by hand, and then the step was made, and these events are left out.
         """
-        state = self._state
-        if values is not None and not isinstance(values, Mapping):
-            raise TypeError(f"inputs are given by name, not as {type(values).__name__}: step(target=0.3)")
-        given, body = {**(values or {}), **inputs}, self._body
-        vector = self._reader.at(state.k, given)
-        if body is not None:
-            vector = body.sense(vector, self._given.union(given))
-        if body is not None or given:
-            self._watch.take_inputs_at(state.k, vector, given if body is None else body.inputs.union(given))
+        state, body = self._state, self._body
+        if values is not None:
+            if not isinstance(values, Mapping):
+                raise TypeError(f"inputs are given by name, not as {type(values).__name__}: step(target=0.3)")
+            inputs = {**values, **inputs}
+        reader, watch, k = self._reader, self._watch, state.k
+        if reader.all_left and not inputs:
+            vector = self._stepper.vector
+        else:
+            vector = reader.at(k, inputs)
+            if body is not None:
+                vector = body.sense(vector, self._given.union(inputs))
         recorder = self._recorder if self._recorder is not None and self._recorder.going else None
         if recorder is not None:
             recorder.begin(state)
-        with np.errstate(all="ignore"):
-            self._stepper.step(state, vector)
-            self._watch.check(state)
-        self._ended = self.after() if self._controls.due(state) else None
+        odd = self._stepper.advance(state, vector, reader.left_beside(inputs) if inputs else reader.left)
+        if (odd or watch.waiting) and not watch.warned:
+            watch.take_inputs_at(k, self._stepper.vector, inputs if body is None else body.inputs.union(inputs))
+            watch.check(state)
+        due = self._eventful and self._controls.due(state)
+        self._ended = self.after() if due else None
         if recorder is not None:
             recorder.end(state)
         if body is not None:
             body.move(state)
-        if self._apply(state):  # events of the next step apply now, so that ``weights`` are those of the next step
-            self._reader.use(state)
+        if due and self._apply(state):  # events of the next step apply now: ``weights`` are those of the next step
+            reader.use(state)
         return self.outputs
 
     @property
@@ -299,7 +307,11 @@ class Simulation:
     @property
     def outputs(self) -> Mapping[str, np.float64 | FloatArray]:
         """The outputs of the last step."""
-        return {name: read(self._state) for name, read in self._outputs.items()}
+        state = self._state
+        found: dict[str, np.float64 | FloatArray] = {}
+        for name, read in self._outputs:
+            found[name] = read(state)
+        return found
 
     def set(self, values: Mapping[str, float] | None = None, /, **parameters: float) -> None:
         """Give parameters other values from step k on, until an event of a later step sets them again.
@@ -463,5 +475,5 @@ def _reader(network: Network, output: Output) -> Callable[[State], np.float64 | 
         return (lambda state: np.float64(probe.now(state)[0])) if output.scalar else probe.now
     if output.scalar:
         index = int(output.neurons[0])
-        return lambda state: np.float64(state.activity[index])
+        return lambda state: state.activity[index]  # of an array of doubles: an np.float64
     return lambda state: state.activity[output.neurons]

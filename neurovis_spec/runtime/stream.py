@@ -18,7 +18,6 @@ from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.columns import Columns, columns_of, recording_of
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.formats import StreamingFormat, take_over_parts
-from neurovis_spec.runtime.inputs import STRETCH
 from neurovis_spec.runtime.memory import check_disk
 from neurovis_spec.runtime.record import InMemory, begin_run, end_values, keep_state, record, run_steps
 from neurovis_spec.runtime.recording import Recording, for_path
@@ -83,10 +82,10 @@ def record_to(network: Network, path: Path, course: Course, progress: Progress |
 
 
 class _BufferedRows:
-    """A RowSink: rows go on to a writer when a stretch is full or some time has passed; their arrays are used again."""
+    """A RowSink: rows go on to a writer when their arrays, which are used again, are full or some time has passed."""
 
     def __init__(self, widths: Widths, writer: RowWriter, after: Callable[[], After], signal_asked: Asked) -> None:
-        self._rows = Rows.room(widths, STRETCH)
+        self._rows = Rows.lent(widths)
         self._writer, self._after, self._signal_asked = writer, after, signal_asked
         self._due = monotonic() + OFTEN
         #: how many rows the writer has

@@ -17,7 +17,8 @@ from neurovis_spec.arguments import callers_level
 from neurovis_spec.arrays import BoolArray, FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Check
-from neurovis_spec.runtime.state import State
+from neurovis_spec.runtime.backend import Stepper
+from neurovis_spec.runtime.state import Cells, State
 
 #: The longest array that is squared at once. A longer one BLAS shares among threads, which takes a thousand times as
 #: long as the product where the processors have other work to do.
@@ -30,9 +31,10 @@ class Watch:
     """Looks at the state after each step until it has warned."""
 
     def __init__(self, network: Network) -> None:
-        self._network = network
-        #: of those steps to come at which an input is wrong: all inputs, and which of them hide what is undefined
-        self._wrong_inputs: dict[int, tuple[FloatArray, BoolArray | None]] = {}
+        self._network, self._carried = network, _Carried(network)
+        #: of those steps to come at which an input is wrong: all inputs, and which of them hide what is undefined. Of
+        #: others only those behind which something is not finite need a check
+        self.waiting: dict[int, tuple[FloatArray, BoolArray | None]] = {}
         self.warned = False
 
     def take_inputs(self, first: int, vectors: FloatArray, hidden: BoolArray | None = None) -> None:
@@ -42,29 +44,29 @@ class Watch:
         if hidden is not None:
             wrong |= hidden.any(axis=1)
         rows = np.flatnonzero(wrong).tolist()
-        self._wrong_inputs = {first + row: (vectors[row], None if hidden is None else hidden[row]) for row in rows}
+        self.waiting = {first + row: (vectors[row], None if hidden is None else hidden[row]) for row in rows}
 
     def take_inputs_at(self, k: int, vector: FloatArray, replaced: Iterable[str]) -> None:
         """Take the inputs of step k alone, where they are known only then: these (``replaced``) do not come from their
         formulas."""
-        _, hidden = self._wrong_inputs.pop(k, (vector, None))
+        _, hidden = self.waiting.pop(k, (vector, None))
         if hidden is not None:
             hidden = hidden.copy()
             for entry in map(self._network.input_index.__getitem__, replaced):
                 hidden[entry.start : entry.start + entry.size] = False
         if not all_finite([vector]) or (hidden is not None and hidden.any()):
-            self._wrong_inputs[k] = vector, hidden
+            self.waiting[k] = vector, hidden
 
     def next_stop(self, k: int, stop: int) -> int:
         """How far steps from k on may be made, ``stop`` at most, before one must be checked: one behind the first
         whose inputs are not finite."""
-        return stop if self.warned else min((step + 1 for step in self._wrong_inputs if k <= step < stop), default=stop)
+        return stop if self.warned else min((step + 1 for step in self.waiting if k <= step < stop), default=stop)
 
     def check(self, state: State) -> None:
         """Warn if something of the step just made is NaN or infinite."""
         if self.warned:
             return
-        if all_finite(carried_by(self._network, state)) and state.k - 1 not in self._wrong_inputs:
+        if all_finite(self._carried.by(state)) and state.k - 1 not in self.waiting:
             return
         message = next(self._messages(state), None)
         if message is not None:
@@ -92,7 +94,7 @@ class Watch:
                     # of a check the name says all; what a lesioned neuron computes is for nobody
                     elif not (of_neurons and lesioned[member]):
                         yield f"{quantity.name} for {name} {when}, {_HIDDEN}"
-        vector, hidden = self._wrong_inputs.get(step, (np.zeros(0), None))
+        vector, hidden = self.waiting.get(step, (np.zeros(0), None))
         for index in _wrong(vector):
             yield f"the {self._input_name(index)} is {vector[index]} at step {step}"
         for index in () if hidden is None else np.flatnonzero(hidden).tolist():
@@ -108,6 +110,41 @@ class Watch:
         entry = next(entry for entry in network.inputs if entry.start <= index < entry.start + entry.size)
         takers = np.flatnonzero(network.neurons.input == index)
         return f"input '{entry.name}'" + (f" of {names[takers[0]]}" if len(takers) else "")
+
+
+class Checked:
+    """A stepper that computes no inputs, and what it is then asked: whether something is not finite (``Reading``)."""
+
+    def __init__(self, network: Network, stepper: Stepper) -> None:
+        self._stepper, self._carried = stepper, _Carried(network)
+        #: the inputs of the step that was made last
+        self.vector: FloatArray = np.zeros(network.vector_size)
+
+    def read(self, computed: frozenset[str]) -> None:
+        """There are none that it computes."""
+
+    def advance(self, state: State, inputs: FloatArray, computed: frozenset[str], /) -> bool:
+        """Make a step; whether something is not finite behind it, an input, too."""
+        self.vector = inputs
+        with np.errstate(all="ignore"):
+            self._stepper.step(state, inputs)
+            return not (all_finite(self._carried.by(state)) and all_finite([inputs]))
+
+
+class _Carried:
+    """What the states of a network carry (``carried_by``), worked out anew only where the arrays are others."""
+
+    def __init__(self, network: Network) -> None:
+        self._network, self._pieces = network, list[FloatArray]()
+        self._activity = self._weights = np.zeros(0)
+        self._cells: Cells | None = None
+
+    def by(self, state: State) -> list[FloatArray]:
+        """By this one, in pieces."""
+        if state.activity is not self._activity or state.weights is not self._weights or state.cells is not self._cells:
+            self._activity, self._weights, self._cells = state.activity, state.weights, state.cells
+            self._pieces = carried_by(self._network, state)
+        return self._pieces
 
 
 def carried_by(network: Network, state: State) -> list[FloatArray]:

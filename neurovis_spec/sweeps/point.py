@@ -21,7 +21,7 @@ from neurovis_spec.plugins import PluginError
 from neurovis_spec.runtime.backend import BackendError
 from neurovis_spec.runtime.columns import Columns, Keep, columns_of
 from neurovis_spec.runtime.course import Course
-from neurovis_spec.runtime.inputs import STRETCH, InputError
+from neurovis_spec.runtime.inputs import InputError
 from neurovis_spec.runtime.measures import Measure, Meter, parsed, resolved
 from neurovis_spec.runtime.record import run_steps
 from neurovis_spec.runtime.rows import Rows
@@ -125,7 +125,7 @@ class _Metered:
     """Rows that are measured and forgotten."""
 
     def __init__(self, network: Network, state: State, meters: Sequence[Meter], columns: Columns) -> None:
-        self._rows = Rows.room(columns.widths(network), STRETCH)
+        self._rows = Rows.lent(columns.widths(network))
         self._state, self._meters = state, meters
         names = columns.probe.names
         self._places = [[names.index(name) for name in meter.measure.probe.names] for meter in meters]

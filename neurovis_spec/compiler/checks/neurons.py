@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.arrays import Indices, IntArray
+from neurovis_spec.arrays import PIECE, Indices, IntArray, pieces, sorting, starts_of
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.events.settable import bias_of
 from neurovis_spec.compiler.names.references import key_span
@@ -67,7 +67,8 @@ def _warn_idle(compiled: Compiled, told: set[Span], findings: Findings) -> None:
     if not idle.any():
         return
     has_incoming = np.zeros(len(network.neurons), dtype=np.bool_)
-    has_incoming[network.connections.targets.compact()] = True
+    for targets in pieces(network.connections.targets.compact()):
+        has_incoming[targets] = True
     origin = {scope.called(name): (scope, name) for scope in compiled.scopes for name in scope.section.neurons}
     for group in network.neurons.groups:
         members = [member for member in group.indices if idle[member]]
@@ -127,7 +128,8 @@ def _idle(network: Network) -> Mask:
         quiet[noise.members] = False
     for port in (port for population in network.populations for port in population.ports):
         if port.combine == "distance":  # |c| away from a signal of 0
-            quiet[connections.targets[port.incoming]] = False
+            for incoming in pieces(port.incoming):
+                quiet[connections.targets[incoming]] = False
     if not len(connections):
         quiet &= _needed(network)
     if not quiet.any():
@@ -163,8 +165,11 @@ class _Ways:
     """The ways along connections: from each neuron where its own lead."""
 
     def __init__(self, n: int, begins: Indices, ends: Indices) -> None:
-        self._ends = ends[np.argsort(begins, kind="stable")]
-        self._starts = np.concatenate(([0], np.cumsum(np.bincount(begins, minlength=n))))
+        self._starts, self._ends = starts_of(begins, n), np.empty_like(ends)
+        for some, places in sorting(begins, self._starts):
+            self._ends[places] = ends[some]
+        #: of each neuron a place among those just found
+        self._last = np.zeros(n, dtype=np.int64)
 
     def follow(self, reached: Mask, begin: list[int]) -> None:
         """Mark neurons as reached, and all to which a way leads from them through neurons that are not yet."""
@@ -185,13 +190,20 @@ class _Ways:
 
     def _follow_all(self, reached: Mask, begin: IntArray) -> list[int]:
         """Mark where connections lead from many neurons, and say what is new."""
-        first, counts = self._starts[begin], self._starts[begin + 1] - self._starts[begin]
-        # each neuron's ends are a run of _ends: the positions of all these runs, one after the other
-        positions = np.repeat(first - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
-        ends = self._ends[positions]
-        new: Indices = np.unique(ends[~reached[ends]])
-        reached[new] = True
-        return [*map(int, new)]
+        found: list[int] = []
+        together = np.cumsum(self._starts[begin + 1] - self._starts[begin])
+        cuts = np.searchsorted(together, np.arange(PIECE, together[-1], PIECE))  # as many connections in each piece
+        for some in np.split(begin, cuts):
+            first, counts = self._starts[some], self._starts[some + 1] - self._starts[some]
+            # each neuron's ends are a run of _ends: the positions of all these runs, one after the other
+            positions = np.repeat(first - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
+            ends = self._ends[positions]
+            ends = ends[~reached[ends]]
+            reached[ends] = True
+            place = np.arange(len(ends))
+            self._last[ends] = place
+            found += ends[self._last[ends] == place].tolist()  # each neuron once
+        return found
 
 
 def _unreached(quiet: Mask, sources: Indices, targets: Indices) -> Mask:
@@ -199,10 +211,11 @@ def _unreached(quiet: Mask, sources: Indices, targets: Indices) -> Mask:
     reached = ~quiet
     for _ in range(_WHOLE_ARRAY_PASSES):
         before = int(reached.sum())
-        reached[targets[reached[sources]]] = True
+        for begins, ends in zip(pieces(sources), pieces(targets), strict=True):
+            reached[ends[reached[begins]]] = True
         if int(reached.sum()) == before:
             return ~reached
-    rest = ~reached[targets]  # connections that may still lead somewhere
+    rest = np.concatenate([~reached[ends] for ends in pieces(targets)])  # what may still lead somewhere
     _Ways(len(quiet), sources[rest], targets[rest]).follow(reached, np.flatnonzero(reached).tolist())
     return ~reached
 
@@ -215,25 +228,31 @@ def _first_causes(idle: Mask, sources: Indices, targets: Indices) -> Mask:
     neuron after the other that was not reached yet; the second does so once more, beginning with the last of these.
     Those that it has not reached yet are on cycles without sources, one on each, and the whole cycle is what leads to
     it."""
-    inside = idle[sources] & idle[targets] & (sources != targets)
-    begins, ends = sources[inside], targets[inside]
+    both = [idle[begins] & idle[ends] for begins, ends in zip(pieces(sources), pieces(targets), strict=True)]
+    inside = slice(None) if all(piece.all() for piece in both) else np.concatenate(both)
+    sources, targets = sources[inside], targets[inside]
     behind = np.zeros(len(idle), dtype=np.bool_)
-    behind[ends] = True
+    for begins, ends in zip(pieces(sources), pieces(targets), strict=True):
+        behind[ends[begins != ends]] = True
     if not behind.any():
         return idle
     result = idle & ~behind
-    ways, reached = _Ways(len(idle), begins, ends), ~idle
+    ways, reached = _Ways(len(idle), sources, targets), ~idle
     ways.follow(reached, np.flatnonzero(result).tolist())
-    reached_again, starts = reached.copy(), []
+    reached_again = reached.copy()
+    starts: list[int] = []
+    causes: list[int] = []
     for neuron in np.flatnonzero(~reached).tolist():
         if not reached[neuron]:
             starts.append(neuron)
             ways.follow(reached, [neuron])
-    backwards = _Ways(len(idle), ends, begins) if starts else ways
     for neuron in reversed(starts):
         if not reached_again[neuron]:
             ways.follow(reached_again, [neuron])
-            backwards.follow(result, [neuron])
+            causes.append(neuron)
+    if causes:
+        del ways
+        _Ways(len(idle), targets, sources).follow(result, causes)
     return result
 
 

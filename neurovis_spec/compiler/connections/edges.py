@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, Indices, IntArray
+from neurovis_spec.arrays import FloatArray, Indices, IntArray, narrow
 from neurovis_spec.compiler.limits import LONGEST_DELAY, PATIENCE
 from neurovis_spec.compiler.names.references import Directory, few
 from neurovis_spec.compiler.values.cells import Cells, cells_of, seen_by_pairs, values_of
@@ -32,19 +33,28 @@ _AN_EDGE = "an edge is [from, to], [from, to, weight] or [from, to, weight, dela
 class EdgeList(NamedTuple):
     """Edges: positions within the ends, weights, delays (−1: the entry's)."""
 
-    i: IntArray
-    j: IntArray
+    i: Indices
+    j: Indices
     weights: FloatArray
     delays: Indices
 
 
 @dataclass(frozen=True)
 class End:
-    """The positions within an end of the neurons that belong to it, by name. Of an end that is UNKNOWN, the neurons of
-    its ``directory`` may belong to it."""
+    """The neurons that belong to an end. Of one that is UNKNOWN, those of its ``directory`` may."""
 
-    positions: Mapping[str, int] | Unknown
+    neurons: Indices | Unknown
     directory: Directory
+    #: the names of all neurons of the network, and how many characters of them are the path of the scope
+    called: tuple[str, ...]
+    path: int
+
+    @cached_property
+    def positions(self) -> Mapping[str, int] | Unknown:
+        """The positions within the end of its neurons, by the names that they have in the scope."""
+        if self.neurons is UNKNOWN:
+            return UNKNOWN
+        return {self.called[neuron][self.path :]: position for position, neuron in enumerate(self.neurons.tolist())}
 
     def indices(self, names: tuple[str, ...]) -> IntArray:
         """The position of each of these neurons; −1 where one cannot belong to the end, 0 where it may."""
@@ -60,7 +70,7 @@ class End:
     @property
     def size(self) -> float | Unknown:
         """How many belong to it."""
-        return UNKNOWN if self.positions is UNKNOWN else float(len(self.positions))
+        return UNKNOWN if self.neurons is UNKNOWN else float(len(self.neurons))
 
 
 @dataclass(frozen=True)
@@ -115,7 +125,7 @@ class EdgeReader:
         delays[delayed] = given_delays
         return EdgeList(i, j, weights, delays)
 
-    def _ends(self, cells: Cells, which: IntArray, end: End, what: str) -> IntArray | Unknown:
+    def _ends(self, cells: Cells, which: IntArray, end: End, what: str) -> Indices | Unknown:
         """The positions of the neurons that these cells name."""
         findings = self.constants.findings
         no_names = which[cells.kinds[which] != TEXT]
@@ -130,10 +140,10 @@ class EdgeReader:
 
     def _positions(
         self, names: tuple[str, ...], which: Indices, end: End, what: str, where: Callable[[int], tuple[Span, str]]
-    ) -> IntArray | Unknown:
+    ) -> Indices | Unknown:
         """The positions in an end of the neurons that edges name, by the numbers of these names. ``where`` says of an
         edge where it stands, and what is to be added in words."""
-        positions = end.indices(names)[which]
+        positions = narrow(end.indices(names))[which]
         unknown = np.flatnonzero(positions < 0)
         _, once = np.unique(which[unknown], return_index=True)
         for edge in unknown[np.sort(once)].tolist()[:PATIENCE]:
@@ -141,7 +151,7 @@ class EdgeReader:
         return UNKNOWN if len(unknown) or end.positions is UNKNOWN else positions
 
     def _given_weights(
-        self, cells: Cells, which: IntArray, ends: tuple[IntArray, IntArray] | Unknown
+        self, cells: Cells, which: IntArray, ends: tuple[Indices, Indices] | Unknown
     ) -> FloatArray | Unknown:
         """The weights in these cells, 1 for a null; they are checked even if their ends are invalid."""
         i, j = known(ends, (UNKNOWN, UNKNOWN))
@@ -185,15 +195,14 @@ class EdgeReader:
             self.constants.findings.error("wrong-size", span, "there is no edge in this file")
             return UNKNOWN
         i, j = (
-            self._positions(
-                table.names, which, end, what, lambda edge: (span, f" (row {table.rows[edge]} of the file)")
-            )
+            self._positions(table.names, which, end, what, lambda edge: (span, f" (row {table.row(edge)} of the file)"))
             for which, end, what in ((table.begins, self.sources, "source"), (table.ends, self.targets, "target"))
         )
-        long = np.flatnonzero(table.delays > LONGEST_DELAY).tolist()
+        delays = table.delays.compact()
+        long = np.flatnonzero(delays > LONGEST_DELAY).tolist()
         for place in long[:PATIENCE]:
-            message = f"row {table.rows[place]} of the file: a delay must be at most {LONGEST_DELAY:,}"
+            message = f"row {table.row(place)} of the file: a delay must be at most {LONGEST_DELAY:,}"
             self.constants.findings.error("out-of-range", span, message, key=("delay", place))
         if i is UNKNOWN or j is UNKNOWN or long or table.fault is not None:
             return UNKNOWN
-        return EdgeList(i, j, table.weights, table.delays)
+        return EdgeList(i, j, table.weights, delays)

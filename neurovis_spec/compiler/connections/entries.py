@@ -287,19 +287,16 @@ class EntryBuilder:
 
     def _edges(self) -> _Shape | Unknown:
         assert self.body.edges is not None
-        ends = (self._end_by_name(self.sources), self._end_by_name(self.targets))
-        reader = EdgeReader(*ends, self.constants, self.context.scope.files, self._stream("weight"), self.context.room)
+        called, path = self.context.census.neurons.names, len(self.context.scope.called(""))
+        sources, targets = (
+            End(neurons, self.context.directory, called, path) for neurons in (self.sources, self.targets)
+        )
+        reader = EdgeReader(
+            sources, targets, self.constants, self.context.scope.files, self._stream("weight"), self.context.room
+        )
         with self.constants.following() as parts:
             edges = reader.read(self.body.edges)
         return UNKNOWN if edges is UNKNOWN else _Shape(edges.i, edges.j, edges.weights, edges.delays, tuple(parts))
-
-    def _end_by_name(self, neurons: Indices | Unknown) -> End:
-        """The positions of an end's neurons by the names that they have in the scope."""
-        if neurons is UNKNOWN:
-            return End(UNKNOWN, self.context.directory)
-        all_names, prefix_length = self.context.census.neurons.names, len(self.context.scope.called(""))
-        positions = {all_names[neuron][prefix_length:]: position for position, neuron in enumerate(neurons.tolist())}
-        return End(positions, self.context.directory)
 
     def _values(self, formula: Formula, shape: _Shape | Unknown, purpose: str) -> FloatArray | Unknown:
         """The values of a formula of i, j, n_from, n_to (and distance), one for every pair."""

@@ -1,7 +1,7 @@
 """The rows and cells of a ``.csv`` file, and the numbers in them.
 
-In: bytes. Out: rows of texts; float64 numbers, NaN for an empty cell. A fault is a CellError that names row and column
-as an editor or a spreadsheet counts them (from 1, the header included).
+In: bytes, in parts. Out: rows of texts; float64 numbers, NaN for an empty cell. A fault is a CellError that names row
+and column as an editor or a spreadsheet counts them (from 1, the header included).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -23,7 +23,7 @@ NO_COMMENT: Final = "row 1 is no comment: all rows of a .csv are read"
 #: bytes of a cell; Python's reader takes twice as many
 LONGEST_CELL: Final = 1 << 16
 #: bytes of lines that are read together
-_STRETCH: Final = 1 << 18
+STRETCH: Final = 1 << 16
 _NUMBER: Final = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _NOT_FINITE: Final = re.compile(r"[-+]?\.?(?:nan|inf|infinity)", re.IGNORECASE)
 _SEPARATOR: Final = re.compile(rb"[,\n]")
@@ -42,47 +42,110 @@ class Row(NamedTuple):
         return Row(self.number, [cell.strip() for cell in self.cells])
 
 
-def count_lines(data: bytes) -> int:
-    """How many lines end, however they do."""
-    return data.count(b"\n") + data.count(b"\r") - data.count(b"\r\n")
+def strip_end(parts: list[bytes]) -> None:
+    """Take the ends of lines at the end of a file from its parts."""
+    while parts:
+        last = parts.pop().rstrip(b"\r\n")
+        if last:
+            parts.append(last)
+            return
 
 
-def plain_text(data: bytes) -> bytes:
-    """The same file with line feeds alone at the ends of its lines, none at its own, and no byte-order mark. Raises
-    CellError where it is empty or no text, or where a cell is longer than any number or name."""
-    text = data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    if not text:
+def given_up(parts: list[bytes]) -> Iterator[bytes]:
+    """One part after the other; each is taken out, so that it takes memory no longer than it is needed."""
+    parts.reverse()
+    while parts:
+        yield parts.pop()
+
+
+def stretches_of(parts: Iterable[bytes]) -> Iterator[bytes]:
+    """A file that is given in parts, in stretches of whole lines, each without the line feed at its end."""
+    begun: list[bytes] = []
+    for part in parts:
+        for start in range(0, len(part), STRETCH):
+            some = part[start : start + STRETCH]
+            end = some.rfind(b"\n")
+            begun.append(some if end < 0 else some[:end])
+            if end >= 0:
+                stretch, begun = b"".join(begun), [some[end + 1 :]]
+                yield stretch
+    stretch, begun = b"".join(begun), []
+    yield stretch
+
+
+def text_of(parts: Iterable[bytes]) -> Iterator[bytes]:
+    """The stretches of a file of text, whose lines may end in any way, without a byte-order mark."""
+    return stretches_of(_with_line_feeds(parts))
+
+
+def _with_line_feeds(parts: Iterable[bytes]) -> Iterator[bytes]:
+    held, mark = b"", b"\xef\xbb\xbf"
+    for part in parts:
+        start, mark = len(mark) if part.startswith(mark) else 0, b""
+        for begin in range(start, len(part), STRETCH):
+            some = held + part[begin : begin + STRETCH]
+            held = b"\r" if some.endswith(b"\r") else b""  # a line feed may follow
+            some = some.removesuffix(held)
+            yield some.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in some else some
+    if held:
+        yield b"\n"
+
+
+def count_lines(text: Iterable[bytes]) -> int:
+    """How many lines of a text end."""
+    return sum(lines.count(b"\n") + 1 for lines in text) - 1
+
+
+def check_text(text: Iterable[bytes]) -> None:
+    """Refuse what is empty, or no text, or has a cell that is longer than any number or name. Raises CellError."""
+    number, broken, empty = 1, 0, True
+    for lines in text:
+        _check_lengths(lines, number)
+        broken = broken or _broken_row(lines, number)
+        number, empty = number + lines.count(b"\n") + 1, empty and not lines
+    if empty:
         raise CellError("file-format", "the file is empty")
-    _check_lengths(text)
-    if not text.isascii():
-        try:
-            text.decode("utf-8")
-        except UnicodeDecodeError as error:
-            row = text.count(b"\n", 0, error.start) + 1
-            raise in_row(row, "is not UTF-8", "save the file as UTF-8", "invalid-utf8") from None
-    return text
+    if broken:
+        raise in_row(broken, "is not UTF-8", "save the file as UTF-8", "invalid-utf8")
 
 
-def _check_lengths(text: bytes) -> None:
+def _broken_row(lines: bytes, number: int) -> int:
+    """The first row that is not UTF-8, of lines of which the first has this number; 0 without one."""
+    if lines.isascii():
+        return 0
+    try:
+        lines.decode("utf-8")
+    except UnicodeDecodeError as error:
+        return number + lines.count(b"\n", 0, error.start)
+    return 0
+
+
+def _check_lengths(lines: bytes, number: int) -> None:
     """Refuse a cell that is longer than any number or name. It covers a stretch of half its length that holds no
     separator; few stretches have none. Raises CellError."""
     half = LONGEST_CELL // 2
-    for start in range(0, len(text) - half, half):
-        if _SEPARATOR.search(text, start, start + half):
+    for start in range(0, len(lines) - half, half):
+        if _SEPARATOR.search(lines, start, start + half):
             continue
         low, high = max(0, start - LONGEST_CELL), start + LONGEST_CELL + half
-        begin = max(low, text.rfind(b",", low, start) + 1, text.rfind(b"\n", low, start) + 1)
-        end = _SEPARATOR.search(text, start + half, high)
-        if (min(len(text), high) if end is None else end.start()) - begin > LONGEST_CELL:
-            row, line = text.count(b"\n", 0, begin) + 1, text.rfind(b"\n", 0, begin) + 1
-            column = text.count(b",", line, begin) + 1
+        begin = max(low, lines.rfind(b",", low, start) + 1, lines.rfind(b"\n", low, start) + 1)
+        end = _SEPARATOR.search(lines, start + half, high)
+        if (min(len(lines), high) if end is None else end.start()) - begin > LONGEST_CELL:
+            row, line = number + lines.count(b"\n", 0, begin), lines.rfind(b"\n", 0, begin) + 1
+            column = lines.count(b",", line, begin) + 1
             raise in_cell(row, column, f"no number or name has more than {LONGEST_CELL:,} bytes")
 
 
-def rows_of(text: bytes, number: int = 1) -> Iterator[Row]:
-    """The rows of a text whose first line has this number; an empty line is a row of one empty cell. Raises
+def first_row(text: Iterator[bytes]) -> Row:
+    """The first row of a text. Raises CellError."""
+    lines = next(text)
+    return next(rows_of(b"\n".join((lines, *text)) if b'"' in lines else lines))
+
+
+def rows_of(lines: bytes, number: int = 1) -> Iterator[Row]:
+    """The rows of lines, of which the first has this number; an empty line is a row of one empty cell. Raises
     CellError."""
-    reader = csv.reader(io.TextIOWrapper(io.BytesIO(text), "utf-8", newline=""), strict=True)
+    reader = csv.reader(io.TextIOWrapper(io.BytesIO(lines + b"\n"), "utf-8", newline=""), strict=True)
     try:
         for cells in reader:
             yield Row(number - 1 + reader.line_num, cells or [""])
@@ -90,21 +153,22 @@ def rows_of(text: bytes, number: int = 1) -> Iterator[Row]:
         raise in_row(number - 1 + reader.line_num, f"is no CSV: {error}") from error
 
 
-def below(text: bytes, number: int) -> Iterator[tuple[int, bytes]]:
-    """The lines below that of this number, many together, each time with the number of the first; all at once where
-    quotes may hold ends of lines."""
-    start = 0
-    for _ in range(number):
-        start = text.find(b"\n", start) + 1
-        if not start:
-            return
-    size = len(text) if text.find(b'"', start) >= 0 else _STRETCH
-    number += 1
-    while start <= len(text):
-        end = text.find(b"\n", start + size) % (len(text) + 1)
-        yield number, text[start:end]
-        number += 1 + text.count(b"\n", start, end)
-        start = end + 1
+def below(stretches: Iterable[bytes], number: int) -> Iterator[tuple[int, bytes]]:
+    """The lines below that of this number, a stretch at a time, each time with the number of the first; from the first
+    quote on, which may hold ends of lines, all at once."""
+    rest, above = iter(stretches), number
+    for stretch in rest:
+        lines = stretch
+        if above:
+            first = stretch.split(b"\n", above)
+            if len(first) <= above:
+                above -= len(first)
+                continue
+            lines, above = first[above], 0
+        if b'"' in lines:
+            lines = b"\n".join((lines, *rest))
+        yield number + 1, lines
+        number += lines.count(b"\n") + 1
 
 
 def is_number(cell: str) -> bool:

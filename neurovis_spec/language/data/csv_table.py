@@ -20,14 +20,17 @@ from neurovis_spec.language.data.cells import (
     PLAIN,
     Row,
     below,
+    check_text,
     count_lines,
     counted,
+    first_row,
     is_number,
     number_of,
     numbers_of,
-    plain_text,
     rows_of,
     separated,
+    strip_end,
+    text_of,
 )
 from neurovis_spec.language.data.table import CellError, Faults, Room, Table, check_cells
 
@@ -44,17 +47,18 @@ _LEAST = 3
 
 def parse_numbers(data: bytes, room: Room | None = None) -> Table:
     """Numbers in rows of one width, after a header of texts, if there is one. Raises CellError."""
-    data = data.rstrip(b"\r\n")
-    most = 1 + data.count(b",") + count_lines(data)  # the separators bound the cells, before any are made
+    parts = [data]
+    strip_end(parts)
+    most = 1 + data.count(b",") + count_lines(text_of(parts))  # the separators bound the cells, before any are made
     check_cells(most)
     if room is not None:
         room(most)
-    text = plain_text(data)
-    first = next(rows_of(text))
+    check_text(text_of(parts))
+    first = first_row(text_of(parts))
     header, width = _header(first), len(first.cells)
     values, filled, faults = np.empty(most), 0, Faults()
     try:
-        for number, lines in below(text, 0 if header is None else first.number):
+        for number, lines in below(text_of(parts), 0 if header is None else first.number):
             for part in _numbers(lines, number, width, header, faults):
                 values[filled : filled + len(part)] = part
                 filled += len(part)

@@ -1,7 +1,8 @@
 """Lists of edges from the bytes of a ``.csv`` file.
 
-In: bytes. Out: EdgeTable. A fault is a CellError that names row and column, from 1, the header included. Rows are taken
-many at a time, column by column; they are checked one by one only among the few where something is wrong.
+In: bytes, in parts, which are let go as they are read. Out: EdgeTable. A fault is a CellError that names row and
+column, from 1, the header included. Rows are taken many at a time, column by column; they are checked one by one only
+among the few where something is wrong.
 """
 
 from __future__ import annotations
@@ -10,22 +11,27 @@ import itertools
 import math
 from array import array
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+import numpy.typing as npt
 
+from neurovis_spec.arrays import FloatArray, Indices, IntColumn, integers, narrow
 from neurovis_spec.language.data.cells import (
     NO_COMMENT,
     Row,
     below,
+    check_text,
     count_lines,
     counted,
+    first_row,
+    given_up,
     number_of,
     numbers_of,
-    plain_text,
     rows_of,
     separated,
+    strip_end,
+    text_of,
 )
 from neurovis_spec.language.data.table import CellError, Faults, Room, in_cell, in_row, quoted
 from neurovis_spec.likeness import nearest
@@ -38,6 +44,8 @@ _NO_MARKS: Final = bytes(set(range(256)) - set(b",\n"))
 #: names are looked up by so many words of eight bytes, at one of so many places
 _WORDS: Final = 4
 _PLACES: Final = 1 << 20
+#: spellings of names for which there is room at first
+_FIRST_ROOM: Final = 1 << 10
 #: what of a word belongs to a name of which so many bytes are left
 _MASKS: Final = np.array([(1 << 8 * size) - 1 for size in range(9)], dtype=np.uint64)
 #: odd numbers that spread words over places (the golden ratio's, as in Knuth 6.4, and powers of it)
@@ -47,20 +55,25 @@ _HINT: Final = "the first row is 'from,to', 'from,to,weight' or 'from,to,weight,
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EdgeTable:
-    """A list of edges, one an index: from ``names[begins[i]]`` to ``names[ends[i]]``. ``rows`` are the rows of the file
-    in which they stand, from 1; a delay is −1 where the file gives none. ``fault`` is the first that is wrong with its
-    rows, and holds the others: then edges are missing, and a weight or delay invalid is as if it were not given."""
+    """A list of edges, one an index: from ``names[begins[i]]`` to ``names[ends[i]]``. A delay is −1 where the file
+    gives none; ``offsets`` is what has to be added to an edge's index for its row in the file. ``fault`` is the first
+    that is wrong with its rows, and holds the others: then edges are missing, and a weight or delay invalid is as if it
+    were not given."""
 
     names: tuple[str, ...]
-    begins: NDArray[np.int32]
-    ends: NDArray[np.int32]
-    weights: NDArray[np.float64]
-    delays: NDArray[np.int32]
-    rows: NDArray[np.int32]
+    begins: Indices
+    ends: Indices
+    weights: FloatArray
+    delays: IntColumn
+    offsets: IntColumn
     fault: CellError | None = None
 
     def __len__(self) -> int:
-        return len(self.rows)
+        return len(self.begins)
+
+    def row(self, edge: int) -> int:
+        """The row of the file in which an edge stands, from 1."""
+        return edge + int(self.offsets[edge])
 
     @property
     def sources(self) -> tuple[str, ...]:
@@ -73,20 +86,21 @@ class EdgeTable:
         return tuple(map(self.names.__getitem__, self.ends.tolist()))
 
 
-def parse_edges(data: bytes, room: Room | None = None) -> EdgeTable:
+def parse_edges(parts: list[bytes], room: Room | None = None) -> EdgeTable:
     """EdgeTable from rows whose first one names the columns, in any order. ``room`` is asked with the number of edges
     before any is made. Raises CellError where not a row is invalid but the header, or the file as a whole."""
-    data = data.rstrip(b"\r\n")
+    strip_end(parts)
+    most = count_lines(text_of(parts))
     if room is not None:
-        room(count_lines(data))
-    text = plain_text(data)
-    cells = 1 + text.count(b",", 0, text.find(b"\n") % (len(text) + 1))
+        room(most)
+    check_text(text_of(parts))
+    cells = 1 + next(text_of(parts)).partition(b"\n")[0].count(b",")
     if cells > _MOST_CELLS:
         raise in_row(1, f"has {cells:,} cells", _HINT)
-    first = next(rows_of(text))
-    reader = _Reader(_columns(first.stripped().cells))
+    first = first_row(text_of(parts))
+    reader = _Reader(_columns(first.stripped().cells), most)
     try:
-        for number, lines in below(text, first.number):
+        for number, lines in below(text_of(given_up(parts)), first.number):
             reader.take(lines, number)
             if reader.faults.many:
                 break
@@ -118,11 +132,11 @@ def _columns(header: list[str]) -> dict[str, int]:
 class _Cells(NamedTuple):
     """A column of some lines: the bytes of these, with room behind them, and where the cells begin and end."""
 
-    text: NDArray[np.uint8]
-    begins: NDArray[np.int64]
-    ends: NDArray[np.int64]
+    text: npt.NDArray[np.uint8]
+    begins: npt.NDArray[np.int64]
+    ends: npt.NDArray[np.int64]
 
-    def words(self) -> list[NDArray[np.uint64]]:
+    def words(self) -> list[npt.NDArray[np.uint64]]:
         """The cells in words of eight bytes, as far as these go."""
         at_all = np.ndarray((len(self.text) - 7,), dtype="<u8", buffer=self.text, strides=(1,))
         sizes = self.ends - self.begins
@@ -140,15 +154,18 @@ class _Cells(NamedTuple):
 class _Names:
     """The numbers of names, in the order in which they come; blanks around a name do not count, an empty one has −1.
 
-    Many cells are looked up at once, by their bytes, in a table with one place for all names that fall on it: who came
-    first has it, the others are looked up one by one, as is each name when it comes first."""
+    Many cells are looked up at once, by their bytes, in a table with one place for all spellings that fall on it: which
+    came first has it, the others are looked up one by one, as is each when it comes first."""
 
     def __init__(self) -> None:
         self.known: list[str] = []
         self._numbers: dict[str, int] = {"": -1}
-        self._held = np.zeros((_WORDS, _PLACES), dtype=np.uint64)
-        #: the number of the name at each place, and 1
-        self._number = np.zeros(_PLACES, dtype=np.int32)
+        #: which spelling is at each place; 0: none
+        self._at = np.zeros(_PLACES, dtype=np.int32)
+        #: of each spelling at a place its words, and the number of the name
+        self._words = np.zeros((_WORDS, _FIRST_ROOM), dtype=np.uint64)
+        self._number = np.full(_FIRST_ROOM, -1, dtype=np.int32)
+        self._spellings = 1
         #: the most words that any name has
         self._most = 0
 
@@ -159,51 +176,95 @@ class _Names:
             self.known.append(name)
         return number
 
-    def of(self, cells: _Cells) -> NDArray[np.int32]:
+    def of(self, cells: _Cells) -> npt.NDArray[np.int32]:
         """The number of the name in each cell."""
         words = cells.words()
         mixed = words[0] * _SPREAD[0]
         for word, spread in zip(words[1:], _SPREAD[1:], strict=False):
             mixed += word * spread
         places = (mixed >> np.uint64(64 - _PLACES.bit_length() + 1)).astype(np.int64)
-        numbers = self._number[places] - 1
+        spellings = self._at[places]
+        numbers = self._number[spellings]
         other = (numbers < 0) | (cells.ends - cells.begins > 8 * _WORDS)
         self._most = max(self._most, len(words))
-        for word, held in itertools.zip_longest(words, self._held[: self._most]):
-            other |= held[places] != (0 if word is None else word)
+        for word, held in itertools.zip_longest(words, self._words[: self._most]):
+            other |= held[spellings] != (0 if word is None else word)
         for cell in np.flatnonzero(other).tolist():
             written = cells.text[cells.begins[cell] : cells.ends[cell]].tobytes()
             number, place = self[written.decode("utf-8")], int(places[cell])
             numbers[cell] = number
-            if number >= 0 and len(written) <= 8 * _WORDS and not self._number[place]:
-                self._number[place] = number + 1
-                self._held[: len(words), place] = [word[cell] for word in words]
+            if number >= 0 and len(written) <= 8 * _WORDS and not self._at[place]:
+                self._at[place] = self._spelling([word[cell] for word in words], number)
         return numbers
+
+    def _spelling(self, words: list[np.uint64], number: int) -> int:
+        """Keep a spelling of the name of this number, by its words."""
+        kept = self._spellings
+        if kept == len(self._number):  # twice the room
+            self._words = np.concatenate((self._words, np.zeros_like(self._words)), axis=1)
+            self._number = np.concatenate((self._number, self._number))
+        self._words[: len(words), kept] = words
+        self._number[kept] = number
+        self._spellings += 1
+        return kept
+
+
+def _in_brief(numbers: npt.NDArray[Any]) -> Indices:
+    """Integers as narrow as they fit, only one of them where all are equal."""
+    kept = narrow(numbers.astype(np.int64))
+    return np.broadcast_to(kept[0], kept.shape) if (kept == kept[0]).all() else kept
 
 
 class _Reader:
     """Takes the rows after the header, and gives the table of all of them; what is wrong with them is reported."""
 
-    def __init__(self, places: dict[str, int]) -> None:
+    def __init__(self, places: dict[str, int], most: int) -> None:
+        """``most``: how many edges there may be."""
         self.faults = Faults()
         self._places = places
         self._names = _Names()
-        self._begins, self._ends, self._delays, self._rows = array("i"), array("i"), array("i"), array("i")
-        self._weights = array("d")
+        self._count = 0
+        self._begins, self._ends = np.empty(most, dtype=np.int32), np.empty(most, dtype=np.int32)
+        self._weights = np.empty(most)
+        #: those of some edges after the other
+        self._delays: list[Indices] = []
+        self._offsets: list[Indices] = []
+        #: edges that were taken one by one since: where they begin and end, weight, delay, row
+        self._singles = array("d")
 
     def table(self) -> EdgeTable:
         """The table of all rows taken so far."""
-        begins, ends, delays, rows = (
-            np.asarray(one, dtype=np.int32) for one in (self._begins, self._ends, self._delays, self._rows)
+        self._add_singles()
+        return EdgeTable(
+            names=tuple(self._names.known),
+            begins=narrow(self._begins[: self._count]),
+            ends=narrow(self._ends[: self._count]),
+            weights=self._weights[: self._count],
+            delays=integers(*self._delays),
+            offsets=integers(*self._offsets),
+            fault=self.faults.first(),
         )
-        weights = np.asarray(self._weights, dtype=np.float64)
-        return EdgeTable(tuple(self._names.known), begins, ends, weights, delays, rows, self.faults.first())
+
+    def _add(self, *columns: npt.NDArray[Any]) -> None:
+        """Add edges: where they begin and end, weights, delays, rows."""
+        begins, ends, weights, delays, rows = columns
+        at = slice(self._count, self._count + len(rows))
+        self._begins[at], self._ends[at], self._weights[at] = begins, ends, weights
+        self._delays.append(_in_brief(delays))
+        self._offsets.append(_in_brief(rows - np.arange(at.start, at.stop)))
+        self._count = at.stop
+
+    def _add_singles(self) -> None:
+        """Add what was taken one by one."""
+        if self._singles:
+            self._add(*np.array(self._singles).reshape(-1, 5).T)
+            del self._singles[:]
 
     def take(self, lines: bytes, number: int) -> None:
         """Take lines, of which the first has this number. Raises CellError where there is no reading on."""
-        width, count = len(self._places), lines.count(b"\n") + 1
-        marks = (b"," * (width - 1) + b"\n") * count
-        if b'"' not in lines and lines.translate(None, _NO_MARKS) == marks[:-1]:
+        width, marks = len(self._places), lines.translate(None, _NO_MARKS) + b"\n"
+        count = len(marks) // width
+        if b'"' not in lines and marks == (b"," * (width - 1) + b"\n") * count:
             text = np.frombuffer(lines + b"\n" + bytes(8 * _WORDS), dtype=np.uint8)
             ends = np.flatnonzero((text == ord(",")) | (text == ord("\n")))
             begins = np.concatenate(([0], ends[:-1] + 1))
@@ -229,11 +290,9 @@ class _Reader:
         begins, ends = self._names.of(columns["from"]), self._names.of(columns["to"])
         if min(begins.min(), ends.min()) < 0:
             return False
-        self._begins.frombytes(begins.tobytes())
-        self._ends.frombytes(ends.tobytes())
-        self._weights.frombytes(np.where(np.isnan(weights), 1.0, weights).tobytes())
-        self._delays.frombytes(np.where(np.isnan(delays), -1, delays).astype(np.int32).tobytes())
-        self._rows.frombytes(np.arange(number, number + count, dtype=np.int32).tobytes())
+        weights, delays = np.where(np.isnan(weights), 1.0, weights), np.where(np.isnan(delays), -1.0, delays)
+        self._add_singles()
+        self._add(begins, ends, weights, delays, np.arange(number, number + count))
         return True
 
     def _one(self, row: Row) -> None:
@@ -248,11 +307,9 @@ class _Reader:
                 self.faults.note(in_cell(number, column + 1, "the name of a neuron is wanted"))
         weight, delay = (self._number(number, cells, name) for name in ("weight", "delay"))
         if all(ends):
-            self._begins.append(self._names[ends[0]])
-            self._ends.append(self._names[ends[1]])
-            self._weights.append(1.0 if math.isnan(weight) else weight)
-            self._delays.append(-1 if math.isnan(delay) else int(delay))
-            self._rows.append(number)
+            begin, end = (self._names[name] for name in ends)
+            weight, delay = 1.0 if math.isnan(weight) else weight, -1.0 if math.isnan(delay) else delay
+            self._singles.extend((begin, end, weight, delay, number))
 
     def _number(self, row: int, cells: list[str], name: str) -> float:
         """What a row has in the column of this name; NaN where that is nothing, or invalid, which is reported."""

@@ -17,7 +17,7 @@ from neurovis_spec.language.data.table import EMPTY_CELL, MOST_FAULTS, CellError
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.values import DATA_FILES
-from neurovis_spec.language.yaml.opening import FileFault, read_bytes
+from neurovis_spec.language.yaml.opening import FileFault, read_parts
 from neurovis_spec.likeness import suggest
 from neurovis_spec.real_paths import real_path
 
@@ -31,6 +31,8 @@ LARGEST: Final = 256 << 20  # bytes; ten million connections in double precision
 LONGEST_PATH: Final = 4096
 #: what is said of NaN and infinity where no cell may be empty
 NO_GAP: Final = "a finite number is needed in every cell"
+#: bytes of a file that are let go together, as soon as they are read
+_PART: Final = 1 << 22
 #: bytes of a file of text that is shown with what is wrong in it
 _SHOWN: Final = 1 << 20
 _FROM: Final = "paths are relative to the file that names them"
@@ -78,11 +80,17 @@ def locate(file: NamedFile, findings: Findings) -> Path | Unknown:
 
 
 def read_data(file: NamedFile, findings: Findings) -> bytes | Unknown:
-    """The bytes of a file that an author named; None, and a finding, where it must not or cannot be read."""
+    """The bytes of a file that an author named; UNKNOWN, and a finding, where it must not or cannot be read."""
+    parts = _read_parts(file, findings)
+    return UNKNOWN if parts is UNKNOWN else b"".join(parts)
+
+
+def _read_parts(file: NamedFile, findings: Findings, size: int | None = None) -> list[bytes] | Unknown:
+    """The same in parts of this size."""
     path = locate(file, findings)
     if path is UNKNOWN:
         return UNKNOWN
-    data = read_bytes(path, LARGEST)
+    data = read_parts(path, LARGEST, size)
     if isinstance(data, FileFault):
         hint = (_neighbours(path) or _FROM) if data.code == "file-missing" else None
         findings.error(data.code, file.span, f"the file '{_short(file.path)}' {data.reason}", hint)
@@ -174,13 +182,13 @@ def read_edges(file: NamedFile, findings: Findings, *, room: Room | None = None)
     if file.key is not None:
         _refuse_key(file.key, findings)
         return UNKNOWN
-    data = read_data(file, findings)
-    if data is UNKNOWN:
+    parts = _read_parts(file, findings, _PART)
+    if parts is UNKNOWN:
         return UNKNOWN
     from neurovis_spec.language.data.edge_list import parse_edges
 
     try:
-        table = parse_edges(data, room)
+        table = parse_edges(parts, room)
     except CellError as error:
         _refuse(error, file.path, file.span, findings)
         return UNKNOWN

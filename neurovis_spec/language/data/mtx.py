@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from neurovis_spec.language.data.cells import below
+from neurovis_spec.language.data.cells import below, stretches_of
 from neurovis_spec.language.data.table import (
     MOST_FAULTS,
     SPARSER,
@@ -149,7 +149,7 @@ def _numbers(data: bytes, number: int, head: _Head, faults: Faults) -> tuple[NDA
     promised. What is wrong with lines is reported."""
     numbers, tables = [np.zeros(0, dtype=np.int32)], [np.zeros((0, head.width))]
     entries = 0
-    for first, part in below(data, number):
+    for first, part in below(stretches_of([data]), number):
         lines = part.split(b"\n")
         table = None if part.translate(None, _PLAIN) else _loaded(lines, head.width)
         if table is not None:

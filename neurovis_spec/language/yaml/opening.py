@@ -1,7 +1,8 @@
 """Opening files that somebody else named: regular files only, bounded in size, never waiting.
 
-In: a path and the most bytes wanted. Out: the bytes, or a FileFault that says in an author's words why not. A device,
-a pipe or a socket is told from a file before it is opened (opening one may have effects, reading one may never end).
+In: a path and the most bytes wanted. Out: the bytes, whole or in parts, or a FileFault that says in an author's words
+why not. A device, a pipe or a socket is told from a file before it is opened (opening one may have effects, reading one
+may never end).
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from typing import NamedTuple
 from neurovis_spec.real_paths import reason_of
 
 _FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
-_CHUNK = 1 << 24
+#: bytes that are read at once of a file that says to have fewer
+_CHUNK = 1 << 18
 
 
 class FileFault(NamedTuple):
@@ -34,6 +36,12 @@ def fault_of(path: Path, most: int) -> FileFault | None:
 
 def read_bytes(path: Path, most: int) -> bytes | FileFault:
     """The bytes of a regular file of at most ``most`` bytes; symbolic links are followed (see ``data.files``)."""
+    parts = read_parts(path, most)
+    return parts if isinstance(parts, FileFault) else b"".join(parts)
+
+
+def read_parts(path: Path, most: int, size: int | None = None) -> list[bytes] | FileFault:
+    """The same in parts of this size; by default in one, where the file is as long as it says."""
     fault = fault_of(path, most)
     if fault is not None:
         return fault
@@ -42,7 +50,8 @@ def read_bytes(path: Path, most: int) -> bytes | FileFault:
     except (OSError, ValueError) as error:
         return _unreadable(error)
     try:
-        return _fault(os.fstat(handle), most) or _read(handle, most)
+        status = os.fstat(handle)
+        return _fault(status, most) or _read(handle, most, size or max(status.st_size + 1, _CHUNK))
     except OSError as error:
         return _unreadable(error)
     finally:
@@ -57,13 +66,13 @@ def _fault(status: os.stat_result, most: int) -> FileFault | None:
     return _too_large(most) if status.st_size > most else None
 
 
-def _read(handle: int, most: int) -> bytes | FileFault:
+def _read(handle: int, most: int, size: int) -> list[bytes] | FileFault:
     parts: list[bytes] = []
     room = most + 1  # one more: a file may grow, and some systems' files claim to be empty
-    while room and (part := os.read(handle, min(room, _CHUNK))):
+    while room and (part := os.read(handle, min(room, size))):
         parts.append(part)
         room -= len(part)
-    return b"".join(parts) if room else _too_large(most)
+    return parts if room else _too_large(most)
 
 
 def _too_large(most: int) -> FileFault:
