@@ -339,7 +339,7 @@ def with_products(tree: Tree) -> Tree:
     made = tree.having(tuple(with_products(part) for part in tree.parts))
     match made:
         case Binary(operator="^", left=base, right=Number(value=3.0 | 4.0 as times)):
-            product = Chain(("*", "*", "*")[: int(times) - 1], (base,) * int(times), made.start, made.end)
+            product = Chain(("*", "*") if times == 3.0 else ("*", "*", "*"), (base,) * int(times), made.start, made.end)
             check_extent(product, tree)
             return product
     return made
