@@ -92,7 +92,11 @@ class _By(Visitor[Tree]):
         return _ZERO
 
     def arithmetic(self, node: Chain) -> Tree:
-        made, slope = node.operands[0], self.of(node.operands[0])
+        base, count = node.operands[0], len(node.operands)
+        if set(node.operators) == {"*"} and node.operands == (base,) * count:  # a power
+            rest = base if count == 2 else Chain(node.operators[1:], node.operands[1:])
+            return _product(_product(Number(float(count)), rest), self.of(base))
+        made, slope = base, self.of(base)
         for place, (operator, operand) in enumerate(node.steps, start=1):
             slope = _chained(OPERATORS[operator], (made, operand), (slope, self.of(operand)))
             made = Chain(node.operators[:place], node.operands[: place + 1])
