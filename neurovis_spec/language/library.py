@@ -151,7 +151,7 @@ class ActivationModel(DefinitionModel):
 
     parameters: Annotated[Named[ParameterField], LOCAL] = Field(default_factory=dict, description="Names and defaults.")
     let: Annotated[Named[Annotated[FormulaField, IN_ACTIVATION]], LOCAL] = Field(
-        default_factory=dict, description="Intermediate values, in order."
+        default_factory=dict, description="Intermediate values; one may read others."
     )
     value: Annotated[FormulaField, IN_ACTIVATION] = Field(
         description="An expression of x, the combined input, and the parameters."
@@ -238,7 +238,7 @@ class RuleModel(DefinitionModel):
         default=(), description="Names of signals that the connection must supply."
     )
     let: Annotated[Named[Annotated[FormulaField, IN_RULE]], LOCAL] = Field(
-        default_factory=dict, description="Intermediate values, in order."
+        default_factory=dict, description="Intermediate values; one may read others."
     )
     state: Annotated[Named[Annotated[StateModel, IN_RULE]], LOCAL] = Field(
         default_factory=dict, description="States, one for each connection."
