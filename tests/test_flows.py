@@ -187,3 +187,50 @@ def test_written_cubes_are_products_where_something_flows() -> None:
     still = model("let: {c: v^3}\n    state: {v: {each_step: -c}}\n    activity: v")
     assert evaluate(dict(still.let)["c"], {"v": v}) == v**3.0
     assert v**3.0 != (v * v) * v
+
+
+# ---- the content -------------------------------------------------------------------------------------------------
+
+CONTENT = """
+    parameters: {tau: 2}
+    ports: [a, b]
+    state: {v: {derivative: (a + b - v)/tau, noise: 0.1}, w: {derivative: -w}}
+    outputs: {x: v*w, y: w}
+    activity: v"""
+
+
+def hash_of(body: str) -> str:
+    return nv.compile_text(f"{HEAD}models:\n  m:{body}\nneurons: {{A: {{model: m}}}}").hash
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("{tau: 2}", "{tau: {value: 2, unit: s}}"),
+        ("[a, b]", "{b: {unit: pA}, a: sum}"),
+        ("-w}", "-w, unit: mV}"),
+        ("{x: v*w, y: w}", "{y: w, x: v*w}"),
+        ("activity: v", "activity: v\n    send: activity\n    time: s"),
+    ],
+)
+def test_what_is_shown_and_the_order_of_names_are_no_content(old: str, new: str) -> None:
+    assert hash_of(CONTENT.replace(old, new)) == hash_of(CONTENT)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("derivative: -w", "derivative: -2*w"),
+        ("derivative: -w", "each_step: -w"),
+        ("noise: 0.1", "noise: 0.2"),
+        (", noise: 0.1", ""),
+        ("[a, b]", "[a, b, c]"),
+        ("[a, b]", "{a: sum, b: product}"),
+        ("y: w", "y: 2*w"),
+        ("y: w", "z: w"),
+        ("activity: v", "activity: v\n    send: w"),
+        ("activity: v", "activity: v\n    time: ms"),
+    ],
+)
+def test_what_a_run_depends_on_is_content(old: str, new: str) -> None:
+    assert hash_of(CONTENT.replace(old, new)) != hash_of(CONTENT)

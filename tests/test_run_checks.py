@@ -31,7 +31,7 @@ BACKENDS = ["reference", "numpy", pytest.param("c", marks=pytest.mark.compiler)]
 SPEC = """
 neurovis: 1
 name: hiding
-time: {{steps: 40, episode: 10}}
+time: {{dt: 1, steps: 40, episode: 10}}
 parameters: {{scale: 1, zero: 0}}
 inputs:
   ramp: {{expression: k - 7}}
@@ -97,6 +97,26 @@ def told(network: nv.CompiledNetwork, backend: str) -> list[str]:
             "the model 'm' divides by 0 for A1 at step 19",
         ),
         (
+            {"model": 'state: {v: {derivative: "clip(1/drive, -1, 1)"}}, activity: v'},
+            "the model 'm' divides by 0 for A1 at step 7",
+        ),
+        (
+            {"model": 'state: {v: {derivative: 1/drive, each_step: "clip(v, -1, 1)"}}, activity: v'},
+            "the model 'm' divides by 0 for A1 at step 7",
+        ),
+        (
+            {"model": "let: {y: f(drive)}, state: {v: {derivative: y - v}}, activity: v", "neuron": "activation: steep"},
+            "the activation 'steep' divides by 0 for A1 at step 7",
+        ),
+        (
+            {"model": "state: {v: {each_step: v + f(drive)}}, activity: v", "neuron": "activation: steep"},
+            "the activation 'steep' divides by 0 for A1 at step 7",
+        ),
+        (
+            {"model": 'state: {v: {derivative: drive}}, outputs: {o: "tanh(1/drive)"}, activity: v'},
+            "the model 'm' divides by 0 for A1 at step 7",
+        ),
+        (
             {"rule": 'weight: {each_step: "weight + min(1/pre, 0.01)"}'},
             "the rule 'r' divides by 0 for A1 -> B after step 7",
         ),
@@ -123,6 +143,7 @@ def test_what_is_undefined_and_hidden_is_told_once(parts: dict[str, str], messag
         {"model": 'let: {y: 1/drive}, activity: "0 if drive == 0 else tanh(y)"'},
         {"model": 'activity: "1 if drive != 0 and 1/drive > 0.5 else 0"'},
         {"model": 'activity: "1/(1 + exp(-300*drive))"'},
+        {"model": "state: {v: {derivative: exprel(drive) - v}}, activity: tanh(v)"},
         {"model": 'activity: "clip(exp(1000*drive), 0, 1)"'},
         {"model": 'activity: "tanh(drive/s) + clip(drive % 3, 0, 1) + exp(-drive^2)"'},
         {"rule": 'weight: {each_step: "weight + (min(1/pre, 0.01) if pre > 0 else 0)"}'},
