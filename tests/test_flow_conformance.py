@@ -15,6 +15,7 @@ import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import SpecError
+from neurovis_spec.runtime import numpy_flows
 from neurovis_spec.runtime.columns import Keep
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.course import Course
@@ -128,3 +129,33 @@ def test_outputs_that_read_each_other_at_a_stage_are_made_in_order() -> None:
 
     coarse, fine, finest = map(after_half_a_second, (40, 80, 640))
     assert 13 < np.abs(coarse - finest).max() / np.abs(fine - finest).max() < 20
+
+
+DENSE = """
+neurovis: 1
+name: dense
+time: {dt: 0.05, integrate: heun}
+models:
+  m: {state: {v: {initial: 0.3, derivative: drive - v}}, activity: f(v), outputs: {far: "v + GROWTH"}, send: far}
+neurons: {A: {count: 70, model: m, bias: 0.01*i}, B: {count: 65, model: m, activation: sin}}
+connections:
+  A -> A: {weight: (1.1 + sin(i + j*j))/99, pattern: all_to_all, PLASTIC}
+  A -> B: {weight: "uniform(0, 0.1)", pattern: all_to_all}
+  B -> A: {weight: 0.1, pattern: {band: {width: 60}}, PLASTIC}
+"""
+
+
+@pytest.mark.parametrize("plastic", ["send: far", "plasticity: {oja: {rate: 0.01}}"])
+@pytest.mark.parametrize("growth", ["0", "1e300*1e300 if t > 0.19 and t < 0.21 else 0"])
+def test_a_full_matrix_adds_up_in_the_same_order(plastic: str, growth: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a product of a matrix as one by one, bit for bit, an infinite activity included."""
+    network = nv.compile_text(DENSE.replace("PLASTIC", plastic).replace("GROWTH", growth)).network
+    runs = []
+    for least in (numpy_flows._DENSE, 1 << 62):
+        monkeypatch.setattr(numpy_flows, "_DENSE", least)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            runs.append(record(network, Course(9, backend="numpy", keep=Keep(states=("all",)))))
+    assert runs[0].states.tobytes() == runs[1].states.tobytes()
+    assert runs[0].weights.tobytes() == runs[1].weights.tobytes()
+    assert np.isinf(runs[0].states).any() == ("300" in growth)

@@ -66,7 +66,7 @@ _PARTS = ("activity", "outlets", "weights", "signals", "history", "cells")
 #: the numbers that can be set, in the conditions of the state
 _VARIABLES = "variables"
 #: the functions of NumPy that are called so often that they are looked up beforehand
-_CALLED = ("bincount", "concatenate", "add", "subtract", "multiply", "divide", "minimum")
+_CALLED = ("bincount", "concatenate", "einsum", "dot", "isfinite", "add", "subtract", "multiply", "divide", "minimum")
 #: whether the step is the first one of all, which no other came before
 FIRST = "k == 0 and not state.continued"
 

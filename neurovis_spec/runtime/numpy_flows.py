@@ -28,6 +28,7 @@ from typing import Final
 
 import numpy as np
 
+from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.program import Diffuse, Integrate, Port
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.words import Method
@@ -42,6 +43,9 @@ from neurovis_spec.runtime.numpy_arrivals import (
 )
 from neurovis_spec.runtime.numpy_code import FIRST, shared
 from neurovis_spec.runtime.stages import Formulas, Part, apart, parts_of, taken_by, times
+
+#: fewer signals are added one by one, however they lie
+_DENSE = 4096
 
 
 def integrate(operation: Integrate, step: Step) -> None:
@@ -103,6 +107,9 @@ class _Flow:
         #: is held over the step, else what arrives there and is held
         self.whole: dict[tuple[int, str], str] = {}
         self.held: dict[tuple[int, str], str] = {}
+        #: matrices of weights, by population and port, and what fills those once a step that learn
+        self.matrices: dict[tuple[int, str], str] = {}
+        self.filled: list[str] = []
 
     def temporary(self) -> str:
         """An array to work in, as long as all flow states."""
@@ -132,10 +139,12 @@ class _Flow:
             for part in self.parts:
                 for port in part.ports:
                     self.hold(part, port)
-            code.line(f"t = (k - 1) * {self.network.dt!r}")
-            self.emit_spread(f"t + {times(0.0, h).first!r}")
             with code.function(stage, "t"):
                 _Stage(self).emit()
+            for line in self.filled:
+                code.line(line)
+            code.line(f"t = (k - 1) * {self.network.dt!r}")
+            self.emit_spread(f"t + {times(0.0, h).first!r}")
             if substeps > 1:
                 code.line("start = t")
                 code.line(f"for substep in range({substeps}):")
@@ -277,10 +286,40 @@ class _Stage:
             connections = port.incoming[staged]
             weights = self.code.select("weights", connections, len(self.network.connections))
             taken = flow.taken[taken_by(self.network)[connections]]
-            sent = self.code.select(flow.sent, taken, flow.taken_count)
-            signals = with_factors(self.code, port, staged, self.code.let("g", f"{weights} * {sent}"))
-            arriving = accumulated(self.step, part.population, port, staged, signals, arriving)
+            signals = f"{weights} * {self.code.select(flow.sent, taken, flow.taken_count)}"
+            if port.combine == "sum" and port.factors is None and not arriving and len(staged) >= _DENSE:
+                arriving = self.product(part, port, taken, weights, signals)
+            else:
+                signals = with_factors(self.code, port, staged, self.code.let("g", signals))
+                arriving = accumulated(self.step, part.population, port, staged, signals, arriving)
         return flow.given(part, port, arriving, self.vector)
+
+    def product(self, part: Part, port: Port, taken: IntArray, weights: str, signals: str) -> str:
+        """The sums of a port all of whose signals are made anew. Where most neurons are connected, they are a product
+        of a matrix of weights, which adds in the same order; it has a 0 where there is no connection, which an infinite
+        activity must not make NaN."""
+        _, staged = apart(port)
+        count, slots = len(part.population.members), port.slots[staged].astype(np.int64)
+        rows, row = np.unique(taken, return_inverse=True)
+        flat, size = row * count + slots, len(rows) * count
+        one_by_one = accumulated(self.step, part.population, port, staged, signals)
+        in_order = np.argsort(slots, kind="stable")
+        ascends = np.diff(flat[in_order])[np.diff(slots[in_order]) == 0] > 0
+        if not ascends.all() or 2 * len(flat) < size:
+            return one_by_one
+        sent, shape = self.code.select(self.flow.sent, rows, self.flow.taken_count), (len(rows), count)
+        if np.array_equal(flat, np.arange(size)):
+            return f"einsum('st,s->t', {weights}.reshape({shape}), {sent})"
+        key = part.number, port.name
+        if key not in self.flow.matrices:
+            matrix = self.flow.matrices[key] = self.code.array("f", f"np.zeros({shape})")
+            fill = f"{matrix}.reshape(-1)[{self.code.constant(flat)}] = {weights}"
+            if (self.network.connections.rules[port.incoming[staged]] >= 0).any():
+                self.flow.filled.append(fill)
+            else:
+                self.code.before.append(f"    {fill}")
+        a = self.code.let("a", sent)
+        return f"einsum('st,s->t', {self.flow.matrices[key]}, {a}) if isfinite(dot({a}, {a})) else {one_by_one}"
 
 
 def _text(place: slice) -> str:
