@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from neurovis_spec.arrays import Indices, IntArray, width
+from neurovis_spec.arrays import Indices, IntArray, sorting, starts_of, width
 from neurovis_spec.compiler.events.settable import CENTRES
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Population
@@ -88,8 +88,9 @@ def incoming_of(network: Network, population: Population) -> Incoming:
     connections, count = network.connections, len(population.members)
     incoming, slots = population.drive.incoming, population.drive.slots
     delays, rules = connections.delays.some(incoming), connections.rules.some(incoming)
-    order = np.argsort(slots, kind="stable")
-    own, ends = incoming[order], np.searchsorted(slots[order], np.arange(count + 1)).astype(np.int64)
+    own, ends = np.empty_like(incoming), starts_of(slots, count)
+    for some, places in sorting(slots, ends):
+        own[places] = incoming[some]
     degrees = np.diff(ends)
     degree = int(degrees[0]) if (degrees == degrees[0]).all() else -1
     full = population.drive.combine == "sum" and degree > 1 and 1 < count <= _BESIDE and len(_different(delays)) == 1
@@ -107,7 +108,7 @@ def incoming_of(network: Network, population: Population) -> Incoming:
 
 def _different(delays: Indices) -> list[int]:
     """The delays that there are, ascending."""
-    found: list[int] = np.unique(delays).tolist()
+    found: list[int] = np.unique(delays[:1] if delays.strides == (0,) else delays).tolist()
     return found
 
 
@@ -135,7 +136,7 @@ class Arrivals:
         self._layout = layout
 
     @cached_property
-    def offsets(self) -> IntArray:
+    def offsets(self) -> Indices:
         """The first slot of each connection."""
         return self._layout.offsets[self.connections]
 
@@ -260,7 +261,8 @@ class Arrivals:
         delays = self.delays[column] if not isinstance(edge, int) else self.delays[column][edge : edge + 1]
         kinds = _different(delays)
         if self.fused:
-            places = self.begin + np.arange(len(self.connections))[column]
+            end = self.begin + len(self.connections)
+            places = np.arange(self.begin, end, dtype=width(0, end))[column]
             return f"packed[{code.at(places, edge)}]*before[{code.at(self.sources[column], edge)}]"
         now = ""
         if kinds[0] == 0:

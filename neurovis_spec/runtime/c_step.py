@@ -299,7 +299,7 @@ class StepCode:
         """The signal of one of some connections, all of one delay: its slot, and what leaves."""
         code, connections = self.code, self.network.connections
         delay = int(connections.delays[members[0]])
-        slot, source = code.at(self.layout.offsets[members], place), code.at(connections.sources[members], place)
+        slot, source = code.at(self.layout.offsets[members], place), code.at(connections.sources.some(members), place)
         shift = "" if delay == 1 else f" + {code.remainder(delay)}"
         return f"signals[{slot}{shift}]", f"weights[{code.at(members, place)}]*activity[{source}]"
 

@@ -68,7 +68,7 @@ class ReferenceStepper:
 
     def __init__(self, network: Network) -> None:
         self.network, self.functions = network, PLAIN
-        self.offsets = signal_layout(network).offsets
+        self.offsets = signal_layout(network).offsets.tolist()
         variables, connections = network.settable.variables, network.connections
         #: the parameters of definitions in use
         self.settings = {
