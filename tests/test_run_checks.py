@@ -105,7 +105,10 @@ def told(network: nv.CompiledNetwork, backend: str) -> list[str]:
             "the model 'm' divides by 0 for A1 at step 7",
         ),
         (
-            {"model": "let: {y: f(drive)}, state: {v: {derivative: y - v}}, activity: v", "neuron": "activation: steep"},
+            {
+                "model": "let: {y: f(drive)}, state: {v: {derivative: y - v}}, activity: v",
+                "neuron": "activation: steep",
+            },
             "the activation 'steep' divides by 0 for A1 at step 7",
         ),
         (

@@ -120,11 +120,10 @@ def test_what_fails_leaves_what_was_there(network: CompiledNetwork, tmp_path: Pa
         if done >= 512:
             raise _FailedError
 
-    with pytest.warns(UserWarning) as caught, pytest.raises(_FailedError):
+    words = r"what was recorded, up to step \d+, is in .*part$"
+    with pytest.warns(UserWarning, match=words) as caught, pytest.raises(_FailedError):
         network.run_to(path, 2000, progress=stop)
-    (message,) = [str(one.message) for one in caught]
-    assert f"what was recorded, up to step {told[-1] - 1}, is in {tmp_path}" in message
-    assert message.endswith("part")
+    assert f"up to step {told[-1] - 1}, is" in str(caught[0].message)
     assert path.read_bytes() == before
     part = tmp_path / f".x.{suffix}.part"
     assert sorted(tmp_path.iterdir()) == [part, path]

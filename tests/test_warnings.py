@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from unittest.mock import patch
 
@@ -16,7 +17,9 @@ import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.codes import catalogue
 from neurovis_spec.compiler.checks import neurons as checks
-from neurovis_spec.diagnostics import Diagnostic
+from neurovis_spec.compiler.checks import warnings as table
+from neurovis_spec.compiler.checks.compiled import Compiled
+from neurovis_spec.diagnostics import Diagnostic, Findings
 from neurovis_spec.language.allow import allows
 
 ROOT = Path(__file__).parents[1]
@@ -464,6 +467,28 @@ def test_every_warning_of_the_catalogue_can_be_allowed(tmp_path: Path) -> None:
             lines = code.bad.split("\n")
             lines[found.span.line - 1] += f"   # neurovis: allow {code.name}"
             assert _told("\n".join(lines), tmp_path) == (), code.name
+
+
+def test_a_check_that_is_left_out_would_find_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Checks are left out of specs without their sections: so it is with the examples of the catalogue."""
+    done = []
+
+    def warn(compiled: Compiled, findings: Findings) -> None:
+        table.warn(compiled, findings)
+        found = findings.sorted()
+        for check in table._CHECKS:
+            check.warn(compiled, findings)
+        assert findings.sorted() == found, compiled.spec.source
+        done.append(found)
+
+    monkeypatch.setattr("neurovis_spec.compiler.compile.warn", warn)
+    for code in catalogue().values():
+        texts = (code.good, code.bad if code.severity == "warning" else None)
+        for text in (text for text in texts if text is not None and not code.files):
+            with suppress(nv.SpecError):
+                nv.compile_text(text, folder=tmp_path)
+    assert len(done) > 100
+    assert sum(map(bool, done)) >= 20
 
 
 def _told(text: str, folder: Path) -> tuple[Diagnostic, ...]:

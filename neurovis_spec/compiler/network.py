@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, FloatColumn, IntArray, IntColumn, frozen
+from neurovis_spec.arrays import FloatArray, FloatColumn, IntArray, IntColumn, frozen, pieces
 from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
 from neurovis_spec.compiler.events.changes import Change
@@ -424,15 +424,36 @@ class Network:
             f"{names[s]} -> {names[t]}"
             for s, t in zip(connections.sources.tolist(), connections.targets.tolist(), strict=True)
         ]
-        places: dict[str, list[int]] = {}
-        for index, name in enumerate(plain):
-            places.setdefault(name, []).append(index)
-        parallel = {name: members for name, members in places.items() if len(members) > 1}
-        keys = self._parallel_keys([index for members in parallel.values() for index in members])
-        for name, members in parallel.items():
-            for rank, index in enumerate(sorted(members, key=keys.__getitem__)):
-                plain[index] = name if rank == 0 else f"{name} ({rank + 1})"
+        for index, number in self.parallel.items():
+            if number > 1:
+                plain[index] += f" ({number})"
         return tuple(plain)
+
+    @cached_property
+    def parallel(self) -> Mapping[int, int]:
+        """The indices of the connections that share both ends with others, and the number of each among these, from 1
+        on, as in its name."""
+        pairs = self._pairs()
+        pairs.sort()
+        shared = np.unique(pairs[1:][pairs[1:] == pairs[:-1]])
+        if not len(shared):
+            return {}
+        pairs = self._pairs()
+        shares = (shared[np.searchsorted(shared[:-1], piece)] == piece for piece in pieces(pairs))
+        indices = np.flatnonzero(np.concatenate([*shares]))
+        keys = self._parallel_keys(indices.tolist())
+        members: dict[int, list[int]] = {}
+        for index, pair in zip(indices.tolist(), pairs[indices].tolist(), strict=True):
+            members.setdefault(pair, []).append(index)
+        ordered = (sorted(some, key=keys.__getitem__) for some in members.values())
+        return {index: number for some in ordered for number, index in enumerate(some, 1)}
+
+    def _pairs(self) -> IntArray:
+        """Both ends of each connection as one number."""
+        result: IntArray = self.connections.sources.compact().astype(np.int64)
+        result *= len(self.neurons)
+        result += self.connections.targets.compact()
+        return result
 
     def _parallel_keys(self, indices: list[int]) -> Mapping[int, tuple[int, str, float, int]]:
         """What each of these connections is ordered by among those that share both ends."""

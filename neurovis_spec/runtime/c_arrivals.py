@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, Indices, IntArray, width
+from neurovis_spec.arrays import FloatArray, Indices, IntArray, sorting, starts_of, width
 from neurovis_spec.compiler.events.settable import CENTRES
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Port
@@ -90,8 +90,12 @@ def incoming_of(network: Network, port: Port, count: int, fusible: bool = True) 
     ``fusible``: whether it may be formed where it arrives."""
     connections, incoming, slots = network.connections, port.incoming, port.slots
     delays, rules = connections.delays.some(incoming), connections.rules.some(incoming)
-    order = np.argsort(slots, kind="stable")
-    own, ends = incoming[order], np.searchsorted(slots[order], np.arange(count + 1)).astype(np.int64)
+    own, ends = np.empty_like(incoming), starts_of(slots, count)
+    factors = None if port.factors is None else np.empty_like(port.factors)
+    for some, places in sorting(slots, ends):
+        own[places] = incoming[some]
+        if factors is not None and port.factors is not None:
+            factors[places] = port.factors[some]
     degrees = np.diff(ends)
     degree = int(degrees[0]) if (degrees == degrees[0]).all() else -1
     full = port.combine == "sum" and degree > 1 and 1 < count <= _BESIDE and len(_different(delays)) == 1
@@ -104,7 +108,6 @@ def incoming_of(network: Network, port: Port, count: int, fusible: bool = True) 
         beside, read = _in_lanes(ends)
         lanes = beside, read
     fused = fusible and len(delays) > 0 and bool((delays == 1).all() and (rules < 0).all())
-    factors = None if port.factors is None else port.factors[order]
     return Incoming(own, ends, degree, fused, full, lanes, factors)
 
 
@@ -124,7 +127,7 @@ def taken(network: Network, code: Code, connections: Indices, place: Place) -> s
 
 def _different(delays: Indices) -> list[int]:
     """The delays that there are, ascending."""
-    found: list[int] = np.unique(delays).tolist()
+    found: list[int] = np.unique(delays[:1] if delays.strides == (0,) else delays).tolist()
     return found
 
 
@@ -180,7 +183,7 @@ class Arrivals:
         return taken(self.network, self.code, self.connections[column], edge)
 
     @cached_property
-    def offsets(self) -> IntArray:
+    def offsets(self) -> Indices:
         """The first slot of each connection."""
         return self._layout.offsets[self.connections]
 
@@ -319,7 +322,8 @@ class Arrivals:
         delays = self.delays[column] if not isinstance(edge, int) else self.delays[column][edge : edge + 1]
         kinds = _different(delays)
         if self.fused:
-            places = self.begin + np.arange(len(self.connections))[column]
+            end = self.begin + len(self.connections)
+            places = np.arange(self.begin, end, dtype=width(0, end))[column]
             return f"packed[{code.at(places, edge)}]*before[{code.at(self.sources[column], edge)}]"
         now = ""
         if kinds[0] == 0:

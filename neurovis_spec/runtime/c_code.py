@@ -23,7 +23,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.arrays import FloatArray, Indices
+from neurovis_spec.arrays import PIECE, FloatArray, Indices, pieces
 from neurovis_spec.compiler.events.settable import Variable
 from neurovis_spec.compiler.program import Key, Owner, Use
 from neurovis_spec.language.expressions.emit_c import Drawn, Emitter, Made, Value
@@ -41,6 +41,15 @@ _NO_CALLS: Mapping[str, Made] = {}
 def state_name(owner: Owner, number: int) -> str:
     """The identifier of the array of a state of an owner."""
     return f"{kept_as(owner.kind)}{owner.number}_{number}"
+
+
+def _is_regular(indices: Indices, first: int, stride: int) -> bool:
+    """Whether indices go on from the first one by the same stride."""
+    ahead = stride * np.arange(PIECE)
+    return all(
+        np.array_equal(some, first + stride * number * PIECE + ahead[: len(some)])
+        for number, some in enumerate(pieces(indices))
+    )
 
 
 class Tables:
@@ -185,7 +194,7 @@ class Code:
         if len(indices) == 1:
             return first
         stride, last = int(indices[1]) - first, len(indices) - 1
-        if int(indices[-1]) == first + stride * last and np.array_equal(indices, first + stride * np.arange(last + 1)):
+        if int(indices[-1]) == first + stride * last and _is_regular(indices, first, stride):
             if stride == 0:
                 return first
             offset = place if stride == 1 else f"{stride}*{place}"

@@ -181,7 +181,7 @@ def recording_of(
     """A recording with the structure of a network, made by a ``backend`` of this name; ``all_weights`` (m,) gives those
     that stay."""
     connections = network.connections
-    names, rows = names_of(network), numbers.rows
+    names, rows, ranks = names_of(network), numbers.rows, _ranks(network)
     return Recording(
         activity=rows.activity,
         neurons=network.neurons.names,
@@ -193,7 +193,7 @@ def recording_of(
         delays=connections.delays.whole(),
         dt=network.dt,
         step=numbers.step,
-        ranks=_ranks(network),
+        ranks=ranks,
         weights_after=after.weights,
         reached=after.reached,
         set_parameters=after.set_parameters,
@@ -219,14 +219,8 @@ def recording_of(
 
 def _ranks(network: Network) -> IntArray:
     """1 for each connection, 2, 3, … for the further ones that share both ends."""
-    connections = network.connections
-    pairs = connections.sources.whole() * len(network.neurons)
-    pairs += connections.targets.compact()
-    pairs.sort()
-    if not (pairs[1:] == pairs[:-1]).any():
-        return np.broadcast_to(np.int64(1), pairs.shape)
-    ranks = np.ones(len(connections), dtype=np.int64)
-    for index, name in enumerate(network.connection_names):
-        if name.endswith(")"):
-            ranks[index] = int(name[name.rindex("(") + 1 : -1])
+    ranks = np.broadcast_to(np.int64(1), (len(network.connections),))
+    if network.parallel:
+        ranks = ranks.copy()
+        ranks[[*network.parallel]] = [*network.parallel.values()]
     return ranks

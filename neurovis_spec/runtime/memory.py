@@ -32,8 +32,10 @@ def check_room(steps: int, every: int, columns: int) -> None:
     """Refuse a recording of ``steps`` steps, every ``every``-th kept, with ``columns`` numbers a step, if it takes more
     memory than is free and is not small. Raises TooLargeError."""
     rows, row_bytes = -(-steps // every), (columns + 1) * _NUMBER  # its columns, and its step
+    if rows * row_bytes <= SMALL:  # what is free need not be asked
+        return
     room = available()
-    if room is not None and rows * row_bytes > max(room, SMALL):
+    if room is not None and rows * row_bytes > room:
         raise _too_large(steps, every, rows * row_bytes, room, "memory")
 
 

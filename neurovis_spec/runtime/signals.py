@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_spec.arrays import Indices, IntArray, width
+from neurovis_spec.arrays import Indices, pieces, width
 from neurovis_spec.compiler.network import Network
 
 
@@ -36,7 +36,7 @@ class DelayClass:
 class SignalLayout:
     """``offsets`` (m,): the first slot of each connection, −1 with delay 0; ``size``: slots in all."""
 
-    offsets: IntArray
+    offsets: Indices
     size: int
     classes: tuple[DelayClass, ...]
 
@@ -48,15 +48,15 @@ def signal_layout(network: Network) -> SignalLayout:
     for number, population in enumerate(network.populations):
         population_of[population.members] = number
     populations = population_of[connections.targets.compact()]
-    offsets = np.full(len(connections), -1, dtype=np.int64)
+    delays, index_type = connections.delays.compact(), width(0, len(connections))
+    offsets = np.full(len(connections), -1, dtype=width(-1, sum(int(piece.sum()) for piece in pieces(delays))))
     classes: list[DelayClass] = []
     size = 0
-    delays, index_type = connections.delays.compact(), width(0, len(connections))
     for delay in np.unique(connections.delays.kept[connections.delays.kept > 0]).tolist():
         members = np.flatnonzero(delays == delay).astype(index_type)
         if len(network.populations) > 1:
             members = members[np.argsort(populations[members], kind="stable")]
-        offsets[members] = np.arange(size, size + delay * len(members), delay)
+        offsets[members] = np.arange(size, size + delay * len(members), delay, dtype=offsets.dtype)
         classes.append(DelayClass(delay, size, members, populations[members]))
         size += delay * len(members)
     return SignalLayout(offsets, size, tuple(classes))

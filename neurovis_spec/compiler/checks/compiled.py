@@ -60,6 +60,12 @@ class Compiled:
         return tuple((scopes[0].section, scopes) for scopes in made.values())
 
     @cached_property
+    def keys(self) -> frozenset[str]:
+        """The keys of the spec, of every module that is used, and of the files that it includes."""
+        parts = (*(section for section, _ in self.sections), *self.included)
+        return frozenset(entry.name for part in parts for entry in part.source.entries)
+
+    @cached_property
     def entries(self) -> Mapping[Span, WrittenEntry]:
         """Every entry of the connections, by the place of its key."""
         made: dict[Span, list[Bundle]] = {}

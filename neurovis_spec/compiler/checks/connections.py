@@ -18,14 +18,12 @@ from neurovis_spec.diagnostics import Findings, shorten
 from neurovis_spec.language.yaml.source import Mapping, one_or_more
 
 
-def check_connections(compiled: Compiled, findings: Findings) -> None:
-    """Warn of doubled connections, of delays beyond the run, and of keys without effect."""
+def check_doubled(compiled: Compiled, findings: Findings) -> None:
+    """Warn of every entry that makes a connection which another one of its mapping makes already: ``A -> K`` beside
+    ``A -> K2``."""
     for section, _ in compiled.sections:
         for mapping in _mappings(section):
             _check_doubled(mapping, compiled, findings)
-    _check_beyond_run(compiled, findings)
-    for entry in compiled.entries.values():
-        _check_no_effect(entry, findings)
 
 
 def _mappings(section: Section) -> Iterator[Mapping]:
@@ -37,8 +35,7 @@ def _mappings(section: Section) -> Iterator[Mapping]:
 
 
 def _check_doubled(mapping: Mapping, compiled: Compiled, findings: Findings) -> None:
-    """Every entry that makes a connection which another one of its mapping makes already: ``A -> K`` beside
-    ``A -> K2``."""
+    """The same, in one mapping."""
     names = compiled.network.neurons.names
     entries = [compiled.entries[entry.key.span] for entry in mapping.entries if entry.key.span in compiled.entries]
     reported: set[int] = set()
@@ -83,8 +80,8 @@ def _doubled_pairs(entries: list[list[Bundle]], neurons: int) -> Iterator[_Doubl
         yield _DoubledPair(int(entry_of[first]), int(entry_of[position]), source, target)
 
 
-def _check_beyond_run(compiled: Compiled, findings: Findings) -> None:
-    """Delays and episodes that are too long for a run of the spec's own length."""
+def check_beyond_run(compiled: Compiled, findings: Findings) -> None:
+    """Warn of delays and episodes that are too long for a run of the spec's own length."""
     time, steps = compiled.spec.time, compiled.network.steps
     if time is None or time.steps is None:
         return
@@ -102,8 +99,14 @@ def _check_beyond_run(compiled: Compiled, findings: Findings) -> None:
             findings.warning("beyond-steps", span, message, hint.format(longest + 1))
 
 
-def _check_no_effect(entry: WrittenEntry, findings: Findings) -> None:
+def check_no_effect(compiled: Compiled, findings: Findings) -> None:
     """Warn of keys of an entry that change nothing, and of a scale that makes all weights 0."""
+    for entry in compiled.entries.values():
+        _check_no_effect(entry, findings)
+
+
+def _check_no_effect(entry: WrittenEntry, findings: Findings) -> None:
+    """The same, of one entry."""
     _, body, bundles = entry
     if body.self is not None and body.self.value and bundles and all(bundle.ends_disjoint for bundle in bundles):
         message = "'self: true' changes nothing: no neuron is in both ends of this connection"

@@ -39,8 +39,11 @@ _RESULT_NOUN: AnyMapping[Kind, str] = {ACTIVATION: "the value", MODEL: "the acti
 _NOUNS = {"let": "intermediate value", "signals": "signal", "parameters": "parameter", "ports": "port"}
 
 
-def check_definitions(compiled: Compiled, findings: Findings) -> None:
-    """Warn of all such definitions."""
+# Parts that nothing reads, and weights that are replaced
+
+
+def check_formulas(compiled: Compiled, findings: Findings) -> None:
+    """Warn of parts of definitions that nothing reads, and of formulas that replace what they should change."""
     shown = _shown(compiled.network)
     for library in compiled.libraries:
         for kind, result_noun in _RESULT_NOUN.items():
@@ -49,12 +52,6 @@ def check_definitions(compiled: Compiled, findings: Findings) -> None:
                 _check_flows(model, shown, findings)
                 if kind.lasting:
                     _check_replaced(model, compiled.library.definitions.of(kind).known()[name], findings)
-    _check_unused(compiled, findings)
-    _check_modules(compiled, findings)
-    _check_hidden(compiled, findings)
-
-
-# Parts that nothing reads
 
 
 class _Part(NamedTuple):
@@ -175,9 +172,6 @@ def check_dt(spec: Spec, included: Iterable[Library], groups: Iterable[Built], f
     findings.error("dt-needed", span, message, hint)
 
 
-# Weights that are replaced where a change is meant
-
-
 def _check_replaced(model: DefinitionModel, rule: Defined, findings: Findings) -> None:
     """``weight: {each_step: 0.01 * pre * post}``: a formula that reads what is active but nothing that outlasts the
     step, neither the weight nor a state that builds up, and that is 0 where all activities are 0, as a change would be.
@@ -220,9 +214,9 @@ def _in_silence(tree: Tree, rule: Defined) -> Value:
 # Definitions that nobody names, or that are hidden
 
 
-def _check_unused(compiled: Compiled, findings: Findings) -> None:
-    """Activations, models and rules of the spec's own that are not used. What a module names counts as used, even if it
-    has no instance."""
+def check_unused(compiled: Compiled, findings: Findings) -> None:
+    """Warn of activations, models and rules of the spec's own that are not used. What a module names counts as used,
+    even if it has no instance."""
     network = compiled.network
     used = {
         ACTIVATION: {group.activation for group in network.neurons.groups},
@@ -256,8 +250,8 @@ def _texts_in(node: Node) -> Iterator[str]:
                 waiting += items
 
 
-def _check_modules(compiled: Compiled, findings: Findings) -> None:
-    """Modules of the spec's own that have no instance; those of an included file may be there for others."""
+def check_modules(compiled: Compiled, findings: Findings) -> None:
+    """Warn of modules of the spec's own that have no instance; those of an included file may be there for others."""
     modules = compiled.library.modules.known()
     in_modules = {instance.module.value for module in modules.values() for instance in module.model.instances.values()}
     for name, module in modules.items():
@@ -266,9 +260,9 @@ def _check_modules(compiled: Compiled, findings: Findings) -> None:
             findings.warning("unused-module", key_span(compiled.spec, "modules", name), message, hint)
 
 
-def _check_hidden(compiled: Compiled, findings: Findings) -> None:
-    """Names that another installed package defines, too, whose definition is not used: what the spec means is not what
-    its author may think. A definition of the spec's own has another warning (``replaces-builtin``)."""
+def check_hidden(compiled: Compiled, findings: Findings) -> None:
+    """Warn of names that another installed package defines, too, whose definition is not used: what the spec means is
+    not what its author may think. A definition of the spec's own has another warning (``replaces-builtin``)."""
     hidden = installed().hidden
     if not hidden:
         return

@@ -6,18 +6,17 @@ one: what may be meant (a rate that is a parameter and can be set in a run, a bi
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Callable
+from typing import Final, NamedTuple
 
 from neurovis_spec.compiler.checks.compiled import Compiled
-from neurovis_spec.compiler.checks.connections import check_connections
-from neurovis_spec.compiler.checks.definitions import check_definitions
+from neurovis_spec.compiler.checks.connections import check_beyond_run, check_doubled, check_no_effect
+from neurovis_spec.compiler.checks.definitions import check_formulas, check_hidden, check_modules, check_unused
 from neurovis_spec.compiler.checks.lone_indices import check_lone_indices
 from neurovis_spec.compiler.checks.neurons import check_neurons
 from neurovis_spec.compiler.checks.rules import check_rules
 from neurovis_spec.compiler.checks.undefined_operations import check_undefined
-from neurovis_spec.compiler.names.references import Section, key_span
-from neurovis_spec.compiler.names.scope import Scope
-from neurovis_spec.compiler.values.data_files import Files
+from neurovis_spec.compiler.names.references import key_span
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.data.csv_table import AS_TEXTS, NUMBERED
 from neurovis_spec.language.unknown import UNKNOWN
@@ -25,21 +24,9 @@ from neurovis_spec.language.unknown import UNKNOWN
 
 def warn(compiled: Compiled, findings: Findings) -> None:
     """Note everything that is surely not meant in a spec that compiled."""
-    _inputs(compiled, findings)
-    for section, scopes in compiled.sections:
-        _files(section, scopes[0].files, findings)
-        _parameters(section, scopes, findings)
-    check_lone_indices(compiled, findings)
-    check_connections(compiled, findings)
-    check_neurons(compiled, findings)
-    check_rules(compiled, findings)
-    check_definitions(compiled, findings)
-    check_undefined(compiled, findings)
-    _events(compiled, findings)
-    _theme(compiled, findings)
-    _figure(compiled, findings)
-    _outputs(compiled, findings)
-    _reset(compiled, findings)
+    for check in _CHECKS:
+        if not compiled.keys.isdisjoint(check.of):
+            check.warn(compiled, findings)
 
 
 def _theme(compiled: Compiled, findings: Findings) -> None:
@@ -65,20 +52,19 @@ def _figure(compiled: Compiled, findings: Findings) -> None:
 
 def _events(compiled: Compiled, findings: Findings) -> None:
     """Events that come too late, or are lost among others. Most specs have none: nothing is imported then."""
-    spec, network = compiled.spec, compiled.network
-    if spec.events:
-        from neurovis_spec.compiler.checks.event_warnings import check_events
+    from neurovis_spec.compiler.checks.event_warnings import check_events
 
-        steps = None if spec.time is None or spec.time.steps is None else network.steps
-        directory, constants = compiled.census.directory, compiled.scopes[0].constants
-        check_events(spec.events, directory, constants, steps, findings)
+    spec, network = compiled.spec, compiled.network
+    steps = None if spec.time is None or spec.time.steps is None else network.steps
+    directory, constants = compiled.census.directory, compiled.scopes[0].constants
+    check_events(spec.events, directory, constants, steps, findings)
 
 
 def _inputs(compiled: Compiled, findings: Findings) -> None:
     """Inputs that neither a group nor a rule reads; of a module those that are read in no instance."""
     network = compiled.network
     n = len(network.neurons)
-    read = set(network.neurons.input.tolist())
+    read = set(network.neurons.input.tolist()).union(*(one.tolist() for one in network.neurons.port_input.values()))
     for projection in network.projections:
         for signal in projection.signals.values():
             read.update(place - n for place in set(signal.tolist()))
@@ -95,21 +81,22 @@ def _inputs(compiled: Compiled, findings: Findings) -> None:
 _READ: Final = "give it to a group, as in {{input: {0}}}, or to a rule as a signal, or remove it"
 
 
-def _files(section: Section, files: Files, findings: Findings) -> None:
+def _files(compiled: Compiled, findings: Findings) -> None:
     """Files of inputs that begin with the numbers of their columns. The file has been read: nothing is read again."""
-    for model in section.inputs.values():
-        table = UNKNOWN if model.file is None else files.table_at(model.file)
-        if model.file is not None and table is not UNKNOWN and table.numbered:
-            findings.warning("numbered-columns", model.file.span, NUMBERED, AS_TEXTS)
+    for section, scopes in compiled.sections:
+        for model in section.inputs.values():
+            table = UNKNOWN if model.file is None else scopes[0].files.table_at(model.file)
+            if model.file is not None and table is not UNKNOWN and table.numbered:
+                findings.warning("numbered-columns", model.file.span, NUMBERED, AS_TEXTS)
 
 
-def _parameters(section: Section, scopes: list[Scope], findings: Findings) -> None:
+def _parameters(compiled: Compiled, findings: Findings) -> None:
     """Parameters that no expression reads."""
-    used = {name for scope in scopes for name in scope.constants.read}
-    for name in section.parameters:
-        if name not in used:
-            message = f"no expression uses the parameter '{name}'"
-            findings.warning("unused-parameter", key_span(section, "parameters", name), message, "remove it, or use it")
+    for section, scopes in compiled.sections:
+        used = {name for scope in scopes for name in scope.constants.read}
+        for name in section.parameters.keys() - used:
+            message, span = f"no expression uses the parameter '{name}'", key_span(section, "parameters", name)
+            findings.warning("unused-parameter", span, message, "remove it, or use it")
 
 
 def _outputs(compiled: Compiled, findings: Findings) -> None:
@@ -137,3 +124,36 @@ def _reset(compiled: Compiled, findings: Findings) -> None:
     findings.warning(
         "no-effect", body.reset.span, message, "say how many steps an episode has, as in time: {episode: 100}"
     )
+
+
+class _Check(NamedTuple):
+    """A check, and what it is ``of``: without any of these sections, in the spec, in modules that are used and in files
+    that are included, there is nothing to warn of."""
+
+    warn: Callable[[Compiled, Findings], None]
+    of: tuple[str, ...]
+
+
+_DEFINITIONS = ("activations", "models", "rules")
+#: All checks, in the order in which findings of one place are told.
+_CHECKS = (
+    _Check(_inputs, ("inputs",)),
+    _Check(_files, ("inputs",)),
+    _Check(_parameters, ("parameters",)),
+    _Check(check_lone_indices, ("neurons", "instances")),
+    _Check(check_doubled, ("connections",)),
+    _Check(check_beyond_run, ("time",)),
+    _Check(check_no_effect, ("connections",)),
+    _Check(check_neurons, ("neurons",)),
+    _Check(check_rules, ("connections",)),
+    _Check(check_formulas, _DEFINITIONS),
+    _Check(check_unused, _DEFINITIONS),
+    _Check(check_modules, ("modules",)),
+    _Check(check_hidden, ("neurons", "connections")),
+    _Check(check_undefined, ("neurons", "connections")),
+    _Check(_events, ("events",)),
+    _Check(_theme, ("render",)),
+    _Check(_figure, ("render",)),
+    _Check(_outputs, ("outputs",)),
+    _Check(_reset, ("body",)),
+)

@@ -51,6 +51,8 @@ def layout_settings(
 ) -> LayoutSettings:
     """The ``layout`` section, and those of modules. Which engines there are is known where they are called; here only
     words are checked."""
+    if all(scope.section.layout is None for scope in scopes):
+        return LayoutSettings()
     pins = pins_of(scopes, census, findings)
     arrange: list[tuple[tuple[int, ...], str]] = []
     boxes: list[tuple[str, tuple[int, ...]]] = []

@@ -43,7 +43,7 @@ _MOST_CELLS: Final = 100
 _NO_MARKS: Final = bytes(set(range(256)) - set(b",\n"))
 #: names are looked up by so many words of eight bytes, at one of so many places
 _WORDS: Final = 4
-_PLACES: Final = 1 << 20
+_PLACES: Final = 1 << 19
 #: spellings of names for which there is room at first
 _FIRST_ROOM: Final = 1 << 10
 #: what of a word belongs to a name of which so many bytes are left
