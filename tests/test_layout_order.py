@@ -124,7 +124,8 @@ def test_what_is_turned_has_its_ports_the_other_way_round(levels: Levels, random
     assert Segments(levels).count(place, turned) == by_pairs(replace(levels, segments=gaps), levels.ranks)
 
 
-# A heuristic, which need not find the best of whatever there may be: the examples are the same where new ones are looked for.
+# A heuristic, which need not find the best of whatever there may be: the examples are the same where others are looked
+# for.
 @given(some_levels(most=4, ranks=3))
 @settings(deadline=None, max_examples=40, derandomize=True)
 def test_tiny_graphs_are_ordered_as_well_as_can_be(levels: Levels) -> None:

@@ -128,7 +128,7 @@ def test_a_film_that_is_killed_can_be_played(spec: Path, tmp_path: Path) -> None
     running.wait()
     assert not (tmp_path / "film.mp4").exists()
     shutil.copy(part, tmp_path / "left.mp4")
-    assert len(decoded(tmp_path / "left.mp4")) >= 2 * 20
+    assert len(decoded(tmp_path / "left.mp4")) >= 2 * 10  # a second each
 
 
 @pytest.mark.parametrize(("suffix", "mark"), [(".mp4", b"moof"), (".webm", b"\x1f\x43\xb6\x75")])
