@@ -36,6 +36,20 @@ neurons:
   O: {activation: swish}
   T: {input: go}
 """
+FLOW = """neurovis: 1
+name: flow
+time: {dt: 0.1}
+models:
+  cell:
+    parameters: {tau: {value: 2, unit: ms, description: how slow}}
+    ports: {gate: product}
+    state: {v: {unit: mV, derivative: "(gate*drive - v)/tau", noise: 0.1}}
+    outputs: {current: 2*v}
+    activity: f(v)
+    send: current
+neurons:
+  A: {model: cell}
+"""
 REST = """connections:
   K1 + K3..K5 -> O: {weight: alpha, plasticity: {delta: {rate: beta, target: T}}}
   K -> K: {edges: [[K1, K2, 0.5], [K4, K5]]}
@@ -60,6 +74,13 @@ def offered(text: str) -> dict[str, Completion]:
         ("neurons:\n  K: {model: {adaptive: {leak: 1}}, initial: {v: 1, ¦", ["activity", "b"], ["leak"]),
         (BASE + "  L: {model: izhikevich, initial: {v: ¦", ["alpha", "normal", "i"], ["v", "k"]),
         ("neurons:\n  K: {combine: ¦", ["sum", "product", "distance"], ["alpha"]),
+        ("models:\n  m: {state: {v: {¦", ["derivative", "noise", "unit", "each_step"], ["jump"]),
+        ("models:\n  m: {time: ¦", ["s", "ms"], []),
+        ("models:\n  m: {ports: {a: ¦", ["sum", "product"], []),
+        ("models:\n  m: {ports: {a: {¦", ["combine", "unit"], []),
+        (FLOW.replace("(gate*", "(ga¦te*"), ["gate", "drive", "tau", "v"], ["current"]),
+        (FLOW.replace("send: current", "send: ¦"), ["v", "current", "activity"], ["tau", "gate"]),
+        (FLOW + "outputs: {o: A.¦", ["v", "current"], ["tau"]),
         (BASE + "  L: {activation: ¦", ["tanh", "swish"], ["leaky_integrator", "alpha"]),
         (BASE + "  L: {activation: {swish: {¦", ["slope"], ["sigma"]),
         (BASE + "  L: {model: ¦", ["leaky_integrator", "static"], ["tanh"]),
@@ -204,6 +225,30 @@ def test_hover_and_definition_work_in_a_broken_document() -> None:
     assert location is not None
     assert document.text.part(location.span) == "alpha"
     assert location.span.line == 4
+
+
+@pytest.mark.parametrize(
+    ("at", "told"),
+    [
+        ("model: ce¦ll", ["cell(tau = 2 ms)", "dv/dt = (gate*drive - v)/tau", "current = 2*v", "how slow"]),
+        ("(gate*drive - v¦)", ["dv/dt = (gate*drive - v)/tau", "dv/dt with noise of 0.1"]),
+        ("- v)/ta¦u", ["parameter of cell", "`2 ms`"]),
+        ("send: curr¦ent", ["current = 2*v"]),
+        ("deriva¦tive", ["What it changes by"]),
+        ("gate*dri¦ve", ["u[t]"]),
+    ],
+)
+def test_what_flows_is_explained(at: str, told: list[str]) -> None:
+    found = hover(*marked(FLOW.replace(at.replace("¦", ""), at)))
+    assert found is not None
+    assert all(one in found.markdown for one in told), found.markdown
+
+
+def test_names_of_what_is_sent_and_of_ports_are_renamed() -> None:
+    document, place = marked(FLOW.replace("send: curr", "send: curr¦"))
+    assert apply(document, rename(document, place, "flux")).source == FLOW.replace("current", "flux")
+    document, place = marked(FLOW.replace("{ga", "{ga¦"))
+    assert apply(document, rename(document, place, "door")).source == FLOW.replace("gate", "door")
 
 
 @pytest.mark.parametrize(

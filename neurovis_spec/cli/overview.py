@@ -37,8 +37,11 @@ def overview(compiled: CompiledNetwork) -> str:
 def _parts(compiled: CompiledNetwork, network: Network) -> Iterator[str]:
     yield _head(network)
     if network.parameters:
-        yield "parameters\n" + table([(name, number(value)) for name, value in network.parameters.items()])
-    groups = [_group(network, group) for group in network.neurons.groups]
+        written = compiled.spec.parameters
+        units = {name: one.unit.value for name, one in written.items() if one.unit is not None}
+        values = [(name, _in_unit(number(value), units.get(name))) for name, value in network.parameters.items()]
+        yield "parameters\n" + table(values)
+    groups = [_group(network, group, _units(network)) for group in network.neurons.groups]
     yield "neurons\n" + table(*_without_empty(groups, _OF_GROUPS))
     if len(network.connections):
         yield "connections\n" + table(*_without_empty(_entries(network), _OF_ENTRIES))
@@ -75,14 +78,19 @@ def _head(network: Network) -> str:
     return "\n".join(printable(line) for line in lines)
 
 
-def _group(network: Network, group: Group) -> tuple[str, ...]:
+def _units(network: Network) -> Mapping[tuple[str, str], Mapping[str, str]]:
+    """The units of parameters, by kinds and names of definitions."""
+    return {(use.definition.kind.name, use.definition.name): dict(use.definition.units) for _, use in network.uses}
+
+
+def _group(network: Network, group: Group, units: Mapping[tuple[str, str], Mapping[str, str]]) -> tuple[str, ...]:
     names = network.neurons.names[group.start : group.start + group.count]
     return (
         group.name,
         _range(names),
         str(group.count),
-        _defined(group.activation, group.activation_parameters),
-        _defined(group.model, group.model_parameters),
+        _defined(group.activation, group.activation_parameters, units["activation", group.activation]),
+        _defined(group.model, group.model_parameters, units["model", group.model]),
         group.combine,
         spread(network.neurons.bias[list(group.indices)].tolist()),
         group.input or "",
@@ -90,10 +98,14 @@ def _group(network: Network, group: Group) -> tuple[str, ...]:
     )
 
 
-def _defined(name: str, parameters: Mapping[str, tuple[float, ...]]) -> str:
+def _defined(name: str, parameters: Mapping[str, tuple[float, ...]], units: Mapping[str, str]) -> str:
     """A definition in use, with the values of its parameters."""
-    given = ", ".join(f"{key}={spread(values)}" for key, values in parameters.items())
+    given = ", ".join(f"{key}={_in_unit(spread(values), units.get(key))}" for key, values in parameters.items())
     return f"{name}({given})" if given else name
+
+
+def _in_unit(value: str, unit: str | None) -> str:
+    return value if unit is None else f"{value} {unit}"
 
 
 def _range(names: tuple[str, ...]) -> str:

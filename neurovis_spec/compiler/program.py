@@ -112,6 +112,8 @@ class Definition:
     send: str = ""
     #: how many of its unit of time a second has: 1, or 1000 where ``time: ms``; ``t`` and ``dt`` are in that unit in it
     per_second: float = 1.0
+    #: the units of parameters that have one, as they are written, to be shown
+    units: tuple[tuple[str, str], ...] = ()
 
     @property
     def outputs(self) -> tuple[Quantity, ...]:

@@ -21,6 +21,7 @@ from neurovis_spec.language.grammar import (
     OneOf,
     Plain,
     declaring,
+    naming,
 )
 from neurovis_spec.language.located import (
     BoolField,
@@ -185,7 +186,7 @@ class ModelModel(DefinitionModel):
     activity: Annotated[FormulaField, IN_MODEL] = Field(
         description="The activity; f(…) is the neuron's activation, drive is u[t]."
     )
-    send: TextField | None = Field(
+    send: Annotated[TextField | None, naming("local")] = Field(
         None, description="The state or output that connections take unless they say otherwise (default activity)."
     )
     spikes: BoolField | None = Field(

@@ -226,6 +226,10 @@ def _of_role(role: Role | None, scope: Scope, path: Path, front: str, index: Ind
             yield from _modules(index)
         case "names" if role.kind == "output":
             yield from (_Offer(name.text, "word", "output") for name in index.declared("output"))
+        case "names" if role.kind == "local" and scope.definition is not None:
+            own = ((name.text, str(name.item.path[2])) for name in index.locals(*scope.definition))
+            sent = ((name, section) for name, section in own if section in ("state", "outputs"))
+            yield from (_Offer(name, "local", section) for name, section in (*sent, ("activity", "")))
 
 
 def _of_body(role: Role | None, document: Document) -> Iterator[_Offer]:
@@ -274,7 +278,8 @@ def _formula(role: Role, scope: Scope, path: Path, index: Index, place: Place) -
         yield from _parameters(names, index)
     else:
         for name in index.locals(*scope.definition):
-            yield _Offer(name.text, "local", str(name.item.path[2]))
+            if name.item.path[2] != "outputs":  # which formulas do not read
+                yield _Offer(name.text, "local", str(name.item.path[2]))
     for given in (*role.sees, *ALWAYS):
         yield _Offer(given, "constant", GIVEN[given])
     for word in functions_of(role).values():
@@ -342,16 +347,18 @@ def _states(scope: Scope, front: str, index: Index) -> Iterator[_Offer]:
         return
     for group in index.declared("neuron", module):
         if group.text == owner or owner in _numbered(group, index):
-            yield from _states_of(index.home(group), group.item.path)
+            yield from _states_of(index.home(group), group.item.path, outputs=True)
 
 
-def _states_of(index: Index, group: Path) -> Iterator[_Offer]:
-    """The states of the model of the group at a path."""
+def _states_of(index: Index, group: Path, outputs: bool = False) -> Iterator[_Offer]:
+    """The states of the model of the group at a path, and its outputs where these are wanted, too."""
     path = (*group, "model")
     told = index.values.get(path)
     inner = (key[-1] for key in index.keys if key[:-1] == path)
     model = known("model", index.all_items).get(told.text if told is not None else str(next(inner, "")))
     yield from (_Offer(name, "parameter", "state") for name in (() if model is None else model.states))
+    if outputs and model is not None:
+        yield from (_Offer(name, "parameter", "output") for name in model.outputs)
 
 
 def _instances(module: str | None, index: Index) -> Iterator[_Offer]:

@@ -18,7 +18,7 @@ from neurovis_spec.lsp.outline import Item, outline
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A parameter of a definition, with its default as it is written."""
+    """A parameter of a definition, with its default as it is written, and its unit behind that."""
 
     name: str
     default: str
@@ -36,6 +36,7 @@ class Definition:
     equations: tuple[str, ...]
     description: str
     states: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ()
 
     @property
     def usage(self) -> str:
@@ -93,13 +94,14 @@ def _definition(section: str, name: str, texts: Mapping[tuple[str, ...], str]) -
     parameters = []
     for path, text in texts.items():
         if len(path) == 2 and path[0] == "parameters":
-            default = texts.get((*path, "value"), text)
+            default = f"{texts.get((*path, 'value'), text)} {texts.get((*path, 'unit'), '')}".rstrip()
             parameters.append(Parameter(path[1], default, texts.get((*path, "description"), "")))
     signals = tuple(text for path, text in texts.items() if path[:1] == ("signals",) and text)
     description = " ".join(texts.get(("description",), "").split())
     states = tuple(dict.fromkeys(path[1] for path in texts if path[:1] == ("state",) and len(path) > 1))
+    outputs = tuple(path[1] for path in texts if path[:1] == ("outputs",) and len(path) == 2)
     equations = _equations(section, texts)
-    return Definition(DEFINITIONS[section], name, tuple(parameters), signals, equations, description, states)
+    return Definition(DEFINITIONS[section], name, tuple(parameters), signals, equations, description, states, outputs)
 
 
 def _equations(section: str, texts: Mapping[tuple[str, ...], str]) -> tuple[str, ...]:
@@ -107,8 +109,12 @@ def _equations(section: str, texts: Mapping[tuple[str, ...], str]) -> tuple[str,
     late: list[str] = []
     for path, text in texts.items():
         match path:
-            case ("let", name):
+            case ("let" | "outputs", name):
                 lines.append(f"{name} = {text}")
+            case ("state", name, "derivative"):
+                lines.append(f"d{name}/dt = {text}")
+            case ("state", name, "noise"):
+                late.append(f"d{name}/dt with noise of {text}")
             case ("state", name, "initial"):
                 late.append(f"{name} = {text} at the beginning")
             case ("state", name, "each_step"):

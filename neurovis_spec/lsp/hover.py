@@ -267,5 +267,6 @@ def _setting(document: Document, name: Name) -> str | None:
             return f"{told}\n\n{parameter.description}" if parameter.description else told
     if name.text in definition.signals:
         return f"**{name.text}** (signal of {owner}): neurons or an input, of size 1 or of the size of the target"
-    lines = [line for line in definition.equations if line.startswith(f"{name.text} =")]
+    own = (f"{name.text} =", f"d{name.text}/dt ")
+    lines = [line for line in definition.equations if line.startswith(own)]
     return f"**{name.text}** of {owner}\n\n```\n" + "\n".join(lines) + "\n```" if lines else None

@@ -91,7 +91,8 @@ def _builtin(
 
 def _shown(parameter: ParameterModel) -> tuple[str, str]:
     value = parameter.value.value
-    return (value if isinstance(value, str) else f"{value:g}", parameter.about)
+    unit = "" if parameter.unit is None else f" ({parameter.unit.value})"
+    return (value if isinstance(value, str) else f"{value:g}", f"{parameter.about}{unit}".lstrip())
 
 
 def _excerpt(entry: Entry, text: list[str]) -> str:

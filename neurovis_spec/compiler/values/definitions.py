@@ -424,6 +424,7 @@ def definition_of(
         ports=ports,
         send=checker.sent(parts.send, [one.name for one in (*state, *outputs)]),
         per_second=_PER_SECOND[parts.time],
+        units=tuple((name, one.unit.value) for name, one in parts.parameters.items() if one.unit is not None),
     )
     return Defined(definition, defaults)
 
