@@ -25,7 +25,7 @@ _Definition: TypeAlias = ActivationModel | ModelModel | RuleModel
 class Builtin:
     """A definition that needs no declaration. ``parameters``: name, default, meaning; ``yaml``: the definition as it
     stands in its file, its description left out; ``origin``: the entry point that brings it, ``builtin`` for ours;
-    ``episodes``: it is a rule that changes weights at the end of an episode alone."""
+    ``time``: what of the section ``time`` it needs, as a rule that changes weights at the end of an episode alone."""
 
     kind: Kind
     name: str
@@ -34,7 +34,7 @@ class Builtin:
     signals: tuple[str, ...]
     yaml: str
     origin: str
-    episodes: bool = False
+    time: str = ""
 
     @property
     def use(self) -> str:
@@ -42,10 +42,10 @@ class Builtin:
         settings = [f"{name}: {default}" for name, default, _ in self.parameters]
         settings += [f"{signal}: T" for signal in self.signals]
         choice = f"{{{self.name}: {{{', '.join(settings)}}}}}" if settings else self.name
+        time = f"time: {{{self.time}}}\n" if self.time else ""
         if self.kind == "rule":
-            time = "time: {episode: 100}\n" if self.episodes else ""
             return f"{time}connections: {{K -> O: {{weight: 0.1, plasticity: {choice}}}}}"
-        return f"neurons: {{K: {{{self.kind}: {choice}}}}}"
+        return f"{time}neurons: {{K: {{{self.kind}: {choice}}}}}"
 
 
 @cache
@@ -85,8 +85,15 @@ def _builtin(
     about = "" if model.description is None else " ".join(model.description.value.split())
     parameters = tuple((key, *_shown(parameter)) for key, parameter in model.parameters.items())
     origin = library.source.span.file.partition("/")[0]
-    episodes = isinstance(model, RuleModel) and model.weight.each_step is None
-    return Builtin(kind, name, about, parameters, signals, _excerpt(entry, text), origin, episodes)
+    return Builtin(kind, name, about, parameters, signals, _excerpt(entry, text), origin, _time(model))
+
+
+def _time(model: _Definition) -> str:
+    """What it needs that ``time`` says."""
+    if isinstance(model, RuleModel):
+        return "episode: 100" if model.weight.each_step is None else ""
+    flows = isinstance(model, ModelModel) and any(state.derivative is not None for state in model.state.values())
+    return "dt: 0.001" if flows else ""
 
 
 def _shown(parameter: ParameterModel) -> tuple[str, str]:

@@ -38,7 +38,7 @@ _ELSEWHERE: Final[Mapping[str, str]] = {
     **dict.fromkeys(("rectifier", "rectified", "threshold_linear"), "relu"),
     **dict.fromkeys(("rbf", "gauss"), "gaussian"),
     **dict.fromkeys(("lif", "if", "spiking"), "integrate_and_fire"),
-    **dict.fromkeys(("ctrnn", "leaky", "leaky_integrate"), "leaky_integrator"),
+    **dict.fromkeys(("ctrnn", "leaky_integrate"), "leaky_integrator"),
     **dict.fromkeys(("hebb", "hebbs"), "hebbian"),
 }
 #: Values of a list that are checked where it is not known how many there should be.

@@ -459,11 +459,13 @@ def sorted_by_need(needs: Mapping[str, Collection[str]]) -> tuple[list[str], lis
 
 
 def define(library: Library, findings: Findings, builtin: Definitions, around: Around = NOTHING_AROUND) -> Definitions:
-    """The definitions of a file. Who replaces a built-in one is warned."""
+    """The definitions of a file. Who replaces a built-in one is warned, unless that came when specs may have had one of
+    their own of this name: those with ports and derivatives did."""
     for reading in _READINGS:
-        node = library.source.get(reading.kind.section)
+        node, replaced = library.source.get(reading.kind.section), builtin.of(reading.kind).known()
         for entry in node.entries if isinstance(node, SourceMapping) else ():
-            if entry.name in builtin.of(reading.kind):
+            old = None if entry.name not in replaced else replaced[entry.name].definition
+            if old is not None and not old.flows and not old.ports:
                 message = f"'{entry.name}' replaces the built-in of that name"
                 findings.warning("replaces-builtin", entry.key.span, message)
     return Definitions({reading.kind: _defined(reading, library, findings, around) for reading in _READINGS})
