@@ -14,6 +14,7 @@ from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.compile import Request
 from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span, SpecError
+from neurovis_spec.language.units import measured
 
 if TYPE_CHECKING:
     from neurovis_spec.runtime.recording import Recording
@@ -26,12 +27,12 @@ _SEEDS = 1 << 63
 def compile(
     source: str | Path | Mapping[str, object],
     *,
-    parameters: Mapping[str, float] | None = None,
+    parameters: Mapping[str, float | str] | None = None,
     seed: int | None = None,
     root: str | Path | None = None,
     limit: int | None = None,
     body: str | Path | bool = True,
-    **more: float,
+    **more: float | str,
 ) -> CompiledNetwork:
     """Compile a spec: a path, or a mapping with the content of one.
 
@@ -55,12 +56,12 @@ def compile_text(
     *,
     file: str = "<text>",
     folder: str | Path | None = None,
-    parameters: Mapping[str, float] | None = None,
+    parameters: Mapping[str, float | str] | None = None,
     seed: int | None = None,
     root: str | Path | None = None,
     limit: int | None = None,
     body: str | Path | bool = True,
-    **more: float,
+    **more: float | str,
 ) -> CompiledNetwork:
     """Compile the text of a spec; its data files are looked for in ``folder`` (default: the working one).
 
@@ -103,18 +104,23 @@ def backends() -> list[tuple[str, bool, str]]:
 def _request(
     folder: Path,
     root: str | Path | None,
-    parameters: Mapping[str, float] | None,
-    more: Mapping[str, float],
+    parameters: Mapping[str, float | str] | None,
+    more: Mapping[str, float | str],
     seed: int | None,
     limit: int | None,
     body: str | Path | bool,
 ) -> Request:
     limits = Limits.of(None if limit is None else arguments.integer("limit", limit, least=0))
     given = {**arguments.mapping("parameters", parameters), **more}
-    values = {name: arguments.number(name, value) for name, value in given.items()}
+    values = {name: setting(name, value) for name, value in given.items()}
     whole = None if seed is None else arguments.integer("seed", seed, -_SEEDS, _SEEDS - 1)
     inside = folder if root is None else arguments.path("root", root)
     return Request(folder, inside, values, whole, limits, body=arguments.body(body))
+
+
+def setting(name: str, value: object) -> float | str:
+    """A number, or a text that is one with a unit."""
+    return value if isinstance(value, str) and measured(value) is not None else arguments.number(name, value)
 
 
 def _compiled(source: str | Path, file: str, request: Request) -> CompiledNetwork:

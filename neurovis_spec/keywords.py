@@ -39,7 +39,7 @@ Function = TypeVar("Function", bound=Callable[..., object])
 class CompileKeywords(TypedDict, total=False):
     """How a spec is compiled."""
 
-    parameters: Mapping[str, float] | None
+    parameters: Mapping[str, float | str] | None
     root: str | Path | None
     limit: int | None
     body: str | Path | bool

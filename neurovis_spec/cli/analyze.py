@@ -108,7 +108,7 @@ def command(
     recording: str | None,
     run: int | None,
     measuring: Measuring,
-    settings: dict[str, float],
+    settings: dict[str, float | str],
     inputs: dict[str, str],
 ) -> None:
     """Measure a run, into tables, pictures and a page.

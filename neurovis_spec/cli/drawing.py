@@ -49,7 +49,7 @@ class Drawing:
     paths: str | None
     min_weight: float | None
     full: bool
-    settings: dict[str, float]
+    settings: dict[str, float | str]
 
     def made_for(self, output: Path) -> tuple[CompiledNetwork, PictureKeywords]:
         """The network, and how it is drawn into a file. Raises UsageError where it would replace what is read."""

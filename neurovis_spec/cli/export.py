@@ -30,7 +30,9 @@ from neurovis_spec.cli.options import examples, set_option, spec_argument
     help="Begin with the last weights and activities of this recording: what was learned is kept.",
 )
 @set_option
-def command(spec: str, form: str, output: Path, single: bool, start: str | None, settings: dict[str, float]) -> None:
+def command(
+    spec: str, form: str, output: Path, single: bool, start: str | None, settings: dict[str, float | str]
+) -> None:
     """Write a network as source code for a robot.
 
     NAME.h and NAME.c need nothing but libm: no heap, no variables that change but a struct of the caller's. The README

@@ -37,14 +37,14 @@ _LARGEST: Final = (64 << 20) + 1
 _INPUTS: Final = (".csv", ".npy")
 
 
-def compiled(spec: str, parameters: Mapping[str, float] | None = None) -> CompiledNetwork:
+def compiled(spec: str, parameters: Mapping[str, float | str] | None = None) -> CompiledNetwork:
     """The network of a SPEC, ``-`` being standard input, with the command's --root, --limit and --body. Raises
     SpecError."""
     with progress("compiling"):
         return compiler(spec, parameters)()
 
 
-def compiler(spec: str, parameters: Mapping[str, float] | None = None) -> Callable[[], CompiledNetwork]:
+def compiler(spec: str, parameters: Mapping[str, float | str] | None = None) -> Callable[[], CompiledNetwork]:
     """What compiles a SPEC so, also in another thread when the command has long begun. It raises SpecError."""
     from neurovis_spec import api
 
@@ -54,7 +54,7 @@ def compiler(spec: str, parameters: Mapping[str, float] | None = None) -> Callab
     return lambda: api.compile_text(standard_input(), file=STDIN, folder=Path.cwd(), **how)
 
 
-def compiler_in_place(spec: str, parameters: Mapping[str, float]) -> Callable[[str], CompiledNetwork]:
+def compiler_in_place(spec: str, parameters: Mapping[str, float | str]) -> Callable[[str], CompiledNetwork]:
     """What compiles a text as if it stood in the file of a SPEC, also when the command has long begun. It raises
     SpecError."""
     from neurovis_spec import api
@@ -63,7 +63,7 @@ def compiler_in_place(spec: str, parameters: Mapping[str, float]) -> Callable[[s
     return lambda text: api.compile_text(text, file=spec, folder=folder, **how)
 
 
-def how_to_compile(parameters: Mapping[str, float] | None = None) -> CompileKeywords:
+def how_to_compile(parameters: Mapping[str, float | str] | None = None) -> CompileKeywords:
     """The command's --root, --limit, --body and --no-body, with these values of --set. Raises UsageError."""
     context = click.get_current_context(silent=True)
     given = {} if context is None else context.meta
@@ -75,7 +75,7 @@ def how_to_compile(parameters: Mapping[str, float] | None = None) -> CompileKeyw
     return {"parameters": parameters, "root": root, "limit": limit, "body": body}
 
 
-def network_of(spec: str, parameters: Mapping[str, float] | None = None) -> CompiledNetwork:
+def network_of(spec: str, parameters: Mapping[str, float | str] | None = None) -> CompiledNetwork:
     """``compiled``; that there are warnings is said on standard error."""
     network = compiled(spec, parameters)
     tell_warnings(spec, network.warnings)

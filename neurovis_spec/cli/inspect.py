@@ -21,7 +21,7 @@ from neurovis_spec.cli.options import body_options, examples, set_option, spec_a
 )
 @set_option
 @body_options
-def command(spec: str, form: str, settings: dict[str, float]) -> None:
+def command(spec: str, form: str, settings: dict[str, float | str]) -> None:
     """Show groups, connections, delays, rules and choices.
 
     The connection matrix C has a row for each source and a column for each target.

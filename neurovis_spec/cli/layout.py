@@ -49,7 +49,7 @@ def command(
     effort: str | None,
     update: Path | None,
     metrics: bool,
-    settings: dict[str, float],
+    settings: dict[str, float | str],
 ) -> None:
     """Compute and write the layout.
 

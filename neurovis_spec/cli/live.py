@@ -108,7 +108,7 @@ door_options: Final = as_one(
 @body_options
 @compile_options
 def command(
-    specs: tuple[str, ...], played: Played, watch: bool, door: Door, drawn: Drawn, settings: dict[str, float]
+    specs: tuple[str, ...], played: Played, watch: bool, door: Door, drawn: Drawn, settings: dict[str, float | str]
 ) -> None:
     """Show a network in the browser while it runs.
 
@@ -137,7 +137,7 @@ def command(
 
 
 def _network(
-    spec: str, played: Played, settings: dict[str, float], runs: bool
+    spec: str, played: Played, settings: dict[str, float | str], runs: bool
 ) -> tuple[CompiledNetwork, Recording | None]:
     """The network, and the recording of it that is played, if one is."""
     if not _is_recording(spec):

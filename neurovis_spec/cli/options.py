@@ -17,6 +17,7 @@ import click
 
 from neurovis_spec import plugins
 from neurovis_spec.cli.completion import input_files, one_of, paths, settings
+from neurovis_spec.language.units import measured
 from neurovis_spec.likeness import suggest
 
 Command: TypeAlias = Callable[..., object]
@@ -83,10 +84,13 @@ def _once(pairs: Iterable[tuple[str, str]]) -> dict[str, str]:
     return result
 
 
-def _settings(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, float]:
-    """Name to number."""
-    settings = {}
+def _settings(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, float | str]:
+    """Name to number, or to a number with a unit."""
+    settings: dict[str, float | str] = {}
     for name, text in _once(_pair(value, "name=value") for value in values).items():
+        if measured(text) is not None:
+            settings[name] = text
+            continue
         try:
             number = float(text)
         except ValueError:
@@ -284,7 +288,7 @@ class Running:
     """What is run, as the command line says it."""
 
     steps: int | None
-    settings: dict[str, float]
+    settings: dict[str, float | str]
     inputs: dict[str, str]
     backend: str | None
 

@@ -42,7 +42,7 @@ def command(
     output: Path,
     ros: str | None,
     form: Literal["package", "cpp", "publisher"],
-    settings: dict[str, float],
+    settings: dict[str, float | str],
 ) -> None:
     """Write a network as a package of ROS: with a launch file, its parameters, and the spec with all that it needs.
 

@@ -41,7 +41,7 @@ def command(
     steps: int | None,
     rate: float | None,
     backend: str | None,
-    settings: dict[str, float],
+    settings: dict[str, float | str],
     desk: Desk,
     meeting: Meeting,
 ) -> None:

@@ -40,7 +40,9 @@ _LOOK = 1.0
 @set_option
 @shown_options(always=True)
 @meeting_options(wait=0)
-def command(spec: str | None, network: str | None, settings: dict[str, float], desk: Desk, meeting: Meeting) -> None:
+def command(
+    spec: str | None, network: str | None, settings: dict[str, float | str], desk: Desk, meeting: Meeting
+) -> None:
     """Show and record a network that runs elsewhere, on a robot.
 
     Without SPEC it is the one that announces itself. The page shows the newest step, and goes back over those that

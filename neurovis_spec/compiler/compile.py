@@ -64,8 +64,8 @@ class Request:
     base: Path
     #: the folder that its files may not lie outside of
     root: Path
-    #: values of parameters, by name, in place of those of the spec
-    parameters: Mapping[str, float] = field(default_factory=dict)
+    #: values of parameters, by name, in place of those of the spec; a text is a number with a unit
+    parameters: Mapping[str, float | str] = field(default_factory=dict)
     #: in place of that of the spec
     seed: int | None = None
     limits: Limits = field(default_factory=Limits)
@@ -170,7 +170,7 @@ def _declare(spec: Spec, request: Request, findings: Findings) -> _Declared:
     seed = 0 if spec.seed is None else spec.seed.value
     seed = seed if request.seed is None else request.seed
     constants = Constants(names_of(spec, "parameters", {}), 1.0, findings)
-    dt_known = _step_length(spec, constants)
+    dt_known = constants.timed = _step_length(spec, constants)
     library = library_of(spec, request.includes, request.base, constants.dt, findings)
     make_parameters(spec, constants, request.parameters)
     _check_names_set(spec, constants, request.parameters)
@@ -415,7 +415,7 @@ def _step_length(spec: Spec, constants: Constants) -> bool:
     return True
 
 
-def _check_names_set(spec: Spec, constants: Constants, values: Mapping[str, float]) -> None:
+def _check_names_set(spec: Spec, constants: Constants, values: Mapping[str, float | str]) -> None:
     """Report names that the caller sets and that are no parameters of the spec."""
     for name in values:
         if name not in spec.parameters:

@@ -23,6 +23,7 @@ from neurovis_spec.language import grammar
 from neurovis_spec.language.expressions.habits import ungrouped_hint, unit_hint, unit_of
 from neurovis_spec.language.expressions.lexer import decimal_hint
 from neurovis_spec.language.grammar import FORMULA, REFERENCE, TEXT, TEXTS, Either, ListOf, Plain, Shape
+from neurovis_spec.language.units import UnitError, measured, number_in, seconds_of
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.yaml.scalars import INTEGER_HIGH, INTEGER_LOW
 from neurovis_spec.language.yaml.source import AnyList, Node, Scalar, describe, one_or_more
@@ -215,6 +216,46 @@ def as_formula(node: Node, info: ValidationInfo) -> Formula:
     return formula
 
 
+def time_of(node: Node, findings: Findings) -> Formula | Unknown:
+    """A time with its unit, as Seconds, or what ``formula_of`` takes; UNKNOWN where it is neither."""
+    written = measured(node.value) if isinstance(node, Scalar) and isinstance(node.value, str) else None
+    if written is None or not isinstance(node, Scalar):
+        return formula_of(node, findings)
+    try:
+        return Located(seconds_of(written), node)
+    except UnitError as error:
+        findings.error("bad-unit", node.span, str(error), error.hint)
+        return UNKNOWN
+
+
+def as_time(node: Node, info: ValidationInfo) -> Formula:
+    """A time with its unit (``1.5 ms``), or a finite number, or the text of an expression."""
+    if not isinstance(node, Scalar) or not isinstance(node.value, str) or measured(node.value) is None:
+        return as_formula(node, info)
+    formula = time_of(node, findings_of(info))
+    return give_up() if formula is UNKNOWN else formula
+
+
+def as_measured(node: Node, info: ValidationInfo) -> Formula:
+    """A finite number, which may have a unit, or the text of an expression."""
+    if isinstance(node, Scalar) and isinstance(node.value, str) and measured(node.value) is not None:
+        return Located(node.value, node)
+    return as_formula(node, info)
+
+
+def in_unit(formula: Formula, unit: str, findings: Findings) -> Formula:
+    """The same; where it is a number with a unit, that number in this unit. Without one it stays as it is, which is no
+    expression."""
+    written = measured(formula.value) if unit and isinstance(formula.value, str) else None
+    if written is None:
+        return formula
+    try:
+        return Located(number_in(unit, written), formula.node)
+    except UnitError as error:
+        findings.error("bad-unit", formula.span, str(error), error.hint)
+        return Located(UNKNOWN, formula.node)
+
+
 def as_number(node: Node, info: ValidationInfo) -> Located[float]:
     """A finite number as such, no expression."""
     if not isinstance(node, Scalar) or isinstance(node.value, (str, bool)) or node.value is None:
@@ -304,3 +345,7 @@ IntegerField = Annotated[
     Located[int], Leaf(as_integer, Plain({"type": "integer", "minimum": INTEGER_LOW, "maximum": INTEGER_HIGH}))
 ]
 FormulaField = Annotated[Formula, Leaf(as_formula, FORMULA, True)]
+#: The same, or a number with a unit, of what may have one.
+MeasuredField = Annotated[Formula, Leaf(as_measured, FORMULA, True)]
+#: The same, or a time with its unit.
+TimeField = Annotated[Formula, Leaf(as_time, FORMULA, True)]

@@ -13,7 +13,7 @@ from pydantic import Field
 
 from neurovis_spec.language.drawing import ModuleLayoutModel
 from neurovis_spec.language.grammar import GROUP, declaring, naming
-from neurovis_spec.language.located import FormulaField, IdentifierField, TextField
+from neurovis_spec.language.located import FormulaField, IdentifierField, MeasuredField, TextField
 from neurovis_spec.language.model import Model, Named
 from neurovis_spec.language.sections import ConnectionsField, GroupsField, InputsField
 from neurovis_spec.language.values import ParametersField
@@ -37,7 +37,7 @@ class InstanceModel(Model):
     count: FormulaField | None = Field(
         None, description="How many instances; left with count 3 makes left1, left2, left3."
     )
-    set: Annotated[Named[Annotated[FormulaField, GROUP]], naming("parameter")] = Field(
+    set: Annotated[Named[Annotated[MeasuredField, GROUP]], naming("parameter")] = Field(
         default_factory=dict, description="{parameter of the module: value}; may use i (0-based) and n (count)."
     )
     inputs: Annotated[Named[Annotated[TextField, naming("input")]], naming("input")] = Field(

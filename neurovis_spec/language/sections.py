@@ -44,10 +44,12 @@ from neurovis_spec.language.located import (
     FormulaField,
     Leaf,
     Located,
+    MeasuredField,
     NamesField,
     PartsField,
     TextField,
     TextsField,
+    TimeField,
     findings_of,
     items_of,
     refuse,
@@ -102,7 +104,7 @@ class Time(Model):
     PLACE: ClassVar[str] = "'time'"
     ELSEWHERE: ClassVar[AnyMapping[str, str]] = dict.fromkeys(("timestep", "time_step", "h"), "dt")
 
-    dt: FormulaField | None = Field(None, description="Seconds a step (default 1).")
+    dt: TimeField | None = Field(None, description="Seconds a step, or a time such as 0.1 ms (default 1).")
     steps: FormulaField | None = Field(None, description="Default run length in steps (default 1000).")
     episode: FormulaField | None = Field(None, description="Steps of an episode; it ends after every m steps.")
     integrate: Annotated[IntegrateModel, Short("method", "a method, or {method: …, substeps: …}")] | None = Field(
@@ -314,8 +316,8 @@ class ConnectionModel(Model):
         Annotated[Located[str], words("from", "to")] | None,
         Needs(("matrix", _CENTRE), "'rows' says how a matrix is read; there is no matrix"),
     ] = Field(None, description="Whether the rows of a matrix are sources (from) or targets (to) (default from).")
-    delay: FormulaField | None = Field(
-        None, description="Steps the signal travels; 0 is within the same step (default 1)."
+    delay: TimeField | None = Field(
+        None, description="Steps the signal travels, or a time such as 1.5 ms; 0 is within the same step (default 1)."
     )
     port: DestinationsField | None = Field(
         None, description="The port of the target, or several with factors: {ampa: 1, nmda: 0.3} (default drive)."
@@ -364,24 +366,24 @@ class EventModel(Model):
     )
 
     at: Annotated[
-        FormulaField | None,
+        TimeField | None,
         NotWith(
             ("clamp",),
             "a clamp lasts: it has 'from', and perhaps 'to'",
             "write from: instead of at:",
             "bad-event",
         ),
-    ] = Field(None, description="The step from which on it applies (all but a clamp).")
+    ] = Field(None, description="The step, or the time, from which on it applies (all but a clamp).")
     from_: Annotated[
-        FormulaField | None,
+        TimeField | None,
         Needs(("clamp",), "'from' is of a clamp, all else takes 'at' alone", "write at: STEP", "bad-event"),
-    ] = Field(None, alias="from", description="The first step of a clamp.")
+    ] = Field(None, alias="from", description="The first step of a clamp, or the time.")
     to: Annotated[
-        FormulaField | None,
+        TimeField | None,
         Needs(("from", "clamp"), "'to' is the end of a clamp, all else takes 'at' alone", "remove 'to'", "bad-event"),
-    ] = Field(None, description="The step before which a clamp ends; without it, it lasts.")
-    set: Annotated[Keyed[FormulaField], KeysAreNames(), Filled("{parameter: value}"), naming("parameter"), _AT] = Field(
-        default_factory=dict, description="{parameter: value} from this step on."
+    ] = Field(None, description="The step, or the time, before which a clamp ends; without it, it lasts.")
+    set: Annotated[Keyed[MeasuredField], KeysAreNames(), Filled("{parameter: value}"), naming("parameter"), _AT] = (
+        Field(default_factory=dict, description="{parameter: value} from this step on.")
     )
     clamp: Annotated[
         Keyed[FormulaField],

@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar, Final, Generic, NamedTuple, TypeAlias, T
 
 from pydantic import Field, ValidationInfo
 
-from neurovis_spec.diagnostics import Span, shorten
+from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.grammar import (
     BOOL,
     CELL,
@@ -37,7 +37,7 @@ from neurovis_spec.language.grammar import (
     declaring,
     words,
 )
-from neurovis_spec.language.keys import read_keys
+from neurovis_spec.language.keys import Keys, read_keys
 from neurovis_spec.language.located import (
     NAME,
     Formula,
@@ -53,11 +53,13 @@ from neurovis_spec.language.located import (
     each,
     findings_of,
     give_up,
+    in_unit,
     one_of,
     refuse,
     value_or,
 )
 from neurovis_spec.language.model import Model, NamedParameters, Short, opening
+from neurovis_spec.language.units import measured
 from neurovis_spec.language.words import Combine
 from neurovis_spec.language.yaml.source import AnyList, Entry, Mapping, Node, Scalar, Sequence, one_or_more
 
@@ -332,13 +334,32 @@ class ParameterModel(Model):
     value: FormulaField = Field(description="The value.")
     minimum: FormulaField | None = Field(None, alias="min", description="The least value that it may be given.")
     maximum: FormulaField | None = Field(None, alias="max", description="The greatest value that it may be given.")
-    unit: TextField | None = Field(None, description="Its unit, which is shown.")
+    unit: TextField | None = Field(
+        None, description="Its unit, which is shown; values may be written with another one of the kind: 0.02 s for ms."
+    )
     description: TextField | None = Field(None, description="What it is.")
 
     @property
     def about(self) -> str:
         """What it is, as the author says."""
         return value_or(self.description, "")
+
+    @property
+    def measure(self) -> str:
+        """Its unit, "" without one."""
+        return value_or(self.unit, "")
+
+    @classmethod
+    def _keys(cls, keys: Keys, findings: Findings) -> dict[str, object]:
+        """What is written with a unit is a number in that of the parameter."""
+        result = super()._keys(keys, findings)
+        unit = result.get("unit")
+        if isinstance(unit, Scalar) and isinstance(unit.value, str):
+            for key in ("value", "min", "max"):
+                node = result.get(key)
+                if isinstance(node, Scalar) and isinstance(node.value, str) and measured(node.value) is not None:
+                    result[key] = in_unit(Located(node.value, node), unit.value, findings)
+        return result
 
 
 ParameterField = Annotated[ParameterModel, Short("value", "a number or an expression")]

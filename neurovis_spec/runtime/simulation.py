@@ -27,6 +27,7 @@ from neurovis_spec.compiler.events.patch import PatchError
 from neurovis_spec.compiler.events.settable import ParameterFormula
 from neurovis_spec.compiler.network import Network, Output
 from neurovis_spec.language.expressions.tree import Number
+from neurovis_spec.language.units import UnitError, measured, number_in
 from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.backend import Backend, Reading, Ready, ready
 from neurovis_spec.runtime.columns import ALL, Keep, Probe, probe_of
@@ -313,8 +314,9 @@ class Simulation:
             found[name] = read(state)
         return found
 
-    def set(self, values: Mapping[str, float] | None = None, /, **parameters: float) -> None:
-        """Give parameters other values from step k on, until an event of a later step sets them again.
+    def set(self, values: Mapping[str, float | str] | None = None, /, **parameters: float | str) -> None:
+        """Give parameters other values from step k on, until an event of a later step sets them again. A parameter with
+        a unit takes a text such as ``0.02 s``, too.
 
         Fixed weights, biases, inputs, clamps and parameters of models and rules follow; plastic weights, states,
         signals under way and ``initial`` stay. Raises ParameterError, and then nothing has changed.
@@ -340,7 +342,7 @@ class Simulation:
                 raise ParameterError(
                     f"parameter '{name}' cannot be set in a run: the structure of the network depends on it"
                 )
-            number = arguments.finite(value)
+            number = _number(name, value, self.network.settable.slots[slots[name]].unit)
             if number is None:
                 raise ParameterError(f"parameter '{name}' takes a finite number, not {reprlib.repr(value)}")
             result[slots[name]] = number
@@ -466,6 +468,18 @@ def _resumed(
     if simulation._body is not None:
         simulation._body.take(state)
     return simulation
+
+
+def _number(name: str, value: object, unit: str) -> float | None:
+    """What a parameter with this unit ("" without one) is set to; None where it is no finite number. Raises
+    ParameterError for a unit that does not fit."""
+    written = measured(value) if unit and isinstance(value, str) else None
+    if written is None:
+        return arguments.finite(value)
+    try:
+        return number_in(unit, written)
+    except UnitError as error:
+        raise ParameterError(f"parameter '{name}': {error}") from None
 
 
 def _reader(network: Network, output: Output) -> Callable[[State], np.float64 | FloatArray]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Final, TypeAlias
@@ -16,9 +16,14 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from neurovis_spec import arguments
+from neurovis_spec.language.units import UnitError, measured, number_in
 
 Number: TypeAlias = int | float
 Point: TypeAlias = tuple[Number, ...]
+#: The values of each name of a grid, as a caller gives them.
+Over: TypeAlias = Mapping[str, str | Iterable[Number | str]]
+#: The unit of a parameter, "" where it has none.
+UnitOf: TypeAlias = Callable[[str], str]
 
 #: The axis that is no parameter.
 SEED: Final = "seed"
@@ -45,13 +50,18 @@ class Axis:
     values: Point
 
 
-def axis(name: str, values: str | Iterable[Number]) -> Axis:
-    """The values of a name, from a text or as they are. Raises SweepError."""
+def _no_unit(name: str) -> str:
+    return ""
+
+
+def axis(name: str, values: str | Iterable[Number | str], unit_of: UnitOf = _no_unit) -> Axis:
+    """The values of a name, from a text or as they are; those that are written with a unit in that of the parameter.
+    Raises SweepError."""
     if isinstance(values, str):
-        found = _of_text(name, values)
+        found = _of_text(name, values, unit_of)
     else:
         given = arguments.several(name, values, "a range or numbers")
-        found = tuple(_plain(name, value) for value in given)
+        found = tuple(_plain(name, value, unit_of) for value in given)
     if not found:
         raise SweepError(f"'{name}' has no value")
     wrong = next((value for value in found if not math.isfinite(value)), None)
@@ -68,10 +78,10 @@ def axis(name: str, values: str | Iterable[Number]) -> Axis:
     return Axis(name, found)
 
 
-def axes(over: Mapping[str, str | Iterable[Number]]) -> tuple[Axis, ...]:
-    """The axes of a grid, in the order given. Raises SweepError."""
+def axes(over: Over, unit_of: UnitOf = _no_unit) -> tuple[Axis, ...]:
+    """The axes of a grid, in the order given; ``unit_of`` says which unit a parameter has. Raises SweepError."""
     arguments.mapping("over", over)
-    found = tuple(axis(name, values) for name, values in (over or {}).items())
+    found = tuple(axis(name, values, unit_of) for name, values in (over or {}).items())
     if not found:
         raise SweepError("a sweep is over one name at least", f"as in eta=0.1:0.5:5; a range is {FORMS}")
     if math.prod(len(one.values) for one in found) > _MOST:
@@ -95,13 +105,15 @@ def number(text: str) -> Number:
     return int(text) if _INTEGER.fullmatch(text) else float(text)
 
 
-def _plain(name: str, value: object) -> Number:
+def _plain(name: str, value: object, unit_of: UnitOf) -> Number:
+    if isinstance(value, str) and measured(value) is not None:
+        return _number(name, value, unit_of)
     if isinstance(value, bool) or not isinstance(value, int | float | np.number):
         raise SweepError(f"'{name}' takes numbers, not {value!r}")
     return int(value) if isinstance(value, int | np.integer) else float(value)
 
 
-def _of_text(name: str, text: str) -> Point:
+def _of_text(name: str, text: str, unit_of: UnitOf) -> Point:
     if match := _INTEGERS.fullmatch(text):
         low, high = int(match[1]), int(match[2])
         if low > high:
@@ -109,17 +121,18 @@ def _of_text(name: str, text: str) -> Point:
         _bounded(name, high - low + 1)
         return tuple(range(low, high + 1))
     if ":" in text:
-        return _spread(name, text)
-    return tuple(_number(name, part) for part in text.split(","))
+        return _spread(name, text, unit_of)
+    return tuple(_number(name, part, unit_of) for part in text.split(","))
 
 
-def _spread(name: str, text: str) -> Point:
+def _spread(name: str, text: str, unit_of: UnitOf) -> Point:
     """``a:b:N`` and ``a:b:logN``."""
     parts = text.split(":")
     count = _COUNT.fullmatch(parts[-1])
     if len(parts) != 3 or count is None:
         raise SweepError(f"'{name}': '{text}' is no range", f"a range is {FORMS}")
-    low, high, number = _number(name, parts[0]), _number(name, parts[1]), int(count[2])
+    low, high = (_number(name, part, unit_of) for part in parts[:2])
+    number = int(count[2])
     if number < 2:
         raise SweepError(f"'{name}': a range has two numbers or more, its ends")
     _bounded(name, number)
@@ -129,9 +142,13 @@ def _spread(name: str, text: str) -> Point:
     return tuple(float(value) for value in spread)
 
 
-def _number(name: str, text: str) -> Number:
+def _number(name: str, text: str, unit_of: UnitOf) -> Number:
+    written = measured(text)
+    unit = "" if written is None else unit_of(name)
     try:
-        return number(text)
+        return number_in(unit, written) if written is not None and unit else number(text)
+    except UnitError as error:
+        raise SweepError(f"'{name}': {error}") from None
     except ValueError:
         raise SweepError(f"'{name}': '{text.strip()}' is no number", f"a range is {FORMS}") from None
 

@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Final, Unpack
 
@@ -18,11 +19,12 @@ import numpy.typing as npt
 
 from neurovis_spec import api, arguments
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.diagnostics import SpecError
+from neurovis_spec.diagnostics import Findings, SpecError
 from neurovis_spec.interrupts import Ended
 from neurovis_spec.keywords import COMPILE, CompileKeywords, check, completed, keywords
+from neurovis_spec.language.shape import read_spec
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
-from neurovis_spec.language.yaml.reader import LARGEST
+from neurovis_spec.language.yaml.reader import LARGEST, read_text
 from neurovis_spec.likeness import suggest
 from neurovis_spec.plain import text_of
 from neurovis_spec.progress import Progress
@@ -34,7 +36,7 @@ from neurovis_spec.runtime.embodied import embodied
 from neurovis_spec.runtime.inputs import check_names
 from neurovis_spec.runtime.measures import parsed
 from neurovis_spec.runtime.record import AS_IT_IS
-from neurovis_spec.sweeps.grid import SEED, Axis, Number, Point, SweepError, axes, points
+from neurovis_spec.sweeps.grid import SEED, Axis, Over, Point, SweepError, axes, points
 from neurovis_spec.sweeps.point import LABEL, Job, Source, compiled, measures
 from neurovis_spec.sweeps.table import ERROR, Journal, Row, Table
 from neurovis_spec.sweeps.workers import Runner, runner_of
@@ -87,7 +89,7 @@ class CheckedSweep:
 @keywords(SweepKeywords, SWEEP)
 def sweep(
     source: str | Path | Mapping[str, object],
-    over: Mapping[str, str | Iterable[Number]],
+    over: Over,
     metrics: str | Iterable[str] | Mapping[str, str],
     **options: Unpack[SweepKeywords],
 ) -> Table:
@@ -124,13 +126,13 @@ def sweep(
 
 def planned(
     source: str | Path | Mapping[str, object] | Source,
-    over: Mapping[str, str | Iterable[Number]],
+    over: Over,
     metrics: str | Iterable[str] | Mapping[str, str],
     course: Course = AS_IT_IS,
     how: CompileKeywords = COMPILE,
 ) -> CheckedSweep:
     """A sweep before anything is run: of each point this ``course``, compiled so. Raises what ``sweep`` raises."""
-    grid = axes(over)
+    grid = axes(over, partial(_unit_of, source))
     spec = source if isinstance(source, Source) else _read(source)
     named = named_metrics(metrics)
     for one in named.values():
@@ -149,7 +151,7 @@ def _anywhere(how: CompileKeywords) -> CompileKeywords:
     given = arguments.mapping("parameters", how["parameters"])
     root, body = how["root"], arguments.body(how["body"])
     return {
-        "parameters": {name: arguments.number(name, value) for name, value in given.items()},
+        "parameters": {name: api.setting(name, value) for name, value in given.items()},
         "root": None if root is None else str(real_path(root)),
         "limit": how["limit"],
         "body": body if isinstance(body, bool) else real_path(body),
@@ -229,6 +231,15 @@ def named_metrics(metrics: str | Iterable[str] | Mapping[str, str]) -> dict[str,
 def _pair(text: str) -> tuple[str, str]:
     match = _NAMED.fullmatch(text)
     return (match[1], match[2].strip()) if match else (" ".join(text.split()), text)
+
+
+def _unit_of(source: str | Path | Mapping[str, object] | Source, name: str) -> str:
+    """The unit of a parameter of a spec, as far as that can be read."""
+    spec = source if isinstance(source, Source) else _read(source)
+    document = read_text(spec.text, spec.file, Findings())
+    model = None if document is None else read_spec(document, Findings())
+    parameter = None if model is None else model.parameters.get(name)
+    return "" if parameter is None else parameter.measure
 
 
 def _read(source: str | Path | Mapping[str, object]) -> Source:

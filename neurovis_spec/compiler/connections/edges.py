@@ -21,7 +21,7 @@ from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Span, shorten
-from neurovis_spec.language.located import formula_of
+from neurovis_spec.language.located import time_of
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
 from neurovis_spec.language.values import EdgeRows, FileReference
 from neurovis_spec.language.yaml.source import NULL, TEXT
@@ -166,10 +166,8 @@ class EdgeReader:
         for place, cell in enumerate(which.tolist()):
             key = int(cells.kinds[cell]), float(cells.numbers[cell]) if cells.kinds[cell] != NULL else 0.0
             if key not in found:
-                formula = formula_of(cells.node(cell), self.constants.findings)
-                found[key] = (
-                    UNKNOWN if formula is UNKNOWN else self.constants.integer(formula, "a delay", 0, LONGEST_DELAY)
-                )
+                formula = time_of(cells.node(cell), self.constants.findings)
+                found[key] = UNKNOWN if formula is UNKNOWN else self.constants.delay(formula)
             result[place] = known(found[key], 0)
         return UNKNOWN if UNKNOWN in found.values() else result
 

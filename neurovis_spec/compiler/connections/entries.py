@@ -24,7 +24,7 @@ from neurovis_spec.compiler.connections.plasticity import ConnectionEnds, Learni
 from neurovis_spec.compiler.connections.routes import default_delays, route_of
 from neurovis_spec.compiler.connections.weight_scale import Scaled, check_scale, scaled
 from neurovis_spec.compiler.events.settable import Assembled, Distance, Part
-from neurovis_spec.compiler.limits import LONGEST_DELAY, Limits, amount
+from neurovis_spec.compiler.limits import Limits, amount
 from neurovis_spec.compiler.names.references import Directory
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import PLAIN_ROUTE, Route
@@ -129,7 +129,7 @@ class EntryBuilder:
         errors_before_entry = findings.errors
         if body.label is not None:
             check_length(body.label, findings)
-        delay = 1 if body.delay is None else self.constants.integer(body.delay, "a delay", 0, LONGEST_DELAY)
+        delay = 1 if body.delay is None else self.constants.delay(body.delay)
         route = route_of(body, self.sources, self.targets, self.context.census, self.constants)
         errors_before_shape = findings.errors
         # what is collected here stands at cells of the matrix, what ``centre_parts`` collects at connections

@@ -64,13 +64,14 @@ class EventReader:
         """One event; UNKNOWN where anything of it is invalid, which is reported."""
         errors_before = self.findings.errors
         begin = model.at if model.at is not None else model.from_
-        at = None if begin is None else self.constants.integer(begin, "the step of an event", 0)
-        to = None if model.to is None else self.constants.integer(model.to, "the end of a clamp", 1)
+        at = None if begin is None else self.constants.steps(begin, "the step of an event", 0)
+        to = None if model.to is None else self.constants.steps(model.to, "the end of a clamp", 1)
         if isinstance(at, int) and isinstance(to, int) and model.to is not None and to <= at:
             message = f"the clamp ends before it begins: from {at} to {to}, which is exclusive"
             self.findings.error("out-of-range", model.to.span, message)
         # a name whose value could not be read (UNKNOWN) is checked, too; ``model.set`` is without it
-        for name, formula in names_of(model, "set", model.set).items():
+        given = {name: self.constants.measured(name, formula) for name, formula in model.set.items()}
+        for name, formula in names_of(model, "set", given).items():
             self._check_set(model, name)
             if formula is not UNKNOWN:
                 self.constants.scalar(formula)
@@ -88,7 +89,7 @@ class EventReader:
         return Event(
             at,
             to,
-            set=model.set,
+            set=given,
             clamp=tuple(clamps),
             lesioned_neurons=lesioned_neurons,
             lesioned_connections=lesioned_connections,

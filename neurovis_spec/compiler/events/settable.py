@@ -201,6 +201,8 @@ class Slot:
     given: bool = False
     #: if so, what the spec says
     own: ParameterFormula | None = None
+    #: its unit, "" without one
+    unit: str = ""
 
     @property
     def bounds_read(self) -> frozenset[int]:

@@ -27,7 +27,7 @@ from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.parameters import make_parameters
 from neurovis_spec.diagnostics import Findings, Undeclared, shorten
 from neurovis_spec.language.expressions.tree import Number, names, substitute
-from neurovis_spec.language.located import NAME_RULE, too_long
+from neurovis_spec.language.located import NAME_RULE, in_unit, too_long
 from neurovis_spec.language.model import names_of, unread
 from neurovis_spec.language.modules import InstanceModel
 from neurovis_spec.language.places import formula_at
@@ -278,12 +278,14 @@ class Expander:
         outer = scope.constants
         constants = constants_of(module, self.dt, self.findings)
         around = Outside(outer.names, _OUTSIDE)
-        constants = replace(constants, slots=outer.slots, path=place.path, outside=around)
+        constants = replace(constants, slots=outer.slots, path=place.path, outside=around, timed=outer.timed)
         extra = dict(zip(COUNTED, (float(place.position), float(place.count)), strict=True))
         given: dict[str, float] = {}
         following_settings: dict[str, ParameterFormula] = {}
         names_read: dict[str, frozenset[str]] = {}
-        for name, formula in model.set.items():
+        for name, written in model.set.items():
+            parameter = module.model.parameters.get(name)
+            formula = in_unit(written, "" if parameter is None else parameter.measure, self.findings)
             value = scope.constants.value(formula, extra)
             if name not in module.model.parameters:
                 continue

@@ -24,7 +24,7 @@ from neurovis_spec.language.expressions.evaluate import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import Name, Tree, names
 from neurovis_spec.language.keys import settings_of
-from neurovis_spec.language.located import IDENTIFIER, Formula, Located, formula_of
+from neurovis_spec.language.located import IDENTIFIER, Formula, Located, formula_of, in_unit
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.values import Choice, FormulaList, Initial
 from neurovis_spec.language.yaml.source import AnyList, Entry, Scalar, one_or_more
@@ -181,18 +181,20 @@ def _value_of_each(
     return np.array(result, dtype=np.float64) if len(result) == n else UNKNOWN
 
 
-def _formulas(entry: Entry, constants: Constants) -> Formula | FormulaList | Unknown:
-    """What is written for a parameter: a formula, or a list of formulas; UNKNOWN where one is invalid."""
-    node = entry.value
+def _formulas(entry: Entry, unit: str, constants: Constants) -> Formula | FormulaList | Unknown:
+    """What is written for a parameter that has a unit, or "": a formula, or a list of formulas; UNKNOWN where one is
+    invalid."""
+    node, findings = entry.value, constants.findings
     if not isinstance(node, AnyList):
-        return formula_of(node, constants.findings)
+        formula = formula_of(node, findings)
+        return formula if formula is UNKNOWN else in_unit(formula, unit, findings)
     items: list[Formula] = []
-    before = constants.findings.errors
+    before = findings.errors
     for item in node.items:
-        formula = formula_of(item, constants.findings)
+        formula = formula_of(item, findings)
         if formula is not UNKNOWN:
-            items.append(formula)
-        elif constants.findings.errors - before >= PATIENCE:
+            items.append(in_unit(formula, unit, findings))
+        elif findings.errors - before >= PATIENCE:
             return UNKNOWN
     return FormulaList(tuple(items), node.span) if len(items) == len(node) else UNKNOWN
 
@@ -211,7 +213,7 @@ def _parameters(
     for default in defaults:
         entry = entries.get(default.name)
         with constants.following() as parts:
-            value = _default(default, n, values) if entry is None else _setting(entry, default.name, n, constants, each)
+            value = _default(default, n, values) if entry is None else _setting(entry, default, n, constants, each)
         values[default.name] = value
         if value is UNKNOWN:
             continue
@@ -238,11 +240,11 @@ def _parameters(
 
 
 def _setting(
-    entry: Entry | Unknown, name: str, n: int | Unknown, constants: Constants, each: Each
+    entry: Entry | Unknown, default: Default, n: int | Unknown, constants: Constants, each: Each
 ) -> FloatArray | Unknown:
-    """The value of a parameter that is set."""
-    formulas = UNKNOWN if entry is UNKNOWN else _formulas(entry, constants)
-    return UNKNOWN if formulas is UNKNOWN else spread(formulas, n, constants, f"'{name}'", each=each)
+    """The value of a parameter that is set; a number with a unit is one in that of the parameter."""
+    formulas = UNKNOWN if entry is UNKNOWN else _formulas(entry, default.unit, constants)
+    return UNKNOWN if formulas is UNKNOWN else spread(formulas, n, constants, f"'{default.name}'", each=each)
 
 
 def _default(default: Default, n: int | Unknown, values: Mapping[str, Value | Unknown]) -> FloatArray | Unknown:

@@ -31,6 +31,7 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray, Indices, IntArray
 from neurovis_spec.compiler.events.settable import Dependent, ParameterFormula, Part, Slot, slots_named
+from neurovis_spec.compiler.limits import LONGEST_DELAY, plural
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Findings, Home, Undeclared, shorten
 from neurovis_spec.language.expressions.evaluate import evaluate_array
@@ -40,7 +41,8 @@ from neurovis_spec.language.expressions.mistakes import INSTEAD
 from neurovis_spec.language.expressions.parser import ExpressionError, parse, unknown_names
 from neurovis_spec.language.expressions.tree import Draw, Number, Tree, draws, names
 from neurovis_spec.language.grammar import PLAIN, Role
-from neurovis_spec.language.located import Formula
+from neurovis_spec.language.located import Formula, in_unit
+from neurovis_spec.language.units import Seconds
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.likeness import suggest
 
@@ -218,6 +220,10 @@ class Constants:
     path: str = ""
     #: where they are declared
     home: Home = PARAMETERS
+    #: whether ``dt`` is in order
+    timed: bool = True
+    #: the units of the parameters that have one
+    units: dict[str, str] = field(default_factory=dict)
     #: the parameters that the instance is given as formulas over those of the scope around it
     settings: Mapping[str, ParameterFormula] = field(default_factory=dict)
     #: the parts of the innermost ``following`` block; None outside of all
@@ -252,6 +258,7 @@ class Constants:
             high=high,
             given=given and not self.path,
             own=own,
+            unit=self.units.get(name, ""),
         )
         self.settable[name] = len(self.slots)
         self.slots.append(slot)
@@ -392,6 +399,47 @@ class Constants:
             self.findings.error("out-of-range", formula.span, f"{what} must be {bound}, this is {value:.15g}")
             return UNKNOWN
         return int(value)
+
+    def measured(self, name: str, formula: Formula) -> Formula:
+        """What a parameter is set to; where that has a unit it is a number in the parameter's own."""
+        return in_unit(formula, self.units.get(name, ""), self.findings)
+
+    def steps(self, formula: Formula, what: str, least: int, most: int = 2**53) -> int | Unknown:
+        """How many steps something takes, an integer from ``least`` to ``most``: as it is written, or as a time, which
+        must be a whole number of steps."""
+        if isinstance(formula.value, Seconds):
+            if not self.timed:
+                return UNKNOWN
+            steps = formula.value / self.dt
+            if abs(steps - round(steps)) > NEAR_INTEGER:
+                message = f"{what} is a whole number of steps, this is {steps:.15g}"
+                hint = f"a step is {self.dt:.12g} s long"
+                self.findings.error("not-an-integer", formula.span, message, hint)
+                return UNKNOWN
+            formula = formula._replace(value=round(steps))
+        return self.integer(formula, what, least, most)
+
+    def delay(self, formula: Formula) -> int | Unknown:
+        """A delay in steps. One that is written as a time is rounded, to one step at least if it is above 0; a warning
+        says so where that makes another delay of it."""
+        if isinstance(formula.value, Seconds):
+            if not self.timed:
+                return UNKNOWN
+            if formula.value < 0:
+                message = f"a delay must be at least 0, this is {formula.value:.15g} s"
+                self.findings.error("out-of-range", formula.span, message)
+                return UNKNOWN
+            exact = formula.value / self.dt
+            steps = max(round(exact), min(1, math.ceil(exact)))
+            written, made = shorten(str(formula.node.value).strip()), plural(steps, "step")
+            if 0 < exact < 1 - NEAR_INTEGER:
+                message = f"'{written}' is less than a step, which is {self.dt:.12g} s long: the delay is 1 step"
+                self.findings.warning("delay-below-step", formula.span, message, "shorten 'dt', or write delay: 1")
+            elif abs(exact - steps) > NEAR_INTEGER:
+                message = f"'{written}' is {exact:.12g} steps: the delay is {made}, {steps * self.dt:.12g} s"
+                self.findings.warning("delay-rounded", formula.span, message, "write a whole number of steps")
+            formula = formula._replace(value=steps)
+        return self.integer(formula, "a delay", 0, LONGEST_DELAY)
 
     def depend(self, used: Iterable[str]) -> None:
         """Note that something of the structure depends on these parameters, and so on those that they follow."""

@@ -68,6 +68,7 @@ class Default(NamedTuple):
     value: Tree | Unknown
     low: Tree | None = None
     high: Tree | None = None
+    unit: str = ""
 
 
 Defaults: TypeAlias = tuple[Default, ...]
@@ -252,16 +253,16 @@ class _Checker:
 
     def _default(self, name: str, parameter: ParameterModel, values: Names[Value]) -> Default:
         """A parameter's default and bounds as formulas; UNKNOWN, or None for a bound, where one is invalid."""
-        value = self._finite(parameter.value, values)
-        low, high = (
+        value, low, high = (
             UNKNOWN if formula is None else self._finite(formula, values)
-            for formula in (parameter.minimum, parameter.maximum)
+            for formula in (parameter.value, parameter.minimum, parameter.maximum)
         )
         return Default(
             name,
             value,
             None if low is UNKNOWN else low,
             None if high is UNKNOWN else high,
+            parameter.measure,
         )
 
     def _finite(self, formula: Formula, values: Names[Value]) -> Tree | Unknown:

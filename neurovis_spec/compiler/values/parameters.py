@@ -10,16 +10,20 @@ from collections.abc import Collection, Mapping
 
 from neurovis_spec.compiler.names.references import Section, key_span
 from neurovis_spec.compiler.values.constants import Constants
-from neurovis_spec.diagnostics import Span
+from neurovis_spec.diagnostics import Span, shorten
 from neurovis_spec.language.expressions.functions import RESERVED, meaning
 from neurovis_spec.language.expressions.tree import names
-from neurovis_spec.language.located import Formula
-from neurovis_spec.language.unknown import UNKNOWN
+from neurovis_spec.language.located import Formula, Located
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.values import ParameterModel
+from neurovis_spec.language.yaml.source import Scalar
 
 
 def make_parameters(
-    section: Section, constants: Constants, given: Mapping[str, float], given_at: Mapping[str, Span] | None = None
+    section: Section,
+    constants: Constants,
+    given: Mapping[str, float | str],
+    given_at: Mapping[str, Span] | None = None,
 ) -> None:
     """Declare the parameters in the order written; a value that is given from outside replaces the written one, within
     its bounds. ``given_at`` says where it is given."""
@@ -38,7 +42,7 @@ def _parameter(
     given_span: Span,
     *,
     constants: Constants,
-    given: Mapping[str, float],
+    given: Mapping[str, float | str],
     later: Collection[str],
 ) -> None:
     """Declare one parameter. ``later`` are the names declared below, for the message where its formula uses one."""
@@ -47,6 +51,8 @@ def _parameter(
         message = f"a parameter may not be called '{name}': the language gives this name a meaning of its own"
         hint = f"'{name}' is {meaning(name)}; take another name, such as '{name}_0'"
         findings.error("reserved-name", name_span, message, hint)
+    if parameter.unit is not None:
+        constants.units[name] = parameter.measure
     invalid = constants.names.declared.get(name) is UNKNOWN  # the value set from outside was found invalid before
     tree = constants.tree(parameter.value, what="parameters before this one, and constants", later=later)
     # a parameter whose value is given does not depend on those of its formula
@@ -57,10 +63,7 @@ def _parameter(
     with constants.following() as upper:
         high = _bound(parameter.maximum, math.inf, constants)
     if name in given:
-        value = float(given[name])
-        if not math.isfinite(value):
-            findings.error("not-finite", given_span, f"the parameter '{name}' is set to {value}")
-            value = UNKNOWN
+        value = _given(name, given[name], given_span, constants)
     if value is UNKNOWN or invalid:
         constants.names.declared[name] = UNKNOWN
         return
@@ -77,6 +80,21 @@ def _parameter(
         bounds = f"{low:g} to {high:g}".replace("inf", "∞")
         where = given_span if name in given else parameter.value.span
         findings.error("out-of-range", where, f"'{name}' is {value:g}; its bounds are {bounds}")
+
+
+def _given(name: str, value: float | str, span: Span, constants: Constants) -> float | Unknown:
+    """A value from outside, which may be a number with a unit."""
+    formula = constants.measured(name, Located(value, Scalar(value, span)))
+    if formula.value is UNKNOWN:
+        return UNKNOWN
+    if isinstance(formula.value, str):
+        message = f"the parameter '{name}' is set to '{shorten(formula.value)}', and has no unit"
+        constants.findings.error("bad-unit", span, message, "give it one: {value: …, unit: …}, or set it to a number")
+        return UNKNOWN
+    if not math.isfinite(formula.value):
+        constants.findings.error("not-finite", span, f"the parameter '{name}' is set to {float(formula.value)}")
+        return UNKNOWN
+    return float(formula.value)
 
 
 def _bound(formula: Formula | None, otherwise: float, constants: Constants) -> float:

@@ -13,8 +13,8 @@ from typing import Final
 from neurovis_spec.diagnostics import shorten
 
 _GROUPED: Final = re.compile(r"([+-]?)([1-9][0-9]{0,2}(?:([,_' .\u00a0\u202f’])[0-9]{3})(?:\3[0-9]{3})*)")
-#: Seconds.
-_TIMES: Final[Mapping[str, float]] = {
+#: Units of time as others write them, in seconds.
+SECONDS: Final[Mapping[str, float]] = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), 1.0),
     **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds"), 1e-3),
     **dict.fromkeys(("us", "usec", "µs", "μs", "microsecond", "microseconds"), 1e-6),
@@ -28,12 +28,12 @@ _PLAIN: Final = frozenset({
 })  # fmt: skip
 #: A number and what may be its unit.
 _WITH_UNIT: Final = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*([^\W\d]\w*|[°%])\s*")
-#: Keys that are times in seconds, in steps, and those that are no times.
-_IN_SECONDS: Final = frozenset({"dt"})
-_IN_STEPS: Final = frozenset({"steps", "delay", "at", "from", "to"})
-_NO_TIMES: Final = frozenset({"bias", "initial", "weight"})
+#: Keys that take a time with its unit, those in steps alone, and those that are no times.
+_TIMED: Final = frozenset({"dt", "delay", "at", "from", "to"})
+_IN_STEPS: Final = frozenset({"steps"})
+_NOSECONDS: Final = frozenset({"bias", "initial", "weight"})
 #: Units that are no likely names.
-UNITS: Final = frozenset({*_TIMES, *_DEGREES, *_PLAIN})
+UNITS: Final = frozenset({*SECONDS, *_DEGREES, *_PLAIN})
 
 
 def ungrouped(text: str) -> str | None:
@@ -81,18 +81,18 @@ def unit_hint(number: str, unit: str, key: str | None = None) -> str | None:
     'numbers have no units: write 0.0001 where seconds are wanted, 0.0001/dt where steps are'
     >>> unit_hint("-65", "mV"), unit_hint("2", "feet")
     ('numbers have no units: write -65', None)
-    >>> unit_hint("0.1", "ms", "dt"), unit_hint("5", "ms", "delay"), unit_hint("20", "ms", "bias")
-    ("'dt' is in seconds: write 0.0001", "'delay' counts steps: write 0.005/dt", 'numbers have no units: write 20')
+    >>> unit_hint("0.1", "ms", "dt"), unit_hint("5", "s", "steps")
+    ('a blank stands before a unit: write 0.1 ms', "'steps' counts steps: write 5/dt")
     """
     if unit in UNITS and math.isinf(float(number)):
         return "numbers have no units, and end near 1.8e308"
-    if unit in _TIMES:
-        seconds = f"{float(number) * _TIMES[unit]:.12g}"
-        if key in _IN_SECONDS:
-            return f"'{key}' is in seconds: write {seconds}"
+    if unit in SECONDS:
+        seconds = f"{float(number) * SECONDS[unit]:.12g}"
+        if key in _TIMED:
+            return f"a blank stands before a unit: write {number} {unit}"
         if key in _IN_STEPS:
             return f"'{key}' counts steps: write {seconds}/dt"
-        if key in _NO_TIMES:
+        if key in _NOSECONDS:
             return f"numbers have no units: write {number}"
         return f"numbers have no units: write {seconds} where seconds are wanted, {seconds}/dt where steps are"
     if unit in _DEGREES:
