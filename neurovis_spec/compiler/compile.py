@@ -12,9 +12,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
-from neurovis_spec.arrays import BoolArray
 from neurovis_spec.compiler.canonical import content_hash
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.checks.definitions import check_dt
@@ -24,7 +21,7 @@ from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
 from neurovis_spec.compiler.drawing.sections import layout_settings, render_settings
 from neurovis_spec.compiler.events.bound import found_in, make_settable, own_weights
-from neurovis_spec.compiler.levels import Cycle, Order, order_of, sent_by
+from neurovis_spec.compiler.levels import Cycle, Order, held_at, order_of, sent_by
 from neurovis_spec.compiler.limits import MOST_SIGNALS, MOST_SUBSTEPS, Limits, amount
 from neurovis_spec.compiler.lower import Integration, make_populations, make_program, make_projections
 from neurovis_spec.compiler.names.expand import Expander, constants_of
@@ -36,7 +33,6 @@ from neurovis_spec.compiler.names.scope import Expansion, Scope, Surroundings
 from neurovis_spec.compiler.network import Input, Instance, Network, Noise, Output
 from neurovis_spec.compiler.neurons.noise import make_noises
 from neurovis_spec.compiler.neurons.populate import Census, populate, without_neurons
-from neurovis_spec.compiler.program import DRIVE
 from neurovis_spec.compiler.ros_settings import RosSettings
 from neurovis_spec.compiler.run_checks import with_checks
 from neurovis_spec.compiler.values.constants import Constants, Sight, parse_formula
@@ -343,7 +339,7 @@ def _order(
 ) -> Order | None:
     """The levels of all neurons; None where neurons wait for each other, which is reported: a cycle of connections that
     are in order is one whatever becomes of the others."""
-    held = _held(census, inputs, noises) if census.models.flow else {}
+    held = held_at(census.neurons, inputs, noises) if census.models.flow else {}
     order = order_of(census.models.different, census.models.of, connected.wired, held)
     if not isinstance(order, Cycle):
         return order
@@ -371,18 +367,6 @@ def _outputs_of(cycle: Cycle, connected: Connected, census: Census) -> tuple[str
         model = census.models.different[census.models.of[neuron]]
         names[neuron] = f"{names[neuron]}.{sent_by(model, connected.bundle_of(connection).route.sends)}"
     return tuple(names)
-
-
-def _held(census: Census, inputs: tuple[Input, ...], noises: tuple[Noise, ...]) -> Mapping[str, BoolArray]:
-    """By ports for each neuron whether a number is added there that is the same over a step: a table's, one that is
-    supplied, noise."""
-    neurons = census.neurons
-    flows = np.array([*(one.expression is not None for one in inputs for _ in range(one.size)), True])
-    result = {port: ~flows[given] for port, given in ((DRIVE, neurons.input), *neurons.port_input.items())}
-    for noise in noises:
-        if not noise.state:
-            result.setdefault(noise.port, np.zeros(len(neurons), dtype=np.bool_))[noise.members] = True
-    return result
 
 
 def _signals_fit(bundles: tuple[Bundle, ...], findings: Findings) -> bool:

@@ -20,7 +20,7 @@ import numpy as np
 
 from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray, IntColumn, frozen, narrow
 from neurovis_spec.compiler.flows import PortsRead, flows_by, plain_flow, ports_read_by
-from neurovis_spec.compiler.network import PLAIN_ROUTE, Route
+from neurovis_spec.compiler.network import PLAIN_ROUTE, Input, Neurons, Noise, Route
 from neurovis_spec.compiler.program import DRIVE, MODEL, Definition
 
 
@@ -128,6 +128,22 @@ class _Undelayed(NamedTuple):
     connections: Indices
     sources: Indices
     targets: Indices
+
+
+def flowing(models: Sequence[Definition], model: Indices, wired: Wired, held: Mapping[str, BoolArray]) -> BoolArray:
+    """For each connection whether what it brings flows; the arguments are those of ``order_of``."""
+    return _Coupled(models, model, wired, held).flowing
+
+
+def held_at(neurons: Neurons, inputs: Sequence[Input], noises: Sequence[Noise]) -> Mapping[str, BoolArray]:
+    """By ports for each neuron whether a number is added there that is the same over a step: a table's, one that is
+    supplied, noise."""
+    flows = np.array([*(one.expression is not None for one in inputs for _ in range(one.size)), True])
+    result = {port: ~flows[given] for port, given in ((DRIVE, neurons.input), *neurons.port_input.items())}
+    for noise in noises:
+        if not noise.state:
+            result.setdefault(noise.port, np.zeros(len(neurons), dtype=np.bool_))[noise.members] = True
+    return result
 
 
 @dataclass(frozen=True)

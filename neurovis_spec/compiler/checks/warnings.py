@@ -29,6 +29,14 @@ def warn(compiled: Compiled, findings: Findings) -> None:
             check.warn(compiled, findings)
 
 
+def _flows(compiled: Compiled, findings: Findings) -> None:
+    """How states are integrated. Most specs have none with a derivative: nothing is imported then."""
+    if compiled.census.models.flow:
+        from neurovis_spec.compiler.checks.flowing import check_flowing
+
+        check_flowing(compiled, findings)
+
+
 def _theme(compiled: Compiled, findings: Findings) -> None:
     """A theme of the spec's own. Most specs have none: nothing is imported then."""
     render = compiled.spec.render
@@ -151,6 +159,7 @@ _CHECKS = (
     _Check(check_modules, ("modules",)),
     _Check(check_hidden, ("neurons", "connections")),
     _Check(check_undefined, ("neurons", "connections")),
+    _Check(_flows, ("neurons", "instances")),
     _Check(_events, ("events",)),
     _Check(_theme, ("render",)),
     _Check(_figure, ("render",)),

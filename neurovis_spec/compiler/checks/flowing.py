@@ -1,0 +1,192 @@
+"""What is legal and makes the integration of states worse than its method is.
+
+In: what a spec without errors became, in which states flow. Out: warnings: at connections that hold over a step what
+could be made anew at each stage, at noise that is held, and at a step that is too long for what decays fastest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from neurovis_spec.arrays import BoolArray, FloatArray, integers
+from neurovis_spec.compiler.checks.compiled import Compiled
+from neurovis_spec.compiler.connections.connect import Connected
+from neurovis_spec.compiler.flows import jacobian, ports_read_by, with_slope
+from neurovis_spec.compiler.levels import Wired, flowing, held_at
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.neurons.initial_states import initial_states
+from neurovis_spec.compiler.program import Integrate, Population
+from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
+from neurovis_spec.language.expressions.functions import CONSTANTS
+from neurovis_spec.language.expressions.tree import ExpressionError, Tree
+from neurovis_spec.language.units import TIMES, measured
+from neurovis_spec.language.words import Method
+
+#: How far into the negative a method stays stable: the least h·∂f/∂x. Others are not limited.
+_LIMITS: Final[Mapping[Method, float]] = {"euler": -2.0, "heun": -2.0, "rk4": -2.785}
+#: Methods of an order above 1.
+_HIGHER: Final = frozenset(("heun", "rk4"))
+
+
+def check_flowing(compiled: Compiled, findings: Findings) -> None:
+    """Warn of what makes an integration worse than it could be. Most specs have none."""
+    by = next((one for one in compiled.network.program if isinstance(one, Integrate)), None)
+    if by is None:
+        return
+    if by.method in _HIGHER:
+        _held_couplings(compiled, by.method, findings)
+    _held_noise(compiled, findings)
+    _stiff(compiled, by, findings)
+
+
+def _held_couplings(compiled: Compiled, method: Method, findings: Findings) -> None:
+    """Connections of delay 1 that bring to a derivative what would flow with delay 0."""
+    network, census = compiled.network, compiled.census
+    connected = Connected(compiled.bundles, complete=True)
+    delays = connected.delays.whole()
+    if not (delays == 1).any():
+        return
+    wired = replace(connected.wired, delays=integers(np.where(delays == 1, 0, delays)))
+    held = held_at(network.neurons, network.inputs, network.noises)
+    would = (delays == 1) & flowing(census.models.different, census.models.of, wired, held)
+    would &= _varying(network, wired)[wired.sources.compact()] & _to_derivatives(compiled, wired)
+    entry, told = wired.entry.compact(), set[Span]()
+    for number in np.unique(entry[would]).tolist():
+        bundle = compiled.bundles[number]
+        body = compiled.entries[bundle.key].body
+        span = bundle.key if body.delay is None else body.delay.span
+        if span in told:
+            continue
+        told.add(span)
+        source = int(wired.sources.compact()[np.flatnonzero(would & (entry == number))[0]])
+        model = census.models.different[census.models.of[source]]
+        message = f"'{bundle.name}' has a delay of one step, over which {method} holds its signal: its order is 1 then"
+        if body.delay is None:
+            reason = "sends what reads a port" if model.flows else "has no derivative"
+            message += f". That is the default, since the model '{model.name}' of its source {reason}"
+        findings.warning("held-coupling", span, message, "write delay: 0")
+
+
+def _to_derivatives(compiled: Compiled, wired: Wired) -> BoolArray:
+    """For each connection whether a derivative reads what it brings."""
+    models, targets = compiled.census.models, wired.targets.compact()
+    read = [ports_read_by(one).flow for one in models.different]
+    result = np.zeros(len(targets), dtype=np.bool_)
+    for port, line in wired.lines.items():
+        there = np.array([port in ports for ports in read], dtype=np.bool_)[models.of][targets]
+        arriving = slice(None) if line.connections is None else line.connections
+        result[arriving] |= there[arriving]
+    return result
+
+
+def _varying(network: Network, wired: Wired) -> BoolArray:
+    """For each neuron whether anything changes what it sends in a run: a state, an input, the time, or such a neuron
+    before it."""
+    neurons = network.neurons
+    result: BoolArray = neurons.input >= 0
+    for given in neurons.port_input.values():
+        result |= given >= 0
+    for population in network.populations:
+        model = population.model.definition
+        if model.state or not model.read.isdisjoint(("t", "k")):
+            result[population.members] = True
+    sources, targets = wired.sources.compact(), wired.targets.compact()
+    while True:
+        before = int(result.sum())
+        result[targets[result[sources]]] = True
+        if int(result.sum()) == before:
+            return result
+
+
+def _held_noise(compiled: Compiled, findings: Findings) -> None:
+    """Noise of groups that a derivative reads."""
+    told: set[Span] = set()
+    for one in compiled.census.groups:
+        model = one.kind.model.definition
+        read = ports_read_by(model).flow if model.flows and one.noises else frozenset[str]()
+        for port, formula, _ in one.noises:
+            if port in read and formula.span not in told:
+                told.add(formula.span)
+                message = f"this noise is held over each step, and a derivative of '{model.name}' reads it: its effect"
+                hint = "give the state a 'noise' of its own, which is scaled by the root of the step"
+                findings.warning("noise-held", formula.span, f"{message} becomes less with a shorter step", hint)
+
+
+class _Stiffest(NamedTuple):
+    """The state that decays fastest: the neuron, the state, and how fast, per second."""
+
+    neuron: str
+    state: str
+    slope: float
+
+
+def _stiff(compiled: Compiled, by: Integrate, findings: Findings) -> None:
+    """A step that is too long for the state that decays fastest, as it begins."""
+    network, time = compiled.network, compiled.spec.time
+    limit = _LIMITS.get(by.method)
+    if limit is None or time is None or time.dt is None:
+        return
+    worst = min(_slopes(network), key=lambda one: one.slope, default=None)
+    if worst is None or network.dt / by.substeps * worst.slope >= limit:
+        return
+    reached = network.dt / by.substeps * worst.slope
+    most = _shown(limit / worst.slope * by.substeps, str(time.dt.node.value))
+    message = f"dt·∂{worst.state}'/∂{worst.state} is {reached:.3g} at '{worst.neuron}'; the limit of {by.method} is"
+    hint = f"take a dt of at most {most}, or integrate: exponential"
+    findings.warning("stiff-step", time.dt.span, f"{message} {limit:g}: the run will diverge", hint)
+
+
+def _slopes(network: Network) -> Iterator[_Stiffest]:
+    """For each flow state how its derivative changes with it where a run begins, at the neuron where that is least.
+    What arrives is taken for nothing but the bias."""
+    for population in network.populations:
+        model = population.model.definition
+        if not model.flows:
+            continue
+        try:
+            slopes, activation = jacobian(model), with_slope(population.activation.definition)
+        except ExpressionError:
+            continue  # it is too long to be told anything of
+        unit = model.per_second
+        values: dict[str, Value] = {**CONSTANTS, "dt": network.dt * unit, "t": 0.0, "k": 0.0}
+        values |= population.model.parameters
+        values |= {port.name: _resting(network, population, port.name) for port in population.ports}
+        values |= initial_states(population.model, population.members, network.dt, network.neurons.starts)
+        known: dict[str, Value] = {**CONSTANTS, "dt": network.dt, **population.activation.parameters}
+        functions = {name: _function(tree, known) for name, tree in activation.functions.items()}
+        for name, tree in (*model.let, *slopes.let):
+            values[name] = evaluate_array(tree, values, functions=functions)
+        for state, tree in slopes.diagonal.items():
+            found = np.broadcast_to(evaluate_array(tree, values, functions=functions), population.members.shape)
+            if np.isfinite(found).any():
+                place = int(np.nanargmin(np.where(np.isfinite(found), found, np.nan)))
+                neuron = network.neurons.names[population.members[place]]
+                yield _Stiffest(neuron, state, float(found[place]) * unit)
+
+
+def _resting(network: Network, population: Population, port: str) -> FloatArray:
+    """What a port is where nothing arrives: its bias."""
+    neurons = network.neurons
+    bias = neurons.port_bias.get(port, neurons.bias if port == population.drive.name else np.zeros(len(neurons)))
+    combined = next(one.combine for one in population.ports if one.name == port)
+    return np.asarray(bias[population.members] + (1.0 if combined == "product" else 0.0), dtype=np.float64)
+
+
+def _function(tree: Tree, known: Mapping[str, Value]) -> Callable[..., Value]:
+    """A function of an activation."""
+    return lambda x: evaluate_array(tree, {**known, "x": x})
+
+
+def _shown(seconds: float, written: str) -> str:
+    """A time, rounded down to two digits, in the unit in which another one is written."""
+    found = measured(written)
+    unit = "s" if found is None else found.unit
+    value = seconds / float(TIMES[unit])
+    power = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return f"{math.floor(value / power) * power:.2g} {unit}"
