@@ -13,6 +13,9 @@ import numpy as np
 
 from neurovis_spec.cli.files import count
 from neurovis_spec.cli.tables import number, spread, table
+from neurovis_spec.compiler.flows import ports_read_by
+from neurovis_spec.compiler.network import PLAIN_ROUTE
+from neurovis_spec.compiler.program import Diffuse, Integrate, Update
 from neurovis_spec.describe import wired
 from neurovis_spec.diagnostics import printable
 
@@ -25,7 +28,7 @@ if TYPE_CHECKING:
 #: The largest network whose connection matrix is shown, in neurons.
 _MATRIX = 24
 _OF_GROUPS = ("group", "neurons", "size", "activation", "model", "combine", "bias", "input", "box")
-_OF_ENTRIES = ("entry", "number", "weight", "delay", "rule", "bounds")
+_OF_ENTRIES = ("entry", "number", "weight", "delay", "port", "sends", "rule", "bounds")
 
 
 def overview(compiled: CompiledNetwork) -> str:
@@ -45,6 +48,7 @@ def _parts(compiled: CompiledNetwork, network: Network) -> Iterator[str]:
     yield "neurons\n" + table(*_without_empty(groups, _OF_GROUPS))
     if len(network.connections):
         yield "connections\n" + table(*_without_empty(_entries(network), _OF_ENTRIES))
+    yield _program(network)
     if network.inputs:
         sensed = set() if network.body is None else {one.input for one in network.body.sensed}
         inputs = [_input(entry, index in sensed) for index, entry in enumerate(network.inputs)]
@@ -127,12 +131,15 @@ def _entries(network: Network) -> list[tuple[str, ...]]:
 
 def _entry(connections: Connections, index: int, name: str, members: IntArray) -> tuple[str, ...]:
     if not len(members):
-        return name, "0", "", "", "", ""
+        return name, "0", "", "", "", "", "", ""
+    route = connections.routes[index] if connections.routes else PLAIN_ROUTE
     return (
         name,
         f"{len(members):,}",
         spread(connections.weights[members].tolist()),
         _delays(connections.delays[members]),
+        "" if route.ports == PLAIN_ROUTE.ports else ", ".join(map(_port, route.ports)),
+        route.sends,
         connections.learns[index] or "",
         _bounds(float(connections.low[members[0]]), float(connections.high[members[0]])),
     )
@@ -141,6 +148,68 @@ def _entry(connections: Connections, index: int, name: str, members: IntArray) -
 def _delays(delays: IntArray) -> str:
     low, high = int(delays.min()), int(delays.max())
     return str(low) if low == high else f"{low} … {high}"
+
+
+def _port(of_route: tuple[str, float]) -> str:
+    name, factor = of_route
+    return name if factor == 1 else f"{number(factor)}·{name}"
+
+
+def _program(network: Network) -> str:
+    """The order of a step where states flow: what is integrated together, and what of it is held."""
+    rows: list[tuple[str, str, str]] = []
+    anew: set[str] = set()
+    held: set[str] = set()
+    for operation in network.program:
+        match operation:
+            case Update(population=one):
+                rows.append(("update", _members(network, one), ""))
+            case Integrate(populations=several, method=method, substeps=substeps):
+                how = method + (f", {count(substeps, 'substep')} a step" if substeps > 1 else "")
+                rows += [("integrate", _members(network, one), _flows(network, one, how)) for one in several]
+                for one in several:
+                    for name, staged in _into_derivatives(network, one):
+                        (anew if staged else held).add(name)
+            case Diffuse(populations=several):
+                noisy = [(one, network.populations[one].model.definition) for one in several]
+                rows += [
+                    ("noise", _members(network, one), ", ".join(state.name for state in model.flows if state.noise))
+                    for one, model in noisy
+                ]
+    if not any(isinstance(operation, Integrate) for operation in network.program):
+        return ""
+    by_default = {network.connections.entries[entry] for entry in network.connections.undelayed}
+    notes = [("made anew at each stage", anew), ("held over a step", held), ("delay 0 by default", by_default)]
+    told = [(what, ", ".join(name for name in network.connections.entries if name in of)) for what, of in notes if of]
+    return "\n".join(["program", table(rows), *([table(told)] if told else [])])
+
+
+def _members(network: Network, population: int) -> str:
+    """The neurons of a population, by groups where these are whole."""
+    members = set(network.populations[population].members.tolist())
+    named: list[str] = []
+    for group in network.neurons.groups:
+        inside = [neuron for neuron in group.indices if neuron in members]
+        named += [group.name] if len(inside) == group.count else [network.neurons.names[neuron] for neuron in inside]
+    return _few(named)
+
+
+def _flows(network: Network, population: int, how: str) -> str:
+    """What is integrated of a population; of one without such states what it sends is made at each stage."""
+    states = [state.name for state in network.populations[population].model.definition.flows]
+    return f"{', '.join(states)} ({how})" if states else "what it sends, at each stage"
+
+
+def _into_derivatives(network: Network, population: int) -> Iterator[tuple[str, bool]]:
+    """The entries that reach derivatives of a population, and whether what they bring is made anew at each stage."""
+    one, connections = network.populations[population], network.connections
+    read = ports_read_by(one.model.definition).flow
+    for port in one.ports:
+        anew = np.zeros(len(port.incoming), dtype=np.bool_)
+        anew[[] if port.staged is None else port.staged] = True
+        for staged in (True, False) if port.name in read else ():
+            for entry in np.unique(connections.entry[port.incoming[anew == staged]]).tolist():
+                yield connections.entries[entry], staged
 
 
 def _bounds(low: float, high: float) -> str:

@@ -43,7 +43,7 @@ SCHEMA: Mapping[type, Content] = {
     Connections: content(
         "Connections",
         "sources targets weights centres delays rules entry low high entries",
-        "descriptions learns labels routes",
+        "descriptions learns labels routes undelayed",
     ),
     Input: content("Input", "name start size expression table", "slots parts"),
     Output: content("Output", "name neurons scalar", "states"),

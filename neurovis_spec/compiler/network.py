@@ -152,6 +152,8 @@ class Connections:
     labels: tuple[str | None, ...]
     #: what the connections of each entry take and where they bring it; empty where all do as PLAIN_ROUTE says
     routes: tuple[Route, ...] = ()
+    #: the entries that name no delay and make connections of delay 0, by their numbers
+    undelayed: tuple[int, ...] = ()
 
     def __len__(self) -> int:
         return len(self.sources)

@@ -130,4 +130,5 @@ def join(made: Connected, rules: list[int]) -> Connections:
         learns=tuple(None if bundle.learning is None else title_of(bundle.learning) for bundle in bundles),
         labels=tuple(bundle.label for bundle in bundles),
         routes=() if all(route == PLAIN_ROUTE for route in made.wired.routes) else tuple(made.wired.routes),
+        undelayed=tuple(number for number, bundle in enumerate(bundles) if bundle.undelayed),
     )

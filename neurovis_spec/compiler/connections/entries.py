@@ -71,6 +71,8 @@ class Bundle(NamedTuple):
     #: of an entry that makes no connection the neurons of its ends
     empty: tuple[Indices, Indices] | None = None
     route: Route = PLAIN_ROUTE
+    #: whether it names no delay, and connections have delay 0 for what flows through them
+    undelayed: bool = False
 
 
 class _Shape(NamedTuple):
@@ -185,6 +187,7 @@ class EntryBuilder:
             label=None if body.label is None else body.label.value,
             empty=None if len(shape.i) else (self.sources, self.targets),
             route=route,
+            undelayed=body.delay is None and not np.all(unsaid),
         )
 
     def _report_empty(self) -> None:
