@@ -58,6 +58,8 @@ PORTS: dict[str, list[Plain]] = {
     "static": ["drive"],
     "leaky_integrator": ["drive"],
 }
+#: a state of each of these models
+_STATES = {"leaky": "v", "rate": "v", "mixed": "x", "through": "z"}
 METHODS = ["euler", "heun", "rk4", *(["exponential", "semi_implicit"] if "exprel" in FUNCTIONS else [])]
 
 
@@ -94,6 +96,7 @@ def flowing_specs(draw: st.DrawFn) -> Spec:
         "events": [
             {"at": 4, "set": {"level": 0.7, "w": -0.5}},
             {"from": 3, "to": 7, "clamp": {"Ga": 0.25}},
+            {"from": 5, "to": 8, "clamp": {f"Ga.{_STATES[kinds['Ga']]}": "level"}},
             {"at": 6, "lesion": [list(kinds)[-1]]},
             {"at": 9, "mend": [list(kinds)[-1]]},
         ],

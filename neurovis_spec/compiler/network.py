@@ -21,7 +21,17 @@ from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, Rend
 from neurovis_spec.compiler.events.changes import Change
 from neurovis_spec.compiler.events.settable import Binding, ParameterFormula, Part, Settable
 from neurovis_spec.compiler.names.state_references import StateOf
-from neurovis_spec.compiler.program import DRIVE, Each, Holder, Integrate, Operation, Population, Projection, Use
+from neurovis_spec.compiler.program import (
+    DRIVE,
+    Check,
+    Each,
+    Holder,
+    Integrate,
+    Operation,
+    Population,
+    Projection,
+    Use,
+)
 from neurovis_spec.compiler.ros_settings import RosSettings
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.language.words import Combine, NeuronRole
@@ -392,6 +402,33 @@ class Network:
             if outlet.name == (name or population.model.definition.send):
                 result[population.members] = len(result) + outlet.start + np.arange(len(population.members))
         return result
+
+    @cached_property
+    def state_places(self) -> Mapping[tuple[int, str], int]:
+        """What can be clamped beside the activities of all n neurons: the states of models. By the number of the
+        population and the name of the state, where those of its members begin among all that can be; from n on."""
+        found: dict[tuple[int, str], int] = {}
+        place = len(self.neurons)
+        for number, population in enumerate(self.populations):
+            for one in population.model.definition.state:
+                if not isinstance(one, Check):
+                    found[number, one.name] = place
+                    place += len(population.members)
+        return found
+
+    def clamp_places(self, what: IntArray | StateOf) -> IntArray:
+        """Where neurons, or the states of some, stand among all that can be clamped."""
+        if not isinstance(what, StateOf):
+            return what
+        _, numbers, positions = self.located("neuron")
+        starts = [self.state_places[number, what.state] for number in numbers[what.neurons].tolist()]
+        return np.array(starts, dtype=np.int64) + positions[what.neurons]
+
+    @cached_property
+    def clampable(self) -> int:
+        """How many numbers can be clamped: activities, then states of models."""
+        states = (len(self.populations[number].members) for number, _ in self.state_places)
+        return len(self.neurons) + sum(states)
 
     @cached_property
     def mark(self) -> str:

@@ -89,7 +89,7 @@ class RecordedSource:
         now = self._by_events().conditions
         states = None if self._states is None else self._recording.states[self._row, self._states]
         lesioned = now.lesioned_neurons.copy(), now.structure.gone.copy()
-        return Seen(snapshot, *lesioned, now.held.order >= 0, states)
+        return Seen(snapshot, *lesioned, now.held.order[: len(self.network.neurons)] >= 0, states)
 
     def after(self) -> After:
         """What is true after the current step, as far as the rows and the spec's events tell; weights of all

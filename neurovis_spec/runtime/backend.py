@@ -290,12 +290,13 @@ def _ready_on(network: Network, backend: Backend, why: str = "") -> Ready:
 
 def _beyond(network: Network) -> tuple[tuple[str, bool], ...]:
     """What only a backend has that says so (``Capabilities.flows``), and whether a network asks for it."""
-    ports = [port for population in network.populations for port in population.ports]
+    n, ports = len(network.neurons), [port for population in network.populations for port in population.ports]
     return (
         ("derivatives", any(isinstance(operation, Integrate) for operation in network.program)),
         ("ports", len(ports) > len(network.populations) or any(port.factors is not None for port in ports)),
         ("outputs of models", any(population.model.definition.outputs for population in network.populations)),
         ("states that are sent", bool(network.outlets)),
+        ("clamps of states", any((c.neurons >= n).any() for change in network.changes for c in change.clamps)),
     )
 
 

@@ -128,7 +128,7 @@ class Exported:
     def _phase(self, at: int, state: State) -> Phase:
         """The phase that begins with a state."""
         now = state.conditions
-        order = tuple(now.held.order.tolist())
+        order = tuple(now.held.order[: len(self.network.neurons)].tolist())
         structure = now.structure
         lesioned, clamps = now.lesioned_neurons.copy(), dict(now.held.active)
         return Phase(

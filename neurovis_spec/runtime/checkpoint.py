@@ -63,6 +63,9 @@ def save_state(state: State, path: Path) -> None:
         "clamped": _joined([clamp.neurons for clamp in clamps]).astype(np.int64),
         "clamp_values": np.array([_number(clamp) for clamp in clamps], dtype=np.float64),
     }
+    n = len(state.activity)
+    if (now.held.order[n:] >= 0).any():
+        arrays |= {"fixed_order": now.held.order[n:], "fixed_value": now.held.value[n:]}
     if now.structure.has_lost:
         arrays["lost"] = now.structure.lost
     if body is not None and body.carried is not None:
@@ -100,6 +103,10 @@ def load_state(network: Network, path: Path) -> State:
             state.k, state.drawn = _whole(about, "k"), _whole(about, "drawn")
             state.backend = str(about.get("backend", ""))
             state.begun, state.continued = _whole(about, "begun", -1), about.get("continued") is True
+            if "fixed_order.npy" in archive.namelist():
+                held, n = state.conditions.held, len(network.neurons)
+                held.order[n:] = _member(archive, "fixed_order", held.order[n:])
+                held.value[n:] = _member(archive, "fixed_value", held.value[n:])
             _clamp_again(network, state, archive, size)
             lost = state.conditions.structure.lost
             if "lost.npy" in archive.namelist():
@@ -125,8 +132,8 @@ def _arrays(state: State) -> dict[str, Array]:
         "parameters": now.parameters,
         "chosen": now.was_set.astype(np.uint8),
         "variables": now.variables,
-        "held_order": now.held.order,
-        "held_value": now.held.value,
+        "held_order": now.held.order[: len(state.activity)],
+        "held_value": now.held.value[: len(state.activity)],
         "lesioned_neurons": now.lesioned_neurons.astype(np.uint8),
         "lesioned_connections": now.lesioned_connections.astype(np.uint8),
         "gone_since": now.structure.since,
@@ -146,7 +153,8 @@ def _fill(state: State, saved: Mapping[str, Array]) -> None:
             array[:] = values
     now.parameters, now.variables = _floats(saved["parameters"]), _floats(saved["variables"])
     now.was_set = saved["chosen"].astype(np.bool_)
-    now.held.order, now.held.value = saved["held_order"].astype(np.int64), _floats(saved["held_value"])
+    n = len(state.activity)
+    now.held.order[:n], now.held.value[:n] = saved["held_order"], saved["held_value"]
     now.lesioned_neurons = saved["lesioned_neurons"].astype(np.bool_)
     now.lesioned_connections = saved["lesioned_connections"].astype(np.bool_)
     now.paused = saved["paused"].astype(np.bool_)
@@ -161,7 +169,7 @@ def _clamp_again(network: Network, state: State, archive: zipfile.ZipFile, size:
     within = (counts >= 0) & (counts <= len(neurons))  # so that their sum is one that fits
     if len(values) != len(rows) or not within.all() or counts.sum() != len(neurons):
         raise RecordingError("its clamps do not agree")
-    if len(neurons) and (neurons.min() < 0 or neurons.max() >= len(network.neurons)):
+    if len(neurons) and (neurons.min() < 0 or neurons.max() >= network.clampable):
         raise RecordingError("it clamps neurons that are not there")
     of_events = {clamp.order: clamp for change in network.changes for clamp in change.clamps}
     held = state.conditions.held

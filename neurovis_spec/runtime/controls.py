@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
-from neurovis_spec.compiler.events.changes import Change
+from neurovis_spec.compiler.events.changes import Change, Held
 from neurovis_spec.compiler.events.patch import Patcher
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Key
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.runtime.presynaptic import remembering
 from neurovis_spec.runtime.signals import signal_layout
@@ -116,17 +117,30 @@ class Controls:
         self.restructure(state)
 
     def hold(self, now: Conditions) -> None:
-        """Work out what is held in each population, lesioned neurons at 0, and put it into ``now.holds``."""
-        holding = (now.held.order >= 0) | now.lesioned_neurons
+        """Work out what is held in each population, lesioned neurons at 0, and put it into ``now.holds``; and the
+        states that are held into ``now.fixed``."""
+        n = len(self.network.neurons)
+        now.fixed = self._fixed(now.held) if (now.held.order[n:] >= 0).any() else None
+        holding = (now.held.order[:n] >= 0) | now.lesioned_neurons
         if not holding.any():
             now.holds = None
             return
-        values = np.where(now.lesioned_neurons, 0.0, now.held.value)
+        values = np.where(now.lesioned_neurons, 0.0, now.held.value[:n])
         holds: list[tuple[IntArray, FloatArray] | None] = []
         for population in self.network.populations:
             held = population.members[holding[population.members]]
             holds.append((held, values[held]) if len(held) else None)
         now.holds = tuple(holds)
+
+    def _fixed(self, held: Held) -> dict[Key, tuple[IntArray, FloatArray]]:
+        """The states of models that are held."""
+        fixed: dict[Key, tuple[IntArray, FloatArray]] = {}
+        for (number, state), start in self.network.state_places.items():
+            population = self.network.populations[number]
+            positions = np.flatnonzero(held.order[start : start + len(population.members)] >= 0)
+            if len(positions):
+                fixed[Key(population.model.owner, state)] = positions, held.value[start + positions]
+        return fixed
 
     def restructure(self, state: State) -> None:
         """Work out what a step leaves out, and put it into ``conditions.structure``: another object only where it

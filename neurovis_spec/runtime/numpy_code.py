@@ -49,13 +49,15 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, Indices, IntArray
 from neurovis_spec.compiler.events.settable import Variable
-from neurovis_spec.compiler.program import Definition, Key, Use
+from neurovis_spec.compiler.program import Definition, Key, Owner, Use
 from neurovis_spec.language.expressions.emit import defined, emit
 from neurovis_spec.language.expressions.tree import Name, Tree, Unary, names
 from neurovis_spec.runtime.stages import unfolded
-from neurovis_spec.runtime.state import State, constants
+from neurovis_spec.runtime.state import Cells, State, constants
 
 _NONE: Mapping[Key, Variable] = {}
+#: what states are held (``Conditions.fixed``)
+Fixed: TypeAlias = Mapping[Key, tuple[IntArray, FloatArray]]
 Functions: TypeAlias = Mapping[str, Callable[[str], str]]
 #: makes steps from a state on, one for each vector of inputs; while it does, the arrays of the state stay the same ones
 Steps: TypeAlias = Callable[[State, Iterable[FloatArray]], Iterator[None]]
@@ -77,6 +79,7 @@ class Code:
     def __init__(self, dt: float, variables: Mapping[Key, Variable] = _NONE) -> None:
         self.dt, self._variables = dt, variables
         self.namespace: dict[str, object] = {"np": np, **{name: getattr(np, name) for name in _CALLED}}
+        self.namespace |= {"held_at": held_at, "hold_cells": hold_cells, "held_among": held_among}
         #: lines before the steps: arrays that these work in, functions that they call
         self.before: list[str] = []
         self.lines: list[str] = []
@@ -230,7 +233,7 @@ class Code:
         lookups = [f"    {name} = state.{name}" for name in _PARTS if any(name in line for line in text)]
         lookups += [
             f"    {name} = state.conditions.{name}"
-            for name in (_VARIABLES, "holds")
+            for name in (_VARIABLES, "holds", "fixed")
             if any(name in line for line in text)
         ]
         loop = ["    for k, s in enumerate(vectors, state.k):", *(f"    {line}" for line in body), ""]
@@ -254,6 +257,8 @@ class Cell(NamedTuple):
     place: str
     #: of the code of a new value that of what is kept of it
     kept: Callable[[str], str] = str
+    #: of that of a new value, before anything is made of it, what it is where states are held
+    held: Callable[[str], str] | None = None
 
 
 def emit_change(
@@ -303,6 +308,10 @@ def _emit_replace(
     new = {name: code.fresh("n", tree, known, functions) for name, tree in trees.items() if tree is not None}
     if stay:
         new = {name: code.let("n", f"np.array({known[name]}) if {stay} else {value}") for name, value in new.items()}
+    for name, made in new.items():
+        held = cells[name].held
+        if held is not None:
+            code.line(f"if fixed: {made} = {held(made)}")
     fleeting_names = {
         name: code.let("y", code.expression(tree, known | new, functions))
         for name, tree in fleeting.items()
@@ -312,6 +321,30 @@ def _emit_replace(
         if name in cells:
             code.line(f"{cells[name].place} = {cells[name].kept(made)}")
     return fleeting_names
+
+
+def held_at(fixed: Fixed, key: Key, value: FloatArray | float, count: int) -> FloatArray | float:
+    """The new value of a state of so many members, in whose places of those that are held."""
+    if key not in fixed:
+        return value
+    result = np.array(np.broadcast_to(value, (count,)))
+    positions, values = fixed[key]
+    result[positions] = values
+    return result
+
+
+def hold_cells(fixed: Fixed, owner: Owner, cells: Cells) -> None:
+    """Have the states of an owner that are held what they are held at."""
+    for key, (positions, values) in fixed.items():
+        if key.owner == owner:
+            cells[owner][key.name][positions] = values
+
+
+def held_among(fixed: Fixed, starts: Mapping[Key, int]) -> tuple[IntArray, FloatArray]:
+    """Where those of some states that lie one behind the other are held, and at what."""
+    places = [start + fixed[key][0] for key, start in starts.items() if key in fixed]
+    values = [fixed[key][1] for key in starts if key in fixed]
+    return np.concatenate([np.zeros(0, dtype=np.int64), *places]), np.concatenate([np.zeros(0), *values])
 
 
 def _may_alias(tree: Tree) -> bool:

@@ -29,7 +29,7 @@ from typing import Final
 import numpy as np
 
 from neurovis_spec.arrays import IntArray
-from neurovis_spec.compiler.program import Diffuse, Integrate, Port
+from neurovis_spec.compiler.program import Diffuse, Integrate, Key, Port
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.numpy_arrivals import (
@@ -66,6 +66,7 @@ def diffuse(operation: Diffuse, step: Step) -> None:
                     cells = code.state(population.model, one.name)
                     numbers = code.select("s", drawn, network.vector_size)
                     code.line(f"{cells} += ({step.spread[number, one.name]} * {root!r}) * {numbers}")
+            code.line(f"if fixed: hold_cells(fixed, {code.constant(population.model.owner)}, cells)")
 
 
 @contextmanager
@@ -136,6 +137,15 @@ class _Flow:
             }
             for key, place in self.places.items():
                 code.line(f"{self.x}[{_text(place)}] = {cells[key]}")
+            starts = code.constant(
+                {
+                    Key(self.network.populations[number].model.owner, name): place.start
+                    for (number, name), place in self.places.items()
+                }
+            )
+            code.line("if fixed:")
+            code.line(f"    held, values = held_among(fixed, {starts})")
+            code.line(f"    {self.x}[held] = values")
             for part in self.parts:
                 for port in part.ports:
                     self.hold(part, port)
@@ -154,6 +164,7 @@ class _Flow:
             calls = [f"{stage}(t + {inside!r})", f"{stage}(t + {h / 2.0!r})", f"{stage}(t + {h!r} - {inside!r})"]
             for line in _METHODS[self.operation.method](self, *calls):
                 code.line(line)
+            code.line(f"if fixed: {self.x}[held] = values")
             code.indent -= substeps > 1
             for key, place in self.places.items():
                 code.line(f"{cells[key]}[:] = {self.x}[{_text(place)}]")
@@ -219,6 +230,7 @@ class _Stage:
             for array, formulas in ((self.flow.k, part.derivatives), (self.flow.j, part.slopes)):
                 for name, value in self.values(part, formulas).items():
                     self.code.line(f"{array}[{_text(self.flow.places[part.number, name])}] = {value}")
+        self.code.line(f"if fixed: {self.flow.k}[held] = 0.0")
 
     def emit_inputs(self) -> str:
         """The vector of the step, in which inputs that are formulas are made anew."""

@@ -34,6 +34,7 @@ from neurovis_spec.compiler.program import (
     Diffuse,
     Gather,
     Integrate,
+    Key,
     Learn,
     Operation,
     Projection,
@@ -96,9 +97,16 @@ def _update(operation: Update, step: Step) -> None:
         return f"np.where({mask}, {at_first_step}, {value}) if {FIRST} else {value}" if mask else value
 
     def cell(name: str) -> Cell:
-        now = code.state(model, name)
-        return Cell(now, f"{now}[:]", lambda value: unless_first(value, now))
+        now, key, count = code.state(model, name), code.constant(Key(model.owner, name)), len(population.members)
+        return Cell(
+            now,
+            f"{now}[:]",
+            lambda value: unless_first(value, now),
+            lambda value: f"held_at(fixed, {key}, {value}, {count})",
+        )
 
+    if model.definition.state:
+        code.line(f"if fixed: hold_cells(fixed, {code.constant(model.owner)}, cells)")
     seen = code.parameters(model) | step.ports[number]
     cells = {one.name: cell(one.name) for one in model.definition.kept}
     functions = code.functions(activation)

@@ -94,6 +94,9 @@ class ReferenceStepper(Seen):
         what of these is sent."""
         network = self.network
         population = network.populations[number]
+        for (owner, name), (positions, values) in (state.conditions.fixed or {}).items():
+            if owner == population.model.owner:
+                state.cells[owner][name][positions] = values
         for position, neuron in enumerate(population.members.tolist()):
             initial = float(network.neurons.initial[neuron])
             if is_first(state) and not math.isnan(initial):
@@ -130,21 +133,31 @@ class ReferenceStepper(Seen):
         flows begins with its initial states: they stay at step 0. ``lasting`` is what it gives and lasts, within its
         bounds. States and outputs are replaced, all is returned."""
         definition, cells = use.definition, state.cells[use.owner]
+        fixed = self.fixed(use, position, state)
         old = {one.name: float(cells[one.name][position]) for one in definition.state}
         old |= {name: bounded.value for name, bounded in lasting.items()}
         known = with_let({**seen, **old}, definition.let, functions)
         begins = definition.flows and is_first(state)
         steps = [] if begins else [(one.name, one.each_step) for one in definition.lasting]
-        new = changed(old, steps, known, lasting, functions)
+        new = changed(old, steps, known, lasting, functions) | fixed
         fleeting = [(one.name, one.each_step) for one in definition.fleeting]
         results = changed(new, fleeting, known | new, {}, functions) if fleeting else new
         if self.ends_episode(state):
             ends = [(one.name, one.each_episode) for one in definition.lasting]
-            new = changed(new, ends, with_let({**seen, **new}, definition.let, functions), lasting, functions)
+            new = changed(new, ends, with_let({**seen, **new}, definition.let, functions), lasting, functions) | fixed
             results = results | new
         for name, values in cells.items():
             values[position] = results[name]
         return results
+
+    def fixed(self, use: Use, position: int, state: State) -> dict[str, float]:
+        """The states of a member that are held, and at what."""
+        found: dict[str, float] = {}
+        for one in use.definition.state if state.conditions.fixed else ():
+            at = state.conditions.fixed_in(use.owner, one.name)
+            if position in at:
+                found[one.name] = at[position]
+        return found
 
     def send(self, state: State) -> None:
         """w[t]·a[t] of every delayed connection leaves; a[t] is remembered."""

@@ -65,13 +65,14 @@ class Flow:
         if is_first(state):
             return
         cells = {Place(part.number, name): self._cells(part, name, state) for part in self.parts for name in part.flows}
-        x: Numbers = {place: values.tolist() for place, values in cells.items()}
+        x = self.fix({place: values.tolist() for place, values in cells.items()}, state)
         start, h = (state.k - 1) * self.network.dt, self.network.dt / self.operation.substeps
         stage = self.stage(state, x, times(start, h).first, inputs)
         self.spread = self.all_values(stage, lambda part: part.spread)
         for substep in range(self.operation.substeps):
             at = times(start + substep * h, h)
             x = METHODS[self.operation.method](self, x, at, lambda x, t: self.stage(state, x, t, inputs))
+            x = self.fix(x, state)
         for place, values in cells.items():
             values[:] = x[place]
 
@@ -84,8 +85,22 @@ class Flow:
             for name, _ in part.spread.trees:
                 drawn = self.network.noise_of(state=name)[part.population.members]
                 values, spread = self._cells(part, name, state), self.spread[Place(part.number, name)]
+                fixed = state.conditions.fixed_in(part.population.model.owner, name)
                 for position, g in enumerate(spread):
-                    values[position] += (g * root) * float(inputs[drawn[position]])
+                    if position not in fixed:
+                        values[position] += (g * root) * float(inputs[drawn[position]])
+
+    def fix(self, x: Numbers, state: State, at: float | None = None) -> Numbers:
+        """The same, but for states that are held: what these are held at, or what all of them have ``at``."""
+        result: dict[Place, list[float]] = {}
+        for place, values in x.items():
+            owner = self.network.populations[place.population].model.owner
+            fixed = state.conditions.fixed_in(owner, place.name)
+            result[place] = [
+                value if position not in fixed else fixed[position] if at is None else at
+                for position, value in enumerate(values)
+            ]
+        return result
 
     def _cells(self, part: Part, name: str, state: State) -> FloatArray:
         return state.cells[part.population.model.owner][name]
@@ -104,8 +119,8 @@ class Flow:
         return stage
 
     def derivatives(self, stage: Stage) -> Numbers:
-        """All derivatives at a stage."""
-        return self.all_values(stage, lambda part: part.derivatives)
+        """All derivatives at a stage; 0 of states that are held."""
+        return self.fix(self.all_values(stage, lambda part: part.derivatives), stage.state, 0.0)
 
     def slopes(self, stage: Stage) -> Numbers:
         """How much each derivative changes with its own state at a stage."""

@@ -70,6 +70,24 @@ def find_states(network: Network, reference: str, names: Names | None = None) ->
     return tuple(_state(network, part, names) for part in parse_sum(reference))
 
 
+def find_model_state(network: Network, reference: str) -> StateOf | None:
+    """The state of models that ``K.v`` names, which lasts, as outputs do not; None for what is no such reference.
+    Raises KeyError with the nearest names."""
+    part, *others = parse_sum(reference)
+    name = None if others else state_of(part)
+    if name is None or name.of_rule or isinstance(names_of(network).find(name.owner.text), str):
+        return None
+    (one,) = find_states(network, reference)
+    holders = network.located("neuron").holders
+    if any(
+        output.name == one.state and np.isin(one.neurons, holder.members).any()
+        for holder in holders
+        for output in holder.uses[-1].definition.outputs
+    ):
+        raise UnknownNameError(f"'{reference}' is an output, made anew at each step: clamp a state, or the neurons")
+    return one
+
+
 def all_states(network: Network) -> tuple[StateOf, ...]:
     """All that models and rules keep, outputs of models among it."""
     none: IntArray = np.zeros(0, dtype=np.int64)

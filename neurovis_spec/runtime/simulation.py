@@ -29,7 +29,7 @@ from neurovis_spec.compiler.network import Network, Output
 from neurovis_spec.language.expressions.tree import Number
 from neurovis_spec.language.units import UnitError, measured, number_in
 from neurovis_spec.likeness import suggest
-from neurovis_spec.runtime.backend import Backend, Reading, Ready, ready
+from neurovis_spec.runtime.backend import Backend, BackendError, Reading, Ready, load, ready
 from neurovis_spec.runtime.columns import ALL, Keep, Probe, probe_of
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.course import Course
@@ -39,7 +39,7 @@ from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.record import end_values
 from neurovis_spec.runtime.recording import Recording
-from neurovis_spec.runtime.references import find_neurons, find_parts
+from neurovis_spec.runtime.references import find_model_state, find_neurons, find_parts
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.rows import After
 from neurovis_spec.runtime.state import State, initial_state
@@ -231,7 +231,7 @@ class Simulation:
     @property
     def held(self) -> npt.NDArray[np.bool_]:
         """Which neurons (n,) are clamped from step k on, a copy."""
-        return self._state.conditions.held.order >= 0
+        return self._state.conditions.held.order[: len(self.network.neurons)] >= 0
 
     @property
     def stopped(self) -> npt.NDArray[np.bool_]:
@@ -350,20 +350,22 @@ class Simulation:
 
     def clamp(self, neurons: str, value: float) -> None:
         """Hold neurons (``K1..K3``, ``K + O``, ``left.K``) at a value from step k on, whatever their model says; its
-        states go on. Raises KeyError for a name that there is not, ValueError for a value that is not finite."""
+        states go on. ``K.v`` holds the state v of their model instead. Raises KeyError for a name that there is not,
+        ValueError for a value that is not finite, BackendError where the backend holds no states."""
         number = arguments.finite(value)
         if number is None:
             raise ValueError(f"a neuron is clamped to a finite number, not {reprlib.repr(value)}")
         now = self._state.conditions
         order = max([_BY_HAND, *(order + 1 for order in now.held.active)])
-        clamp = Clamp(order, -1, self._neurons(neurons), ParameterFormula(Number(number), {}))
+        clamp = Clamp(order, -1, self._clampable(neurons), ParameterFormula(Number(number), {}))
         now.held.begin(clamp, now.parameters)
         self._controls.hold(now)
 
     def release(self, neurons: str) -> None:
-        """No clamp holds these neurons any more, by hand or by an event that has begun. Raises KeyError."""
+        """No clamp holds these neurons, or these states, any more, by hand or by an event that has begun. Raises
+        KeyError."""
         now = self._state.conditions
-        now.held.release(self._neurons(neurons))
+        now.held.release(self._clampable(neurons))
         self._controls.hold(now)
 
     def lesion(self, *parts: str) -> None:
@@ -390,6 +392,16 @@ class Simulation:
         if not len(members) or not (self.network.connections.rules[members] >= 0).any():
             raise UnknownNameError(f"there is no rule at '{connections}'")
         self._controls.learn(self._state, members, arguments.truth("on", on))
+
+    def _clampable(self, text: str) -> IntArray:
+        """Neurons or states of models, among all that can be clamped."""
+        reference = arguments.text("reference", text)
+        state = None if not isinstance(self._names.find(reference), str) else find_model_state(self.network, reference)
+        if state is None:
+            return self._neurons(text)
+        if not load(self.backend).capabilities.flows:
+            raise BackendError(f"the backend '{self.backend}' cannot clamp '{text}': it holds no states")
+        return self.network.clamp_places(state)
 
     def _neurons(self, text: str) -> IntArray:
         return np.array(find_neurons(arguments.text("reference", text), self._names), dtype=np.int64)

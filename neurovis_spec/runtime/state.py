@@ -18,7 +18,7 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.changes import Held
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.initial_states import initial_states
-from neurovis_spec.compiler.program import Owner
+from neurovis_spec.compiler.program import Key, Owner
 from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import signal_layout
 
@@ -62,6 +62,10 @@ class Structure:
         return bool((self.lost > NEVER_LOST).any())
 
 
+#: what is held of a state of which nothing is
+_NOTHING: Final = (np.zeros(0, dtype=np.int64), np.zeros(0))
+
+
 @dataclass
 class Conditions:
     """What holds for the step to come; n neurons, m connections. A *slot* is the index of a parameter in Settable."""
@@ -85,6 +89,9 @@ class Conditions:
     #: per population the neurons that are held, and at what (lesioned ones at 0); None for a population without any,
     #: and as a whole where nothing is held
     holds: tuple[tuple[IntArray, FloatArray] | None, ...] | None = None
+    #: the states of models that are held, by owner and name: of which members (their positions), and at what; None
+    #: where none is
+    fixed: Mapping[Key, tuple[IntArray, FloatArray]] | None = None
 
     def copy(self) -> Conditions:
         """The same, of its own; what is replaced as a whole is shared."""
@@ -98,6 +105,11 @@ class Conditions:
             lesioned_connections=self.lesioned_connections.copy(),
             paused=self.paused.copy(),
         )
+
+    def fixed_in(self, owner: Owner, state: str) -> Mapping[int, float]:
+        """What a state is held at, by the positions of the members of which it is."""
+        positions, values = (self.fixed or {}).get(Key(owner, state), _NOTHING)
+        return dict(zip(positions.tolist(), values.tolist(), strict=True))
 
     def held_at(self, neuron: int) -> float | None:
         """What a neuron is held at, None where it is not."""
@@ -116,7 +128,7 @@ def first_conditions(network: Network) -> Conditions:
         parameters=settable.parameters.copy(),
         was_set=np.zeros(len(settable.slots), dtype=np.bool_),
         variables=settable.initial.copy(),
-        held=Held.none(n),
+        held=Held.none(network.clampable),
         lesioned_neurons=np.zeros(n, dtype=np.bool_),
         lesioned_connections=np.zeros(m, dtype=np.bool_),
         paused=np.zeros(m, dtype=np.bool_),

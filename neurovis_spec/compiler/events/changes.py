@@ -20,8 +20,9 @@ NO_INDICES: IntArray = frozen(np.zeros(0, dtype=np.int64))
 
 
 class Clamp(NamedTuple):
-    """Neurons held at a value, which follows the parameters. Of several clamps of a neuron the one of the highest
-    ``order`` holds: the one written last, or by hand after that. ``event`` is what ends it."""
+    """Neurons held at a value, which follows the parameters; or states of models: indices from the number of neurons on
+    are those of ``Network.state_places``. Of several clamps of a neuron the one of the highest ``order`` holds: the one
+    written last, or by hand after that. ``event`` is what ends it."""
 
     order: int
     event: int
@@ -50,9 +51,9 @@ class Change(NamedTuple):
 
 @dataclass
 class Held:
-    """The clamps that hold at a step: ``order`` (n,) is that of the clamp which holds a neuron, −1 where none does, and
-    ``value`` (n,) what it is held at. ``active`` are all that have not ended, by their order. What a formula says is
-    computed ``by`` a library."""
+    """The clamps that hold at a step: ``order`` is that of the clamp which holds a neuron or a state, −1 where none
+    does, and ``value`` what it is held at, both for all that can be clamped, neurons first. ``active`` are all that
+    have not ended, by their order. What a formula says is computed ``by`` a library."""
 
     order: IntArray
     value: FloatArray
@@ -60,7 +61,7 @@ class Held:
 
     @classmethod
     def none(cls, count: int) -> Held:
-        """No clamp, for so many neurons."""
+        """No clamp, of so many neurons and states."""
         return cls(np.full(count, -1, dtype=np.int64), np.zeros(count), {})
 
     def copy(self) -> Held:

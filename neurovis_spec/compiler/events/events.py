@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 
 from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.names.finder import Finder
-from neurovis_spec.compiler.names.references import check_keys, key_of, other_parameter
+from neurovis_spec.compiler.names.references import key_of, other_parameter
+from neurovis_spec.compiler.names.state_references import StateOf
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, Span, Undeclared, shorten
 from neurovis_spec.language.located import Formula, Located
@@ -31,8 +32,8 @@ class Event:
     to: int | None = None
     #: parameters, and what each is set to
     set: Mapping[str, Formula] = field(default_factory=dict)
-    #: neurons, and what they are clamped to
-    clamp: tuple[tuple[IntArray, Formula], ...] = ()
+    #: neurons or states of some, and what they are clamped to
+    clamp: tuple[tuple[IntArray | StateOf, Formula], ...] = ()
     lesioned_neurons: tuple[IntArray, ...] = ()
     lesioned_connections: tuple[IntArray, ...] = ()
     mended_neurons: tuple[IntArray, ...] = ()
@@ -75,8 +76,8 @@ class EventReader:
             self._check_set(model, name)
             if formula is not UNKNOWN:
                 self.constants.scalar(formula)
-        check_keys(model.source, "clamp", model.clamp, self.finder.directory, self.findings)
-        clamps = [one for name, formula in model.clamp.items() for one in self._clamp(model, name, formula)]
+        named = names_of(model, "clamp", model.clamp)
+        clamps = [one for name, formula in named.items() for one in self._clamp(model, name, formula)]
         lesioned_neurons, lesioned_connections = self._neurons_and_connections(model.lesion)
         mended_neurons, mended_connections = self._neurons_and_connections(model.mend)
         learning = [
@@ -114,11 +115,16 @@ class EventReader:
             message = f"'{name}' cannot be set in a run: the structure of the network depends on it"
             self.findings.error("structural-parameter", span, message)
 
-    def _clamp(self, model: EventModel, name: str, formula: Formula) -> list[tuple[IntArray, Formula]]:
-        """The neurons that a key of ``clamp`` names, and what they are clamped to; nothing where either is invalid."""
-        neurons = self.finder.neurons(key_of(model.source, "clamp", name))
-        value = self.constants.scalar(formula)
-        return [] if neurons is UNKNOWN or value is UNKNOWN else [(neurons, formula)]
+    def _clamp(
+        self, model: EventModel, name: str, formula: Formula | Unknown
+    ) -> list[tuple[IntArray | StateOf, Formula]]:
+        """What a key of ``clamp`` names, and what that is clamped to; nothing where either is invalid."""
+        if formula is UNKNOWN and self.finder.directory.instance(name):
+            return []
+        found = self.finder.clamped(key_of(model.source, "clamp", name))
+        if found is UNKNOWN or formula is UNKNOWN or self.constants.scalar(formula) is UNKNOWN:
+            return []
+        return [(found, formula)]
 
     def _neurons_and_connections(
         self, references: Iterable[Located[str]]

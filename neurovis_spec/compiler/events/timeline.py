@@ -51,7 +51,7 @@ def with_changes(network: Network, events: tuple[Event, ...], constants: Constan
         if event.clamp and event.to is not None:
             ending_at[event.to].append(index)
     changes = tuple(
-        _change(step, {index: events[index] for index in starting_at[step]}, ending_at[step], constants)
+        _change(network, step, {index: events[index] for index in starting_at[step]}, ending_at[step], constants)
         for step in sorted({*starting_at, *ending_at})
     )
     trial, run_hash = _TrialRun(network, events, changes, constants), hashlib.sha256()
@@ -71,7 +71,7 @@ def _index_in_event(clamp_order: int) -> int:
     return clamp_order % _MOST_CLAMPS
 
 
-def _change(step: int, starting: dict[int, Event], ending: list[int], constants: Constants) -> Change:
+def _change(network: Network, step: int, starting: dict[int, Event], ending: list[int], constants: Constants) -> Change:
     """What several events change at a step; of those that do the same the last one counts. Events are known by their
     index."""
     values: dict[int, ParameterFormula] = {}
@@ -80,9 +80,9 @@ def _change(step: int, starting: dict[int, Event], ending: list[int], constants:
     for index, event in starting.items():
         for name, formula in event.set.items():
             values[constants.settable[name]] = _formula(formula, constants)
-        for index_in_event, (neurons, formula) in enumerate(event.clamp):
-            order = _clamp_order(index, index_in_event)
-            clamps.append(Clamp(order, event=index, neurons=neurons, value=_formula(formula, constants)))
+        for index_in_event, (what, formula) in enumerate(event.clamp):
+            order, places = _clamp_order(index, index_in_event), network.clamp_places(what)
+            clamps.append(Clamp(order, event=index, neurons=places, value=_formula(formula, constants)))
         learning += event.learning
     events = starting.values()
     return Change(
@@ -160,7 +160,7 @@ class _TrialRun:
         self._was_set = np.zeros(len(settable.slots), dtype=np.bool_)
         self._weights = self.network.connections.weights.whole().copy()
         self._variables = settable.initial.copy()
-        self._held = Held.none(len(self.network.neurons))
+        self._held = Held.none(self.network.clampable)
         self._arrays: dict[tuple[Binding, ...], tuple[_WrittenArray, ...]] = {}
         self._read_in_run = self._slots_read_in_run()
         # without those of instances, which follow; by name, as the hash depends on no order of the spec

@@ -27,17 +27,19 @@ from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.program import Definition
 from neurovis_spec.diagnostics import Findings, shorten
 from neurovis_spec.language.located import Located
-from neurovis_spec.language.references import Arrow, Part, StateName, state_of
+from neurovis_spec.language.references import Arrow, Part, StateName, parse_sum, state_of
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.likeness import suggest
 
 
 @dataclass(frozen=True)
 class Finder:
-    """Finds what references name; ``models`` has the states of neurons, ``wiring`` the connections and their states."""
+    """Finds what references name; ``models`` has the states and outputs of neurons, ``lasting`` the states alone,
+    ``wiring`` the connections and their states."""
 
     directory: Directory
     models: tuple[Holder, ...]
+    lasting: tuple[Holder, ...]
     wiring: Wiring
     findings: Findings
     #: what references mean, those that are valid
@@ -107,15 +109,27 @@ class Finder:
         owner = name.owner.text
         return None if self.directory.instance(owner) or owner in self.directory.instances else name
 
-    def state(self, name: StateName, part: Part, text: Located[str]) -> StateOf | Unknown:
-        """The state that a part of a text names; UNKNOWN where there is none, which is reported."""
+    def clamped(self, text: Located[str]) -> IntArray | StateOf | Unknown:
+        """What a key of ``clamp`` names: neurons, or a state of some; UNKNOWN where it is neither, which is
+        reported."""
+        part, *others = parse_sum(text.value)
+        name = None if others else self.name_of_state(part)
+        if name is None or name.of_rule:
+            return self.neurons(text)
+        return self.state(name, part, text, self.lasting)
+
+    def state(
+        self, name: StateName, part: Part, text: Located[str], models: tuple[Holder, ...] | None = None
+    ) -> StateOf | Unknown:
+        """The state or output that a part of a text names, or which of these ``models`` have; UNKNOWN where there is
+        none, which is reported."""
         one: StateOf | Refusal | Unknown
         if isinstance(name.owner, Arrow):
             connections = self._between(name.owner, text)
             one = UNKNOWN if connections is UNKNOWN else connections_state(name, connections, self.wiring)
         else:
             neurons = resolve_part(name.owner, text, self.directory, self.findings)
-            one = UNKNOWN if neurons is UNKNOWN else model_state(name, neurons, self.models)
+            one = UNKNOWN if neurons is UNKNOWN else model_state(name, neurons, models or self.models)
         if isinstance(one, Refusal):
             span = text.node.at(part.start, part.end)
             self.findings.error("unknown-state", span, one.message, one.hint, undeclared=one.undeclared)
@@ -134,11 +148,12 @@ def finder_of(census: Census, made: Connected, findings: Findings) -> Finder:
     names = tuple(bundle.name for bundle in made.bundles)
     empty = tuple(bundle.empty for bundle in made.bundles if bundle.empty is not None)
     wiring = Wiring(made.sources.compact(), made.targets.compact(), names, tuple(rules), made.complete, empty)
-    return Finder(census.directory, _models(census), wiring, findings)
+    return Finder(census.directory, _models(census), _models(census, outputs=False), wiring, findings)
 
 
-def _models(census: Census) -> tuple[Holder, ...]:
-    """The states of the models of groups, by models; nothing is known of a group whose model is invalid."""
+def _models(census: Census, outputs: bool = True) -> tuple[Holder, ...]:
+    """The states of the models of groups, with their outputs or without, by models; nothing is known of a group whose
+    model is invalid."""
     members: dict[str, list[range]] = {}
     models: dict[str, Definition] = {}
     for one in census.groups:
@@ -151,7 +166,7 @@ def _models(census: Census) -> tuple[Holder, ...]:
         Holder(
             np.fromiter(chain.from_iterable(members[name]), np.int64),
             name,
-            tuple(quantity.name for quantity in model.kept),
+            tuple(quantity.name for quantity in (model.kept if outputs else model.state)),
         )
         for name, model in models.items()
     )
