@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from small_specs import codes, network_of
 
 import neurovis_spec as nv
 from neurovis_spec.language.units import Measured, UnitError, measured, number_in, seconds_of
 from neurovis_spec.sweeps.grid import SweepError
 from neurovis_spec.sweeps.sweep import sweep
-from tests.small_specs import codes, network_of
 
 SCALES = {"s": Decimal(1), "ms": Decimal("1e-3"), "us": Decimal("1e-6"), "min": Decimal(60)}
 NUMBERS = st.decimals(-10_000, 10_000, places=4).map(str) | st.floats(1e-200, 1e200).map(repr)
