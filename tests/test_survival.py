@@ -19,7 +19,7 @@ import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.runtime import parts, stream
+from neurovis_spec.runtime import parts, record, stream
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.numpy_backend import NumpyStepper
 from neurovis_spec.runtime.recording import Recording
@@ -216,8 +216,8 @@ def test_a_part_is_read_up_to_its_last_whole_chunk_wherever_it_breaks_off(tmp_pa
         "connections: {A -> A: {weight: 1, pattern: all_to_all, plasticity: {oja: {rate: 0.001}}}}"
     )
     part = tmp_path / f".x.{suffix}.part"
-    whole = _broken_off(network, part, 600)
-    data, last = part.read_bytes(), 600
+    whole = _broken_off(network, part, 800)
+    data, last = part.read_bytes(), 800
     for cut in range(len(data), 0, -max(1, len(data) // 60)):
         part.write_bytes(data[:cut])
         try:
@@ -320,14 +320,17 @@ def test_what_a_writer_that_was_killed_has_left_is_cleared(tmp_path: Path) -> No
 
 
 def test_a_large_network_makes_few_steps_between_two_looks_at_the_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As many as take a tenth of a second, by a clock on which each step takes 5 ms."""
     network = compiled("neurons: {A: {count: 400}}\nconnections: {A -> A: {weight: 0, pattern: all_to_all}}")
-    run, lengths = NumpyStepper.run, []
+    run, lengths, now = NumpyStepper.run, [], [0.0]
 
     def counted(self: NumpyStepper, state: State, vectors: FloatArray, *more: object) -> int:
         lengths.append(len(vectors))
+        now[0] += 0.005 * len(vectors)
         return run(self, state, vectors, *more)  # type: ignore[arg-type]
 
     monkeypatch.setattr(NumpyStepper, "run", counted)
+    monkeypatch.setattr(record, "monotonic", lambda: now[0])
     network.run(100, backend="numpy")
     assert sum(lengths) == 100
-    assert max(lengths) <= 32
+    assert max(lengths) in (19, 20)
