@@ -111,7 +111,7 @@ def test_ranges_in_python_are_numbers_too() -> None:
     assert [one.values for one in found] == [(0, 1), (0.0, 0.5, 1.0), (1, 0.5)]
     for bad in ([True], ["1"], []):
         with pytest.raises(SweepError):
-            grid.axes({"a": bad})  # type: ignore[dict-item]
+            grid.axes({"a": bad})
 
 
 def test_metrics_have_names() -> None:
