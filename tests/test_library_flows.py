@@ -83,7 +83,7 @@ connections: {N -> N: {weight: -1.5, pattern: all_to_all}}"""
 def test_hopf_comes_back_to_its_amplitude() -> None:
     """In closed form: the square of the amplitude grows as a population does, the phase evenly."""
     mu, gamma, omega = 2.0, 3.0, 5.0
-    spec = f"neurons: {{N: {{model: {{hopf: {{mu: {mu}, gamma: {gamma}, omega: {omega}}}}}, initial: {{x: 0.1}}}}}}"
+    spec = f"neurons: {{N: {{model: {{hopf: {{mu: {mu}, gamma: {gamma}, nu: {omega / (2 * np.pi)!r}}}}}, initial: {{x: 0.1}}}}}}"
     activity, (amplitude, phase) = run(spec, 0.001, 3000, "N.amplitude N.phase")
     t = np.arange(3001) * 0.001
     squared = mu / (1 + (mu / 0.01 - 1) * np.exp(-2 * gamma * mu * t))
@@ -147,7 +147,7 @@ def test_jansen_and_rits_column_makes_an_alpha_rhythm() -> None:
 
 def test_phases_come_together_as_kuramoto_says() -> None:
     """By the sine of differences, which two connections make; two in closed form."""
-    spec = """neurons: {N: {count: 2, model: {phase_oscillator: {omega: 3}}, initial: {theta: [0, 2]}}}
+    spec = """neurons: {N: {count: 2, model: {phase_oscillator: {nu: 3/(2*pi)}}, initial: {theta: [0, 2]}}}
 connections:
   - N -> N: {weight: 0.7, pattern: all_to_all, send: sine, port: sines}
   - N -> N: {weight: 0.7, pattern: all_to_all, send: cosine, port: cosines}"""

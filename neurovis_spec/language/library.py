@@ -97,7 +97,7 @@ class NeuronStateModel(StateModel):
         None, description="Its new value at an episode's end."
     )
     derivative: FormulaField | None = Field(
-        None, description="What it changes by, per second (or millisecond: time), as in an equation dx/dt = …"
+        None, description="What it changes by, per second (or millisecond: time): what an equation has behind dx/dt."
     )
     noise: Annotated[
         Annotated[FormulaField, WITHOUT_F] | None,
