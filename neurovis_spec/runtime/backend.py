@@ -44,6 +44,8 @@ class Capabilities:
     episodes: bool = True
     #: derivatives; ports, outputs and what is sent beside those that every model has
     flows: bool = False
+    #: clamps of states of models (``Conditions.fixed``)
+    clamped_states: bool = False
     #: the most neurons and connections together, None without a bound
     largest: int | None = None
     #: its numbers are the reference's to the ``bits``, where the C library is the same, or up to ``rounding``
@@ -290,14 +292,19 @@ def _ready_on(network: Network, backend: Backend, why: str = "") -> Ready:
 
 def _beyond(network: Network) -> tuple[tuple[str, bool], ...]:
     """What only a backend has that says so (``Capabilities.flows``), and whether a network asks for it."""
-    n, ports = len(network.neurons), [port for population in network.populations for port in population.ports]
+    ports = [port for population in network.populations for port in population.ports]
     return (
         ("derivatives", any(isinstance(operation, Integrate) for operation in network.program)),
         ("ports", len(ports) > len(network.populations) or any(port.factors is not None for port in ports)),
         ("outputs of models", any(population.model.definition.outputs for population in network.populations)),
         ("states that are sent", bool(network.outlets)),
-        ("clamps of states", any((c.neurons >= n).any() for change in network.changes for c in change.clamps)),
     )
+
+
+def _clamps_states(network: Network) -> bool:
+    """Whether events do."""
+    clamps = (clamp for change in network.changes for clamp in change.clamps)
+    return any((clamp.neurons >= len(network.neurons)).any() for clamp in clamps)
 
 
 def lacking(network: Network, capabilities: Capabilities) -> tuple[str, ...]:
@@ -312,6 +319,7 @@ def lacking(network: Network, capabilities: Capabilities) -> tuple[str, ...]:
         (not capabilities.noise and bool(network.noises), "no noise"),
         (not capabilities.episodes and network.episode is not None, "no episodes"),
         *((not capabilities.flows and has, f"no {what}") for what, has in _beyond(network)),
+        (not capabilities.clamped_states and _clamps_states(network), "no clamps of states"),
         (
             capabilities.largest is not None and size > capabilities.largest,
             f"at most {capabilities.largest} neurons and connections, not {size}",

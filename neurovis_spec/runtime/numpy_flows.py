@@ -31,6 +31,7 @@ import numpy as np
 from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.program import Diffuse, Integrate, Key, Port
 from neurovis_spec.language.expressions.functions import FUNCTIONS
+from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.numpy_arrivals import (
     Step,
@@ -240,7 +241,8 @@ class _Stage:
         for name, held in self.network.held_inputs.items():
             entry = self.network.input_index[name]
             if entry.expression is not None:
-                known = {name: self.code.constant(value) for name, value in self.network.parameters.items()}
+                read = names(entry.expression) & self.network.parameters.keys()
+                known = {name: self.code.constant(self.network.parameters[name]) for name in sorted(read)}
                 known |= {name: f"state.conditions.parameters[{slot}]" for name, slot in entry.slots.items()}
                 value = self.code.expression(entry.expression, known | {"t": "t"})
                 place = f"{entry.start}:{entry.start + entry.size}"

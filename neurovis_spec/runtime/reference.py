@@ -49,7 +49,7 @@ class ReferenceBackend:
     """Executes anything, slowly."""
 
     name = "reference"
-    capabilities = Capabilities(noise=True, flows=True, exactness="bits")
+    capabilities = Capabilities(noise=True, flows=True, clamped_states=True, exactness="bits")
 
     def availability(self) -> Availability:
         """Always there."""

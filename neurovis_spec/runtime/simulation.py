@@ -399,7 +399,7 @@ class Simulation:
         state = None if not isinstance(self._names.find(reference), str) else find_model_state(self.network, reference)
         if state is None:
             return self._neurons(text)
-        if not load(self.backend).capabilities.flows:
+        if not load(self.backend).capabilities.clamped_states:
             raise BackendError(f"the backend '{self.backend}' cannot clamp '{text}': it holds no states")
         return self.network.clamp_places(state)
 
