@@ -83,7 +83,8 @@ connections: {N -> N: {weight: -1.5, pattern: all_to_all}}"""
 def test_hopf_comes_back_to_its_amplitude() -> None:
     """In closed form: the square of the amplitude grows as a population does, the phase evenly."""
     mu, gamma, omega = 2.0, 3.0, 5.0
-    spec = f"neurons: {{N: {{model: {{hopf: {{mu: {mu}, gamma: {gamma}, nu: {omega / (2 * np.pi)!r}}}}}, initial: {{x: 0.1}}}}}}"
+    model = f"{{hopf: {{mu: {mu}, gamma: {gamma}, nu: {omega / (2 * np.pi)!r}}}}}"
+    spec = f"neurons: {{N: {{model: {model}, initial: {{x: 0.1}}}}}}"
     activity, (amplitude, phase) = run(spec, 0.001, 3000, "N.amplitude N.phase")
     t = np.arange(3001) * 0.001
     squared = mu / (1 + (mu / 0.01 - 1) * np.exp(-2 * gamma * mu * t))

@@ -226,7 +226,7 @@ def _functions(small: bool, watched: bool) -> tuple[_Function, ...]:
     """The functions that ``nv_once`` and ``nv_run`` call. Those of type double give ``odd``."""
     of_inputs, of_step = ", int64_t k, double *restrict s", ", int64_t k, const double *restrict s"
     plain = Form(written_out=small, watched=watched)
-    general = Form(first=True, held=True, gone=True, still=True, lost=True)
+    general = Form(first=True, held=True, fixed=True, gone=True, still=True, lost=True)
     fused = Form(fused=True)
     return (
         _Function("double", "nv_read", Form(watched=True), StepCode.read, of_inputs),
@@ -303,6 +303,8 @@ class CStepper:
         self._long_tables = made.long_tables
         #: the inputs of the step that is made: what it computes of them stands there behind it
         self.vector = np.zeros(network.vector_size)
+        #: where it stands there whether formulas that reach what flows are held
+        self._formulas = [*network.held_inputs.values()]
         #: the inputs that a step computes, and of each input whether it is one
         self._computed = _NO_INPUTS
         self._reads = np.zeros(len(network.inputs), dtype=np.uint8)
@@ -330,6 +332,7 @@ class CStepper:
         self._activity = self._weights = self._signals = self._history = self._outlets = self.vector
         self._variables = self._parameters = self.vector
         self._holds: object = None
+        self._fixed: object = None
         self._structure: Structure | None = None
         self._general = False
 
@@ -348,6 +351,7 @@ class CStepper:
         if (
             state is not self._known_state
             or now.holds is not self._holds
+            or now.fixed is not self._fixed
             or now.structure is not self._structure
             or now.variables is not self._variables
             or now.parameters is not self._parameters
@@ -368,6 +372,8 @@ class CStepper:
             self._pointers.form = self._form_there = form
         if inputs is not self.vector:
             self.vector[:] = inputs
+        elif self._formulas:  # nobody gives anything in their place
+            self.vector[self._formulas] = 0.0
         odd: int = self._step(self._struct)
         state.k = self._k = k + 1
         return odd != 0
@@ -415,7 +421,7 @@ class CStepper:
         pointers.x, pointers.parameters = now.variables.ctypes.data, now.parameters.ctypes.data
         self._cells = _addresses([array for own in state.cells.values() for array in own.values()])
         pointers.cells = ctypes.addressof(self._cells)
-        if now.holds is not self._holds or now.structure is not self._structure:
+        if now.holds is not self._holds or now.fixed is not self._fixed or now.structure is not self._structure:
             self._take_conditions(now)
         self._known_state = state  # what is kept alive cannot be mistaken for another array at the same address
         self._activity, self._weights = state.activity, state.weights
@@ -423,10 +429,14 @@ class CStepper:
         self._signals, self._history, self._outlets = state.signals, state.history, state.outlets
 
     def _take_conditions(self, now: Conditions) -> None:
-        n, pointers = len(self.network.neurons), self._pointers
-        self._holds, self._structure = now.holds, now.structure
-        self._general = now.holds is not None or not now.structure.whole
-        self._held, self._holding = np.zeros(n, dtype=np.uint8), np.zeros(n)
+        count, pointers = self.network.clampable, self._pointers
+        self._holds, self._fixed, self._structure = now.holds, now.fixed, now.structure
+        self._general = now.holds is not None or now.fixed is not None or not now.structure.whole
+        self._held, self._holding = np.zeros(count, dtype=np.uint8), np.zeros(count)
+        if now.fixed is not None:
+            states = now.held.order >= 0
+            states[: len(self.network.neurons)] = False
+            self._held[states], self._holding[states] = 1, now.held.value[states]
         for hold in now.holds or ():
             if hold is not None:
                 neurons, values = hold
@@ -459,7 +469,7 @@ class CBackend:
     """C made from the update program, compiled for this machine."""
 
     name = "c"
-    capabilities = Capabilities(noise=True, flows=True, exactness="bits")
+    capabilities = Capabilities(noise=True, flows=True, clamped_states=True, exactness="bits")
 
     def availability(self) -> Availability:
         """Whether there is a compiler."""

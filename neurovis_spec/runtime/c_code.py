@@ -110,6 +110,8 @@ class Form:
     first: bool = False
     #: neurons whose byte of ``held`` is set have the activity ``holding``
     held: bool = False
+    #: so do states of models, whose bytes and numbers stand behind those of all neurons (``Network.state_places``)
+    fixed: bool = False
     #: connections whose byte of ``gone`` is set are left out
     gone: bool = False
     #: connections whose byte of ``still`` is set do not learn

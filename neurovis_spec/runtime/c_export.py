@@ -97,6 +97,10 @@ class Exported:
         self.phases = self._phases()
         #: whether any phase holds neurons
         self.holding = any(any(order >= 0 for order in phase.order) or phase.lesioned.any() for phase in self.phases)
+        n = len(network.neurons)
+        #: whether any holds states of models, and how many numbers can be held
+        self.fixing = any(order >= 0 for phase in self.phases for order in phase.order[n:])
+        self.clampable = network.clampable if self.fixing else n
         self.members = self._members()
 
     # ---- what there is -----------------------------------------------------------------------------------------
@@ -128,7 +132,7 @@ class Exported:
     def _phase(self, at: int, state: State) -> Phase:
         """The phase that begins with a state."""
         now = state.conditions
-        order = tuple(now.held.order[: len(self.network.neurons)].tolist())
+        order = tuple(now.held.order.tolist())
         structure = now.structure
         lesioned, clamps = now.lesioned_neurons.copy(), dict(now.held.active)
         return Phase(
@@ -159,7 +163,8 @@ class Exported:
             Member("work", np.zeros(c_flows.work_size(network)), "what an integration keeps between stages"),
         ]
         if self.holding:
-            members.append(Member("holding", np.zeros(len(network.neurons)), "what neurons are held at"))
+            about = "what neurons are held at" + (", then states" if self.fixing else "")
+            members.append(Member("holding", np.zeros(self.clampable), about))
         return [member for member in members if len(member.begin) or member.name in ("activity", "weights")]
 
     @property
@@ -238,7 +243,8 @@ void {name}_step({name}_state *state, const {name}_inputs *in, {name}_outputs *o
         if len(self.phases) > 1:
             fields.append("int32_t phase; /* events that have happened */")
         if self.holding:
-            fields.append(f"unsigned char held[{len(self.network.neurons)}]; /* neurons that are held */")
+            about = "neurons that are held" + (", then states" if self.fixing else "")
+            fields.append(f"unsigned char held[{self.clampable}]; /* {about} */")
             if self.network.outlets:
                 fields.append(f"unsigned char lesioned[{len(self.network.neurons)}]; /* neurons that are lesioned */")
         return fields
@@ -351,6 +357,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             written_out=len(network.neurons) + len(network.connections) <= SMALL,
             first=self.takes_initial,
             held=self.holding,
+            fixed=self.fixing,
             gone="gone" in left_out,
             still="still" in left_out,
             lost="lost" in left_out,
@@ -385,7 +392,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
         switch = len(self.phases) > 1
         for number, phase in enumerate(self.phases):
             order = np.array(phase.order)
-            order[phase.lesioned] = -1
+            order[: len(phase.lesioned)][phase.lesioned] = -1
             if (order < 0).all() and not phase.lesioned.any():
                 continue
             with code.block(f"if (state->phase == {number})" if switch else ""):

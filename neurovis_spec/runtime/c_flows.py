@@ -212,7 +212,7 @@ class _Integration:
     def write(self) -> None:
         """All of it."""
         code, network, plan = self.code, self.network, self.plan
-        self.copy("fx[{at}] = {cell};")
+        self.copy("fx[{at}] = {now};")
         if network.held_inputs:
             code.line(f"memcpy(fv, s, {network.vector_size}*sizeof(fv[0]));")
         for part in plan.of_stage:
@@ -239,11 +239,14 @@ class _Integration:
         code.lines += body
 
     def copy(self, line: str) -> None:
-        """A line for each flow state, which is ``cell`` in the State, and ``at`` here."""
+        """A line for each flow state, which is ``cell`` in the State, ``now`` with what is held, and ``at`` here."""
         for one in self.plan.states:
 
             def copied(place: Place, totals: Mapping[int, str], one: _State = one) -> None:
-                self.code.line(line.format(cell=self.step.states(one.use, place)[one.name], at=_plus(one.start, place)))
+                now = cell = self.step.states(one.use, place)[one.name]
+                if held := self.step.held(one.part.number, one.name, place):
+                    now = f"held[{held}] ? holding[{held}] : {cell}"
+                self.code.line(line.format(cell=cell, now=now, at=_plus(one.start, place)))
 
             self.step.each(one.size, {}, copied)
 
@@ -450,6 +453,8 @@ class _Integration:
                 h = self.length(made.per_second)
                 parts: dict[str, Value] = {"h": h, "f": code.let("n", slope), "j": code.let("n", own_slope)}
                 slope = code.value(formula(changes), parts)
+            if held := self.step.held(part.number, name, place):
+                slope = f"held[{held}] ? {code.text(0.0)} : {code.text(slope)}"
             code.line(f"fk[{_plus(self.plan.starts[part.number, name], place)}] = {code.text(slope)};")
 
     def spread(self, part: Part, place: Place, known: Mapping[str, Value], functions: Mapping[str, Made]) -> None:
@@ -498,6 +503,8 @@ def _diffuse(operation: Diffuse, step: StepCode) -> None:
                 root: str = root,
             ) -> None:
                 cell, spread = step.states(one.use, place)[one.name], f"fg[{_plus(one.start, place)}]"
+                if held := step.held(one.part.number, one.name, place):
+                    code.line(f"if (!held[{held}])")
                 code.line(f"{cell} = {cell} + {spread}*{root}*s[{code.at(drawn, place)}];")
 
             step.each(one.size, {}, disturb)

@@ -281,12 +281,25 @@ class StepCode:
         made, stored = population.model.definition, self.states(population.model, place)
         seen: Mapping[str, Value] = {**code.parameters(population.model, place), **self.clock(made), **ports}
         states = {one.name: stored[one.name] for one in made.state}
+        for name, cell in states.items():
+            if at := self.held(number, name, place):
+                code.line(f"if (held[{at}])")
+                code.line(f"    {cell} = holding[{at}];")
+
+        def fixed(name: str, value: Value) -> Value:
+            at = self.held(number, name, place)
+            return code.let("n", f"held[{at}] ? holding[{at}] : {code.text(value)}") if at else value
 
         begins = bool(made.flows) and self.form.first
-        new, given = self.change(made, seen, states, self.activation(population, place), begins=begins)
+        new, given = self.change(made, seen, states, self.activation(population, place), fixed, begins)
         self.store([(stored[name], value) for name, value in new.items()])
         self.store([(stored[one.name], given[one.name]) for one in made.outputs])
         self.store([(f"activity[{neuron}]", given["activity"])])
+
+    def held(self, number: int, name: str, place: Place) -> str:
+        """The code of where a state of a member of a population stands among what can be held; "" where none is."""
+        start = self.network.state_places.get((number, name)) if self.form.fixed else None
+        return "" if start is None else str(start + place if isinstance(place, int) else f"{start} + {place}")
 
     def activation(
         self, population: Population, place: Place, formulas: Mapping[str, Tree] | None = None

@@ -1,0 +1,96 @@
+"""What flows, in C: the bits of the reference, written out and in loops, in a library and exported."""
+
+from __future__ import annotations
+
+import tempfile
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from exported import exported
+from hypothesis import Phase, given, settings
+from random_flows import flowing_specs
+from random_specs import Spec
+from test_export_c import runs_alike
+from test_flow_conformance import compiled
+
+import neurovis_spec as nv
+from neurovis_spec.runtime import c_backend, c_export
+from neurovis_spec.runtime.columns import Keep
+from neurovis_spec.runtime.course import Course
+from neurovis_spec.runtime.record import record
+
+pytestmark = pytest.mark.compiler
+FORMS = pytest.mark.parametrize("small", [0, 600], ids=["loops", "written out"])
+MANY = """
+neurovis: 1
+name: many
+time: {dt: 0.01, integrate: METHOD}
+models:
+  rate:
+    time: ms
+    parameters: {tau: 20}
+    ports: [gate]
+    state: {v: {derivative: (f(drive + 0.1*gate) - v)/tau}}
+    outputs: {twice: 2*v}
+    activity: v
+inputs: {wave: {expression: sin(9*t)}}
+neurons:
+  A: {count: 40, model: {rate: {tau: 15 + i}}, activation: tanh, initial: {v: 0.1*sin(i)}, input: wave}
+  B: {count: 30, model: rate, activation: sigmoid, bias: {gate: 0.2}}
+connections:
+  - A -> A: {weight: "normal(0, 0.3)", pattern: all_to_all}
+  - A -> B: {weight: "uniform(-1, 1)", pattern: {random: {probability: 0.6}}, port: {drive: 0.5, gate: 1}}
+  - B -> A: {weight: "uniform(-1, 1)", pattern: {random: {probability: 0.6}}, delay: 2, port: gate}
+  - B -> A: {weight: "uniform(-1, 1)", pattern: all_to_all, send: twice, port: gate}
+"""
+
+
+def same_bits(network: nv.CompiledNetwork, steps: int) -> None:
+    """Activities, weights and states of the C backend are the reference's."""
+    made = [
+        record(network.network, Course(steps, backend=backend, keep=Keep(states=("all",))))
+        for backend in ("reference", "c")
+    ]
+    for part in ("activity", "weights", "states"):
+        np.testing.assert_array_equal(getattr(made[1], part), getattr(made[0], part), part)
+
+
+@FORMS
+@settings(max_examples=12, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(spec=flowing_specs())
+def test_random_networks_have_the_bits_of_the_reference(small: int, spec: Spec) -> None:
+    compiled(spec)
+    with warnings.catch_warnings(), pytest.MonkeyPatch.context() as patch:
+        warnings.simplefilter("ignore")
+        patch.setattr(c_backend, "SMALL", small)
+        same_bits(nv.compile(spec), 12)
+
+
+@pytest.mark.parametrize("method", ["euler", "heun", "rk4", "{method: exponential, substeps: 2}", "semi_implicit"])
+def test_many_neurons_are_summed_beside_each_other_in_their_order(method: str) -> None:
+    network = nv.compile_text(MANY.replace("METHOD", method))
+    assert len(network.network.connections) > c_backend.SMALL
+    same_bits(network, 4)
+
+
+@FORMS
+@settings(max_examples=5, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(spec=flowing_specs())
+def test_random_networks_run_alike_when_exported(small: int, spec: Spec) -> None:
+    compiled(spec)
+    with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        warnings.simplefilter("ignore")
+        patch.setattr(c_export, "SMALL", small)
+        runs_alike(nv.compile(spec), Path(folder), steps=12)
+
+
+@pytest.mark.parametrize("method", ["rk4", "exponential"])
+def test_numbers_of_32_bits(method: str, tmp_path: Path) -> None:
+    network = nv.compile_text(MANY.replace("METHOD", method))
+    expected = network.run(4, backend="numpy").activity
+    controller = exported(network, tmp_path, "C++17", real="float")
+    for row in expected:
+        controller.step()
+        np.testing.assert_allclose(controller.activity, row, rtol=0, atol=1e-4)
