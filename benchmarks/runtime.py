@@ -5,7 +5,9 @@ benchmarks/runtime.py``; only the ratios of one run can be compared. C by hand i
 the one network: a loop over neurons, one over the connections of each (CSR), arrays that are made beforehand; it is
 compiled by the same compiler with the same flags. "tanh alone" is what the C library takes for the tanh of as many
 neurons, on the numbers of a real step: what no program that calls it can be quicker than. All keep every activity, and
-every weight that learns. Inputs are given beforehand. Brian2 runs ``cpp_standalone`` and keeps nothing.
+every weight that learns, and compute inputs that are expressions in their loop.
+"Record" is a whole run as it is called from Python, into arrays that are made for it, and "sim.step" a step of a
+Simulation. Brian2 runs ``cpp_standalone`` and keeps nothing.
 """
 
 from __future__ import annotations
@@ -29,7 +31,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from networks_by_hand import all_learning, cpg_rbf, rule
 from stepping import cpg_by_hand, random_by_hand, random_network
 
-import neurovis_spec as nv
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime import c_library
 from neurovis_spec.runtime.c_backend import CBackend
@@ -37,6 +38,7 @@ from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.numpy_backend import NumpyBackend
 from neurovis_spec.runtime.record import record
+from neurovis_spec.runtime.simulation import Simulation
 from neurovis_spec.runtime.state import initial_state
 
 Run = Callable[[int], None]
@@ -77,8 +79,7 @@ void run(int64_t steps, int64_t n, int64_t learns, const int32_t *first, const i
 
 #: use case 1: a rhythm of two neurons, eight kernels, an output that learns a target
 CPG_BY_HAND = """
-void run(int64_t steps, const double *matrix, const double *centres, const double *target, double *restrict rows,
-         double *restrict kept)
+void run(int64_t steps, const double *matrix, const double *centres, double *restrict rows, double *restrict kept)
 {
     static const int32_t first[11] = {0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20};
     static const int32_t source[20] = {0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1};
@@ -110,72 +111,11 @@ void run(int64_t steps, const double *matrix, const double *centres, const doubl
         for (int i = 0; i < 8; i++)
             u += w[i]*a[2 + i];
         a[10] = u;
-        a[11] = target[k];
+        const double turn = 2*3.141592653589793*(k + 24)/128.62;
+        a[11] = 0.5*sin(turn) + 0.2*sin(2*turn);
         for (int i = 0; i < 8; i++)
             w[i] += 0.01*a[2 + i]*(a[11] - a[10]);
         memcpy(rows + 12*k, a, sizeof a);
-    }
-}
-"""
-
-#: the six-legged robot: groups of neurons one after the other, each with its function, signals in rings
-HEXAPOD_BY_HAND = """
-void run(int64_t steps, int64_t n, int64_t m, const int32_t *group, const int32_t *neuron, const int32_t *first,
-         const int32_t *edge, const int32_t *source, const int32_t *delay, const int32_t *start,
-         const int32_t *fed, const double *bias, const double *initial, const double *one, const double *two,
-         double *restrict w, double *restrict ring, double *restrict v, double *restrict a, const double *inputs,
-         const int32_t *learned, const int32_t *reflex, const double *rate, double *restrict last,
-         double *restrict rows, double *restrict kept)
-{
-    double sent[4] = {0};
-    for (int64_t k = 0; k < steps; k++, inputs += 9) {
-        for (int i = 0; i < 4; i++)
-            kept[4*k + i] = w[learned[i]];
-        for (int g = 0; g < 10; g++) {
-            for (int32_t p = group[g]; p < group[g + 1]; p++) {
-                const int32_t i = neuron[p];
-                double u = g == 9 ? 1.0 : 0.0, y;
-                for (int32_t e = first[p]; e < first[p + 1]; e++) {
-                    const int32_t c = edge[e];
-                    const double signal = ring[start[c] + k % delay[c]];
-                    if (g == 9)
-                        u *= signal;
-                    else
-                        u += signal;
-                }
-                u += bias[i];
-                if (fed[i] >= 0)
-                    u += inputs[fed[i]];
-                switch (g) {
-                case 0: y = tanh(u); break;
-                case 1: y = u - one[p] >= 0 ? 1.0 : 0.0; break;
-                case 2: y = v[p] = (1 - one[p])*v[p] + one[p]*u; break;
-                case 3: y = u > 0 ? u : 0.0; break;
-                case 5: y = u < one[p] ? one[p] : u > two[p] ? two[p] : u; break;
-                case 6:
-                    v[p] = u > one[p] ? 0.0 : v[p] + 1 < two[p] ? v[p] + 1 : two[p];
-                    y = v[p] < two[p] ? 1.0 : 0.0;
-                    break;
-                case 7: y = v[p] = u > (1 - one[p])*v[p] ? u : (1 - one[p])*v[p]; break;
-                case 8:
-                    v[p] = (1 - one[p])*v[p] + one[p]*u;
-                    y = v[p] > 0 ? v[p] : 0.0;
-                    break;
-                default: y = u;
-                }
-                a[i] = k == 0 && initial[i] == initial[i] ? initial[i] : y;
-            }
-        }
-        for (int64_t c = 0; c < m; c++)
-            ring[start[c] + k % delay[c]] = w[c]*a[source[c]];
-        for (int i = 0; i < 4; i++) {
-            const int32_t c = learned[i];
-            const double change = k ? a[reflex[i]] - last[i] : 0.0;
-            w[c] += rate[i]*sent[i]*change;
-            sent[i] = a[source[c]];
-            last[i] = a[reflex[i]];
-        }
-        memcpy(rows + k*n, a, n*sizeof(double));
     }
 }
 """
@@ -249,64 +189,14 @@ def cpg_in_c(network: Network) -> Run:
     by_target = centres[4:20].reshape(2, 8).T.ravel().copy()
 
     def made(steps: int) -> None:
-        target = INPUTS.setdefault("cpg", np.ascontiguousarray(vectors(network, 20000).ravel()))
-        arrays = (matrix, by_target, target, ROOM[: 12 * steps], ROOM[12 * steps :])
+        arrays = (matrix, by_target, ROOM[: 12 * steps], ROOM[12 * steps :])
         run(ctypes.c_int64(steps), *map(at, arrays))
-
-    return made
-
-
-def hexapod_in_c(network: Network) -> Run:
-    run, n, m = loaded(HEXAPOD_BY_HAND), len(network.neurons), len(network.connections)
-    populations, links = network.populations, network.connections
-    group = np.cumsum([0, *(len(b.members) for b in populations)]).astype(np.int32)
-    neuron = np.concatenate([b.members for b in populations]).astype(np.int32)
-    edges = [b.drive.incoming[np.argsort(b.drive.slots, kind="stable")] for b in populations]
-    counts = np.concatenate([np.bincount(b.drive.slots, minlength=len(b.members)) for b in populations])
-    first, edge = np.cumsum([0, *counts]).astype(np.int32), np.concatenate(edges).astype(np.int32)
-    delay = links.delays.whole().astype(np.int32)
-    start = np.cumsum([0, *delay[:-1]]).astype(np.int32)
-    one, two, v = np.zeros(n), np.zeros(n), np.zeros(n)
-    for number, b in enumerate(populations):
-        own = [*b.model.parameters.values(), *b.activation.parameters.values()]
-        for array, values in zip((one, two), own, strict=False):
-            array[group[number] : group[number + 1]] = values
-    v[group[6] : group[7]] = two[group[6] : group[7]]
-    (rules,) = network.projections
-    learned, reflex = rules.members.astype(np.int32), rules.signals["reflex"].astype(np.int32)
-    rate = rules.rule.parameters["rate"]
-    source, fed = links.sources.whole().astype(np.int32), network.neurons.input.astype(np.int32)
-
-    initial = network.neurons.initial
-
-    def made(steps: int) -> None:
-        given = INPUTS.setdefault("hexapod", vectors(network, 20000))
-        w, ring, a, last = links.weights.whole().copy(), np.zeros(int(delay.sum())), np.zeros(n), np.zeros(4)
-        arrays = (
-            group,
-            neuron,
-            first,
-            edge,
-            source,
-            delay,
-            start,
-            fed,
-            network.neurons.bias,
-            initial,
-            one,
-            two,
-            w,
-            ring,
-        )
-        rest = (v.copy(), a, given, learned, reflex, rate, last, ROOM[: n * steps], ROOM[n * steps :])
-        run(ctypes.c_int64(steps), ctypes.c_int64(n), ctypes.c_int64(m), *map(at, (*arrays, *rest)))
 
     return made
 
 
 #: where recordings go: made once, and touched, so that nobody pays for fresh memory
 ROOM = np.ones(30_000_000)
-INPUTS: dict[str, npt.NDArray[np.float64]] = {}
 
 
 def vectors(network: Network, steps: int) -> npt.NDArray[np.float64]:
@@ -316,9 +206,10 @@ def vectors(network: Network, steps: int) -> npt.NDArray[np.float64]:
 
 
 def ours_in_c(network: Network) -> Run:
-    """Whole runs, as ``record`` makes them, with inputs given."""
+    """Whole runs, as ``record`` makes them: inputs that are expressions are computed within."""
     stepper, n = CBackend().prepare(network), len(network.neurons)
     given = vectors(network, 20000 if network.vector_size else 1)
+    InputReader(network).leave(stepper)
 
     def made(steps: int) -> None:
         state = initial_state(network)
@@ -341,6 +232,17 @@ def one_by_one(network: Network) -> Run:
         step = stepper.step
         for _ in range(steps):
             step(state, vector)
+
+    return made
+
+
+def simulated(network: Network) -> Run:
+    """Steps of a Simulation, one by one."""
+    step = Simulation(network, "c").step
+
+    def made(steps: int) -> None:
+        for _ in range(steps):
+            step()
 
     return made
 
@@ -414,10 +316,8 @@ def microseconds(runs: dict[str, Run], steps: int, repeats: int = 7) -> dict[str
 
 
 def main() -> None:
-    hexapod = nv.compile(HERE.parent / "specs" / "hexapod" / "hexapod.yaml").network
     cases = (
         Case("12/28, use case 1", cpg_rbf(), cpg_in_c, cpg_by_hand, 20000, False),
-        Case("148/204, hexapod", hexapod, hexapod_in_c, None, 10000, False, 2000),
         Case("150/200", random_network(150, 200), tanh_in_c, random_by_hand, 10000),
         Case("302/7,000 plastic", all_learning(random_network(302, 7000), OJA), tanh_in_c, None, 1000),
         Case("1,000/10,000", random_network(1000, 10000), tanh_in_c, random_by_hand, 1000),
@@ -429,8 +329,10 @@ def main() -> None:
         "ratio",
         "tanh",
         "a step",
+        "sim.step",
         "above",
         "record",
+        "/by hand",
         "numpy",
         "by hand",
         "ratio",
@@ -441,20 +343,22 @@ def main() -> None:
     for case in cases:
         network = case.network
         same(case)
-        runs = {"c": ours_in_c(network), "c by hand": case.in_c(network), "a step": one_by_one(network)}
+        runs = {"c": ours_in_c(network), "c by hand": case.in_c(network), "record": recorded(network, "c")}
+        runs |= {"a step": one_by_one(network), "sim.step": simulated(network)}
         if case.in_c is tanh_in_c:
             runs["tanh"] = tanh_alone(network)
         found = microseconds(runs, case.steps)
-        slower = {"record": recorded(network, "c"), "numpy": numpy_steps(network)}
+        slower = {"numpy": numpy_steps(network)}
         if case.in_numpy is not None:
             slower["numpy by hand"] = case.in_numpy(network)
         found |= microseconds(slower, max(case.steps // 5, 20), 5)
         if case.brian:
             found["brian2"] = brian(network, case.steps * 2)
-        above = found["a step"] - found["c"]
+        above = found["sim.step"] - found["c"]
         numbers = [found["c"], found["c by hand"], found["c"] / found["c by hand"]]
-        numbers += [found.get("tanh", np.nan), found["a step"], above]
-        numbers += [found["record"], found["numpy"], found.get("numpy by hand", np.nan)]
+        numbers += [found.get("tanh", np.nan), found["a step"], found["sim.step"], above]
+        numbers += [found["record"], found["record"] / found["c by hand"]]
+        numbers += [found["numpy"], found.get("numpy by hand", np.nan)]
         numbers += [found["numpy"] / numbers[-1], found.get("brian2", np.nan)]
         numbers.append(numbers[-1] / found["c"])
         print(f"{case.name:20}" + "".join(f"{'-' if np.isnan(x) else f'{x:.2f}':>10}" for x in numbers), flush=True)

@@ -115,6 +115,7 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
         nv_pack(p);
     int64_t wait = (c->every - c->k % c->every) % c->every;
     for (int64_t i = 0; i < c->steps; i++, s += INPUTS) {
+        double odd = nv_read(p, c->k + i, s);
         const int kept = wait == 0;
         if (kept) {
             if (c->beside)
@@ -127,7 +128,6 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
         }
         wait--;
         const int64_t form = i ? c->then : c->form;
-        double odd = nv_read(p, c->k + i, s);
         if (form)
             nv_general(p, c->k + i, s, form == 2);
         else if (fused && i)
@@ -255,8 +255,9 @@ def _pointer_lines(network: Network) -> dict[str, str]:
 def _look(network: Network) -> tuple[str, str]:
     """The code of whether anything that neurons carry, and that connections carry, is not finite."""
     tests = {"neuron": [f"nv_odd(p->activity, {len(network.neurons)})"], "connection": list[str]()}
-    if network.projections:
-        tests["connection"].append(f"nv_odd(p->weights, {len(network.connections)})")
+    if network.projections:  # what neither a rule nor an event changes is finite
+        first, last = int(network.changing[0]), int(network.changing[-1])
+        tests["connection"].append(f"nv_odd(p->weights + {first}, {last - first + 1})")
     cell = 0
     for holder, use in network.uses:
         for _ in use.definition.kept:
