@@ -145,6 +145,24 @@ def test_one_stepper_serves_simulations_that_are_given_different_inputs() -> Non
 
 
 @pytest.mark.compiler
+def test_an_input_that_flows_is_its_expression_again_after_a_step_for_which_it_was_given() -> None:
+    text = """
+neurovis: 1
+name: x
+time: {dt: 0.1}
+models: {leaky: {state: {v: {derivative: drive - v}}, activity: v}}
+inputs: {wave: {expression: sin(t)}}
+neurons: {A: {model: leaky, input: wave}}
+"""
+    network = nv.compile_text(text).network
+    plain, fast = (Simulation(network, name) for name in ("reference", "c"))
+    for k in range(8):
+        for one in (plain, fast):
+            one.step({"wave": 2.0} if k in (2, 5) else None)
+        assert plain.activity.tobytes() == fast.activity.tobytes(), k
+
+
+@pytest.mark.compiler
 @pytest.mark.parametrize("every", [1, 7])
 def test_rows_are_handed_on_as_often_as_there_is_room(
     every: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

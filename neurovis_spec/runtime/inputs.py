@@ -90,7 +90,8 @@ class InputReader:
             return
         kept = {*self._supplied, *but, *(self.network.inputs[number].name for number in self._undefined)}
         self.left = frozenset(one.name for one in self.network.inputs if one.expression is not None) - kept
-        self.all_left = not self.network.noises and len(self.left) == len(self.network.inputs)
+        sizes = (one.size for one in self.network.inputs if one.name in self.left)
+        self.all_left = sum(sizes) == self.network.vector_size
         self._left_beside = frozenset(), self.left
         stepper.read(self.left)
 
