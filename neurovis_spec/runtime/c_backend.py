@@ -304,8 +304,6 @@ class CStepper:
         self._long_tables = made.long_tables
         #: the inputs of the step that is made: what it computes of them stands there behind it
         self.vector = np.zeros(network.vector_size)
-        #: where it stands there whether formulas that reach what flows are held
-        self._formulas = [*network.held_inputs.values()]
         #: the inputs that a step computes, and of each input whether it is one
         self._computed = _NO_INPUTS
         self._reads = np.zeros(len(network.inputs), dtype=np.uint8)
@@ -373,8 +371,6 @@ class CStepper:
             self._pointers.form = self._form_there = form
         if inputs is not self.vector:
             self.vector[:] = inputs
-        elif self._formulas:  # nobody gives anything in their place
-            self.vector[self._formulas] = 0.0
         odd: int = self._step(self._struct)
         state.k = self._k = k + 1
         return odd != 0
