@@ -272,55 +272,60 @@ def emit_change(
     """Emit the new value of all that lasts of a definition, from old values at once, then its change at an episode's
     end. Gives the identifiers of what does not last, which is made from the new states. ``seen``: what formulas see
     besides their own. What flows begins with its initial states: they stay at the first step."""
-    each_step = {one.name: one.each_step for one in definition.lasting}
-    fleeting = {one.name: one.each_step for one in definition.fleeting}
-    stay = FIRST if definition.flows else ""
-    fleeting_names = _emit_replace(code, definition, seen, cells, each_step, fleeting, functions, stay)
+    change = _Change(code, definition, seen, cells, functions)
+    fleeting_names = change.replace(
+        {one.name: one.each_step for one in definition.lasting},
+        {one.name: one.each_step for one in definition.fleeting},
+        FIRST if definition.flows else "",
+    )
     ends = {one.name: one.each_episode for one in definition.lasting}
     if episode is not None and any(tree is not None for tree in ends.values()):
         code.line(f"if (k + 1) % {episode} == 0:")
         code.indent += 1
-        _emit_replace(code, definition, seen, cells, ends, {}, functions)
+        change.replace(ends, {})
         code.indent -= 1
     return fleeting_names
 
 
-def _emit_replace(
-    code: Code,
-    definition: Definition,
-    seen: Mapping[str, str],
-    cells: Mapping[str, Cell],
-    trees: Mapping[str, Tree | None],
-    fleeting: Mapping[str, Tree | None],
-    functions: Functions | None,
-    stay: str = "",
-) -> dict[str, str]:
-    """Emit all right-hand sides, then all changes; gives the identifiers of what is ``fleeting``. Where what ``stay``
-    says is true what lasts keeps its value."""
-    known = dict(seen)
-    known |= {
-        name: cell.now if cell.now.isidentifier() else code.let("v", cell.now)
-        for name, cell in cells.items()
-        if name not in fleeting
-    }
-    for name, value in unfolded(definition.let, [*trees.values(), *fleeting.values()]).let:
-        known[name] = code.fresh("m", value, known, functions)
-    new = {name: code.fresh("n", tree, known, functions) for name, tree in trees.items() if tree is not None}
-    if stay:
-        new = {name: code.let("n", f"np.array({known[name]}) if {stay} else {value}") for name, value in new.items()}
-    for name, made in new.items():
-        held = cells[name].held
-        if held is not None:
-            code.line(f"if fixed: {made} = {held(made)}")
-    fleeting_names = {
-        name: code.let("y", code.expression(tree, known | new, functions))
-        for name, tree in fleeting.items()
-        if tree is not None
-    }
-    for name, made in (new | fleeting_names).items():
-        if name in cells:
-            code.line(f"{cells[name].place} = {cells[name].kept(made)}")
-    return fleeting_names
+class _Change(NamedTuple):
+    """What ``emit_change`` is given."""
+
+    code: Code
+    definition: Definition
+    seen: Mapping[str, str]
+    cells: Mapping[str, Cell]
+    functions: Functions | None
+
+    def replace(
+        self, trees: Mapping[str, Tree | None], fleeting: Mapping[str, Tree | None], stay: str = ""
+    ) -> dict[str, str]:
+        """Emit all right-hand sides, then all changes; gives the identifiers of what is ``fleeting``. Where what
+        ``stay`` says is true what lasts keeps its value."""
+        code, cells, functions = self.code, self.cells, self.functions
+        known = dict(self.seen)
+        known |= {
+            name: cell.now if cell.now.isidentifier() else code.let("v", cell.now)
+            for name, cell in cells.items()
+            if name not in fleeting
+        }
+        for name, value in unfolded(self.definition.let, [*trees.values(), *fleeting.values()]).let:
+            known[name] = code.fresh("m", value, known, functions)
+        new = {name: code.fresh("n", tree, known, functions) for name, tree in trees.items() if tree is not None}
+        if stay:
+            new = {n: code.let("n", f"np.array({known[n]}) if {stay} else {value}") for n, value in new.items()}
+        for name, made in new.items():
+            held = cells[name].held
+            if held is not None:
+                code.line(f"if fixed: {made} = {held(made)}")
+        given = {
+            name: code.let("y", code.expression(tree, known | new, functions))
+            for name, tree in fleeting.items()
+            if tree is not None
+        }
+        for name, made in (new | given).items():
+            if name in cells:
+                code.line(f"{cells[name].place} = {cells[name].kept(made)}")
+        return given
 
 
 def held_at(fixed: Fixed, key: Key, value: FloatArray | float, count: int) -> FloatArray | float:
