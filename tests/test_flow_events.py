@@ -9,6 +9,9 @@ import pytest
 
 import neurovis_spec as nv
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.live.carry import carried
+from neurovis_spec.live.simulated import SimulatedSource
+from neurovis_spec.live.turns import Hold, Release, Set, Turn
 from neurovis_spec.runtime.backend import load
 from neurovis_spec.runtime.columns import Keep
 from neurovis_spec.runtime.controls import Controls
@@ -198,3 +201,27 @@ def test_stepping_in_the_references_state_agrees_with_clamps_and_lesions() -> No
             for name, values in cells.items():
                 np.testing.assert_allclose(states[1].cells[owner][name], values, rtol=1e-13, atol=1e-15)
         state = states[0]
+
+
+def test_the_live_view_goes_back_and_on_and_into_an_edited_network() -> None:
+    """With a state held by hand on the way, exactly; and edited, a network goes on with the states that it has."""
+    compiled = nv.compile_text(PAIR.replace("NOISE", "0.1").replace("EVENTS", ""))
+    source = SimulatedSource(compiled.simulator(backend="numpy"))
+    turns: dict[int, Turn] = {5: Hold("A.x", 0.5), 40: Release("A.x"), 50: Set({"pull": 2})}
+    seen = {}
+    for _ in range(80):
+        source.advance()
+        if source.step in turns:
+            source.turn(turns[source.step])
+        seen[source.step] = source.seen().snapshot.activity.copy()
+    assert [seen[step][0] for step in (6, 40)] == [0.5, 0.5]
+    for step in (79, 45, 20, 6, 60, 41):
+        source.go(step)
+        np.testing.assert_array_equal(source.seen().snapshot.activity, seen[step])
+    source.go(79)
+    edited = PAIR.replace("NOISE", "0.1").replace("EVENTS", "").replace("speed: 3", "speed: 2.5")
+    other = carried(source, nv.compile_text(edited).simulator(backend="numpy"))
+    assert other.step == 79
+    np.testing.assert_allclose(other.seen().snapshot.activity, seen[79], atol=0.03)  # its last step made by the edited
+    other.advance()
+    np.testing.assert_allclose(other.seen().snapshot.activity, seen[80], atol=0.06)

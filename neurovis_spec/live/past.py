@@ -41,9 +41,11 @@ class Kept:
 
 
 def _bytes(value: object) -> int:
-    """The bytes of the arrays in a bundle of arrays and tuples of arrays."""
+    """The bytes of the arrays in a bundle of arrays, and of tuples and mappings of these."""
     if isinstance(value, np.ndarray):
         return int(value.nbytes)
+    if isinstance(value, Mapping):
+        return sum(_bytes(part) for part in value.values())
     if isinstance(value, tuple):
         return sum(_bytes(part) for part in value)
     if isinstance(value, BodyState):
