@@ -12,12 +12,13 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.carry import carried
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.turns import Hold, Release, Set, Turn
-from neurovis_spec.runtime.backend import load
+from neurovis_spec.runtime.backend import BackendError, Capabilities, load
 from neurovis_spec.runtime.columns import Keep
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.errors import UnknownNameError
 from neurovis_spec.runtime.inputs import InputReader
+from neurovis_spec.runtime.numpy_backend import NumpyBackend
 from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.simulation import Simulation
@@ -124,6 +125,24 @@ def test_what_is_held_by_hand_goes_through_a_checkpoint(backend: str, tmp_path: 
         simulation.step()
     assert one.activity.tolist() == other.activity.tolist()
     assert one.activity[0] != 0.7
+
+
+def test_a_backend_that_holds_no_states_refuses_them() -> None:
+    """By name, before the run, by hand, and where a state is gone on from."""
+
+    class Plain(NumpyBackend):
+        name = "plain"
+        capabilities = Capabilities(noise=True, flows=True)
+
+    with pytest.raises(BackendError, match=r"'plain' cannot run 'pair': no clamps of states"):
+        Simulation(pair("{from: 3, clamp: {A.x: 1}}"), Plain())
+    simulation, other = Simulation(pair(), Plain()), Simulation(pair(), "numpy")
+    with pytest.raises(BackendError, match=r"'plain' cannot clamp the state 'A.x'; 'numpy' can"):
+        simulation.clamp("A.x", 1)
+    simulation.clamp("A", 1)
+    other.clamp("A.x", 1)
+    with pytest.warns(UserWarning, match="last bits"), pytest.raises(BackendError, match=r"cannot clamp a state"):
+        simulation.restore(other.state())
 
 
 def test_only_states_of_models_are_held() -> None:

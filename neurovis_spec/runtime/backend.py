@@ -54,6 +54,9 @@ class Capabilities:
     exact_sums: InitVar[bool | None] = None
 
 
+_PLAIN: Final = Capabilities()
+
+
 @dataclass(frozen=True, slots=True)
 class Availability:
     """Whether a backend works here; ``note`` says which way, or why not. ``by_default``: it is the one to take here
@@ -215,12 +218,24 @@ def _named() -> str:
 @dataclass(frozen=True, slots=True)
 class Ready:
     """A network made ready to run: the ``name`` of the backend, what makes the steps, what computes the functions of
-    formulas beside them, and ``why`` it was chosen, where nobody asked for it."""
+    formulas beside them, what it can do, and ``why`` it was chosen, where nobody asked for it."""
 
     name: str
     stepper: Stepper
     functions: Library
     why: str = ""
+    capabilities: Capabilities = _PLAIN
+
+    def take(self, state: State) -> None:
+        """Make the steps of a run from this state on. Raises BackendError where the state is held as it cannot hold."""
+        if state.conditions.fixed:
+            self.check_clamp("a state")
+        state.backend = self.name
+
+    def check_clamp(self, what: str) -> None:
+        """Refuse a clamp of a state. Raises BackendError."""
+        if not self.capabilities.clamped_states:
+            raise BackendError(f"the backend '{self.name}' cannot clamp {what}; '{_LAST_RESORT}' can")
 
 
 def ready(network: Network, backend: str | Backend | Ready | None = None, before: str = "") -> Ready:
@@ -287,7 +302,8 @@ def _ready_on(network: Network, backend: Backend, why: str = "") -> Ready:
     if missing:
         raise BackendError(f"the backend '{backend.name}' cannot run '{network.name}': {'; '.join(missing)}")
     stepper = backend.prepare(network)
-    return Ready(backend.name, stepper, stepper.functions if isinstance(stepper, Computing) else NUMPY, why)
+    functions = stepper.functions if isinstance(stepper, Computing) else NUMPY
+    return Ready(backend.name, stepper, functions, why, backend.capabilities)
 
 
 def _beyond(network: Network) -> tuple[tuple[str, bool], ...]:

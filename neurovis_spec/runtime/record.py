@@ -81,7 +81,7 @@ def begin_run(network: Network, course: Course) -> tuple[Course, State]:
     if state is None and course.start is not None:
         state = resumed_state(network, course.start, backend.functions)
     state = state or initial_state(network)
-    state.backend = backend.name
+    backend.take(state)
     return replace(course, backend=backend), state
 
 

@@ -29,7 +29,7 @@ from neurovis_spec.compiler.network import Network, Output
 from neurovis_spec.language.expressions.tree import Number
 from neurovis_spec.language.units import UnitError, measured, number_in
 from neurovis_spec.likeness import suggest
-from neurovis_spec.runtime.backend import Backend, BackendError, Reading, Ready, load, ready
+from neurovis_spec.runtime.backend import Backend, Reading, Ready, ready
 from neurovis_spec.runtime.columns import ALL, Keep, Probe, probe_of
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.course import Course
@@ -81,7 +81,7 @@ class Simulation:
         self._begin = (
             initial_state(network) if start is None else resumed_state(network, start, self._backend.functions)
         )
-        self._begin.backend = self._backend.name
+        self._backend.take(self._begin)
         self._apply(self._begin)
         self._recorder: Recorder | None = None
         #: what was true after the last step, where events of the step to come have changed something (``ended``)
@@ -399,8 +399,7 @@ class Simulation:
         state = None if not isinstance(self._names.find(reference), str) else find_model_state(self.network, reference)
         if state is None:
             return self._neurons(text)
-        if not load(self.backend).capabilities.clamped_states:
-            raise BackendError(f"the backend '{self.backend}' cannot clamp '{text}': it holds no states")
+        self._backend.check_clamp(f"the state '{text}'")
         return self.network.clamp_places(state)
 
     def _neurons(self, text: str) -> IntArray:
@@ -422,7 +421,8 @@ class Simulation:
         """Go on from this state, with its backend unless another is asked for."""
         if state.backend not in ("", self._backend.name):
             self._use_backend(state.backend)
-        state.backend, self._state, self._ended = self._backend.name, state, None
+        self._backend.take(state)
+        self._state, self._ended = state, None
         self._reader.use(state)
 
     def state(self) -> State:
