@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from neurovis_spec.compiler.canonical import content_hash
 from neurovis_spec.compiler.checks.compiled import Compiled
-from neurovis_spec.compiler.checks.definitions import check_dt
+from neurovis_spec.compiler.checks.definitions import check_dt, check_slopes
 from neurovis_spec.compiler.checks.warnings import warn
 from neurovis_spec.compiler.connections.connect import Connected, connect, join
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
 from neurovis_spec.compiler.drawing.sections import layout_settings, render_settings
 from neurovis_spec.compiler.events.bound import found_in, make_settable, own_weights
+from neurovis_spec.compiler.flows import BY_SLOPE
 from neurovis_spec.compiler.levels import Cycle, Order, held_at, order_of, sent_by
 from neurovis_spec.compiler.limits import MOST_SIGNALS, MOST_SUBSTEPS, Limits, amount
 from neurovis_spec.compiler.lower import Integration, make_populations, make_program, make_projections
@@ -174,7 +175,10 @@ def _declare(spec: Spec, request: Request, findings: Findings) -> _Declared:
     expander = Expander(library, request.root, findings, constants.dt, files={**request.files}, limits=request.limits)
     expansion = expander.expand(spec, constants, request.base)
     census = populate(expansion.scopes, request.limits, seed)
-    check_dt(spec, (file.model for file in request.includes.files), census.groups, findings)
+    files = [file.model for file in request.includes.files]
+    check_dt(spec, files, census.groups, findings)
+    if integration.method in BY_SLOPE:
+        check_slopes(spec, files, census.groups, findings)
     _check_modules_without_instance(expander, request.limits, seed)
     if not len(census.neurons):
         _report_no_neurons(spec, census, findings)

@@ -11,11 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from neurovis_spec.compiler.program import DRIVE, SLOPE_F, Definition, Quantity
 from neurovis_spec.language.expressions.derivative import derivative, slope
 from neurovis_spec.language.expressions.tree import Name, Number, Tree, names
+from neurovis_spec.language.words import Method
 
 
 def reads(definition: Definition, trees: Iterable[Tree | None]) -> frozenset[str]:
@@ -100,6 +101,8 @@ def jacobian(definition: Definition) -> Jacobian:
 
 
 _SLOPES = {"f": SLOPE_F}
+#: The methods that look at how much a derivative changes with its own state.
+BY_SLOPE: Final[frozenset[Method]] = frozenset(("exponential", "semi_implicit"))
 
 
 def _needed(let: list[tuple[str, Tree]], by: Tree) -> list[tuple[str, Tree]]:

@@ -13,18 +13,15 @@ from typing import Final, NamedTuple, TypeAlias
 import numpy as np
 
 from neurovis_spec.arrays import Indices, IntArray
-from neurovis_spec.compiler.flows import Jacobian, jacobian, with_slope
+from neurovis_spec.compiler.flows import BY_SLOPE, Jacobian, jacobian, with_slope
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Definition, Integrate, Population, Port
 from neurovis_spec.language.expressions.tree import Name, Tree, names
-from neurovis_spec.language.words import Method
 
 Let: TypeAlias = tuple[tuple[str, Tree], ...]
 
 #: how far inside a step its ends are seen from, of its length: what jumps on the grid jumps between two steps
 _INSIDE: Final = 2.0**-20
-#: the methods that look at how much a derivative changes with its own state
-_BY_SLOPE: Final[frozenset[Method]] = frozenset(("exponential", "semi_implicit"))
 #: what every model gives
 _ACTIVITY: Final = "activity"
 
@@ -110,7 +107,7 @@ def parts_of(network: Network, operation: Integrate) -> tuple[Part, ...]:
     for number in operation.populations:
         population, slopes = network.populations[number], Jacobian((), {})
         model = population.model.definition
-        if operation.method in _BY_SLOPE:
+        if operation.method in BY_SLOPE:
             slopes = jacobian(model)
             activation = replace(population.activation, definition=with_slope(population.activation.definition))
             population = replace(population, activation=activation)

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
 from collections.abc import Mapping as AnyMapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from neurovis_spec.compiler.checks.compiled import Compiled
+from neurovis_spec.compiler.flows import jacobian, with_slope
 from neurovis_spec.compiler.names.references import key_of, key_span
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.groups import Built
@@ -25,7 +27,7 @@ from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.parser import parse
-from neurovis_spec.language.expressions.tree import Tree, names
+from neurovis_spec.language.expressions.tree import ExpressionError, Tree, names
 from neurovis_spec.language.grammar import ACTIVITIES
 from neurovis_spec.language.library import DefinitionModel, Library, Parts
 from neurovis_spec.language.located import Formula
@@ -159,17 +161,42 @@ def check_dt(spec: Spec, included: Iterable[Library], groups: Iterable[Built], f
         return
     model = group.kind.model.definition
     first = model.flows[0].name
-    own = next((one.models[model.name] for one in (spec, *included) if model.name in one.models), None)
-    derivative = None if own is None else own.state[first].derivative
-    choice = group.model.model
-    if derivative is not None:
-        span = derivative.span
-    else:  # the model is a built-in one
-        span = group.model.source.span if choice is None else choice.name.span
     unit = "second" if model.per_second == 1 else "millisecond"
     message = f"the derivative of '{first}' is per {unit}, and no 'dt' says how long a step is"
-    hint = "say it at the top, in seconds: time: {dt: 0.001}"
-    findings.error("dt-needed", span, message, hint)
+    hint = "say it at the top, as in time: {dt: 0.1 ms}"
+    findings.error("dt-needed", _place_of(first, group, (spec, *included)), message, hint)
+
+
+def check_slopes(spec: Spec, included: Iterable[Library], groups: Iterable[Built], findings: Findings) -> None:
+    """Report a derivative in use whose own derivative by its state, which the integration needs, is longer than an
+    expression may be."""
+    told: set[tuple[str, str]] = set()
+    for group in groups:
+        model, activation = group.kind.model.definition, group.kind.activation.definition
+        states = () if (model.name, activation.name) in told else model.flows
+        told.add((model.name, activation.name))
+        for state in states:
+            try:
+                jacobian(replace(model, state=(state,)))
+                if model.reads_activation:
+                    with_slope(activation)
+            except ExpressionError as error:
+                message = (
+                    f"how the derivative of '{state.name}' changes with it is too long to be told: {error.message}"
+                )
+                hint = f"{error.hint} (let), or take another method of time.integrate, such as rk4"
+                findings.error(error.code, _place_of(state.name, group, (spec, *included)), message, hint)
+                break
+
+
+def _place_of(state: str, group: Built, libraries: Iterable[Library]) -> Span:
+    """Where the derivative of a state of a group's model stands, or where the model is named, if it is a built-in."""
+    name, choice = group.kind.model.definition.name, group.model.model
+    own = next((one.models[name] for one in libraries if name in one.models), None)
+    derivative = None if own is None else own.state[state].derivative
+    if derivative is not None:
+        return derivative.span
+    return group.model.source.span if choice is None else choice.name.span
 
 
 def _check_replaced(model: DefinitionModel, rule: Defined, findings: Findings) -> None:
