@@ -234,3 +234,23 @@ def test_what_is_shown_and_the_order_of_names_are_no_content(old: str, new: str)
 )
 def test_what_a_run_depends_on_is_content(old: str, new: str) -> None:
     assert hash_of(CONTENT.replace(old, new)) != hash_of(CONTENT)
+
+
+# ---- what is too long to be differentiated -----------------------------------------------------------------------
+
+LONG = "*".join(f"sin(x + {number})" for number in range(30))
+
+
+@pytest.mark.parametrize("backend", ["reference", "numpy", pytest.param("c", marks=pytest.mark.compiler)])
+def test_a_long_derivative_is_no_matter_where_its_own_is_not_needed(backend: str) -> None:
+    text = f"""{HEAD}models:
+  m: {{state: {{x: {{initial: 0.3, derivative: {LONG}}}}}, activity: f(x)}}
+activations: {{a: {{value: {LONG}}}}}
+neurons: {{M: {{model: m, activation: a}}}}"""
+    run = nv.compile_text(text).run(3, backend=backend)
+    assert np.isfinite(run.activity).all()
+
+
+def test_an_activation_in_a_derivative_is_used() -> None:
+    text = f"{HEAD}models: {{m: {{state: {{v: {{derivative: f(drive) - v}}}}, activity: v}}}}\n"
+    assert nv.compile_text(f"{text}neurons: {{A: {{model: m, activation: tanh, bias: 1}}}}").warnings == ()

@@ -6,7 +6,7 @@ projections say for which neurons and connections which are in use; operations a
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -151,20 +151,22 @@ class Definition:
         return {one.name: one.each_step for one in self.gives if one.each_step is not None}
 
     @property
+    def formulas(self) -> Iterator[Tree]:
+        """All that is computed in a run."""
+        yield from (tree for _, tree in self.let)
+        for one in (*self.state, *self.gives):
+            parts = one.each_step, one.each_episode, one.derivative, one.noise
+            yield from (tree for tree in parts if tree is not None)
+
+    @property
     def read(self) -> frozenset[str]:
         """All names that its formulas read in a run."""
-        found: set[str] = set()
-        for _, tree in self.let:
-            found |= names(tree)
-        for one in (*self.state, *self.gives):
-            for part in (one.each_step, one.each_episode, one.derivative, one.noise):
-                found |= frozenset() if part is None else names(part)
-        return frozenset(found)
+        return frozenset().union(*map(names, self.formulas))
 
     @property
     def reads_activation(self) -> bool:
-        """Whether what it gives depends on the neuron's activation."""
-        return any(is_activation(node) for tree in self.functions.values() for node in walk(tree))
+        """Whether any of its formulas depends on the neuron's activation."""
+        return any(is_activation(node) for tree in self.formulas for node in walk(tree))
 
 
 def ports_of(model: Definition) -> tuple[str, ...]:

@@ -33,7 +33,7 @@ from typing import NamedTuple
 import numpy as np
 
 from neurovis_spec.arrays import Indices, IntArray
-from neurovis_spec.compiler.flows import jacobian
+from neurovis_spec.compiler.flows import Jacobian, jacobian
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import SLOPE_F, Diffuse, Integrate, Port, Use
 from neurovis_spec.language.expressions.derivative import derivative
@@ -439,9 +439,9 @@ class _Integration:
         """The derivatives of the states of a neuron, or what these change by."""
         code, changes = self.code, _CHANGES.get(self.method)
         made, activation = part.population.model.definition, part.population.activation.definition
-        slopes = jacobian(made)
+        slopes = Jacobian((), {}) if changes is None else jacobian(made)
         if changes is not None:
-            value = activation.given.each_step
+            value = activation.given.each_step if made.reads_activation else None
             if SLOPE_F not in functions and value is not None:
                 own = {SLOPE_F: derivative(value, "x")}
                 functions = {**functions, **self.step.activation(part.population, place, own)}

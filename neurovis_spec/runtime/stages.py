@@ -108,9 +108,10 @@ def parts_of(network: Network, operation: Integrate) -> tuple[Part, ...]:
         population, slopes = network.populations[number], Jacobian((), {})
         model = population.model.definition
         if operation.method in BY_SLOPE:
-            slopes = jacobian(model)
-            activation = replace(population.activation, definition=with_slope(population.activation.definition))
-            population = replace(population, activation=activation)
+            slopes, activation = jacobian(model), population.activation
+            if model.reads_activation:
+                activation = replace(activation, definition=with_slope(activation.definition))
+                population = replace(population, activation=activation)
         own = [(name, places) for (owner, name), places in taken.items() if owner == number]
         parts.append(
             Part(
