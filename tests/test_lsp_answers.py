@@ -244,6 +244,25 @@ def test_what_flows_is_explained(at: str, told: list[str]) -> None:
     assert all(one in found.markdown for one in told), found.markdown
 
 
+@pytest.mark.parametrize(
+    ("step", "flow"),
+    [
+        ("v + dt*(drive - v)/tau", "(drive - v)/tau"),
+        ("v + dt * drive", "drive"),
+        ("(1 - leak)*v + leak*(drive - w)", "((drive - w) - v)*leak/dt"),
+        ("v + drive", None),
+        ("w + dt*v", None),
+        ("(1 - leak)*v + rate*drive", None),
+    ],
+)
+def test_a_step_by_euler_is_shown_as_a_derivative(step: str, flow: str | None) -> None:
+    text = f"neurovis: 1\nname: x\nmodels:\n  m: {{state: {{v¦: {{each_step: {step}}}, w: {{}}}}, activity: v}}\n"
+    found = hover(*marked(text))
+    assert found is not None
+    assert (f"`derivative: {flow}`" in found.markdown) == (flow is not None)
+    assert ("derivative" in found.markdown) == (flow is not None)
+
+
 def test_names_of_what_is_sent_and_of_ports_are_renamed() -> None:
     document, place = marked(FLOW.replace("send: curr", "send: curr¦"))
     assert apply(document, rename(document, place, "flux")).source == FLOW.replace("current", "flux")

@@ -18,7 +18,7 @@ from neurovis_spec.language.grammar import Role
 from neurovis_spec.language.patterns import PATTERNS
 from neurovis_spec.language.places import key_at, role_of
 from neurovis_spec.language.templates import Hole, pieces
-from neurovis_spec.lsp.definitions import known
+from neurovis_spec.lsp.definitions import as_derivative, known
 from neurovis_spec.lsp.document import Document, described, ports_of
 from neurovis_spec.lsp.index import Found, Index
 from neurovis_spec.lsp.names import DEFINITIONS, Name
@@ -269,4 +269,8 @@ def _setting(document: Document, name: Name) -> str | None:
         return f"**{name.text}** (signal of {owner}): neurons or an input, of size 1 or of the size of the target"
     own = (f"{name.text} =", f"d{name.text}/dt ")
     lines = [line for line in definition.equations if line.startswith(own)]
-    return f"**{name.text}** of {owner}\n\n```\n" + "\n".join(lines) + "\n```" if lines else None
+    if not lines:
+        return None
+    told = f"**{name.text}** of {owner}\n\n```\n" + "\n".join(lines) + "\n```"
+    flow = as_derivative(name.text, lines[0].partition(" = ")[2]) if section == "models" else None
+    return told if flow is None else f"{told}\n\nAs an equation, which is integrated: `derivative: {flow}`"
