@@ -297,22 +297,25 @@ class _Checker:
 
     def outputs(self, outputs: Mapping[str, Formula]) -> tuple[Quantity, ...]:
         """The outputs beside the activity, which nothing in the definition reads."""
-        made = tuple(Quantity(name, self.tree(formula, self.functions)) for name, formula in outputs.items())
-        for name in names_of(self.model, "outputs", outputs):
+        trees = {name: self.tree(formula, self.functions) for name, formula in outputs.items()}
+        declared = names_of(self.model, "outputs", outputs)
+        for name in declared:
             if name in _NO_OUTPUTS:
                 message = f"'{name}' is no name for an output: it means something else where outputs are named"
                 self.findings.error("reserved-name", self._key("outputs", name), message, "choose another name")
             else:
                 self.declare("outputs", name)
-        return made
+        return tuple(Quantity(name, trees.get(name, Number(0.0))) for name in declared)
 
-    def sent(self, send: Located[str] | None, kept: Collection[str]) -> str:
+    def sent(self, send: Located[str] | None) -> str:
         """The name of what is sent, of what the model keeps; "" for the activity."""
         if send is None or send.value == MODEL.gives:
             return ""
-        if send.value not in kept and not self.known.is_open:
+        kept = {"state": self.parts.state or {}, "outputs": self.parts.outputs or {}}
+        known = [names_of(self.model, section, made) for section, made in kept.items()]
+        if not any(send.value in names for names in known):
             message = f"'{shorten(send.value)}' is neither a state nor an output of this model"
-            hint = suggest(send.value, (*kept, MODEL.gives), "what can be sent")
+            hint = suggest(send.value, [*(name for names in known for name in names), MODEL.gives], "what can be sent")
             self.findings.error("unknown-state", send.span, message, hint)
         return send.value
 
@@ -423,7 +426,7 @@ def definition_of(
         signals=signals,
         spikes=parts.spikes,
         ports=ports,
-        send=checker.sent(parts.send, [one.name for one in (*state, *outputs)]),
+        send=checker.sent(parts.send),
         per_second=_PER_SECOND[parts.time],
         units=tuple((name, one.unit.value) for name, one in parts.parameters.items() if one.unit is not None),
     )
