@@ -254,3 +254,42 @@ neurons: {{M: {{model: m, activation: a}}}}"""
 def test_an_activation_in_a_derivative_is_used() -> None:
     text = f"{HEAD}models: {{m: {{state: {{v: {{derivative: f(drive) - v}}}}, activity: v}}}}\n"
     assert nv.compile_text(f"{text}neurons: {{A: {{model: m, activation: tanh, bias: 1}}}}").warnings == ()
+
+
+# ---- where a run begins ------------------------------------------------------------------------------------------
+
+
+def test_an_activity_that_is_a_state_begins_as_the_state() -> None:
+    text = f"{HEAD}models: {{m: {{state: {{u: {{initial: 1, derivative: v}}, v: {{derivative: -u}}}}, activity: v}}}}\n"
+    state, activity, both = (
+        nv.compile_text(f"{text}neurons: {{A: {{count: 3, model: m, initial: {initial}}}}}")
+        for initial in ("{v: [1, 2, 3]}", "[1, 2, 3]", "{activity: i + 1, u: 1}")
+    )
+    assert state.hash == activity.hash != both.hash
+    assert [*activity.run(1).activity[0]] == [*both.run(1).activity[0]] == [1, 2, 3]
+
+
+def test_draws_of_such_an_activity_are_those_of_the_state() -> None:
+    text = (
+        f"{HEAD}models: {{m: {{state: {{v: {{derivative: -v}}}}, activity: v}}}}\nneurons: {{A: {{count: 3, model: m, "
+    )
+    drawn = [nv.compile_text(f"{text}initial: {one}}}}}").hash for one in ('"normal(0, 1)"', '{v: "normal(0, 1)"}')]
+    assert drawn[0] == drawn[1]
+
+
+def test_dt_and_t_are_in_the_unit_of_the_definition() -> None:
+    """In formulas, initial values and defaults."""
+    body = "parameters: {p: 2*dt}, state: {v: {initial: dt, derivative: 1}}, outputs: {o: t, q: p, d: dt}, activity: v"
+    text = f"""neurovis: 1
+name: x
+time: {{dt: 0.002}}
+models: {{s: {{{body}}}, ms: {{time: ms, {body}}}}}
+neurons: {{A: {{model: s}}, B: {{model: ms}}}}
+outputs: {{oa: A.o, ob: B.o, qa: A.q, qb: B.q, da: A.d, db: B.d}}
+"""
+    found = nv.compile_text(text).run(4)
+    for name in ("A", "oa", "qa", "da"):
+        other = {"A": "B"}.get(name, f"{name[0]}b")
+        assert np.asarray(found[other]).ravel() == pytest.approx(1000 * np.asarray(found[name]).ravel(), rel=1e-12)
+    assert np.asarray(found["oa"]).ravel() == pytest.approx([0, 0.002, 0.004, 0.006])
+    assert np.asarray(found["A"]).ravel() == pytest.approx([0.002, 0.004, 0.006, 0.008])

@@ -33,8 +33,8 @@ INSTEAD: Mapping[str, str] = {
     "trunc": "write 'sign(x) * floor(abs(x))'",
     "square": "write 'x^2'",
     "cbrt": "write 'sign(x) * abs(x)^(1/3)'",
-    "f": "f(x), the neuron's activation, is known in the 'activity' of a model, its outputs, 'let' and states, but not in "
-    "'initial', 'each_episode' and 'noise'",
+    "f": "f(x), the neuron's activation, is known in the 'activity' of a model, its outputs, 'let' and states, but not "
+    "in 'initial', 'each_episode' and 'noise'",
     "relu": "write 'max(x, 0)'",
     "where": "write 'a if condition else b'",
     "sum": "write the terms one by one",
