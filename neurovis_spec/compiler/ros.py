@@ -25,7 +25,7 @@ from neurovis_spec.compiler.ros_settings import (
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, Home, Undeclared, shorten
 from neurovis_spec.language.located import Formula, value_or
-from neurovis_spec.language.model import names_of
+from neurovis_spec.language.model import names_of, opening
 from neurovis_spec.language.ros import PublishModel, RosModel, SubscribeModel
 from neurovis_spec.language.ros_types import Field, all_types, fields_of, misspelt, numbers_of, plain
 from neurovis_spec.language.spec import Spec
@@ -37,11 +37,17 @@ _DATA: Final = "data"
 #: The types of what the network itself publishes.
 _ARRAY: Final = "std_msgs/Float64MultiArray"
 _SPEC: Final = "std_msgs/String"
+#: The most steps a second that a node makes unless the spec says so.
+_MOST_RATE: Final = 1000 * (1 + 1e-9)
 
 
 def ros_settings(model: RosModel, around: Surroundings, constants: Constants) -> RosSettings:
     """The ``ros`` section of a spec. What is invalid in it is reported and left out."""
     rate = None if model.rate is None else _above_zero(model.rate, "'rate' is steps a second", constants)
+    if model.rate is None and "rate" not in model.unknown and constants.timed and 1 / constants.dt > _MOST_RATE:
+        message = f"a node would make {1 / constants.dt:,.6g} steps a second, as 1/dt says: 'rate' is missing"
+        hint = "add rate: how many steps a second it is to make, as many as the machine can"
+        constants.findings.error("missing-key", opening(model.source), message, hint, key="rate")
     namespace = NAMESPACE if model.namespace is None else f"/{model.namespace.value.strip('/')}"
     qos, depth = model.qos, None
     if qos is not None and qos.depth is not None:

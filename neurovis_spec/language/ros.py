@@ -153,7 +153,9 @@ class RosModel(Model):
     PLACE: ClassVar[str] = "'ros'"
 
     namespace: NamespaceField | None = Field(None, description="Prefix of the topics (default /neurovis).")
-    rate: FormulaField | None = Field(None, description="Steps a second (default 1/dt).")
+    rate: FormulaField | None = Field(
+        None, description="Steps a second, which must be given where 1/dt is above 1,000 (default 1/dt)."
+    )
     qos: QosModel | None = Field(None, description="Quality of service of what is published (ROS 2).")
     subscribe: Annotated[Keyed[SubscribeModel], naming("input")] = Field(
         default_factory=dict, description="{input: where it comes from}."
