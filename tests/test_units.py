@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from small_specs import codes, network_of
+from small_specs import codes, compiled, network_of
 
 import neurovis_spec as nv
+from neurovis_spec.cli.overview import overview
 from neurovis_spec.language.units import Measured, UnitError, measured, number_in, seconds_of
 from neurovis_spec.sweeps.grid import SweepError
 from neurovis_spec.sweeps.sweep import sweep
@@ -124,6 +125,17 @@ def test_a_sweep_is_over_values_with_units(tmp_path: Path) -> None:
         assert [row[:2] for row in sweep(spec, {"tau": over}, "rms(A)", steps=1).rows] == [(10.0, 10.0), (20.0, 20.0)]
     with pytest.raises(SweepError, match="'tau': expected a value in ms, found '1 mV'"):
         sweep(spec, {"tau": "1 mV"}, "rms(A)")
+
+
+def test_people_are_told_times_in_the_unit_of_dt(tmp_path: Path) -> None:
+    text = "time: {dt: 0.1 ms, steps: 201}\nneurons: {A: {bias: 1}}\n"
+    for written, caption, axis in (("0.1 ms", "step 200 · 20.00 ms", "time (ms)"), ("1e-4", "0.0200 s", "time (s)")):
+        made = compiled(text.replace("0.1 ms", written))
+        made.render(tmp_path / "x.svg", view=["network", "traces"])
+        picture = (tmp_path / "x.svg").read_text(encoding="utf-8")
+        assert caption in picture
+        assert f">{axis}<" in picture
+        assert f"dt {'0.1 ms' if 'ms' in axis else '0.0001 s'}, 201 steps" in overview(made)
 
 
 def test_an_invalid_dt_says_nothing_of_delays() -> None:

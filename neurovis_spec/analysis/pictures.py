@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.network import StepLength
 from neurovis_spec.runtime.named_array import NamedArray
 from neurovis_spec.scene import strips, texts
 from neurovis_spec.scene.caption import HEADER, caption_text, title_text
@@ -159,7 +160,13 @@ def _height(value: float) -> float:
 
 
 def curves(
-    names: Sequence[str], values: FloatArray, steps: IntArray, dt: float | None, title: str, what: str, theme: Theme
+    names: Sequence[str],
+    values: FloatArray,
+    steps: IntArray,
+    dt: StepLength | None,
+    title: str,
+    what: str,
+    theme: Theme,
 ) -> Scene:
     """Curves over time, (steps, names), a few to a strip."""
     parts = [(name.replace("->", "→"), "") if "->" in name else texts.with_subscript(name) for name in names]
@@ -185,7 +192,7 @@ def diagram(
     stretches: Mapping[str, Sequence[tuple[int, int]]],
     gait: NamedArray,
     steps: IntArray,
-    dt: float | None,
+    dt: StepLength | None,
     title: str,
     theme: Theme,
 ) -> Scene:

@@ -138,7 +138,7 @@ class _Report:
         self.theme: Theme = theme_of(network.settings_for(options.theme))
         self._part = excerpt(recording, options.of)
         self._late = cut(recording, int(recording.step[-_SEEN])) if len(recording) > _SEEN else recording
-        self._dt = network.network.dt if network.network.dt_given else None
+        self._dt = network.network.shown_dt
 
     def settings(self) -> dict[str, str]:
         """What was measured, in words."""

@@ -70,12 +70,13 @@ def _parts(compiled: CompiledNetwork, network: Network) -> Iterator[str]:
 
 def _head(network: Network) -> str:
     """The name, the sizes and the clock."""
+    dt, unit = network.shown_dt or (network.dt, "s")
     plastic = int((network.connections.rules.whole() >= 0).sum())
     lines = [
         f"{network.name}: {network.title}" if network.title != network.name else network.name,
         f"{count(len(network.neurons), 'neuron')}, {count(len(network.connections), 'connection')}"
         + (f", {plastic:,} of them learning" if plastic else ""),
-        f"dt {number(network.dt)} s, {count(network.steps, 'step')} ({number(network.dt * network.steps)} s)"
+        f"dt {number(dt)} {unit}, {count(network.steps, 'step')} ({number(dt * network.steps)} {unit})"
         + (f", episodes of {count(network.episode, 'step')}" if network.episode is not None else "")
         + f", seed {network.seed}",
     ]

@@ -45,6 +45,7 @@ from neurovis_spec.language.includes import Includes, ReadBytes
 from neurovis_spec.language.located import value_or
 from neurovis_spec.language.model import names_of, opening
 from neurovis_spec.language.spec import Spec, is_library
+from neurovis_spec.language.units import measured
 from neurovis_spec.language.unknown import UNKNOWN, known
 from neurovis_spec.language.yaml.opening import read_bytes
 
@@ -212,6 +213,7 @@ def _assemble(spec: Spec, sections: _Sections) -> Network:
         description="\n".join(text.value for text in spec.description or ()),
         dt=constants.dt,
         dt_given=spec.time is not None and spec.time.dt is not None,
+        dt_unit=_unit_of_dt(spec),
         steps=declared.steps,
         episode=declared.episode,
         seed=declared.seed,
@@ -401,6 +403,13 @@ def _step_length(spec: Spec, constants: Constants) -> bool:
         return False
     constants.dt = dt
     return True
+
+
+def _unit_of_dt(spec: Spec) -> str:
+    """The unit in which ``dt`` is written, s where that says none."""
+    written = None if spec.time is None or spec.time.dt is None else spec.time.dt.node.value
+    found = measured(written) if isinstance(written, str) else None
+    return "s" if found is None else found.unit
 
 
 def _check_names_set(spec: Spec, constants: Constants, values: Mapping[str, float | str]) -> None:

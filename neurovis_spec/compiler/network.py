@@ -34,6 +34,7 @@ from neurovis_spec.compiler.program import (
 )
 from neurovis_spec.compiler.ros_settings import RosSettings
 from neurovis_spec.language.expressions.tree import Tree
+from neurovis_spec.language.units import TIMES
 from neurovis_spec.language.words import Combine, NeuronRole
 
 if TYPE_CHECKING:
@@ -244,6 +245,13 @@ class Located(NamedTuple):
     positions: IntArray
 
 
+class StepLength(NamedTuple):
+    """How long a step is, in the unit of time in which people are told."""
+
+    length: float
+    unit: str
+
+
 @dataclass(frozen=True, eq=False)
 class Network:
     """A compiled network. ``hash`` is the SHA-256 of its canonical content, as ``inspect`` prints it."""
@@ -286,6 +294,15 @@ class Network:
     ros: RosSettings = field(default_factory=RosSettings)
     #: the body that it senses and moves in a run; like ``ros``, no part of the hash
     body: BodySettings | None = None
+    #: the unit in which the spec writes ``time.dt``, which pictures take
+    dt_unit: str = "s"
+
+    @property
+    def shown_dt(self) -> StepLength | None:
+        """How long a step is as the spec says it; None where it does not."""
+        if not self.dt_given:
+            return None
+        return StepLength(self.dt / float(TIMES[self.dt_unit]), self.dt_unit)
 
     @property
     def holders(self) -> tuple[Holder, ...]:

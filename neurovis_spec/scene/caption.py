@@ -35,8 +35,9 @@ def caption_text(words: str, width: float, theme: Theme) -> Text:
 def caption(network: Network, step: int, activity: FloatArray) -> str:
     """What is said of a step; ``activity`` (n,)."""
     parts = [f"step {step}"]
-    if network.dt_given:
-        parts.append(f"{step * network.dt:.{_decimals(network.dt)}f} s")
+    dt = network.shown_dt
+    if dt is not None:
+        parts.append(f"{step * dt.length:.{_decimals(dt.length)}f} {dt.unit}")
     error = _error(network, activity)
     if error is not None:
         parts.append(f"error {error}")

@@ -78,7 +78,7 @@ def figure(network: Network, layout: Layout | None, look: Look, shots: Shots, ga
         blocks = [others.get(number, Drawing(picture)) for number in range(len(look.panels))]
         density = picture.scene.density
         sheet = _Sheet(picture.scene.width, None if settings.size is None else settings.size[1] / density, density)
-    span = span_of(blocks, shots, sheet.width, network.dt if network.dt_given else None)
+    span = span_of(blocks, shots, sheet.width, network.shown_dt)
     theme, captions = theme_of(settings), _captions(network, shots)
     parts, bottom = _placed(blocks, sheet, span, theme, head)
     if title is not None:

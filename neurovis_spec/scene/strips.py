@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.network import StepLength
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.model import Group, Polyline, Rectangle, Shape, Text, Theme
 
@@ -28,13 +29,13 @@ _TICK = 4.0
 @dataclass(frozen=True)
 class Span:
     """The steps (rows,) that strips show, from ``left`` to ``right`` (user units), and the steps of the frames (f,).
-    ``dt`` is that of the network in seconds, None where its spec writes none."""
+    ``dt`` is how long a step is shown to be, None where the spec of the network does not say it."""
 
     steps: IntArray
     frames: IntArray
     left: float
     right: float
-    dt: float | None
+    dt: StepLength | None
 
     @property
     def stride(self) -> float:
@@ -67,8 +68,8 @@ def title(words_: str, span: Span, theme: Theme) -> Text:
 
 
 def time_axis(span: Span, bottom: float, theme: Theme) -> list[Shape]:
-    """Ticks beneath a plot with their steps or seconds, and which of these it is."""
-    unit = 1.0 if span.dt is None else span.dt
+    """Ticks beneath a plot with their steps or times, and in which unit these are."""
+    unit = 1.0 if span.dt is None else span.dt.length
     low, high = float(span.steps[0]) * unit, float(span.steps[-1]) * unit
     most = max(2, int((span.right - span.left) / _APART))
     found = [value for value in ticks(low, high, most) if span.dt is not None or value == round(value)] or [low]
@@ -77,7 +78,7 @@ def time_axis(span: Span, bottom: float, theme: Theme) -> list[Shape]:
         (x,) = span.at(np.array([value / unit])).tolist()
         shapes.append(Polyline(((x, bottom), (x, bottom + _TICK)), theme.muted, 1.0))
         shapes.append(Text((x, bottom + 16.0), said, SMALL, theme.muted, "middle"))
-    name = "step" if span.dt is None else "time (s)"
+    name = "step" if span.dt is None else f"time ({span.dt.unit})"
     shapes.append(Text(((span.left + span.right) / 2, bottom + 30.0), name, SMALL, theme.muted, "middle"))
     return shapes
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
-from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.network import Network, StepLength
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene import body, encoding, strips
 from neurovis_spec.scene.encode import tooltips
@@ -344,7 +344,7 @@ def _full_at(
     return full, used
 
 
-def span_of(blocks: Sequence[Block], shots: Shots, width: float, dt: float | None) -> Span:
+def span_of(blocks: Sequence[Block], shots: Shots, width: float, dt: StepLength | None) -> Span:
     """Where the time lies on a page of this width, the same for all views over it."""
     timed = [block.sides for block in blocks if block.timed]
     left = MARGIN + max((one[0] for one in timed), default=0.0)
