@@ -45,9 +45,9 @@ def ros_settings(model: RosModel, around: Surroundings, constants: Constants) ->
     """The ``ros`` section of a spec. What is invalid in it is reported and left out."""
     rate = None if model.rate is None else _above_zero(model.rate, "'rate' is steps a second", constants)
     if model.rate is None and "rate" not in model.unknown and constants.timed and 1 / constants.dt > _MOST_RATE:
-        message = f"a node would make {1 / constants.dt:,.6g} steps a second, as 1/dt says: 'rate' is missing"
+        message = f"a node would make {1 / constants.dt:,.6g} steps a second, by dt; above 1,000 they are written"
         hint = "add rate: how many steps a second it is to make, as many as the machine can"
-        constants.findings.error("missing-key", opening(model.source), message, hint, key="rate")
+        constants.findings.error("out-of-range", opening(model.source), message, hint)
     namespace = NAMESPACE if model.namespace is None else f"/{model.namespace.value.strip('/')}"
     qos, depth = model.qos, None
     if qos is not None and qos.depth is not None:

@@ -30,6 +30,8 @@ Use: TypeAlias = Literal[
     "setting",
     "setting value",
     "state",
+    "port",
+    "sent",
     "pattern",
     "engine",
     "message",
@@ -78,6 +80,9 @@ ACTIVITIES: Final = ("pre", "sent", "post")
 IN_RULE: Final = Role("formula", sees=(*ACTIVITIES, "weight", "k", "t"))
 #: A text with formulas in braces.
 LABEL: Final = Role("template", sees=("i", "n", "number"))
+#: A port of the neurons that something goes to; what connections take of their sources.
+PORT: Final = Role("port")
+SENT: Final = Role("sent")
 #: References to neurons; the ends of a connection, FROM -> TO, or neurons.
 REFERENCES: Final = Role("references")
 ENDS: Final = Role("ends")

@@ -26,6 +26,7 @@ from neurovis_spec.language.grammar import (
     PAIR,
     REFERENCES,
     RUN,
+    SENT,
     TEXT,
     TWO,
     AsTable,
@@ -322,7 +323,7 @@ class ConnectionModel(Model):
     port: DestinationsField | None = Field(
         None, description="The port of the target, or several with factors: {ampa: 1, nmda: 0.3} (default drive)."
     )
-    send: TextField | None = Field(
+    send: Annotated[TextField, SENT] | None = Field(
         None, description="What is sent: a state or an output of the source's model, or its activity."
     )
     plasticity: RuleField | None = Field(None, description="A rule: name, or {name: {parameter: value, signal: …}}.")

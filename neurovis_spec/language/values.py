@@ -19,6 +19,7 @@ from neurovis_spec.language.grammar import (
     FORMULAS,
     GROUP,
     NULL,
+    PORT,
     REFERENCE,
     REFERENCES,
     RULE_SETTING,
@@ -300,7 +301,7 @@ def at_ports(
             refuse(info, node, wanted)
         return tuple(AtPort(read(one.value, info), Located(one.name, one.key)) for one in node.entries)
 
-    return Leaf(check, Either((shape, Map({}, shape, least=1))))
+    return Leaf(check, Either((shape, Map({}, shape, PORT, least=1))))
 
 
 def as_destinations(node: Node, info: ValidationInfo) -> tuple[AtPort[Formula | None], ...]:
@@ -313,7 +314,8 @@ def as_destinations(node: Node, info: ValidationInfo) -> tuple[AtPort[Formula | 
 
 
 DestinationsField = Annotated[
-    tuple[AtPort[Formula | None], ...], Leaf(as_destinations, Either((TEXT, Map({}, FORMULA, least=1))))
+    tuple[AtPort[Formula | None], ...],
+    Leaf(as_destinations, Either((Plain(TEXT.written, PORT), Map({}, FORMULA, PORT, least=1)))),
 ]
 BiasField = Annotated[
     tuple[AtPort[Formula | FormulaList], ...], at_ports(as_formulas, FORMULAS, "a bias, or ports with biases")

@@ -40,6 +40,7 @@ _REST = re.compile(r"\w*", re.ASCII)
 #: The instances on the way to a name that is being typed, and the begin of a range that it ends.
 _WAY = re.compile(r"(?:(?<![\w.])|(?<=\.\.))(?:[A-Za-z_]\w*\.(?!\.))+$", re.ASCII)
 _RANGE = re.compile(r"(?<![\w.])[A-Za-z_][\w.]*\.\.(?=(?:[A-Za-z_]\w*\.)*$)", re.ASCII)
+_NAMES = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 #: Of a larger group only the first and the last neuron are offered; of one that is larger than any, none.
 _FEW = 40
 _MANY = 999_999
@@ -203,6 +204,8 @@ def _of_role(role: Role | None, scope: Scope, path: Path, front: str, index: Ind
             yield from _settings(role, scope, path, front, index, place)
         case "state":
             yield from _states_of(index, path[:-2])
+        case "port" | "sent":
+            yield from _of_ends(role.use, scope, path, index)
         case "pattern":
             yield from (_Offer(one.name, "definition", one.about) for one in PATTERNS.values())
         case "engine":
@@ -352,13 +355,40 @@ def _states(scope: Scope, front: str, index: Index) -> Iterator[_Offer]:
 
 def _states_of(index: Index, group: Path, outputs: bool = False) -> Iterator[_Offer]:
     """The states of the model of the group at a path, and its outputs where these are wanted, too."""
-    path = (*group, "model")
-    told = index.values.get(path)
-    inner = (key[-1] for key in index.keys if key[:-1] == path)
-    model = known("model", index.all_items).get(told.text if told is not None else str(next(inner, "")))
+    model = _model_of(index, group)
     yield from (_Offer(name, "parameter", "state") for name in (() if model is None else model.states))
     if outputs and model is not None:
         yield from (_Offer(name, "parameter", "output") for name in model.outputs)
+
+
+def _model_of(index: Index, group: Path) -> Definition | None:
+    """The model of the group at a path, where it is written."""
+    path = (*group, "model")
+    told = index.values.get(path)
+    inner = (key[-1] for key in index.keys if key[:-1] == path)
+    return known("model", index.all_items).get(told.text if told is not None else str(next(inner, "")))
+
+
+def _of_ends(use: Literal["port", "sent"], scope: Scope, path: Path, index: Index) -> Iterator[_Offer]:
+    """The ports of the group that a path leads through, or of those that a connection goes to; what those that it
+    comes from can send."""
+    arrow = next((str(part) for part in path if "->" in str(part)), None)
+    if arrow is None:
+        groups = [path[: path.index("neurons") + 2]] if "neurons" in path else []
+    else:
+        named = set(_NAMES.findall(arrow.partition("->")[2 if use == "port" else 0]))
+        groups = [
+            group.item.path
+            for group in index.declared("neuron", scope.module)
+            if group.text in named or not named.isdisjoint(_numbered(group, index))
+        ]
+    found: dict[str, str] = {"drive": "port"} if use == "port" else {"activity": ""}
+    for model in (_model_of(index, group) for group in groups):
+        if model is not None and use == "port":
+            found |= dict.fromkeys(model.ports, "port")
+        elif model is not None:
+            found |= {**dict.fromkeys(model.states, "state"), **dict.fromkeys(model.outputs, "output")}
+    yield from (_Offer(name, "parameter", detail) for name, detail in found.items())
 
 
 def _instances(module: str | None, index: Index) -> Iterator[_Offer]:

@@ -39,6 +39,7 @@ class Definition:
     description: str
     states: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
+    ports: tuple[str, ...] = ()
 
     @property
     def usage(self) -> str:
@@ -102,8 +103,15 @@ def _definition(section: str, name: str, texts: Mapping[tuple[str, ...], str]) -
     description = " ".join(texts.get(("description",), "").split())
     states = tuple(dict.fromkeys(path[1] for path in texts if path[:1] == ("state",) and len(path) > 1))
     outputs = tuple(path[1] for path in texts if path[:1] == ("outputs",) and len(path) == 2)
+    ports = tuple(
+        text if len(path) == 1 or path[1].isdecimal() else path[1]  # one, a list, or a mapping
+        for path, text in texts.items()
+        if path[:1] == ("ports",) and len(path) < 3
+    )
     equations = _equations(section, texts)
-    return Definition(DEFINITIONS[section], name, tuple(parameters), signals, equations, description, states, outputs)
+    return Definition(
+        DEFINITIONS[section], name, tuple(parameters), signals, equations, description, states, outputs, ports
+    )
 
 
 def _equations(section: str, texts: Mapping[tuple[str, ...], str]) -> tuple[str, ...]:
