@@ -90,6 +90,7 @@ def offered(text: str) -> dict[str, Completion]:
         (FLOW.replace("dt: 0.1", "integrate: ¦"), ["rk4", "exponential"], []),
         (FLOW.replace("dt: 0.1", "integrate: {¦"), ["method", "substeps"], []),
         (FLOW + "outputs: {o: A.¦", ["v", "current"], ["tau"]),
+        (FLOW + "render: {show: {A: ¦", ["v", "current"], ["tau", "gate"]),
         (BASE + "  L: {activation: ¦", ["tanh", "swish"], ["leaky_integrator", "alpha"]),
         (BASE + "  L: {activation: {swish: {¦", ["slope"], ["sigma"]),
         (BASE + "  L: {model: ¦", ["leaky_integrator", "static"], ["tanh"]),

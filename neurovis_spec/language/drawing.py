@@ -371,6 +371,10 @@ class RenderModel(Model):
         default_factory=dict,
         description="{neurons: seconds}: how long activity is still seen while it fades, to 1/e; 0: not at all.",
     )
+    show: Annotated[Keyed[Annotated[TextField, Role("state", "model")]], REFERENCES] = Field(
+        default_factory=dict,
+        description="{neurons: state}: a state or an output whose value is their colour, in place of the activity.",
+    )
     theme: ThemeField | None = Field(
         None, description="The colours: default, dark, print, paper, or other ones (default default)."
     )

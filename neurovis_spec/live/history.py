@@ -36,7 +36,8 @@ class Bins:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Members:
-    """What a trace is of: the mean activity of neurons, or the sum of the weights of connections (indices)."""
+    """What a trace is of: the mean activity of neurons, or of the states that they show, or the sum of the weights of
+    connections (indices)."""
 
     neurons: bool
     indices: IntArray
@@ -126,10 +127,11 @@ class Ring:
 
 
 class Recorded:
-    """The steps of a recording, which holds all activities and weights."""
+    """The steps of a recording, which holds all activities and weights; ``told`` (rows, n) is what traces of neurons
+    show, by default the activities."""
 
-    def __init__(self, recording: Recording) -> None:
-        self._recording = recording
+    def __init__(self, recording: Recording, told: FloatArray | None = None) -> None:
+        self._recording, self._told = recording, recording.activity if told is None else told
         self._column = np.full(len(recording.sources), -1, np.int64)
         self._column[recording.plastic] = np.arange(len(recording.plastic))
         self._fixed = np.zeros(len(recording.sources))
@@ -141,7 +143,7 @@ class Recorded:
         ends = np.searchsorted(steps, [bins.first, bins.first + bins.every * bins.count])
         rows = _thinned(np.arange(*ends), members)
         if members.neurons:
-            values = self._recording.activity[rows[:, None], members.indices]
+            values = self._told[rows[:, None], members.indices]
         else:
             column, values = self._column[members.indices], np.tile(self._fixed[members.indices], (len(rows), 1))
             values[:, column >= 0] = self._recording.weights[rows[:, None], column[column >= 0]]

@@ -24,6 +24,7 @@ from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.rows import After
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.scene.fading import snapshots_of
+from neurovis_spec.scene.shown_states import ShownStates
 
 
 class RecordedSource:
@@ -46,7 +47,9 @@ class RecordedSource:
         known = {name: column for column, name in enumerate(recording.state_names)}
         self._states = [known[name] for name in names] if names and known.keys() >= set(names) else None
         self._controls, self._state, self._applied = Controls(network), initial_state(network), 0
-        self.history = Recorded(self._recording)
+        shown = ShownStates(network)
+        now = self._recording
+        self.history = Recorded(now, shown.put(now.activity, shown.recorded(now)) if shown else None)
 
     @property
     def step(self) -> int:

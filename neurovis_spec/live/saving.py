@@ -22,7 +22,7 @@ from neurovis_spec.language.expressions.tree import Number
 from neurovis_spec.live.source import NOTHING, Drawn, Mask, Seen, Source, Turned
 from neurovis_spec.live.turns import Lesion, Mend, Set
 from neurovis_spec.live.view import View
-from neurovis_spec.runtime.columns import Numbers, columns_of, recording_of
+from neurovis_spec.runtime.columns import Numbers, Probe, columns_of, recording_of
 from neurovis_spec.runtime.names import names_of
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.references import find_parts
@@ -126,8 +126,9 @@ def recording(network: Network, told: Told) -> bytes:
     changing = turned.changing
     states = _known([one.states for one in seen])
     sensed, poses = (_known([of(one.snapshot) for one in seen]) for of in (attrgetter("sensors"), attrgetter("pose")))
+    columns = columns_of(turned)
     columns = replace(
-        columns_of(turned if states else replace(turned, outputs=())),
+        columns if states else replace(columns, probe=Probe((), ()), outputs={}),
         sensors=body.sensor_names if sensed else None,
         skeleton=body.skeleton if poses else None,
     )

@@ -91,7 +91,7 @@ class View:
         neurons, lines = self.lesioned(seen)
         bars = shown.bars & (self.plan.theme.ends == "signs")
         of_lines = bars * BAR + lines * FAINT + shown.bars * NEGATIVE + self._shares(snapshot.weights) * _SHARE
-        clamped, undefined = self._all(seen.clamped), ~np.isfinite(snapshot.activity)
+        clamped, undefined = self._all(seen.clamped), ~np.isfinite(snapshot.told)
         of_neurons = neurons * FAINT + clamped * CLAMPED + undefined * UNDEFINED
         return Glance(
             step=snapshot.step,
@@ -112,11 +112,12 @@ class View:
         return result
 
     def values(self, seen: Seen, items: Iterable[str]) -> dict[str, float]:
-        """Exact activities (``n3``) and weights (``c5``) at a step, by these ids; unknown ones are left out."""
+        """Exact activities, or states that are shown (``n3``), and weights (``c5``) at a step, by these ids; unknown
+        ones are left out."""
         snapshot = self.drawn.snapshot(seen.snapshot)
         result = {}
         for item in items:
-            values, index = snapshot.activity if item[0] == "n" else snapshot.weights, int(item[1:])
+            values, index = snapshot.told if item[0] == "n" else snapshot.weights, int(item[1:])
             if index < len(values):
                 result[item] = float(values[index])
         return result

@@ -72,8 +72,9 @@ class Listening:
         definitions: Callable[[str], str] = lambda type_: "",
         base: str | None = None,
     ) -> None:
-        network = compiled.network
-        self.compiled, self.ros, self._definitions_of = compiled, ros, definitions
+        # a topic has activities alone: neurons are coloured by these
+        network = replace(compiled.network, render=replace(compiled.network.render, show=()))
+        self.compiled, self.ros, self._definitions_of = replace(compiled, network=network), ros, definitions
         self.base = base_of(compiled) if base is None else base
         self.streams: dict[str, Stream] = {}
         self._definitions: dict[str, str] = {}

@@ -31,6 +31,9 @@ class Sensing(Protocol):
     skeleton: Skeleton | None
 
 
+_NONE: IntArray = np.zeros(0, dtype=np.int64)
+
+
 @dataclass(frozen=True)
 class Keep:
     """What is recorded."""
@@ -39,7 +42,7 @@ class Keep:
     neurons: tuple[str, ...] = ()
     #: whether the changing weights are
     weights: bool = True
-    #: references to states, besides those that the outputs of the spec name
+    #: references to states, besides those that the outputs of the spec name and its pictures show
     states: tuple[str, ...] = ()
     #: the spec itself as one text, where a format holds it
     spec: str = ""
@@ -106,7 +109,8 @@ class Columns:
 
 
 def columns_of(network: Network, keep: Keep = ALL, body: Sensing | None = None) -> Columns:
-    """What is kept of a network, and of the body that it has in a run. Raises KeyError with the nearest names."""
+    """What is kept of a network, and of the body that it has in a run; states that its pictures show are, as those that
+    its outputs name. Raises KeyError with the nearest names."""
     names = names_of(network) if keep.neurons or keep.states else None
     states: dict[tuple[str, str, int], None] = {}
     outputs: dict[str, tuple[tuple[int, ...], bool]] = {}
@@ -115,6 +119,8 @@ def columns_of(network: Network, keep: Keep = ALL, body: Sensing | None = None) 
             of_output = list(singles(output.states))
             states.update(dict.fromkeys(of_output))
             outputs[output.name] = tuple(list(states).index(one) for one in of_output), output.scalar
+    shown = (StateOf(one.state, np.array(one.members, np.int64), _NONE) for one in network.render.show)
+    states.update(dict.fromkeys(singles(shown)))
     for reference in keep.states:
         states.update(dict.fromkeys(singles(find_states(network, reference, names))))
     return Columns(
@@ -158,12 +164,11 @@ def _probe(network: Network, wanted: list[tuple[str, str, int]]) -> Probe:
         _Read(*key, np.array(members, dtype=np.int64), np.array(columns, dtype=np.int64))
         for key, (members, columns) in places.items()
     )
-    none: IntArray = np.zeros(0, dtype=np.int64)
     names: list[str] = []
     for state, what, index in wanted:
         one = np.array([index], dtype=np.int64)
         neuron = what == "neuron"
-        names += network.state_names([StateOf(state, one if neuron else none, none if neuron else one)])
+        names += network.state_names([StateOf(state, one if neuron else _NONE, _NONE if neuron else one)])
     return Probe(tuple(names), reads)
 
 

@@ -41,7 +41,8 @@ class Snapshot:
     """One step: ``activity`` (n,) is a[t], ``weights`` (m,) w[t] of all connections.
 
     ``previous_weights`` (m,) is w[t−1], None at step 0 and where step t − 1 was not recorded. ``seen`` (n,) is what a
-    picture shows in place of the activity, where neurons have a trace.
+    picture shows in place of the activity, where neurons have a trace; ``shown`` (n,) has the states in place of the
+    activities of the neurons that show one (``render: show``), None where none does.
     """
 
     step: int
@@ -53,6 +54,12 @@ class Snapshot:
     pose: FloatArray | None = None
     #: what the body sensed then, which the step was given
     sensors: FloatArray | None = None
+    shown: FloatArray | None = None
+
+    @property
+    def told(self) -> FloatArray:
+        """What a picture says of each neuron, (n,): its activity, or the state that it shows."""
+        return self.activity if self.shown is None else self.shown
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -15,7 +15,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray, integers, reals
-from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, Mirror, RenderSettings, StatedGain
+from neurovis_spec.compiler.drawing.drawing_settings import (
+    LayoutSettings,
+    Mirror,
+    RenderSettings,
+    ShownState,
+    StatedGain,
+)
 from neurovis_spec.compiler.events.changes import Change
 from neurovis_spec.compiler.events.settable import Settable
 from neurovis_spec.compiler.network import Connections, Group, Instance, Network, Neurons
@@ -23,6 +29,7 @@ from neurovis_spec.compiler.program import Projection
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.lesions import lesions_of
 from neurovis_spec.scene.reached import Reached, reached, reached_by
+from neurovis_spec.scene.shown_states import ShownStates
 
 if TYPE_CHECKING:
     from neurovis_spec.runtime.recording import Recording, Snapshot
@@ -88,7 +95,13 @@ class Gathered:
             seen=None if snapshot.seen is None else self.mean(snapshot.seen),
             weights=self.total(snapshot.weights),
             previous_weights=None if before is None else self.total(before),
+            shown=None if snapshot.shown is None else self._shown(self.mean(snapshot.activity), snapshot.shown),
         )
+
+    def _shown(self, activity: FloatArray, shown: FloatArray) -> FloatArray:
+        """The activities (…, glyphs) of what is drawn, with the means of what all members of a glyph show (…, n)."""
+        states = ShownStates(self.network)
+        return states.put(activity, self.mean(shown)[..., states.neurons])
 
     def signals(self, snapshot: Snapshot) -> FloatArray | None:
         """What a step of the whole sends along each line that is drawn; None where this is weight times activity."""
@@ -100,8 +113,10 @@ class Gathered:
 
     def reached(self, recording: Recording) -> Reached:
         """How far a recording of the whole takes what is drawn."""
+        states, own = ShownStates(self.whole), ShownStates(self.network)
         if not self.any:
-            return reached(self.whole, recording)
+            found = reached(self.whole, recording)
+            return found.with_shown(own.neurons, states.recorded(recording)) if states else found
         changing, sources = self.network.changing, self.network.connections.sources.whole()
         fixed = self.total(_weights(recording, slice(0, 0)))
         parts = [self.total(_weights(recording, rows))[:, changing] for rows in _rows(recording)]
@@ -112,7 +127,11 @@ class Gathered:
                 sent = recording.activity[rows][:, recording.sources] * _weights(recording, rows)
                 sizes = np.abs(self.total(sent))
                 signals = np.maximum(signals, np.where(np.isfinite(sizes), sizes, 0.0).max(axis=0, initial=0.0))
-        return replace(found, signals=signals)
+        found = replace(found, signals=signals)
+        if not own:
+            return found
+        shown = states.put(recording.activity, states.recorded(recording))
+        return found.with_shown(own.neurons, self.mean(shown)[:, own.neurons])
 
 
 def _rows(recording: Recording) -> list[slice]:
@@ -375,6 +394,9 @@ class _Gatherer:
                 for one in stated
             )
 
+        def wholly(one: ShownState) -> ShownState:
+            return replace(one, members=tuple(self._whole_units(one.members)))
+
         def of_lines(stated: tuple[StatedGain, ...]) -> tuple[StatedGain, ...]:
             result = []
             for one in stated:
@@ -392,6 +414,7 @@ class _Gatherer:
             signal=of_lines(old.signal),
             thickness=of_lines(old.thickness),
             change=of_lines(old.change),
+            show=tuple(shown for shown in map(wholly, old.show) if shown.members),
         )
 
     def _instances(self) -> tuple[Instance, ...]:

@@ -22,6 +22,7 @@ from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.lesions import FAINT
 from neurovis_spec.scene.model import Disc, Group, Point, Scene, Shape, Spline, Text, ended
 from neurovis_spec.scene.plan import Plan
+from neurovis_spec.scene.shown_states import ShownStates
 from neurovis_spec.scene.themes import colours, readable
 
 if TYPE_CHECKING:
@@ -64,6 +65,9 @@ def looks(
         lines = encoding.connection_colour(seen[connections.sources.whole()], snapshot.weights, gains.signal)
     else:
         lines = encoding.connection_colour(signals, np.ones_like(signals), gains.signal)
+    if snapshot.shown is not None:
+        states = ShownStates(network)
+        seen = states.put(seen, snapshot.shown[states.neurons])
     return Looks(
         discs=encoding.neuron_colour(seen, gains.activity, gains.centre),
         lines=lines,
@@ -124,10 +128,12 @@ def _fainter(groups: list[Group], lesions: dict[str, int], step: int) -> list[Gr
 def _neurons(planned: Plan, seen: Looks, titles: list[str]) -> list[Group]:
     theme = planned.theme
     fills = colours(theme, seen.discs)
-    groups = []
+    groups, states = [], ShownStates(planned.network).called
     for index, name in enumerate(planned.network.neurons.names):
         disc = Disc(planned.centres[index], planned.radii[index], fills[index], theme.ring, planned.rings[index])
         label, data = planned.labels[index], {"neuron": name}
+        if states[index]:
+            data["state"] = states[index]
         shapes: tuple[Shape, ...] = (disc,)
         if index in planned.sizes:
             data["size"] = str(planned.sizes[index])
@@ -176,12 +182,12 @@ def data_attributes(network: Network) -> list[dict[str, str]]:
 
 
 def tooltips(network: Network, gains: Gains, activity: FloatArray, weights: FloatArray) -> tuple[list[str], list[str]]:
-    """What a pointer shows of neurons and connections: name, activity or weight (from … to where there are several
-    steps), rule, gains. ``activity`` (steps, n), ``weights`` (steps, m)."""
+    """What a pointer shows of neurons and connections: name, activity, the state that it shows, or weight (from … to
+    where there are several steps), rule, gains. ``activity`` (steps, n), ``weights`` (steps, m)."""
     neurons, connections = network.neurons, network.connections
     of_neurons = [""] * len(neurons)
     lows, highs = activity.min(axis=0).tolist(), activity.max(axis=0).tolist()
-    traces = seconds_of(network).tolist()
+    traces, states = seconds_of(network).tolist(), ShownStates(network).called
     for group in neurons.groups:
         kind = group.activation if group.model == "static" else f"{group.model}, {group.activation}"
         for index in group.indices:
@@ -189,7 +195,8 @@ def tooltips(network: Network, gains: Gains, activity: FloatArray, weights: Floa
             first = name if label in (name, name.rsplit(".", 1)[-1]) else f"{name}: {label}"
             seen = _gain_of(float(gains.activity[index]), float(gains.centre[index]))
             fades = f"fades to 1/e in {texts.number(traces[index])} s" if traces[index] else ""
-            parts = [first, f"activity {_range(lows[index], highs[index])}", kind, group.description or "", seen, fades]
+            told = f"{states[index] or 'activity'} {_range(lows[index], highs[index])}"
+            parts = [first, told, kind, group.description or "", seen, fades]
             of_neurons[index] = "\n".join(part for part in parts if part)
     of_connections = []
     scaled = _gains_of(network, gains)

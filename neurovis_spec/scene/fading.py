@@ -16,6 +16,7 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.recording import Recording, Snapshot
 from neurovis_spec.scene.film_size import frames_a_second
+from neurovis_spec.scene.shown_states import ShownStates
 
 #: Seconds of a film in which the trace of a spike fades to 1/e, where the spec does not say; and the least steps.
 _SECONDS, _STEPS = 0.2, 2.0
@@ -76,10 +77,11 @@ class Fading:
 
 
 def snapshots_of(network: Network, recording: Recording, steps: Iterable[int]) -> Iterator[Snapshot]:
-    """The snapshots of ascending steps of a recording, with the traces of what was before. Raises RecordingError."""
-    fading, done = Fading(network), 0
+    """The snapshots of ascending steps of a recording, with the states that are shown, and the traces of what was
+    before. Raises RecordingError."""
+    fading, shown, done = Fading(network), ShownStates(network), 0
     for step in steps:
-        snapshot = recording.snapshot(step)
+        snapshot = shown.of_row(recording, recording.snapshot(step))
         if fading:
             row = recording.row(step)
             done = max(done, int(np.searchsorted(recording.step, step - fading.reach)))

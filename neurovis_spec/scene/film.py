@@ -108,7 +108,7 @@ def filmed(drawn: Gathered, planned: Plan, snapshots: Collection[Snapshot], gain
         shape = planned.caption_shape(words)
         captions.append(shape.text if shape else words)
         titles.append(f"{planned.title}, {words}")
-        now = (snapshot.activity, snapshot.weights)
+        now = (snapshot.told, snapshot.weights)
         low = now if low is None else (np.minimum(low[0], now[0]), np.minimum(low[1], now[1]))
         high = now if high is None else (np.maximum(high[0], now[0]), np.maximum(high[1], now[1]))
     assert low is not None

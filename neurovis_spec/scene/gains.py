@@ -7,17 +7,18 @@ Those whose ranges are alike share a scale.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
-from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings, StatedGain
+from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings, ShownState, StatedGain
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.scene.called import Names, names_of, unit_of
 from neurovis_spec.scene.reached import Reached
+from neurovis_spec.scene.shown_states import ShownStates
 
 #: what reaches so many times the full colour can be told from grey for most of a period, in every theme; at its height
 #: alone; or what reaches nearly as much as the strongest
@@ -37,6 +38,8 @@ _ALIKE_WEIGHTS = 3.0
 _WIDEST, _LEARNED, _TYPICAL, _SEEN = 5.0, 5.0, 2.2, 2.0
 #: with more lines than this they get thinner
 _CROWD = 10
+#: a state is at rest at 0 where the middle of its values is nearer to that than this share of its range
+_REST = 0.1
 #: what is at most so much is nothing but rounding, and beyond that numbers overflow
 _LEAST, _GREATEST = 1e-12, 1e280
 
@@ -44,12 +47,14 @@ _LEAST, _GREATEST = 1e-12, 1e280
 @dataclass(frozen=True, slots=True)
 class Scale:
     """A gain and what has it: the groups, entries or references in ``names`` (empty: all that have no other).
-    ``reaches`` is how far their values go, as a distance from ``centre``; 0 where nothing is known of it."""
+    ``reaches`` is how far their values go, as a distance from ``centre``; 0 where nothing is known of it. ``state`` is
+    what is shown in place of an activity."""
 
     gain: float
     names: tuple[str, ...] = ()
     centre: float = 0.0
     reaches: float = 0.0
+    state: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +105,8 @@ def choose_gains(network: Network, settings: RenderSettings, run: Reached) -> Ga
     groups, entries = _groups(network, names), _entries(network, names)
     range_ = 2 * np.minimum(run.activity / 2, run.typical)  # so that nothing overflows
     colours = _shared([_full(range_[m]) for m in groups.members])
-    activity = _chosen(groups, colours, _named(settings.activity, names), run.highest, run.lowest)
+    stated = [*_of_states(settings.show, run.shares, names), *_named(settings.activity, names)]
+    activity = _chosen(groups, colours, stated, run.highest, run.lowest, ShownStates(network).called)
     signals = _shared([_full(run.signals[m]) for m in entries.members], least=True)
     signal = _chosen(entries, signals, _named(settings.signal, names), run.signals)
     widths = _widths(entries, run.weights, network.changing)
@@ -170,6 +176,25 @@ def _named(stated: Sequence[StatedGain], names: Names) -> list[StatedGain]:
     return [replace(one, name=names.reference(one.name)) for one in stated]
 
 
+def _of_states(shown: Sequence[ShownState], shares: FloatArray | None, names: Names) -> Iterator[StatedGain]:
+    """The gains of what is shown in place of activities: rest is grey, and nearly all values have a colour of their
+    own. Rest is 0 where it is near that, else as a legend can state it."""
+    for one in shown:
+        if shares is None:
+            return
+        low, rest, high = shares[:, list(one.members)]
+        ends, centre = (float(low.min()), float(high.max())), float(np.median(rest))
+        full = max(ends[1] - centre, centre - ends[0])
+        if _LEAST * max(abs(centre), 1.0) < full < _GREATEST:
+            fine = 10.0 ** np.floor(np.log10(full / 10))
+            near = abs(centre) <= _REST * (ends[1] - ends[0])
+            centre = 0.0 if near else float(f"{fine * np.rint(centre / fine):.12g}")
+            full = _nice(max(ends[1] - centre, centre - ends[0]))
+        else:
+            full = 1.0
+        yield StatedGain(1 / full, one.members, names.reference(one.name), centre)
+
+
 @dataclass(frozen=True, slots=True)
 class _Share:
     """Units that have a gain together."""
@@ -184,9 +209,10 @@ def _chosen(
     stated: Sequence[StatedGain],
     highest: FloatArray,
     lowest: FloatArray | None = None,
+    states: Sequence[str] = (),
 ) -> _Chosen:
     """Gains for all members: those that are chosen, under those that are stated. ``highest`` and ``lowest`` say how far
-    the values of the members go."""
+    the values of the members go, ``states`` which of them are states that are shown."""
     gains, centres = np.ones(units.count), np.zeros(units.count)
     owner = np.full(units.count, -1, np.int64)  # the number of the scale that each member has
     scales: list[Scale] = []
@@ -203,7 +229,7 @@ def _chosen(
         free[members] = False
         scales.append(Scale(one.gain, (one.name,) if one.name else (), one.centre))
     left = {name for name, members in zip(units.names, units.members, strict=True) if free[members].any()}
-    kept: dict[tuple[float, float], Scale] = {}
+    kept: dict[tuple[float, float, str], Scale] = {}
     for number, scale in enumerate(scales):
         mine = np.flatnonzero(owner == number)
         if not len(mine):
@@ -214,16 +240,24 @@ def _chosen(
         reaches = float((highest[mine] - scale.centre).max(initial=0.0))
         if lowest is not None:
             reaches = max(reaches, float((scale.centre - lowest[mine]).max()))
-        same = kept.get((scale.gain, scale.centre))
+        state = _what({states[index] for index in mine.tolist()} if states else {""})
+        if state and len(mine) == units.count:
+            names = ()
+        same = kept.get((scale.gain, scale.centre, state))
         if same is not None:
             names = () if not names or not same.names else (*same.names, *names)
             reaches = max(reaches, same.reaches)
-        kept[scale.gain, scale.centre] = replace(scale, names=names, reaches=reaches)
+        kept[scale.gain, scale.centre, state] = replace(scale, names=names, reaches=reaches, state=state)
     if not kept and units.count:
-        kept[1.0, 0.0] = Scale(1.0)
+        kept[1.0, 0.0, ""] = Scale(1.0)
     if len(kept) == 1 and not stated:  # it is that of all which have one
         kept = {key: replace(scale, names=()) for key, scale in kept.items()}
     return _Chosen(gains, centres, tuple(kept.values()))
+
+
+def _what(states: set[str]) -> str:
+    """What a scale is of, where it is not activities alone."""
+    return "" if states == {""} else ", ".join(sorted(state or "activity" for state in states))
 
 
 def _shared(full: Sequence[float], *, least: bool = False) -> list[_Share]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -62,14 +62,24 @@ def stroke(x: float, length: float, colour: str, width: float, y: float = SAMPLE
 
 def colour(gains: Gains, lines: bool, theme: Theme) -> list[LegendEntry]:
     """The scales of activities and, if there are ``lines``, of signals: in one entry, or two where one has several."""
-    neurons = _rows("neuron: activity", gains.activity_scales)
+    states = {scale.state for scale in gains.activity_scales}
+    word = "activity" if states <= {""} else "" if "" in states or len(states) > 1 else next(iter(states))
+    neurons = _rows(f"neuron: {word or 'activity'}", gains.activity_scales)
     signals = _rows("line: signal w·a", gains.signal_scales) if lines else []
     if len(neurons) <= 1 and len(signals) <= 1:
         return [_ramp("Colour", [*neurons, *signals], theme)]
-    result = [_ramp("Neurons: activity", _rows("", gains.activity_scales), theme)]
+    told = gains.activity_scales if word else [_with_state(scale) for scale in gains.activity_scales]
+    result = [_ramp(f"Neurons: {word}" if word else "Neurons", _rows("", told), theme)]
     if signals:
         result.append(_ramp("Lines: signal w·a", _rows("", gains.signal_scales), theme))
     return result
+
+
+def _with_state(scale: Scale) -> Scale:
+    """A scale whose names say what is shown of them: ``v of K``."""
+    what = scale.state or "activity"
+    first, *others = scale.names or ("",)
+    return replace(scale, names=(f"{what} of {first}" if first else what, *others))
 
 
 def thickness(gains: Gains, theme: Theme) -> list[LegendEntry]:

@@ -6,7 +6,7 @@ In: the activities and weights of a run. Out: Reached. Values that are not finit
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,8 @@ from neurovis_spec.runtime.recording import Recording
 _CHUNK = 256
 #: What is below this share of a neuron's largest activity counts as rest.
 REST = 1 / 200
+#: The shares of the values of a shown state that lie below the ends of its colours, and below rest, which is grey.
+_SHARES = (0.02, 0.5, 0.98)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +35,29 @@ class Reached:
     weights: FloatArray
     signals: FloatArray
     changes: FloatArray
+    #: of what neurons show in place of their activity: what 2 %, 50 % and 98 % of its values lie below (3, n)
+    shares: FloatArray | None = None
 
     @property
     def activity(self) -> FloatArray:
         """The largest |a| (n,)."""
         result: FloatArray = np.maximum(np.abs(self.lowest), np.abs(self.highest))
         return result
+
+    def with_shown(self, neurons: IntArray, values: FloatArray) -> Reached:
+        """The same with the states (rows, k) that ``neurons`` (k,) show in place of their activities."""
+        shares = np.zeros((3, len(self.lowest)))
+        known = np.ma.masked_invalid(values)
+        ends = [self.lowest.copy(), self.highest.copy()]
+        for neuron, column in zip(neurons.tolist(), known.T, strict=True):
+            found = column.compressed()
+            if len(found):
+                shares[:, neuron] = np.quantile(found, _SHARES)
+            for end, of in zip(ends, (np.min, np.max), strict=True):
+                end[neuron] = of(found) if len(found) else 0.0
+        typical = self.typical.copy()
+        typical[neurons] = 0.0
+        return replace(self, lowest=ends[0], highest=ends[1], typical=typical, shares=shares)
 
 
 def reached(network: Network, recording: Recording) -> Reached:

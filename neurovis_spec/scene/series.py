@@ -17,6 +17,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.labels import names_in_parts, parts_of
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.recording import Recording
+from neurovis_spec.scene.shown_states import ShownStates
 
 _NONE: npt.NDArray[np.int64] = np.zeros(0, dtype=np.int64)
 
@@ -74,23 +75,24 @@ def states_of(panels: Sequence[Panel], network: Network) -> tuple[str, ...]:
 
 
 def chosen(view: str, network: Network) -> tuple[Curve, ...]:
-    """What a view shows that names nothing: traces the outputs, then what takes in inputs, else all neurons; a raster
-    all neurons; weights those that can change."""
+    """What a view shows that names nothing: traces the outputs, then what takes in inputs, else all neurons, of these
+    the states that they show; a raster all neurons; weights those that can change."""
     if view == "weights":
         return tuple(Curve("connection", index) for index in network.changing.tolist())
-    neurons = len(network.neurons)
-    if view == "traces":
-        found: dict[Curve, None] = {}
-        for output in network.outputs:
-            for state in output.states:
-                found.update(dict.fromkeys(Curve("neuron", index, state.state) for index in state.neurons.tolist()))
-                rules = (Curve("connection", index, state.state) for index in state.connections.tolist())
-                found.update(dict.fromkeys(rules))
-            if not output.states:
-                found.update(dict.fromkeys(Curve("neuron", index) for index in output.neurons.tolist()))
-        taking = [index for group in network.neurons.groups if group.role == "output" for index in group.indices]
-        taking += [index for group in network.neurons.groups if group.input is not None for index in group.indices]
-        found.update(dict.fromkeys(Curve("neuron", index) for index in taking))
-        if found:
-            return tuple(found)
-    return tuple(Curve("neuron", index) for index in range(neurons)) if view in ("traces", "raster") else ()
+    every = range(len(network.neurons))
+    if view != "traces":
+        return tuple(Curve("neuron", index) for index in every) if view == "raster" else ()
+    found: dict[Curve, None] = {}
+    for output in network.outputs:
+        for state in output.states:
+            found.update(dict.fromkeys(Curve("neuron", index, state.state) for index in state.neurons.tolist()))
+            rules = (Curve("connection", index, state.state) for index in state.connections.tolist())
+            found.update(dict.fromkeys(rules))
+        if not output.states:
+            found.update(dict.fromkeys(Curve("neuron", index) for index in output.neurons.tolist()))
+    taking = [index for group in network.neurons.groups if group.role == "output" for index in group.indices]
+    taking += [index for group in network.neurons.groups if group.input is not None for index in group.indices]
+    states = ShownStates(network).called
+    more = taking if found or taking else every
+    found.update(dict.fromkeys(Curve("neuron", index, states[index]) for index in more))
+    return tuple(found)

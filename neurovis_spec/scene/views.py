@@ -29,6 +29,7 @@ from neurovis_spec.scene.poses import Poses, posed_of, start_of
 from neurovis_spec.scene.scales import ScaleLabel, scale_of
 from neurovis_spec.scene.series import chosen, full_name, kind_of, short_names, values_of
 from neurovis_spec.scene.shots import Shots
+from neurovis_spec.scene.shown_states import ShownStates
 from neurovis_spec.scene.strips import SMALL, Span
 from neurovis_spec.scene.texts import number
 from neurovis_spec.scene.themes import MOST_DISTINCT
@@ -272,11 +273,14 @@ class Maker:
         group_of = {index: group.name for group in network.neurons.groups for index in group.indices}
         groups = [group_of[index] for index in neurons.tolist()]
         bands = bands_of(groups), bands_of([group.partition(".")[0] for group in groups])
-        rows, gains = self.shots.rows, self.gains
+        rows, gains, states = self.shots.rows, self.gains, ShownStates(network)
         assert gains is not None
+        values = recording.activity[rows]
+        values = states.put(values, states.recorded(recording)[rows]) if states else values
+        stateful[states.neurons] = False  # what is shown of these is no spike
 
         def activity(some: IntArray) -> FloatArray:
-            result: FloatArray = recording.activity[rows][:, neurons[some]]
+            result: FloatArray = values[:, neurons[some]]
             return result
 
         def colour(some: IntArray) -> FloatArray:
@@ -287,7 +291,8 @@ class Maker:
         used = [(one, 1 / abs(one.gain or 1e-9)) for one in gains.activity_scales if one.gain in own]
         scale = ScaleLabel("") if self.explained else scale_of("", used)
         names = short_names([curve for curve in curves if curve.of == "neuron"], network)
-        return Raster(Heat("activity", activity, colour, stateful[neurons], tuple(names), *bands, scale))
+        what = ", ".join(dict.fromkeys(states.called[index] or "activity" for index in neurons.tolist()))
+        return Raster(Heat(what, activity, colour, stateful[neurons], tuple(names), *bands, scale))
 
     def _matrix(self, shown: tuple[Curve, ...] | None) -> Block:
         network = self.network

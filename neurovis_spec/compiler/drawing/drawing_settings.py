@@ -116,6 +116,16 @@ class StatedTrace:
 
 
 @dataclass(frozen=True, slots=True)
+class ShownState:
+    """A ``state``, or an output, whose value is the colour of the neurons ``members`` in place of their activity;
+    ``name`` refers to them."""
+
+    state: str
+    members: tuple[int, ...]
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
 class RenderSettings:
     """The ``render`` section. Of the gains a later one goes before an earlier one; what has none gets one from what a
     run reaches."""
@@ -126,6 +136,8 @@ class RenderSettings:
     change: tuple[StatedGain, ...] = ()
     #: a later one goes before an earlier one; of the others those that spike have one
     traces: tuple[StatedTrace, ...] = ()
+    #: what colours neurons in place of their activity; no neuron is in two
+    show: tuple[ShownState, ...] = ()
     theme: str = "default"
     #: what the spec changes of it: colours by their names, and ``ends``
     colours: tuple[tuple[str, str], ...] = ()

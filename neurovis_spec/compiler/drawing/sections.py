@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Literal, NamedTuple
 
 from neurovis_spec import plugins
@@ -17,6 +18,7 @@ from neurovis_spec.compiler.drawing.drawing_settings import (
     LayoutSettings,
     Mirror,
     RenderSettings,
+    ShownState,
     StatedGain,
     StatedTrace,
 )
@@ -198,6 +200,7 @@ def render_settings(model: RenderModel | None, finder: Finder, constants: Consta
         thickness=() if gain is None else stated_gains(gain.thickness, "thickness", finder, constants),
         change=() if gain is None else stated_gains(gain.change, "change", finder, constants),
         traces=_traces(model, finder, constants),
+        show=_shown(model, finder),
         theme="default" if theme is None else value_or(theme.base, "default"),
         colours=() if theme is None else _theme_changes(theme),
         size=size,
@@ -228,6 +231,28 @@ def _traces(model: RenderModel, finder: Finder, constants: Constants) -> tuple[S
         elif members is not UNKNOWN:
             traces.append(StatedTrace(seconds, tuple(members.tolist())))
     return tuple(sorted(traces, key=lambda trace: -len(trace.members)))
+
+
+def _shown(model: RenderModel, finder: Finder) -> tuple[ShownState, ...]:
+    """What neurons show in place of their activity; of a neuron that several name it is what the one says that names
+    the fewest."""
+    shown: list[ShownState] = []
+    for name, text in model.show.items():
+        key = key_of(model.source, "show", name)
+        found = parse(name)
+        if not isinstance(found, Sum):
+            message = f"'{shorten(name)}' is a connection; what is shown is the colour of neurons"
+            finder.findings.error("wrong-type", key.span, message, "the colour of connections is their signal")
+            continue
+        members = finder.having(key, text)
+        if members is not UNKNOWN:
+            shown.append(ShownState(text.value, tuple(members.tolist()), found.normal))
+    taken, result = set[int](), list[ShownState]()
+    for one in sorted(shown, key=lambda one: len(one.members)):
+        own = tuple(index for index in one.members if index not in taken)
+        taken.update(own)
+        result.append(replace(one, members=own))
+    return tuple(reversed(result))
 
 
 def _theme_changes(theme: ThemeModel) -> tuple[tuple[str, str], ...]:

@@ -25,9 +25,9 @@ from neurovis_spec.compiler.names.state_references import (
 from neurovis_spec.compiler.neurons.groups import is_written
 from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.program import Definition
-from neurovis_spec.diagnostics import Findings, shorten
+from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.located import Located
-from neurovis_spec.language.references import Arrow, Part, StateName, parse_sum, state_of
+from neurovis_spec.language.references import Arrow, DottedName, Part, StateName, parse_sum, state_of
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.likeness import suggest
 
@@ -109,6 +109,14 @@ class Finder:
         owner = name.owner.text
         return None if self.directory.instance(owner) or owner in self.directory.instances else name
 
+    def having(self, text: Located[str], state: Located[str]) -> IntArray | Unknown:
+        """The neurons of a reference, whose models must have this state or output; UNKNOWN where it is invalid."""
+        neurons = self.neurons(text)
+        if neurons is UNKNOWN:
+            return UNKNOWN
+        one = model_state(StateName(DottedName(text.value, 0), state.value), neurons.tolist(), self.models)
+        return self._refused(one, state.span) if isinstance(one, Refusal) else one.neurons
+
     def clamped(self, text: Located[str]) -> IntArray | StateOf | Unknown:
         """What a key of ``clamp`` names: neurons, or a state of some; UNKNOWN where it is neither, which is
         reported."""
@@ -131,10 +139,12 @@ class Finder:
             neurons = resolve_part(name.owner, text, self.directory, self.findings)
             one = UNKNOWN if neurons is UNKNOWN else model_state(name, neurons, models or self.models)
         if isinstance(one, Refusal):
-            span = text.node.at(part.start, part.end)
-            self.findings.error("unknown-state", span, one.message, one.hint, undeclared=one.undeclared)
-            return UNKNOWN
+            return self._refused(one, text.node.at(part.start, part.end))
         return one
+
+    def _refused(self, why: Refusal, span: Span) -> Unknown:
+        self.findings.error("unknown-state", span, why.message, why.hint, undeclared=why.undeclared)
+        return UNKNOWN
 
 
 def finder_of(census: Census, made: Connected, findings: Findings) -> Finder:

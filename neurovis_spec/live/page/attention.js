@@ -162,15 +162,15 @@ export class Attention {
     if (this.held) say(this.words(this.held, look).replaceAll('\n', ', '));
   }
 
-  /** What is said of a neuron, a connection or a closed box: name, activity or weight, delay, rule. @param {string} id @param {Look} look
+  /** What is said of a neuron, a connection or a closed box: name, activity, the state that it shows, or weight, delay, rule. @param {string} id @param {Look} look
    * @returns {string} */
   words(id, look) {
     const group = this.groups.get(id);
     if (!group) return this.zoom.words(id, look);
     const [name, ...more] = group.title.split('\n'),
-      { neuron, delay } = group.data;
-    const told =
-      id in this.values ? [`${neuron === undefined ? 'weight' : 'activity'} ${signed(this.values[id])}`] : [];
+      { neuron, delay, state } = group.data;
+    const what = neuron === undefined ? 'weight' : (state ?? 'activity'),
+      told = id in this.values ? [`${what} ${signed(this.values[id])}`] : [];
     if (delay !== undefined && !more.some((line) => line.startsWith('delay '))) told.push(`delay ${delay}`);
     const item = Number(id.slice(1)) + (neuron === undefined ? 0 : look.widths.length);
     const { isClamped = 0, isFaint = 0 } = this.link.scene?.constants ?? {},

@@ -66,7 +66,9 @@ export class Pointer {
         : '';
     if (!this.on) return;
     this.canvas.setPointerCapture(event.pointerId);
-    this.clamp = event.shiftKey ? { y: event.offsetY, from: this.attention.values[id] ?? 0, last: 0 } : null;
+    // of one that shows a state the activity is not known
+    const from = placing.groups.get(id)?.data.state === undefined ? (this.attention.values[id] ?? 0) : 0;
+    this.clamp = event.shiftKey ? { y: event.offsetY, from, last: 0 } : null;
     const [across, down] = this.camera.unit(x, y),
       [left, top] = placing.stand(id).at[0];
     this.off = [left - across, top - down];
