@@ -11,8 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from scipy.integrate import solve_ivp
 
 import neurovis_spec as nv
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.language.data.files import LARGEST
 from neurovis_spec.language.data.table import MOST_CELLS
 from neurovis_spec.language.expressions.functions import RESERVED
@@ -145,6 +147,68 @@ def test_the_oscillators_fall_into_step() -> None:
     left, right, alike = beats(0)
     assert right - left == 2
     assert abs(alike) < 0.5
+
+
+def largest_error(name: str, of: str, method: str, exact: FloatArray) -> float:
+    """How far the neuron of an example is at most from a solution, integrated by this method."""
+    text = example(name).replace("}\n", f", integrate: {method}}}\n", 1)
+    return float(np.abs(nv.compile_text(text).run()[of] - exact).max())
+
+
+def test_the_two_populations_oscillate_as_the_page_says() -> None:
+    def flow(t: float, x: FloatArray) -> FloatArray:
+        gain, threshold = np.array([1.3, 2.0]), np.array([4.0, 3.7])
+        drive = x @ np.array([[16.0, 15.0], [-12.0, -3.0]]) + [1.25, 0.0]
+        shares = 1 / (1 + np.exp(-gain * (drive - threshold))) - 1 / (1 + np.exp(gain * threshold))
+        return np.asarray((-x + (1 - x) * shares) / 10)
+
+    at = np.arange(3001) * 0.1
+    exact = solve_ivp(flow, (0, 300), [0.1, 0.1], "DOP853", at, rtol=1e-11, atol=1e-13).y[0]
+    late = exact[1000:]
+    assert (late.min(), late.max()) == pytest.approx((0.10, 0.27), abs=0.005)
+    (rises,) = np.nonzero((late[1:] > 0.18) & (late[:-1] <= 0.18))
+    assert np.diff(rises) * 0.1 == pytest.approx(50, abs=1)
+    for method, error in (("rk4", 1.2e-8), ("heun", 3e-4), ("euler", 0.13)):
+        assert largest_error("wilson_cowan", "E", method, exact) == pytest.approx(error, rel=0.1)
+
+
+def test_the_coupled_oscillators_keep_one_time() -> None:
+    def rounds(coupling: float) -> FloatArray:
+        run = nv.compile_text(example("hopf_pair"), coupling=coupling).run(states=["N.phase"])
+        return np.asarray(np.unwrap(run["N.phase"][2500:], axis=0) / (2 * np.pi))
+
+    alone, together = rounds(0), rounds(1)
+    assert (alone[-1] - alone[0]) / 5 == pytest.approx([1, 1.1], abs=1e-6)
+    assert (together[-1] - together[0]) / 5 == pytest.approx([1.05, 1.05], abs=0.005)
+    assert (together[-1, 1] - together[-1, 0]) % 1 * 2 * np.pi == pytest.approx(0.7, abs=0.05)
+
+
+def test_the_noise_has_the_deviation_that_the_page_says() -> None:
+    assert round(float(nv.compile_text(example("noise")).run()["X"][250:].std()), 2) == 2.01
+
+
+def test_the_squids_axon_fires_when_the_page_says() -> None:
+    """Beside a solution in two parts, before and from the current on."""
+    at = np.arange(5001) * 0.01
+    tight = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-11}
+    first = solve_ivp(squid_axon, (0, 5), [-65, 0.0529, 0.5961, 0.3177], t_eval=at[:501], args=(0.0,), **tight).y
+    then = solve_ivp(squid_axon, (5, 50), first[:, -1], t_eval=at[500:], args=(10.0,), **tight).y
+    exact = np.concatenate((first[0], then[0, 1:]))
+    (fires,) = np.nonzero((exact[1:] > 0) & (exact[:-1] <= 0))
+    assert (fires * 0.01).tolist() == pytest.approx([6.90, 21.82, 36.47])
+    for method, error in (("rk4", 1.2e-4), ("euler", 5.2)):
+        assert largest_error("hodgkin_huxley", "axon", method, exact) == pytest.approx(error, rel=0.05)
+
+
+def squid_axon(t: float, x: FloatArray, current: float) -> list[float]:
+    """The equations of Hodgkin and Huxley, by the formulas of the paper."""
+    v, m, h, n = x
+    return [
+        current - 120 * m**3 * h * (v - 50) - 36 * n**4 * (v + 77) - 0.3 * (v + 54.387),
+        0.1 * (v + 40) / (1 - np.exp(-(v + 40) / 10)) * (1 - m) - 4 * np.exp(-(v + 65) / 18) * m,
+        0.07 * np.exp(-(v + 65) / 20) * (1 - h) - h / (1 + np.exp(-(v + 35) / 10)),
+        0.01 * (v + 55) / (1 - np.exp(-(v + 55) / 10)) * (1 - n) - 0.125 * np.exp(-(v + 65) / 80) * n,
+    ]
 
 
 def test_the_names_of_parameters_that_are_taken() -> None:
