@@ -123,6 +123,8 @@ _READINGS = (
 _NAMED = frozenset({"parameters", "signals", "ports", "outputs"})
 _SECTIONS = ("parameters", "signals", "let", "state")
 _DECLARING = frozenset({*_SECTIONS, "ports"})
+#: Keys that are not there yet, and are to declare names: what reads these is not to blame.
+_LATER = ("spike",)
 #: How many of its unit of time a second has.
 _PER_SECOND: Final[Mapping[TimeUnit, float]] = {"s": 1.0, "ms": 1000.0}
 #: Names that no output has: what is sent and shown by these is something else.
@@ -166,6 +168,8 @@ class _Checker:
         self.known = Names[Span | None](
             dict.fromkeys((*ALWAYS, *reading.role.sees)), not model.unknown.isdisjoint(_DECLARING)
         )
+        for key in (entry.key for entry in model.source.entries if entry.name in _LATER):
+            self.known.declared[str(key.value)] = key.span
         #: whether anything is integrated in it; there x^3 and x^4 are products
         self.flows = any(one.flow.derivative is not None for one in (self.parts.state or {}).values())
 
