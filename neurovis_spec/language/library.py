@@ -93,6 +93,11 @@ class StateModel(Model):
 class NeuronStateModel(StateModel):
     """A state of a model."""
 
+    ELSEWHERE: ClassVar[AnyMapping[str, str]] = {
+        **dict.fromkeys(("ode", "dot", "flow", "equation", "rate"), "derivative"),
+        **dict.fromkeys(("sigma", "diffusion"), "noise"),
+    }
+
     each_episode: Annotated[FormulaField, WITHOUT_F] | None = Field(
         None, description="Its new value at an episode's end."
     )
