@@ -33,12 +33,14 @@ def topics() -> dict[str, tuple[Topic, ...]]:
 
 
 def find(name: str) -> tuple[Topic, ...]:
-    """All that a name may mean, a section found by its singular, too; empty for a name that nobody knows."""
+    """All that a name may mean, a section first, which is found by its singular, too; empty for a name that nobody
+    knows."""
     asked = name.strip().removesuffix(":").removesuffix("()")
     plural = tuple(
         topic for topic in topics().get(f"{asked}s", ()) if isinstance(topic, Key) and topic.path == topic.name
     )
-    return topics().get(asked, ()) + plural
+    found = sorted(topics().get(asked, ()), key=lambda topic: not isinstance(topic, Key) or topic.path != asked)
+    return (*found, *plural)
 
 
 def near(name: str) -> str:
