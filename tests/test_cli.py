@@ -579,8 +579,8 @@ def test_a_disk_that_becomes_full_leaves_the_recording_that_was_there(folder: Pa
     """The system refuses files beyond a size as it refuses them on a full disk."""
     good("run", "small.yaml", "--steps", 9, "-o", f"x.{suffix}")
     before = Path(f"x.{suffix}").read_bytes()
-    command = [sys.executable, "-m", "neurovis_spec", "run", "small.yaml", "--steps", "100000", "-o", f"x.{suffix}"]
-    limited = ["sh", "-c", 'ulimit -f 64; exec "$@"', "sh", *command]
+    command = [sys.executable, "-m", "neurovis_spec", "run", "small.yaml", "--steps", "300000", "-o", f"x.{suffix}"]
+    limited = ["sh", "-c", 'ulimit -f 4096; exec "$@"', "sh", *command]
     done = subprocess.run(limited, capture_output=True, check=False)
     assert (done.returncode, done.stdout) == (1, b"")
     kept = nv.load(f".x.{suffix}.part")

@@ -491,9 +491,10 @@ class Network:
         on, as in its name."""
         pairs = self._pairs()
         pairs.sort()
-        shared = np.unique(pairs[1:][pairs[1:] == pairs[:-1]])
+        shared = pairs[1:][pairs[1:] == pairs[:-1]]
         if not len(shared):
             return {}
+        shared = shared[np.diff(shared, prepend=-1) > 0]  # once each, as np.unique, which would import numpy.ma
         pairs = self._pairs()
         shares = (shared[np.searchsorted(shared[:-1], piece)] == piece for piece in pieces(pairs))
         indices = np.flatnonzero(np.concatenate([*shares]))

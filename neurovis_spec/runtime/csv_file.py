@@ -79,7 +79,11 @@ class _CsvRows:
 
     def write(self, rows: Rows, after: After) -> None:
         numbers = self._steps.at(self._rows) + np.arange(len(rows.activity)) * self._steps.every
-        self._table.write(numbers, rows)
+        try:
+            self._table.write(numbers, rows)
+        except OSError:  # the disk took some of them
+            self._part.held = held_csv(self._part.file)
+            raise
         self._rows += len(rows.activity)
         self._part.held = self._steps.at(self._rows - 1) if self._rows else None
 

@@ -21,7 +21,7 @@ KINDS: Final = ("activity", "weights", "states", "sensors", "pose")
 #: steps of a stretch, a power of two: what is computed beside the steps is computed a stretch at a time
 STRETCH: Final = 1 << 8
 #: numbers of rows that are well handed on together
-_HANDED_ON: Final = 1 << 19
+_HANDED_ON: Final = 1 << 16
 
 
 class Widths(NamedTuple):
@@ -51,7 +51,7 @@ class Rows(NamedTuple):
 
     @classmethod
     def lent(cls, widths: Widths) -> Rows:
-        """Room for as many rows as are well handed on at once: some hundred thousand numbers, and a stretch of steps
+        """Room for as many rows as are well handed on at once: some ten thousand numbers, and a stretch of steps
         at least."""
         return cls.room(widths, max(STRETCH, _HANDED_ON // max(1, sum(widths))))
 
