@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from neurovis_spec.body import BodyError, Port, open_body
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Integrate
 
 
 def describe(network: Network, engine: tuple[str, str]) -> dict[str, object]:
@@ -38,6 +39,7 @@ def describe(network: Network, engine: tuple[str, str]) -> dict[str, object]:
             | ({"states": list(network.state_names(entry.states))} if entry.states else {})
             for entry in network.outputs
         ],
+        **_integration(network),
         "engine": {"name": engine[0], "reason": engine[1]},
         "hash": network.hash,
         **({} if network.body is None else {"body": _body(network)}),
@@ -65,17 +67,31 @@ def _connections(network: Network) -> list[dict[str, object]]:
     rules = [
         None if rule < 0 else network.projections[rule].rule.definition.name for rule in connections.rules.tolist()
     ]
+    routes = _routes(network)
     return [
         {"from": names[source], "to": names[target], "weight": weight, "delay": delay, "rule": rule}
-        for source, target, weight, delay, rule in zip(
+        | (routes[entry] if routes else {})
+        for source, target, weight, delay, rule, entry in zip(
             connections.sources.tolist(),
             connections.targets.tolist(),
             connections.weights.tolist(),
             connections.delays.tolist(),
             rules,
+            connections.entry.tolist(),
             strict=True,
         )
     ]
+
+
+def _routes(network: Network) -> list[dict[str, object]]:
+    """By entries what connections take and where they bring it, where any does as no other says."""
+    return [{"sends": route.sends or None, "ports": dict(route.ports)} for route in network.connections.routes]
+
+
+def _integration(network: Network) -> dict[str, object]:
+    """How states are integrated, where there are some with a derivative."""
+    by = next((one for one in network.program if isinstance(one, Integrate)), None)
+    return {} if by is None else {"integrate": {"method": by.method, "substeps": by.substeps}}
 
 
 class Wired(NamedTuple):

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import neurovis_spec as nv
+from neurovis_spec.cli.overview import overview
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Diffuse, Integrate, Send, Update
 
@@ -248,6 +249,35 @@ connections: {S -> T: {delay: 0}}
     assert [network.populations[number].model.definition.name for number in integrate.populations] == ["leaky"]
     assert [one.model.definition.name for one in network.populations] == ["static", "leaky"]
     assert network.populations[1].drive.staged is None
+
+
+def test_inspect_shows_the_order_of_a_step() -> None:
+    made = nv.compile_text(
+        MODELS
+        + """\
+neurons: {L: {model: leaky, bias: 1}, C: {model: cell}, S: {}}
+connections: {L -> C: {}, L -> S: {}, S -> C: {port: {p: 0.5}}}
+"""
+    )
+    lines = [" ".join(line.split()) for line in overview(made).splitlines()]
+    program = lines[lines.index("program") + 1 :]
+    assert program[: program.index("")] == [
+        "integrate L v (rk4)",
+        "integrate C v (rk4)",
+        "noise C v",
+        "update S",
+        "update L",
+        "update C",
+        "made anew at each stage L -> C",
+        "held over a step S -> C",
+        "delay 0 by default L -> C",
+    ]
+    assert "S -> C 1 1 1 0.5·p" in lines
+    told = made.describe()
+    assert told["integrate"] == {"method": "rk4", "substeps": 1}
+    connections = told["connections"]
+    assert isinstance(connections, list)
+    assert [one["ports"] for one in connections] == [{"drive": 1}, {"drive": 1}, {"p": 0.5}]
 
 
 # ---- a law: levels and stages against a plain reference ------------------------------------------------------------

@@ -38,11 +38,21 @@ def check_flowing(compiled: Compiled, findings: Findings) -> None:
     """Warn of what makes an integration worse than it could be. Most specs have none."""
     by = next((one for one in compiled.network.program if isinstance(one, Integrate)), None)
     if by is None:
+        _nothing_flows(compiled, findings)
         return
     if by.method in _HIGHER:
         _held_couplings(compiled, by.method, findings)
     _held_noise(compiled, findings)
     _stiff(compiled, by, findings)
+
+
+def _nothing_flows(compiled: Compiled, findings: Findings) -> None:
+    """``integrate`` where no state has a derivative."""
+    time = compiled.spec.time
+    entry = None if time is None else time.source.entry("integrate")
+    if entry is not None:
+        message = "'integrate' changes nothing: no neuron here has a state with a 'derivative'"
+        findings.warning("no-effect", entry.key.span, message, "remove it, or take a model that has one")
 
 
 def _held_couplings(compiled: Compiled, method: Method, findings: Findings) -> None:
