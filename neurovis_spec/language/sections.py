@@ -18,6 +18,7 @@ from pydantic_core import PydanticCustomError, core_schema
 from neurovis_spec.diagnostics import listed, shorten
 from neurovis_spec.language.grammar import (
     ENDS,
+    FORMULA,
     FORMULAS,
     GROUP,
     GROUP_DRAWN,
@@ -39,9 +40,11 @@ from neurovis_spec.language.grammar import (
     naming,
 )
 from neurovis_spec.language.keys import apart, mend_torn
+from neurovis_spec.language.library import not_yet
 from neurovis_spec.language.located import (
     IDENTIFIER,
     BoolField,
+    Formula,
     FormulaField,
     Leaf,
     Located,
@@ -51,7 +54,9 @@ from neurovis_spec.language.located import (
     TextField,
     TextsField,
     TimeField,
+    as_time,
     findings_of,
+    give_up,
     items_of,
     refuse,
     valid,
@@ -152,6 +157,10 @@ class InputModel(Model):
         None, description="How many numbers a step, for an input without a source."
     )
     description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
+
+    @classmethod
+    def _foreign(cls, name: str) -> tuple[str, str] | None:
+        return not_yet(name, "spikes", "poisson", "hold")
 
     @classmethod
     def _instead(cls, node: Node) -> str | None:
@@ -275,6 +284,15 @@ class ScaleModel(Model):
     )
 
 
+def _delay(node: Node, info: ValidationInfo) -> Formula:
+    """Steps, or a time with its unit."""
+    for entry in node.entries if isinstance(node, Mapping) else ():
+        if (later := not_yet(entry.name, "seconds", "matrix")) is not None:
+            findings_of(info).error("unknown-key", entry.key.span, later[0], "write a time, as 1.5 ms")
+            give_up()
+    return as_time(node, info)
+
+
 #: Rows of centres say which neurons are connected, as a matrix does.
 _CENTRE = AsTable("centre")
 
@@ -317,7 +335,7 @@ class ConnectionModel(Model):
         Annotated[Located[str], words("from", "to")] | None,
         Needs(("matrix", _CENTRE), "'rows' says how a matrix is read; there is no matrix"),
     ] = Field(None, description="Whether the rows of a matrix are sources (from) or targets (to) (default from).")
-    delay: TimeField | None = Field(
+    delay: Annotated[Formula, Leaf(_delay, FORMULA, True)] | None = Field(
         None, description="Steps the signal travels, or a time such as 1.5 ms; 0 is within the same step (default 1)."
     )
     port: DestinationsField | None = Field(
@@ -336,6 +354,8 @@ class ConnectionModel(Model):
 
     @classmethod
     def _foreign(cls, name: str) -> tuple[str, str] | None:
+        if (later := not_yet(name, "synapse", "symmetric")) is not None:
+            return later
         taken_by = [one.name for one in PATTERNS.values() if name in one.settings]
         if name in ("rate", "target", "learning_rate", "eta"):
             return f"'{name}' belongs to a rule, and stands with it", f"write plasticity: {{RULE: {{{name}: …}}}}"
