@@ -255,7 +255,7 @@ def _pointer_lines(network: Network) -> dict[str, str]:
 def _look(network: Network) -> tuple[str, str]:
     """The code of whether anything that neurons carry, and that connections carry, is not finite."""
     tests = {"neuron": [f"nv_odd(p->activity, {len(network.neurons)})"], "connection": list[str]()}
-    if network.projections:  # what neither a rule nor an event changes is finite
+    if network.projections and len(network.changing):  # what neither a rule nor an event changes is finite
         first, last = int(network.changing[0]), int(network.changing[-1])
         tests["connection"].append(f"nv_odd(p->weights + {first}, {last - first + 1})")
     cell = 0
