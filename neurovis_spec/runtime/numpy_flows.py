@@ -4,20 +4,22 @@ In: a Step in the making. Out: lines in its ``Code``. While they are integrated,
 one behind the other in one array, so that a method computes with all at once. What of a port is held over the step is
 made once, before the first stage; a stage is a function of the time. A state v of two neurons gives, with euler,
 
-    f1 = np.empty(2)                             # the states at the beginning of the step, …
-    f2 = np.empty(2)                             # … where a stage looks, …
-    f3 = np.empty(2)                             # … and its derivatives
-    def stage(t):
-        f3[0:2] = c4 - f2[0:2]
+    f4 = np.empty(2)                             # before the steps: the states at the beginning of one, …
+    f5 = np.empty(2)                             # … where a stage looks, …
+    f6 = np.empty(2)                             # … and its derivatives
+    f7 = f5[0:2]
+    def stage8(t):
+        f6[0:2] = 3.0 - f7
+        if fixed: f6[held] = 0.0                 # of states that are clamped
     …
         if not (k == 0 and not state.continued):
-            f1[0:2] = v0_
+            f4[0:2] = v0_
             t = (k - 1) * 0.1
-            f2[:] = f1
-            stage(t + 9.5367431640625e-08)
-            multiply(f3, 0.1, f3)
-            add(f1, f3, f1)
-            v0_[:] = f1[0:2]
+            f5[:] = f4
+            stage8(t + 9.5367431640625e-08)
+            multiply(f6, c12, f6)                # c12 the length of the step
+            add(f4, f6, f4)
+            v0_[:] = f4[0:2]
 """
 
 from __future__ import annotations
@@ -138,15 +140,7 @@ class _Flow:
             }
             for key, place in self.places.items():
                 code.line(f"{self.x}[{_text(place)}] = {cells[key]}")
-            starts = code.constant(
-                {
-                    Key(self.network.populations[number].model.owner, name): place.start
-                    for (number, name), place in self.places.items()
-                }
-            )
-            code.line("if fixed:")
-            code.line(f"    held, values = held_among(fixed, {starts})")
-            code.line(f"    {self.x}[held] = values")
+            self.emit_fixed()
             for part in self.parts:
                 for port in part.ports:
                     self.hold(part, port)
@@ -169,6 +163,16 @@ class _Flow:
             code.indent -= substeps > 1
             for key, place in self.places.items():
                 code.line(f"{cells[key]}[:] = {self.x}[{_text(place)}]")
+
+    def emit_fixed(self) -> None:
+        """Which of the flow states are held, and at what."""
+        starts = {
+            Key(self.network.populations[number].model.owner, name): place.start
+            for (number, name), place in self.places.items()
+        }
+        self.code.line("if fixed:")
+        self.code.line(f"    held, values = held_among(fixed, {self.code.constant(starts)})")
+        self.code.line(f"    {self.x}[held] = values")
 
     def emit_spread(self, t: str) -> None:
         """What the noise of the flow states is multiplied by, at the first stage."""
