@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from neurovis_spec.runtime.columns import Keep
     from neurovis_spec.runtime.recording import Recording
     from neurovis_spec.runtime.simulation import Simulation
+    from neurovis_spec.runtime.step_check import StepCheck
     from neurovis_spec.runtime.until import Until
     from neurovis_spec.scene.look import Look
     from neurovis_spec.scene.panels import View
@@ -131,6 +132,24 @@ class CompiledNetwork(Compilation):
         course = course_of(self.network, steps, inputs, given)
         of = self.with_body(given["body"])
         return played(record(of.network, course, given["progress"]), self)
+
+    def check_step(
+        self,
+        steps: int | None = None,
+        inputs: Mapping[str, npt.ArrayLike] | None = None,
+        *,
+        backend: str | None = None,
+        every: int = 1,
+        progress: Progress | None = None,
+    ) -> StepCheck:
+        """Run with dt, dt/2 and dt/4 and compare activities and states that flow, of each group: its ``errors`` have
+        the largest differences at common times, of one step in ``every``, and the order that they show, or why there is
+        none. Delays, events and rows of inputs take as long as before. Raises InputError, also for a network with a
+        body, and what ``run`` raises."""
+        from neurovis_spec.runtime.step_check import check_step
+
+        given: MemoryKeywords = {**MEMORY, "backend": backend, "every": every, "progress": progress}
+        return check_step(self.network, course_of(self.network, steps, inputs, given), progress)
 
     def live(
         self,

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from neurovis_spec.compiled import CompiledNetwork
     from neurovis_spec.keywords import RunKeywords
     from neurovis_spec.runtime.recording import Recording
+    from neurovis_spec.runtime.step_check import StepCheck
     from neurovis_spec.runtime.until import Until
 
 #: activities shown where nothing is written to a file
@@ -107,6 +108,34 @@ keeping_options: Final = as_one(
 )
 
 
+@dataclass(frozen=True)
+class Checking:
+    """Whether the length of the steps is checked."""
+
+    step: bool
+
+    def check(self, keeping: Keeping, output: Path | None) -> None:
+        """Refuse what the check does not do."""
+        asked = {"-o": output, "--from": keeping.start, "--states": keeping.states, "--neurons": keeping.neurons}
+        asked |= {"--until": keeping.until, "--checkpoint": keeping.checkpoint}
+        for name, value in asked.items():
+            if self.step and value:
+                raise click.UsageError(f"--check-step compares runs from the first step on: it goes without {name}")
+
+
+checking_option: Final = as_one(
+    "checking",
+    Checking,
+    click.option(
+        "--check-step",
+        "step",
+        is_flag=True,
+        help="Run with dt, dt/2 and dt/4, and print for each group how far the runs are apart and the order that this "
+        "shows.",
+    ),
+)
+
+
 @click.command(
     epilog=examples(
         "neurovis run first.yaml",
@@ -114,16 +143,18 @@ keeping_options: Final = as_one(
         "neurovis run first.yaml --input touch=touch.csv --every 10 -o first.csv",
         "neurovis run first.yaml --from first.npz -o second.npz",
         'neurovis run first.yaml --steps 100000 --until "rms(O, last=100) < 0.01"',
+        "neurovis run first.yaml --steps 500 --check-step",
         "neurovis run --backend list",
     )
 )
 @click.argument("spec", metavar="SPEC", shell_complete=paths)
 @running_options("Steps to run; default: the spec's time.steps.")
 @keeping_options
+@checking_option
 @output_option("Write the recording here (.npz, .csv, .mcap); without it a summary is printed.")
 @body_options
 @compile_options
-def command(spec: str, running: Running, keeping: Keeping, output: Path | None) -> None:
+def command(spec: str, running: Running, keeping: Keeping, checking: Checking, output: Path | None) -> None:
     """Run a network and write a recording.
 
     A recording holds the activity of every neuron and every weight that can change, at every step, or what of it
@@ -134,9 +165,20 @@ def command(spec: str, running: Running, keeping: Keeping, output: Path | None) 
 
     With --checkpoint a run is made in parts: each goes on exactly where the last one ended, --steps counts the steps to
     be made now, and the parts together are bit for bit the run in one go, as they are made by one backend.
+
+    With --check-step nothing is recorded. The run is made again with half and a quarter of the step, in which all that
+    is counted in steps (delays, events, rows of tables) takes as long as before. Of a method of order p the difference
+    between two of the runs falls by 2^p. What is per step or random (each_step, noise, learning, a delay of a step or
+    more between what flows), and what it reaches, has no order.
     """
+    checking.check(keeping, output)
     network = _network(spec, running, keeping, output)
     steps, arrays = running.steps, tables(running.inputs, network.network)
+    if checking.step:
+        with progress("running") as bar:
+            check = network.check_step(steps, arrays, backend=running.backend, every=keeping.every, progress=bar)
+        _print_check(network, check)
+        return
     options, begun = keeping.keywords(network, running.backend), perf_counter()
     until = options["until"]
     assert not isinstance(until, str)
@@ -204,3 +246,19 @@ def _print(network: CompiledNetwork, recording: Recording, summary: str, asked: 
     if recording.weights.shape[1]:
         least, most = recording.weights[-1].min(), recording.weights[-1].max()
         click.echo(f"{count(recording.weights.shape[1], 'changing weight')}: {number(least)} to {number(most)}")
+
+
+def _print_check(network: CompiledNetwork, check: StepCheck) -> None:
+    """How far runs with shorter steps are from each other."""
+    from neurovis_spec.cli.tables import number, table
+    from neurovis_spec.compiler.program import Integrate
+
+    by = next((one for one in network.network.program if isinstance(one, Integrate)), None)
+    what = "" if by is None else f"{by.method}, "
+    steps = " s, ".join(number(check.dt / parts) for parts in (1, 2, 4))
+    click.echo(f"{network.name}: {count(check.steps, 'step')} of {steps} s, {what}backend {check.backend}")
+    rows = []
+    for one in check.errors:
+        order = f"none: {one.why}" if one.order is None else f"{one.order:.2f}"
+        rows.append((one.name, f"{one.first:.2e}", f"{one.second:.2e}", order))
+    click.echo(table(rows, ("", "max |Δ| dt, dt/2", "dt/2, dt/4", "order")))

@@ -1,0 +1,195 @@
+"""The check of a step's length: the same run with half and with a quarter of the step, and what that changes.
+
+In: a network, the Course of a run. Out: for each group and each state that flows how far the runs are apart at the
+times that they share, and the order that this shows: of a method of order p it falls by 2^p when the step is halved.
+
+In a run with shorter steps all that is counted in steps is stretched: delays, events, episodes, rows of tables and of
+inputs that are given. What is held over a step is held over as many of these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.arrays import FloatArray, integers
+from neurovis_spec.compiler.names.state_references import StateOf
+from neurovis_spec.compiler.network import Group, Network
+from neurovis_spec.compiler.program import Definition
+from neurovis_spec.language.expressions.tree import names
+from neurovis_spec.progress import Progress
+from neurovis_spec.runtime.columns import Keep
+from neurovis_spec.runtime.course import Course
+from neurovis_spec.runtime.inputs import InputError
+from neurovis_spec.runtime.record import record
+from neurovis_spec.runtime.recording import Recording
+
+#: what is less than this share of the largest value is rounding, and says nothing of an order
+_ROUNDING = 1e-13
+
+
+@dataclass(frozen=True)
+class StepError:
+    """How far runs are apart in ``name``, the activity of a group or a state of it: that with the step from that with
+    half of it (``first``), and this one from that with a quarter (``second``), the largest |Δ| at any common time.
+    ``order`` is log2 of their ratio, None where there is none, and ``why`` says why."""
+
+    name: str
+    first: float
+    second: float
+    order: float | None
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class StepCheck:
+    """What halving the step twice changes. ``dt`` is the step in seconds, ``steps`` how many the first run has,
+    ``backend`` what made them."""
+
+    dt: float
+    steps: int
+    backend: str
+    errors: tuple[StepError, ...]
+
+
+def check_step(network: Network, course: Course, progress: Progress | None = None) -> StepCheck:
+    """Make the run of a course with its step, half and a quarter of it, and compare them. Raises InputError for a
+    network with a body, whose steps are its own, and what ``record`` raises."""
+    if network.body is not None:
+        raise InputError("a body has steps of its own, so that a check needs a network without: --no-body, body=False")
+    groups = network.neurons.groups
+    models = {index: one.model.definition for one in network.populations for index in one.members.tolist()}
+    states = [(group, one.name) for group in groups for one in models[group.start].flows]
+    course = replace(course, keep=Keep(weights=False, states=tuple(f"{group.name}.{name}" for group, name in states)))
+    runs = [_run(network, course, parts, progress) for parts in (1, 2, 4)]
+    why = _without_order(network, models)
+    errors = []
+    for group in groups:
+        reason = next((why[index] for index in group.indices if index in why), "")
+        found = [run.activity[:, group.start : group.start + group.count] for run in runs]
+        errors.append(_compared(group.name, found, reason))
+        for _, name in (one for one in states if one[0] is group):
+            errors.append(
+                _compared(f"{group.name}.{name}", [_state(network, group, name, run) for run in runs], reason)
+            )
+    return StepCheck(network.dt, course.length(network), runs[0].backend, tuple(errors))
+
+
+def stretched(network: Network, parts: int) -> Network:
+    """The network with so many steps in place of one. What happens at a step happens to the time that ends with it, and
+    so from the first of these on."""
+    changes = tuple(change._replace(at=_begins(change.at, parts)) for change in network.changes)
+    delays = integers(network.connections.delays.whole() * parts)
+    return replace(
+        network,
+        dt=network.dt / parts,
+        steps=_begins(network.steps, parts),
+        episode=None if network.episode is None else network.episode * parts,
+        connections=replace(network.connections, delays=delays),
+        changes=changes,
+    )
+
+
+def _begins(step: int, parts: int) -> int:
+    """The first of the steps that stand for one: those of step k end at k·dt."""
+    return max(0, (step - 1) * parts + 1)
+
+
+def _run(network: Network, course: Course, parts: int, progress: Progress | None) -> Recording:
+    finer = stretched(network, parts)
+    steps = _begins(course.length(network), parts)
+    given = {name: _repeated(values, parts) for name, values in _held(network, course.inputs).items()}
+    run = replace(course, steps=steps, every=course.every * parts, inputs=given or None)
+    return record(finer, run if parts > 1 else course, progress)
+
+
+def _held(network: Network, given: Mapping[str, npt.ArrayLike] | None) -> dict[str, npt.ArrayLike]:
+    """The inputs that have a row for each step: what is given, and tables."""
+    found: dict[str, npt.ArrayLike] = dict(given or {})
+    events = any(change.parameters for change in network.changes)
+    for entry in network.inputs:
+        if entry.table is None or entry.name in found:
+            continue
+        if entry.parts and events:
+            raise InputError(f"the table of the input '{entry.name}' follows parameters, and events set some")
+        table: FloatArray = entry.table
+        found[entry.name] = table
+    return found
+
+
+def _repeated(values: npt.ArrayLike, parts: int) -> npt.ArrayLike:
+    """Rows for shorter steps: that of step k for all whose time ends after (k − 1)·dt, and by k·dt."""
+    rows = np.asarray(values)
+    if rows.ndim == 0 or not len(rows):
+        return values
+    return rows[-(-np.arange((len(rows) - 1) * parts + 1) // parts)]
+
+
+def _state(network: Network, group: Group, name: str, run: Recording) -> FloatArray:
+    none = np.zeros(0, np.int64)
+    named = network.state_names([StateOf(name, np.array(group.indices, np.int64), none)])
+    return run.states[:, [run.state_names.index(one) for one in named]]
+
+
+def _compared(name: str, runs: list[FloatArray], why: str) -> StepError:
+    """The values of three runs, each (rows, members)."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        first, second = (float(np.abs(one - other).max(initial=0.0)) for one, other in pairwise(runs))
+        largest = float(np.abs(runs[-1]).max(initial=0.0))
+    if why:
+        return StepError(name, first, second, None, why)
+    if not np.isfinite([first, second, largest]).all():
+        return StepError(name, first, second, None, "not finite")
+    if max(first, second) == 0:
+        return StepError(name, first, second, None, "equal")
+    if second <= _ROUNDING * largest:
+        return StepError(name, first, second, None, "rounding")
+    return StepError(name, first, second, float(np.log2(first / second)) if first else -np.inf)
+
+
+def _without_order(network: Network, models: Mapping[int, Definition]) -> dict[int, str]:
+    """The neurons whose values do not follow the length of a step as those of a method do, and why: they, or one that
+    reaches them, have something that is per step, or random."""
+    connections = network.connections
+    sources, targets = connections.sources.whole().tolist(), connections.targets.whole().tolist()
+    why = {index: told for index, model in models.items() if (told := _per_step(model))}
+    for noise in network.noises:
+        why.update(dict.fromkeys(noise.members.tolist(), "noise"))
+    stepped = {index for one in network.inputs if one.expression is not None and "k" in names(one.expression)
+               for index in range(one.start, one.start + one.size)}  # fmt: skip
+    for port in dict.fromkeys(port.name for one in network.populations for port in one.ports):
+        fed = np.flatnonzero(np.isin(network.neurons.input_at(port), list(stepped)))
+        why.update(dict.fromkeys(fed.tolist(), "an input that reads k"))
+    following: dict[int, list[int]] = {}
+    rows = zip(sources, targets, connections.delays.tolist(), connections.rules.tolist(), strict=True)
+    for source, target, delay, rule in rows:
+        following.setdefault(source, []).append(target)
+        if rule >= 0:
+            why.setdefault(target, "learning")
+        elif delay >= 1 and models[source].flows and models[target].flows:
+            why.setdefault(target, f"delay {delay}")
+    called = {index: group.name for group in network.neurons.groups for index in group.indices}
+    waiting = list(why)
+    while waiting:
+        source = waiting.pop()
+        for target in following.get(source, ()):
+            if target not in why:
+                told = why[source]
+                why[target] = told if " of " in told else f"{told} of {called[source]}"
+                waiting.append(target)
+    return why
+
+
+def _per_step(model: Definition) -> str:
+    """What of a model is per step, or random."""
+    if any(one.noise is not None for one in model.state):
+        return "noise"
+    if any(one.each_step is not None for one in model.state):
+        return "each_step"
+    if any(one.each_episode is not None for one in model.state):
+        return "each_episode"
+    return "k" if "k" in model.read else ""
