@@ -9,15 +9,23 @@ are
     fs  sums of derivatives, over stages                       expressions as they are at a stage
     fg  what their noise is multiplied by
 
-Of a leaky neuron and euler the text is, in short
+Of a leaky neuron with an input and Heun's method the text is
 
     fx[0] = cells0_0[0];
-    const double since = (kd - 1.0)*0.01 + (double)sub*0.01;
-    for (int32_t stage = 0; stage < 1; stage++) {
-        fk[0] = (0.0 - fx[0] + s[0])/0.02;
-        fx[0] += 0.01*fk[0];
+    for (int32_t sub = 0; sub < 1; sub++) {
+        memcpy(fy, fx, 1*sizeof(fx[0]));
+        for (int32_t stage = 0; stage < 2; stage++) {
+            const double u1 = 0.0 + s[0];
+            fk[0] = (u1 - fy[0])/0.02;
+            if (stage == 0)
+                fs[0] = fk[0], fy[0] = fx[0] + 0.01*fk[0];
+            else
+                fx[0] = fx[0] + 0.005*(fs[0] + fk[0]);
+        }
     }
     cells0_0[0] = fx[0];
+
+with loops over all states in place of the last two lines of a stage, and in large networks over neurons everywhere.
 """
 
 from __future__ import annotations
@@ -44,7 +52,7 @@ from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.c_arrivals import Arrivals, incoming_of
 from neurovis_spec.runtime.c_code import Place, words_of
 from neurovis_spec.runtime.c_step import StepCode, write, write_input
-from neurovis_spec.runtime.stages import Formulas, Part, Taken, parts_of
+from neurovis_spec.runtime.stages import INSIDE, Formulas, Part, Taken, parts_of
 
 #: Of a substep of the length 1, when the stages of a method are: just behind the beginning, in the middle, just before
 #: the end.
@@ -56,8 +64,6 @@ _STAGES: Mapping[Method, tuple[int, ...]] = {
     "exponential": (_BEGIN,),
     "semi_implicit": (_BEGIN,),
 }
-#: How far inside a substep its ends are, in its lengths.
-_INSIDE = 2.0**-20
 #: What a state changes by in a substep of the length h, by its derivative f and j = ∂f/∂x.
 _CHANGES: Mapping[Method, str] = {
     "exponential": "(h*exprel(h*min(j, 0)))*f",
@@ -316,7 +322,7 @@ class _Integration:
 
     def time(self, when: int, h: float) -> str:
         """The time of a stage."""
-        code, inside = self.code, self.code.text(_INSIDE * h)
+        code, inside = self.code, self.code.text(INSIDE * h)
         if when == _BEGIN:
             return f"since + {inside}"
         return f"since + {code.text(h / 2.0)}" if when == _MIDDLE else f"since + {code.text(h)} - {inside}"

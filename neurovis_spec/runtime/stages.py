@@ -21,7 +21,7 @@ from neurovis_spec.language.expressions.tree import Name, Tree, names
 Let: TypeAlias = tuple[tuple[str, Tree], ...]
 
 #: how far inside a step its ends are seen from, of its length: what jumps on the grid jumps between two steps
-_INSIDE: Final = 2.0**-20
+INSIDE: Final = 2.0**-20
 #: what every model gives
 _ACTIVITY: Final = "activity"
 
@@ -96,7 +96,7 @@ class Times(NamedTuple):
 
 def times(start: float, h: float) -> Times:
     """The stages of ``h`` seconds from ``start`` on: the ends are seen from inside."""
-    inside = _INSIDE * h
+    inside = INSIDE * h
     return Times(start + inside, start + h / 2.0, start + h - inside)
 
 
