@@ -8,6 +8,7 @@ from itertools import pairwise
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from small_specs import codes
 
 import neurovis_spec as nv
 from neurovis_spec.cli.overview import overview
@@ -60,6 +61,22 @@ connections:
     assert [port.incoming.tolist() for port in of.ports] == [[0, 1, 4, 5], [0, 1], [2, 3]]
     assert [None if port.factors is None else port.factors.tolist() for port in of.ports] == [None, [0.5, 0.5], None]
     assert "half" in network.structural
+
+
+def test_what_leads_to_another_port_is_another_connection() -> None:
+    text = """\
+neurons: {A: {bias: 1, count: 2}, B: {model: far, count: 2}}
+models: {far: {ports: {q: distance}, activity: drive + q}}
+connections:
+  A -> B: {port: q, centre: 2, pattern: all_to_all}
+  A1 + A2 -> B: {pattern: all_to_all}
+"""
+    made = nv.compile_text("neurovis: 1\nname: x\n" + text)
+    assert made.warnings == ()
+    assert made.network.connections.centres.tolist() == [2, 2, 2, 2, 0, 0, 0, 0]
+    assert codes(text.replace("port: q", "port: drive")) == ["useless-key"]
+    (again,) = nv.compile_text("neurovis: 1\nname: x\n" + text.replace("port: q, centre: 2, ", "")).warnings
+    assert again.code == "made-twice"
 
 
 def test_what_is_plain_is_hashed_as_it_always_was() -> None:

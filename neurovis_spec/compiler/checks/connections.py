@@ -65,8 +65,12 @@ def _doubled_pairs(entries: list[list[Bundle]], neurons: int) -> Iterator[_Doubl
     bundles = [bundle for entry in entries for bundle in entry]
     if len(bundles) < 2:
         return
-    # a pair (source, target) as one number
-    pairs = np.concatenate([bundle.sources.astype(np.int64) * neurons + bundle.targets for bundle in bundles])
+    routes = {route: number for number, route in enumerate(dict.fromkeys(bundle.route for bundle in bundles))}
+    # a pair (source, target) as one number; those of different routes are no pairs
+    pairs = np.concatenate([
+        (bundle.sources.astype(np.int64) * neurons + bundle.targets) * len(routes) + routes[bundle.route]
+        for bundle in bundles
+    ])  # fmt: skip
     ordered = np.sort(pairs)
     if not (ordered[1:] == ordered[:-1]).any():
         return
@@ -76,7 +80,7 @@ def _doubled_pairs(entries: list[list[Bundle]], neurons: int) -> Iterator[_Doubl
     same = (pairs[order][1:] == pairs[order][:-1]) & (entry_of[order][1:] != entry_of[order][:-1])
     for position in np.sort(order[1:][same]).tolist():
         first = int(order[np.searchsorted(ordered, pairs[position])])
-        source, target = divmod(int(pairs[position]), neurons)
+        source, target = divmod(int(pairs[position]) // len(routes), neurons)
         yield _DoubledPair(int(entry_of[first]), int(entry_of[position]), source, target)
 
 

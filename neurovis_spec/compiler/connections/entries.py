@@ -12,6 +12,7 @@ does: weights that are scaled together are one Scaled, what depends on positions
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -30,6 +31,7 @@ from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import PLAIN_ROUTE, Route
 from neurovis_spec.compiler.neurons.labels import check_length
 from neurovis_spec.compiler.neurons.populate import Census
+from neurovis_spec.compiler.program import DRIVE
 from neurovis_spec.compiler.values.constants import Constants, Randomness, Value
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.compiler.values.matrices import Grid, grid_of
@@ -118,6 +120,11 @@ class EntryBuilder:
         """What evaluates the formulas of the scope."""
         return self.context.scope.constants
 
+    @cached_property
+    def route(self) -> Route | Unknown:
+        """What its connections take, and where they bring it."""
+        return route_of(self.body, self.sources, self.targets, self.context.census, self.constants)
+
     def _stream(self, purpose: str) -> Stream:
         return Stream(self.context.seed, purpose, self.context.scope.declares(self.name))
 
@@ -132,7 +139,7 @@ class EntryBuilder:
         if body.label is not None:
             check_length(body.label, findings)
         delay = 1 if body.delay is None else self.constants.delay(body.delay)
-        route = route_of(body, self.sources, self.targets, self.context.census, self.constants)
+        route = self.route
         errors_before_shape = findings.errors
         # what is collected here stands at cells of the matrix, what ``centre_parts`` collects at connections
         with self.constants.following() as centre_cell_parts:
@@ -388,8 +395,15 @@ class EntryBuilder:
         return np.ascontiguousarray(grid.values[shape.i, shape.j])
 
     def _measures_distance(self) -> bool:
-        """Whether any of the targets combines by distance, or may, where what it says of that is invalid."""
-        return self.targets is UNKNOWN or bool(self.context.census.by_distance[self.targets].any())
+        """Whether any of the targets combines what arrives by distance, or may, where what it says of that is
+        invalid."""
+        if self.targets is UNKNOWN or self.route is UNKNOWN:
+            return True
+        census, ports = self.context.census, [name for name, _ in self.route.ports]
+        if DRIVE in ports and census.by_distance[self.targets].any():
+            return True
+        models = (one.kind.model.definition for one in census.groups_of(self.targets))
+        return any(port.combine == "distance" and port.name in ports for model in models for port in model.ports)
 
     def _bounds(self, weights: FloatArray | Unknown) -> tuple[float, float] | Unknown:
         """The bounds of the weights. A bound that follows parameters is followed together with the other one, so that
