@@ -24,6 +24,7 @@ from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.runtime import c_export
 from neurovis_spec.runtime.c_library import FLAGS
+from neurovis_spec.runtime.c_package import files
 from neurovis_spec.runtime.c_settable import ExportError
 
 pytestmark = pytest.mark.compiler
@@ -254,6 +255,26 @@ def test_what_is_no_folder_is_told(tmp_path: Path) -> None:
     assert f"{tmp_path / 'pipe'} is not a folder: name one" in result.stderr
     with pytest.raises(ExportError, match="file is not a folder: name one"):
         nv.compile(spec).export(tmp_path / "file")
+
+
+STAGED = """neurovis: 1
+name: staged
+time: {dt: 0.1, integrate: {method: METHOD, substeps: 2}}
+models:
+  cell: {state: {v: {derivative: tanh(drive) - v}, w: {derivative: v - w}}, outputs: {s: sin(v)}, activity: v}
+neurons: {A: {count: 3, model: cell, bias: 1}}
+connections: {A -> A: {pattern: ring, weight: 0.5}}
+"""
+
+
+@pytest.mark.parametrize(("method", "stages"), [("rk4", 4), ("heun", 2), ("exponential", 1)])
+def test_the_readme_says_what_the_integration_takes(method: str, stages: int) -> None:
+    made = files(nv.compile_text(STAGED.replace("METHOD", method)).network)
+    cost = made["README.md"].partition("## Cost")[2].splitlines()
+    assert f"- {2 * stages} stages ({method}, 2 substeps): at each 6 derivatives, and 3 signals made anew" in cost
+    (kept,) = re.findall(r"double work\[(\d+)\]", made["staged.h"])
+    assert f"- {kept} numbers kept between stages, in the struct (`state.work`)" in cost
+    assert f"- {3 + 3 * 2 * stages} calls of functions such as exp and tanh" in cost
 
 
 def test_the_size_in_the_readme_is_that_of_the_struct(tmp_path: Path) -> None:

@@ -57,7 +57,7 @@ from neurovis_spec.runtime.stages import INSIDE, Formulas, Part, Taken, parts_of
 #: Of a substep of the length 1, when the stages of a method are: just behind the beginning, in the middle, just before
 #: the end.
 _BEGIN, _MIDDLE, _END = range(3)
-_STAGES: Mapping[Method, tuple[int, ...]] = {
+STAGES: Mapping[Method, tuple[int, ...]] = {
     "euler": (_BEGIN,),
     "heun": (_BEGIN, _END),
     "rk4": (_BEGIN, _MIDDLE, _MIDDLE, _END),
@@ -152,7 +152,7 @@ class Plan:
     @cached_property
     def parts(self) -> Mapping[str, int]:
         """Where the parts of ``work`` begin, by their names; those of no numbers are left out."""
-        several = len(_STAGES[self.operation.method]) > 1
+        several = len(STAGES[self.operation.method]) > 1
         count = sum(one.size for one in self.states)
         sizes = {
             "fx": count,
@@ -300,7 +300,7 @@ class _Integration:
 
     def substep(self, h: float) -> None:
         """A substep of so many seconds."""
-        code, stages = self.code, _STAGES[self.method]
+        code, stages = self.code, STAGES[self.method]
         times = [self.time(one, h) for one in stages]
         if len(stages) == 1:
             with code.block(""):

@@ -12,14 +12,16 @@ from pathlib import Path
 
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Definition
+from neurovis_spec.compiler.program import Definition, Integrate, is_activation
 from neurovis_spec.language.expressions.emit_c import INEXACT
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.expressions.tree import Call, Tree, walk
 from neurovis_spec.runtime.c_export import Exported
+from neurovis_spec.runtime.c_flows import STAGES
 from neurovis_spec.runtime.c_names import words
 from neurovis_spec.runtime.c_settable import ExportError
 from neurovis_spec.runtime.files import replacing
+from neurovis_spec.runtime.stages import Part, apart, parts_of
 from neurovis_spec.runtime.state import State
 
 #: What gcc and clang are told, so that the bits are those of the backend c: no operation is joined to another, and no
@@ -118,8 +120,35 @@ def _calls(trees: Iterable[Tree | None]) -> int:
 
 def _calls_a_step(definition: Definition) -> int:
     """The functions of the library that a definition calls at a step."""
-    first = definition.gives[:1]  # without what checks an activation
-    return _calls([*(tree for _, tree in definition.let), *(one.each_step for one in (*definition.state, *first))])
+    given = (*definition.gives[:1], *definition.outputs)  # without what checks an activation
+    return _calls([*(tree for _, tree in definition.let), *(one.each_step for one in (*definition.state, *given))])
+
+
+def _calls_a_stage(part: Part) -> int:
+    """The functions of the library that a neuron calls at a stage of the integration."""
+    made = (*(taken.formulas for taken in part.taken), part.derivatives, part.slopes)
+    trees = [tree for formulas in made for _, tree in (*formulas.let, *formulas.trees)]
+    activations = sum(is_activation(node) for tree in trees for node in walk(tree))
+    return _calls(trees) + activations * _calls_a_step(part.population.activation.definition)
+
+
+def _integration(exported: Exported) -> tuple[int, list[str]]:
+    """How many functions the integration calls in a step, and what else it takes; none where nothing flows."""
+    network = exported.network
+    by = next((one for one in network.program if isinstance(one, Integrate)), None)
+    if by is None:
+        return 0, []
+    parts, stages = parts_of(network, by), len(STAGES[by.method]) * by.substeps
+    states = sum(len(part.flows) * len(part.population.members) for part in parts)
+    signals = sum(len(apart(port)[1]) for part in parts for port in part.ports)
+    functions = stages * sum(_calls_a_stage(part) * len(part.population.members) for part in parts)
+    how = f"{by.method}, {plural(by.substeps, 'substep')}" if by.substeps > 1 else by.method
+    anew = f", and {plural(signals, 'signal')} made anew" if signals else ""
+    kept = sum(len(member.begin) for member in exported.members if member.name == "work")
+    lines = [f"- {plural(stages, 'stage')} ({how}): at each {plural(states, 'derivative')}{anew}"]
+    if kept:
+        lines.append(f"- {plural(kept, 'number')} kept between stages, in the struct (`state.work`)")
+    return functions, lines
 
 
 def _cost(exported: Exported) -> str:
@@ -136,10 +165,12 @@ def _cost(exported: Exported) -> str:
         learning += len(projection.members)
         functions += _calls_a_step(projection.rule.definition) * len(projection.members)
     functions += _calls(entry.expression for entry in network.inputs)
+    at_stages, stages = _integration(exported)
     drawn = sum(len(noise.members) for noise in network.noises)
     lines = [
         f"- {plural(len(network.connections), 'connection')}: a multiplication and an addition each",
-        f"- {functions} calls of functions such as exp and tanh",
+        *stages,
+        f"- {functions + at_stages} calls of functions such as exp and tanh",
     ]
     if learning:
         lines.append(f"- {learning} weights that learn")
