@@ -224,3 +224,12 @@ def test_the_command() -> None:
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr == "error[unknown-name]: there is nothing about 'oya'\nhelp: did you mean 'oja'?\n"
     assert "help: it is the code of a finding: neurovis explain unknown-key\n" in docs("unknown-key").stderr
+
+
+def test_a_model_says_its_time_its_ports_and_what_it_gives() -> None:
+    rows = [line.split() for line in text_of(find("jansen_rit")).splitlines()]
+    assert ["time", "seconds"] in rows
+    assert ["outputs", "rate"] in rows
+    assert ["sent", "rate"] in rows
+    assert "  time  milliseconds" in text_of(find("wilson_cowan"))
+    assert "  time" not in text_of(find("izhikevich")).partition("as it ships")[0]

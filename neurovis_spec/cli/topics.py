@@ -50,6 +50,8 @@ def _builtin(builtin: Builtin) -> str:
     parts = [f"{builtin.name}, {_KINDS[builtin.kind]}", filled(builtin.about)]
     if builtin.parameters:
         parts.append(table(builtin.parameters, ("parameter", "default", "")))
+    if builtin.ends:
+        parts.append(table(builtin.ends))
     if builtin.signals:
         parts.append(filled(f"signals, each a neuron, a group or an input: {', '.join(builtin.signals)}"))
     shipped = f"{builtin.kind}s:\n{indented(builtin.yaml)}"

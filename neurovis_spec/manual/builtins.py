@@ -12,6 +12,7 @@ from importlib.resources import files
 from typing import Literal, TypeAlias
 
 from neurovis_spec import plugins
+from neurovis_spec.compiler.program import DRIVE
 from neurovis_spec.compiler.values.builtin import libraries
 from neurovis_spec.language.library import ActivationModel, Library, ModelModel, RuleModel
 from neurovis_spec.language.values import ParameterModel
@@ -25,7 +26,8 @@ _Definition: TypeAlias = ActivationModel | ModelModel | RuleModel
 class Builtin:
     """A definition that needs no declaration. ``parameters``: name, default, meaning; ``yaml``: the definition as it
     stands in its file, its description left out; ``origin``: the entry point that brings it, ``builtin`` for ours;
-    ``time``: what of the section ``time`` it needs, as a rule that changes weights at the end of an episode alone."""
+    ``time``: what of the section ``time`` it needs, as a rule that changes weights at the end of an episode alone;
+    ``ends``: of a model in which unit its time is, what arrives where, and what it gives beside its activity."""
 
     kind: Kind
     name: str
@@ -35,6 +37,7 @@ class Builtin:
     yaml: str
     origin: str
     time: str = ""
+    ends: tuple[tuple[str, str], ...] = ()
 
     @property
     def use(self) -> str:
@@ -85,15 +88,36 @@ def _builtin(
     about = "" if model.description is None else " ".join(model.description.value.split())
     parameters = tuple((key, *_shown(parameter)) for key, parameter in model.parameters.items())
     origin = library.source.span.file.partition("/")[0]
-    return Builtin(kind, name, about, parameters, signals, _excerpt(entry, text), origin, _time(model))
+    return Builtin(kind, name, about, parameters, signals, _excerpt(entry, text), origin, _time(model), _ends(model))
 
 
 def _time(model: _Definition) -> str:
     """What it needs that ``time`` says."""
     if isinstance(model, RuleModel):
         return "episode: 100" if model.weight.each_step is None else ""
-    flows = isinstance(model, ModelModel) and any(state.derivative is not None for state in model.state.values())
-    return "dt: 0.001" if flows else ""
+    return "dt: 0.001" if isinstance(model, ModelModel) and _flows(model) else ""
+
+
+def _flows(model: ModelModel) -> bool:
+    return any(state.derivative is not None for state in model.state.values())
+
+
+def _ends(model: _Definition) -> tuple[tuple[str, str], ...]:
+    """The unit of time of a model, its ports, outputs and what it sends, where it has any that it need not have."""
+    if not isinstance(model, ModelModel):
+        return ()
+    unit = "milliseconds" if model.time is not None and model.time.value == "ms" else "seconds"
+    ports = [DRIVE]
+    for port in model.ports:
+        told = ", ".join(word for word in ("" if port.combine == "sum" else port.combine, port.unit) if word)
+        ports.append(f"{port.name.value} ({told})" if told else port.name.value)
+    rows = (
+        ("time", unit if _flows(model) else ""),
+        ("ports", ", ".join(ports) if model.ports else ""),
+        ("outputs", ", ".join(model.outputs)),
+        ("sent", "" if model.send is None else model.send.value),
+    )
+    return tuple((name, told) for name, told in rows if told)
 
 
 def _shown(parameter: ParameterModel) -> tuple[str, str]:
