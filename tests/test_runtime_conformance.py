@@ -193,6 +193,23 @@ def test_full_matrices_and_many_connections_add_up_in_order(delay: int, by_targe
 
 
 @pytest.mark.compiler
+@pytest.mark.parametrize("delay", [0, 3])
+def test_neurons_of_a_full_matrix_may_take_different_things_of_a_source(delay: int) -> None:
+    matrix = "\n".join(
+        f"  - {source} -> {targets}: {{weight: 0.3*j - 0.2, delay: {delay}, pattern: all_to_all{sent}}}"
+        for source in ("S1", "S2")
+        for targets, sent in (("T1..T150", ", send: v"), ("T151..T300", ""))
+    )
+    network = nv.compile_text(
+        "neurovis: 1\nname: x\n"
+        "models: {two: {state: {v: {each_step: 0.5*v + drive}}, activity: v + 0.1}}\n"
+        f"neurons: {{S: {{count: 2, model: two, bias: 0.1*i}}, T: {{count: 300}}}}\nconnections:\n{matrix}\n"
+    )
+    runs = [network.run(6, backend=name).activity for name in ("c", "reference")]
+    assert (runs[0] == runs[1]).all()
+
+
+@pytest.mark.compiler
 @pytest.mark.parametrize("backend", ["numpy", "c"])
 def test_what_is_not_finite_is_told_at_its_step(backend: str) -> None:
     growing = model("f(v)", {"v": ("1", "v^2 * 10 + 1e300 * (v > 1e9)", None)})

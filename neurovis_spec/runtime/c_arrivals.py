@@ -20,6 +20,7 @@ from neurovis_spec.compiler.program import Port
 from neurovis_spec.language.expressions.emit_c import Value
 from neurovis_spec.runtime.c_code import Code, Form, Place
 from neurovis_spec.runtime.signals import SignalLayout
+from neurovis_spec.runtime.stages import taken_by
 
 #: connections of a neuron that are written out one after the other
 _FEW = 16
@@ -100,9 +101,9 @@ def incoming_of(network: Network, port: Port, count: int, fusible: bool = True) 
     degree = int(degrees[0]) if (degrees == degrees[0]).all() else -1
     full = port.combine == "sum" and degree > 1 and 1 < count <= _BESIDE and len(_different(delays)) == 1
     if full:
-        rows, sources = own.reshape(count, degree), connections.sources[own].reshape(count, degree)
+        rows, sent = own.reshape(count, degree), taken_by(network)[own].reshape(count, degree)
         regular = rows[0, 0] + np.arange(degree) * count + np.arange(count).reshape(-1, 1)
-        full = bool((rows == regular).all() and (sources == sources[0]).all()) and port.factors is None
+        full = bool((rows == regular).all() and (sent == sent[0]).all()) and port.factors is None
     lanes = None
     if not 0 <= degree <= _FEW:
         beside, read = _in_lanes(ends)
