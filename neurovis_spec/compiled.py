@@ -342,7 +342,7 @@ class CompiledNetwork(Compilation):
         if to != "c" or real not in ("double", "float"):
             raise ValueError(f"a network is exported to c, of double or float, not to {to} of {real}")
         check(start=start)
-        state = None if start is None else resumed_state(self.network, start, PLAIN)
+        state = None if start is None else resumed_state(self.network, start, PLAIN, own_signals=True)
         return write(arguments.path("folder", folder), files(self.network, state, real))
 
     def choose_engine(self) -> tuple[str, str]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,9 +22,9 @@ from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import SourceError, Turned
 from neurovis_spec.live.turns import Feed, turn
 from neurovis_spec.runtime.controls import lose
-from neurovis_spec.runtime.signals import signal_layout
+from neurovis_spec.runtime.signals import SignalLayout, signal_layout
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
-from neurovis_spec.runtime.state import State
+from neurovis_spec.runtime.state import State, have_own_signals, signals_of_each
 
 
 def carried(old: SimulatedSource, simulation: Simulation) -> SimulatedSource:
@@ -169,17 +170,41 @@ def _gather(
     into[there] = known[members][there]
 
 
+def _as_they_left(
+    old: State, before: SignalLayout, state: State, after: SignalLayout, one: IntArray, other: IntArray
+) -> bool:
+    """Whether connections that share what is under way have shared it before, and have the weights that it left by."""
+    rings = np.zeros(after.size, dtype=np.int64)  # of each place the one before
+    rings[after.offsets[other]] = before.offsets[one]
+    alike = before.shares[one] & (rings[after.offsets[other]] == before.offsets[one])
+    return bool((alike & (old.weights[one] == state.weights[other])).all())
+
+
 def _carry_signals(
     was: Network, old: State, network: Network, state: State, connections: tuple[IntArray, IntArray]
 ) -> None:
-    before, after = signal_layout(was).offsets, signal_layout(network).offsets
     delays = network.connections.delays[connections[1]]
     same = was.connections.delays[connections[0]] == delays
-    for delay in np.unique(network.connections.delays.kept).tolist():
-        own = same & (delays == delay)
-        slots = np.arange(delay)
-        one, other = before[connections[0][own]], after[connections[1][own]]
-        state.signals[other[:, None] + slots] = old.signals[one[:, None] + slots]
+    one, other, delays = connections[0][same], connections[1][same], delays[same]
+    before, after = signal_layout(was, old.own_signals), signal_layout(network, state.own_signals)
+    shares = after.shares[other]
+    if not _as_they_left(old, before, state, after, one[shares], other[shares]):
+        have_own_signals(network, state)
+        after = signal_layout(network, own=True)
+        shares = after.shares[other]
+    own = (delays > 0) & ~shares
+    parts = [(shares, before.offsets, old.signals)]
+    if own.any():
+        parts.append((own, signal_layout(was, own=True).offsets, signals_of_each(was, old)))
+    for which, offsets, signals in parts:
+        for delay in np.unique(delays[which]).tolist():
+            some, slots = which & (delays == delay), np.arange(delay)
+            there = signals[offsets[one[some]][:, None] + slots]
+            state.signals[after.offsets[other[some]][:, None] + slots] = there
+    structure, lost = state.conditions.structure, old.conditions.structure.lost[one[shares]]
+    if (structure.lost[other[shares]] != lost).any():  # what is carried has lost what it had lost
+        state.conditions.structure = replace(structure, lost=structure.lost.copy())
+        state.conditions.structure.lost[other[shares]] = lost
     anew = np.ones(len(network.connections), dtype=np.bool_)
-    anew[connections[1][same]] = False
+    anew[other] = False
     lose(network, state, np.flatnonzero(anew))

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, Indices, IntArray, sorting, starts_of, width
+from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray, sorting, starts_of, width
 from neurovis_spec.compiler.events.settable import CENTRES
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Port
@@ -115,8 +115,13 @@ def incoming_of(network: Network, port: Port, count: int, fusible: bool = True) 
 def taken(network: Network, code: Code, connections: Indices, place: Place) -> str:
     """What one of some connections takes: the activity of its source, or an outlet."""
     if network.sending is None:
-        return f"activity[{code.at(network.connections.sources.some(connections), place)}]"
-    n, index = len(network.neurons), network.sending[connections]
+        return taken_at(network, code, network.connections.sources.some(connections), place)
+    return taken_at(network, code, network.sending[connections], place)
+
+
+def taken_at(network: Network, code: Code, index: Indices, place: Place) -> str:
+    """One of some activities and outlets, as ``Network.sending`` numbers them."""
+    n = len(network.neurons)
     own = index if not isinstance(place, int) else index[place : place + 1]
     if (own < n).all():
         return f"activity[{code.at(index, place)}]"
@@ -130,6 +135,11 @@ def _different(delays: Indices) -> list[int]:
     """The delays that there are, ascending."""
     found: list[int] = np.unique(delays[:1] if delays.strides == (0,) else delays).tolist()
     return found
+
+
+def _alike(which: BoolArray) -> bool:
+    """Whether all of them are true, or none is."""
+    return bool((which == which[0]).all())
 
 
 class Arrivals:
@@ -159,10 +169,10 @@ class Arrivals:
         self._begins, self._sent = begins, sent
         #: whether nothing is added any more to what is put together here
         self.finished = True
-        #: whether the sums of all neurons go on beside each other, each in its own order
-        self.dense = incoming.full and not (form.gone or form.written_out)
-        self.lanes: _Lanes | None = None
         self.connections, self.factors = incoming.connections, incoming.factors
+        #: whether the sums of all neurons go on beside each other, each in its own order
+        self.dense = incoming.full and not (form.gone or form.written_out) and _alike(layout.shares[self.connections])
+        self.lanes: _Lanes | None = None
         if incoming.lanes is not None and not (form.written_out or self.dense):
             self.lanes, read = incoming.lanes
             self.connections = self.connections[read]
@@ -187,6 +197,11 @@ class Arrivals:
     def offsets(self) -> Indices:
         """The first slot of each connection."""
         return self._layout.offsets[self.connections]
+
+    @cached_property
+    def shares(self) -> BoolArray:
+        """Which connections weigh on arrival what was sent."""
+        return self._layout.shares[self.connections]
 
     @property
     def packed(self) -> Indices:
@@ -233,13 +248,15 @@ class Arrivals:
         delay = int(self.delays[0])
         first, offset = int(self.connections[0]), int(self.offsets[0])
         with code.block(code.loop("q", self.degree)):
-            direct = delay == 0 or self.fused
-            if direct:
+            now, shares = delay == 0 or self.fused, bool(self.shares[0])
+            if now:
                 # each row is of the same sources
                 source = f"before[{code.at(self.sources[: self.degree], 'q')}]"
                 code.line(f"const {code.real} a = {self.sent(slice(self.degree), 'q') if delay == 0 else source};")
+            elif shares:
+                code.line(f"const {code.real} a = {self._slot(delay, self.offsets[: self.degree], 'q')};")
             code.line(code.loop("p", count))
-            if direct:
+            if now or shares:
                 code.line(f"    {name}[p] += weights[{first} + {count}*q + p]*a;")
             elif delay == 1:
                 code.line(f"    {name}[p] += signals[{offset} + {count}*q + p];")
@@ -318,7 +335,8 @@ class Arrivals:
 
     def _signal(self, edge: Place, column: slice) -> str:
         """w[t−d]·a[t−d] of a connection: ``weights[3]*activity[1]`` without a delay, ``signals[5 + r2]`` with one of
-        2, and a choice of both in a loop over connections of which some have none."""
+        2, ``weights[3]*signals[5 + r2]`` where it is shared, and a choice in a loop over connections of which some
+        are of one kind and some of another."""
         code = self.code
         delays = self.delays[column] if not isinstance(edge, int) else self.delays[column][edge : edge + 1]
         kinds = _different(delays)
@@ -331,13 +349,32 @@ class Arrivals:
             now = f"weights[{code.at(self.connections[column], edge)}]*{self.sent(column, edge)}"
         if kinds == [0]:
             return now
-        offset = code.at(self.offsets[column], edge)
         if len(kinds) == 1:
-            shift = "" if kinds[0] == 1 else f" + {code.remainder(kinds[0])}"
-            return f"signals[{offset}{shift}]"
+            return self._on_arrival(self._slot(kinds[0], self.offsets[column], edge), edge, column)
+        offset = code.at(self.offsets[column], edge)
         kind = code.at(np.searchsorted(kinds, delays).astype(np.int64), edge)
         rests = "_".join(["r", *map(str, kinds)])
         shifts = ", ".join("0" if delay < 2 else f"(int32_t)(k % {delay})" for delay in kinds)
         code.head[rests] = f"const int32_t {rests}[{len(kinds)}] = {{{shifts}}};"
-        arriving = f"signals[{offset} + {rests}[{kind}]]"
+        arriving = self._on_arrival(f"signals[{offset} + {rests}[{kind}]]", edge, column)
         return f"({kind} ? {arriving} : {now})" if kinds[0] == 0 else arriving
+
+    def _slot(self, delay: int, offsets: Indices, edge: Place) -> str:
+        """What arrives in this step in the slots of a connection with this delay."""
+        shift = "" if delay == 1 else f" + {self.code.remainder(delay)}"
+        return f"signals[{self.code.at(offsets, edge)}{shift}]"
+
+    def _on_arrival(self, sent: str, edge: Place, column: slice) -> str:
+        """What is made of the content of a slot: what is shared is weighted, and 0 where it is lost."""
+        code, connections = self.code, self.connections[column]
+        delays, shares = self.delays[column], self.shares[column]
+        some = slice(edge, edge + 1) if isinstance(edge, int) else slice(None)
+        if not shares[some].any():
+            return sent
+        connection = code.at(connections, edge)
+        arriving = f"weights[{connection}]*{sent}"
+        if self.form.lost:
+            arriving = f"(k - {code.at(delays, edge)} < lost[{connection}] ? {code.text(0.0)} : {arriving})"
+        if shares[some][delays[some] > 0].all():
+            return arriving
+        return f"({code.at(shares.astype(np.int64), edge)} ? {arriving} : {sent})"

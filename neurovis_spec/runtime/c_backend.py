@@ -29,6 +29,7 @@ from neurovis_spec.runtime import c_flows, c_functions, c_library
 from neurovis_spec.runtime.backend import Availability, BackendError, Capabilities
 from neurovis_spec.runtime.c_code import Code, Form, Table, Tables, function, state_name, words_of
 from neurovis_spec.runtime.c_step import StepCode, begins_otherwise, incoming_in
+from neurovis_spec.runtime.signals import SignalLayout, signal_layout
 from neurovis_spec.runtime.state import Conditions, Mask, State, Structure
 
 #: neurons and connections up to which a network is written out one by one
@@ -39,6 +40,8 @@ LONGEST = 1024
 #: addition neurons that take ``initial``
 _PLAIN, _GENERAL, _FIRST = 0, 1, 2
 _NO_INPUTS: Final[frozenset[str]] = frozenset()
+#: a step behind all others
+_NEVER: Final = 1 << 62
 
 #: ``nv_state``: of a State ``activity``, ``weights``, ``signals``, ``history``, ``outlets``, and ``cells``, one pointer
 #: for each state or output of a model or a rule; ``x``: the numbers that can be set; ``parameters``; ``s``: the inputs
@@ -163,15 +166,15 @@ class Written:
     packed: int
 
 
-_written: WeakKeyDictionary[Network, Written] = WeakKeyDictionary()
+_written: WeakKeyDictionary[Network, dict[bool, Written]] = WeakKeyDictionary()
 
 
-def written(network: Network) -> Written:
-    """The C of a network; made once for each."""
-    found = _written.get(network)
-    if found is None:
-        found = _written[network] = _write(network)
-    return found
+def written(network: Network, own_signals: bool = False) -> Written:
+    """The C of a network, for states that share signals or have each connection its own; made once for each."""
+    found = _written.setdefault(network, {})
+    if own_signals not in found:
+        found[own_signals] = _write(network, signal_layout(network, own_signals))
+    return found[own_signals]
 
 
 def forget() -> None:
@@ -192,7 +195,7 @@ class _Function(NamedTuple):
     of_fused: bool = False
 
 
-def _write(network: Network) -> Written:
+def _write(network: Network, layout: SignalLayout) -> Written:
     emitter, tables = Emitter(), Tables("double", LONGEST)
     small = len(network.neurons) + len(network.connections) <= SMALL
     bodies: list[str] = []
@@ -200,12 +203,12 @@ def _write(network: Network) -> Written:
     watched = bool(network.projections) and not small
     # a network that is written out is in registers, and nothing is gained
     incoming = incoming_in(network)
-    whole = StepCode(network, Code(emitter, tables, network.dt, {}), Form(), incoming)
+    whole = StepCode(network, Code(emitter, tables, network.dt, {}), Form(), incoming, layout)
     fused = not small and bool(whole.fuses.any())
     for type_, name, form, write, parameters, of_fused in _functions(small, watched):
         code = Code(emitter, tables, network.dt, network.settable.variables)
         if fused or not of_fused:
-            write(StepCode(network, code, form, incoming))
+            write(StepCode(network, code, form, incoming, layout))
         if type_ == "double":
             code.line("return odd;" if form.watched and code.lines else "return 0.0;")
         head = f"static {type_} {name}(const nv_state *p{parameters})"
@@ -289,19 +292,13 @@ class _Course(ctypes.Structure):
 
 class CStepper:
     """One network, compiled. Of the state that it stepped last it keeps where the arrays lie, and looks them up again
-    only where one of them is another object (``_point_to``)."""
+    only where one of them is another object (``_point_to``). What steps states with ``own_signals``, where others share
+    them, is compiled when there is one."""
 
     def __init__(self, network: Network) -> None:
         self.network = network
-        made = written(network)
-        library = c_library.load(made.text)
-        self._library = library
         #: what computes formulas beside the steps
         self.functions: Library = c_functions.library()
-        self._step, self._run = library.nv_once, library.nv_run
-        self._step.restype = ctypes.c_int64
-        self._run.argtypes, self._run.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
-        self._long_tables = made.long_tables
         #: the inputs of the step that is made: what it computes of them stands there behind it
         self.vector = np.zeros(network.vector_size)
         #: the inputs that a step computes, and of each input whether it is one
@@ -320,11 +317,9 @@ class CStepper:
         #: what ``nv_once`` takes, which need not be converted anew; and the step and the form that stand there
         self._struct = ctypes.c_void_p(self._address)
         self._k, self._form_there = 0, _PLAIN
-        self._table_addresses = _addresses(self._long_tables)
-        self._before, self._packed = np.zeros(len(network.neurons)), np.zeros(made.packed)
-        self._pointers.before, self._pointers.packed = self._before.ctypes.data, self._packed.ctypes.data
-        self._pointers.work = self._work.ctypes.data
-        self._pointers.given = ctypes.addressof(self._table_addresses)
+        self._before = np.zeros(len(network.neurons))
+        self._pointers.before, self._pointers.work = self._before.ctypes.data, self._work.ctypes.data
+        self._take_code(own_signals=not signal_layout(network).shared)
         #: the state whose arrays the struct points to, these arrays, and the objects that say what holds in it: where
         #: each is still the same one, nothing has changed
         self._known_state: State | None = None
@@ -333,7 +328,21 @@ class CStepper:
         self._holds: object = None
         self._fixed: object = None
         self._structure: Structure | None = None
-        self._general = False
+        #: the first step at which nothing is held, left out, still or lost
+        self._plain_from = 0
+
+    def _take_code(self, own_signals: bool) -> None:
+        """Make the steps of states that share signals, where anything can be shared, or of those with their own."""
+        made = written(self.network, own_signals)
+        library = c_library.load(made.text)
+        self._library, self._own_signals = library, own_signals
+        self._step, self._run = library.nv_once, library.nv_run
+        self._step.restype = ctypes.c_int64
+        self._run.argtypes, self._run.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
+        self._long_tables, self._packed = made.long_tables, np.zeros(made.packed)
+        self._table_addresses = _addresses(self._long_tables)
+        self._pointers.packed = self._packed.ctypes.data
+        self._pointers.given = ctypes.addressof(self._table_addresses)
 
     def read(self, computed: frozenset[str]) -> None:
         """Compute these inputs, which are expressions, in the runs that follow."""
@@ -366,7 +375,7 @@ class CStepper:
         k = state.k
         if k != self._k:
             self._pointers.k = k
-        form = self._form(state) if k == 0 or self._general else _PLAIN
+        form = _PLAIN if k > 0 and k >= self._plain_from else self._form(state)
         if form != self._form_there:
             self._pointers.form = self._form_there = form
         if inputs is not self.vector:
@@ -388,7 +397,7 @@ class CStepper:
             steps=len(rows),
             every=every,
             form=self._form(state),
-            then=_GENERAL if self._general else _PLAIN,
+            then=_GENERAL if state.k + 1 < self._plain_from else _PLAIN,
             look=look,
             beside=self._contiguous,
             rows=rows.ctypes.data,
@@ -404,11 +413,13 @@ class CStepper:
         """The form of the step to come."""
         if state.k == 0 and not state.continued and self._initial:
             return _FIRST
-        return _GENERAL if self._general else _PLAIN
+        return _GENERAL if state.k < self._plain_from else _PLAIN
 
     def _point_to(self, state: State) -> None:
         """Note where the arrays of a state lie, and what is held and left out."""
         now, pointers = state.conditions, self._pointers
+        if state.own_signals != self._own_signals:
+            self._take_code(state.own_signals)
         for name in ("activity", "weights", "signals", "history", "outlets"):
             array = getattr(state, name)
             if not _as_c_has_it(array):
@@ -428,7 +439,10 @@ class CStepper:
     def _take_conditions(self, now: Conditions) -> None:
         count, pointers = self.network.clampable, self._pointers
         self._holds, self._fixed, self._structure = now.holds, now.fixed, now.structure
-        self._general = now.holds is not None or now.fixed is not None or not now.structure.whole
+        plain = now.holds is None and now.fixed is None and now.structure.whole
+        self._plain_from = 0 if plain else _NEVER
+        if plain and now.structure.has_lost:
+            self._plain_from = int((now.structure.lost + self.network.connections.delays.compact()).max())
         self._held, self._holding = np.zeros(count, dtype=np.uint8), np.zeros(count)
         if now.fixed is not None:
             states = now.held.order >= 0

@@ -78,7 +78,7 @@ class Exported:
         self.network, self.real = replace(without_checks(network), settable=settable), real
         self.name = prefix(network.name)
         self.macro = self.name.upper()
-        self.state = (initial_state(network) if start is None else start).copy()
+        self.state = (initial_state(network, own_signals=True) if start is None else start).copy()
         self.emitter, self.tables = Emitter(real), Tables(real, None)
         #: the kinds of draws that noise makes, whose functions the source needs
         self.kinds: set[str] = set()
@@ -362,7 +362,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             still="still" in left_out,
             lost="lost" in left_out,
         )
-        StepCode(network, code, form, incoming_in(network)).write()
+        StepCode(network, code, form, incoming_in(network), signal_layout(network, own=True)).write()
         before: list[str] = []
         for name in sorted(left_out.keys() & words_of(code.lines)):  # what never learns asks for none that is still
             kind, phases = left_out[name]
@@ -465,7 +465,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
 
     def _mend(self, code: Code, mended: Mask) -> None:
         """Nothing is under way on connections that are mended."""
-        delays, offsets = self.network.connections.delays.whole(), signal_layout(self.network).offsets
+        delays, offsets = self.network.connections.delays.whole(), signal_layout(self.network, own=True).offsets
         connections = np.flatnonzero(mended & (delays > 0))
         slots = [np.arange(offsets[c], offsets[c] + delays[c]) for c in connections.tolist()]
         if slots:

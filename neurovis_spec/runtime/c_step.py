@@ -10,6 +10,8 @@ of a larger one, each population is a loop. So K -> O after one step, O with a b
         activity[1] = u1;
     }
     signals[0] = weights[0]*activity[0];
+
+and where K's signals are shared, ``weights[0]*signals[0]`` and ``signals[0] = activity[0]``.
 """
 
 from __future__ import annotations
@@ -42,10 +44,10 @@ from neurovis_spec.compiler.program import (
 )
 from neurovis_spec.language.expressions.emit_c import Made, Value
 from neurovis_spec.language.expressions.tree import Name, Tree, names
-from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, incoming_of, taken
+from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, incoming_of, taken, taken_at
 from neurovis_spec.runtime.c_code import Code, Form, Place, state_name
 from neurovis_spec.runtime.presynaptic import history_depth
-from neurovis_spec.runtime.signals import SignalLayout, signal_layout
+from neurovis_spec.runtime.signals import SharedSlots, SignalLayout
 from neurovis_spec.runtime.state import Mask
 
 _NONE: Mapping[str, Made] = {}
@@ -56,12 +58,13 @@ _RULES_SIDE_BY_SIDE = 4
 
 
 class StepCode:
-    """Writes the body of a step; ``incoming`` is what arrives at each port of each population, which all forms of a
-    step share."""
+    """Writes the body of a step; ``incoming`` is what arrives at each port of each population, and ``layout`` where
+    signals are under way, which all forms of a step share."""
 
-    def __init__(self, network: Network, code: Code, form: Form, incoming: Sequence[Sequence[Incoming]]) -> None:
-        self.network, self.code, self.form = network, code, form
-        self.layout: SignalLayout = signal_layout(network)
+    def __init__(
+        self, network: Network, code: Code, form: Form, incoming: Sequence[Sequence[Incoming]], layout: SignalLayout
+    ) -> None:
+        self.network, self.code, self.form, self.layout = network, code, form, layout
         self.depth = history_depth(network)
         #: what ports have beside what arrives, by their names
         self.own = {port.name: _own(network, port.name) for one in network.populations for port in one.ports}
@@ -406,12 +409,14 @@ class StepCode:
     # ---- signals -----------------------------------------------------------------------------------------------
 
     def send(self) -> None:
-        """w[t]·a[t] of every delayed connection leaves; a[t] is remembered for ``pre``."""
+        """w[t]·a[t] of every delayed connection leaves, or a[t] where it is shared; a[t] is remembered for ``pre``."""
         code = self.code
         which = ~self.fuses if self.form.fused else np.ones(len(self.fuses), dtype=np.bool_)
         for number in self.sent_with:
             which[self.network.projections[number].members] = False
         self.leave(which)
+        for slots in self.layout.shared:
+            self.store_each(len(slots.sent), partial(self.sharing, slots))
         if self.depth:
             n, beside = len(self.network.neurons), self.network.outlet_count
             row = f"(size_t)(k % {self.depth})*{n + beside}"
@@ -420,18 +425,13 @@ class StepCode:
                 code.line(f"memcpy(history + {row} + {n}, outlets, {beside}*sizeof(outlets[0]));")
 
     def leave(self, which: Mask) -> None:
-        """The signals of some connections (m,) leave."""
-        code = self.code
+        """The signals of some connections (m,) leave, as far as they have their own."""
         for delay_class in self.layout.classes:
             sent = which[delay_class.connections]
             if not sent.any():
                 continue
             members = delay_class.connections[sent]
-            if self.form.written_out:
-                self.store([self.leaving(members, place) for place in range(len(members))])
-            else:
-                with code.block(code.loop("p", len(members))):
-                    self.store([self.leaving(members, "p")])
+            self.store_each(len(members), partial(self.leaving, members))
 
     def leaving(self, members: Indices, place: Place) -> tuple[str, Value]:
         """The signal of one of some connections, all of one delay: its slot, and what leaves."""
@@ -441,6 +441,13 @@ class StepCode:
         shift = "" if delay == 1 else f" + {code.remainder(delay)}"
         signal = f"weights[{code.at(members, place)}]*{taken(self.network, code, members, place)}"
         return f"signals[{slot}{shift}]", signal
+
+    def sharing(self, slots: SharedSlots, place: Place) -> tuple[str, Value]:
+        """What is sent to all connections that share it: its slot, and what leaves."""
+        code = self.code
+        slot = code.at(np.arange(slots.start, slots.stop, slots.delay), place)
+        shift = "" if slots.delay == 1 else f" + {code.remainder(slots.delay)}"
+        return f"signals[{slot}{shift}]", taken_at(self.network, code, slots.sent, place)
 
     # ---- connections -------------------------------------------------------------------------------------------
 
@@ -487,6 +494,14 @@ class StepCode:
         if self.form.still and isinstance(places[0], int):
             code.indent -= 1
             code.line("}")
+
+    def store_each(self, count: int, made: Callable[[Place], tuple[str, Value]]) -> None:
+        """As many values, each in its cell."""
+        if self.form.written_out:
+            self.store([made(place) for place in range(count)])
+        else:
+            with self.code.block(self.code.loop("p", count)):
+                self.store([made("p")])
 
     def store(self, made: Sequence[tuple[str, Value]]) -> None:
         """Values, each in its cell."""

@@ -3,7 +3,8 @@
 In: a State and a path, or a Network and a path. Out: a file, or a State. The names in the file are fixed (``chosen``:
 the parameters that were set). The file is an archive of arrays as NumPy writes them, without pickles; it is believed in
 nothing: whatever is not of the size that this network asks for is refused before it is read, and so is a checkpoint of
-another network (hash).
+another network (hash). What is under way is ``under_way`` where connections share it, and ``signals`` where each has
+its own, as in the files of before.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.files import regular_size, replacing
 from neurovis_spec.runtime.npz_file import Array, put_arrays, read_array, recording_errors
+from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.state import BodyState, State, by_kind, initial_state
 
 #: bytes that the text may have, and those of all headers together
@@ -87,7 +89,8 @@ def load_state(network: Network, path: Path) -> State:
     with recording_errors(path, "a checkpoint"):
         state = initial_state(network)
         wanted = _arrays(state)
-        size, most = regular_size(path), sum(array.nbytes for array in wanted.values())
+        own_size = signal_layout(network, own=True).size
+        size, most = regular_size(path), 8 * own_size + sum(array.nbytes for array in wanted.values())
         most += state.conditions.structure.lost.nbytes + (0 if network.body is None else _BODY)
         if size > most + len(network.neurons) * _CLAMPS + _ROOM:
             raise RecordingError("not a checkpoint of this network: it is larger than its state")
@@ -98,6 +101,9 @@ def load_state(network: Network, path: Path) -> State:
                     "a checkpoint of another network, or of other parameters: it goes on with the spec and the "
                     "settings that it was made with"
                 )
+            if not state.own_signals and "signals.npy" in archive.namelist():
+                state.signals, state.own_signals = np.zeros(own_size), True
+                wanted = _arrays(state)
             arrays = {name: _member(archive, name, array) for name, array in wanted.items()}
             _fill(state, arrays)
             state.k, state.drawn = _whole(about, "k"), _whole(about, "drawn")
@@ -126,7 +132,7 @@ def _arrays(state: State) -> dict[str, Array]:
         "activity": state.activity,
         **({"outlets": state.outlets} if len(state.outlets) else {}),
         "weights": state.weights,
-        "signals": state.signals,
+        _signals_as(state): state.signals,
         "history": state.history,
         **{kept: _joined(arrays) for kept, arrays in by_kind(state.cells).items()},
         "parameters": now.parameters,
@@ -141,11 +147,16 @@ def _arrays(state: State) -> dict[str, Array]:
     }
 
 
+def _signals_as(state: State) -> str:
+    """The name of what is under way."""
+    return "signals" if state.own_signals else "under_way"
+
+
 def _fill(state: State, saved: Mapping[str, Array]) -> None:
     """Have a state the arrays of a file, which are of the right sizes."""
     now = state.conditions
     state.activity, state.weights = _floats(saved["activity"]), _floats(saved["weights"])
-    state.signals, state.history = _floats(saved["signals"]), _floats(saved["history"])
+    state.signals, state.history = _floats(saved[_signals_as(state)]), _floats(saved["history"])
     state.outlets = _floats(saved.get("outlets", state.outlets))
     for kept, arrays in by_kind(state.cells).items():
         ends = np.cumsum([len(array) for array in arrays])

@@ -25,11 +25,12 @@ from neurovis_spec.runtime.state import Conditions, State
 
 def lose(network: Network, state: State, connections: IntArray) -> None:
     """Nothing is under way on these connections: what they have sent so far never arrives."""
-    offsets, delays = signal_layout(network).offsets, network.connections.delays.whole()
-    for connection in connections.tolist():
+    layout, delays = signal_layout(network, state.own_signals), network.connections.delays.whole()
+    for connection in connections[~layout.shares[connections]].tolist():
         if delays[connection]:
-            state.signals[offsets[connection] : offsets[connection] + delays[connection]] = 0.0
-    read_later = connections[remembering(network)[connections]]  # those whose rules read past activities
+            state.signals[layout.offsets[connection] : layout.offsets[connection] + delays[connection]] = 0.0
+    # those that read past activities on arrival, or whose rules do
+    read_later = connections[(layout.shares | remembering(network))[connections]]
     if len(read_later):
         lost = state.conditions.structure.lost.copy()
         lost[read_later] = state.k

@@ -16,8 +16,9 @@ from neurovis_spec.compiler.events.settable import CENTRES, bias_of
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Population, Port
 from neurovis_spec.runtime.numpy_code import Code, any_given
-from neurovis_spec.runtime.signals import SignalLayout
-from neurovis_spec.runtime.state import Structure
+from neurovis_spec.runtime.signals import SharedSlots, SignalLayout
+from neurovis_spec.runtime.stages import taken_by
+from neurovis_spec.runtime.state import NEVER_LOST, Structure
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,30 +87,46 @@ def signals_at(step: Step, number: int, port: Port, places: Indices) -> str:
     """What the connections at these places of a port bring, in their order: the values of each delay, put together."""
     code, connections = step.code, step.network.connections
     incoming = port.incoming[places]
-    delays = connections.delays[incoming]
-    by_delay: dict[int, str] = {}
-    undelayed = incoming[delays == 0]
+    delays, shares = connections.delays[incoming], step.layout.shares[incoming]
+    #: what arrives, and where in the order
+    parts: list[tuple[str, IntArray]] = []
+    undelayed = np.flatnonzero(delays == 0)
     if len(undelayed):
-        weights = code.select("weights", undelayed, len(connections))
-        by_delay[0] = f"{weights} * {sent_by(step, undelayed)}"
+        weights = code.select("weights", incoming[undelayed], len(connections))
+        parts.append((f"{weights} * {sent_by(step, incoming[undelayed])}", undelayed))
+    for slots in step.layout.shared:
+        there = np.flatnonzero(shares & (delays == slots.delay))
+        if len(there):
+            parts.append((_shared(step, slots, incoming[there]), there))
     for delay_class in step.layout.classes:
         inside = np.flatnonzero(delay_class.populations == number)  # they lie next to each other
         if len(inside):
             start, stop = (delay_class.start + delay_class.delay * int(i) for i in (inside[0], inside[-1] + 1))
-            slots = slots_of(code, start, stop, delay_class.delay)
+            own = slots_of(code, start, stop, delay_class.delay)
             arriving = np.isin(delay_class.connections[inside], incoming)
             if not arriving.any():  # a lesion, or another port: what is under way there does not arrive here
                 continue
             if not arriving.all():
-                slots = code.select(code.let("g", slots), np.flatnonzero(arriving), len(arriving))
-            by_delay[delay_class.delay] = slots
-    if len(by_delay) == 1:
-        signals = code.let("g", next(iter(by_delay.values())))
+                own = code.select(code.let("g", own), np.flatnonzero(arriving), len(arriving))
+            parts.append((own, np.flatnonzero(~shares & (delays == delay_class.delay))))
+    if len(parts) == 1:
+        signals = code.let("g", parts[0][0])
     else:
         signals = code.let("g", f"np.empty({len(delays)})")
-        for delay, values in by_delay.items():
-            code.line(f"{signals}{code.position(np.flatnonzero(delays == delay), len(delays))} = {values}")
+        for values, there in parts:
+            code.line(f"{signals}{code.position(there, len(delays))} = {values}")
     return with_factors(code, port, places, signals)
+
+
+def _shared(step: Step, slots: SharedSlots, members: Indices) -> str:
+    """What was sent, times the weights of some connections that share it; 0 where it is lost."""
+    code, lost = step.code, step.structure.lost[members]
+    places = (step.layout.offsets[members] - slots.start) // slots.delay
+    past = code.select(slots_of(code, slots.start, slots.stop, slots.delay), places, len(slots.sent))
+    arriving = f"{code.select('weights', members, len(step.network.connections))} * {past}"
+    if not (lost > NEVER_LOST).any():
+        return arriving
+    return f"np.where(k < {code.constant(lost + slots.delay)}, 0.0, {arriving})"
 
 
 def with_factors(code: Code, port: Port, places: Indices, signals: str) -> str:
@@ -120,12 +137,14 @@ def with_factors(code: Code, port: Port, places: Indices, signals: str) -> str:
 
 
 def sent_by(step: Step, connections: Indices, broadcast: bool = False) -> str:
-    """What connections take now: activities, outlets, or some of both; an index of n or more is an outlet's."""
+    """What connections take now."""
+    return sent_at(step, taken_by(step.network)[connections], broadcast)
+
+
+def sent_at(step: Step, taken: Indices, broadcast: bool = False) -> str:
+    """Some activities, outlets, or both, as they are now; an index of n or more is an outlet's."""
     code, network = step.code, step.network
     n, outlets = len(network.neurons), network.outlet_count
-    if network.sending is None:
-        return code.select("activity", network.connections.sources[connections], n, broadcast)
-    taken = network.sending[connections]
     if (taken < n).all():
         return code.select("activity", taken, n, broadcast)
     if (taken >= n).all():

@@ -30,6 +30,7 @@ class NumpyStepper:
     def __init__(self, network: Network) -> None:
         self.network = network
         self._structure: Structure | None = None
+        self._own_signals = False
         self._changing = subscript(network.changing)
 
     def step(self, state: State, inputs: FloatArray, /) -> None:
@@ -57,9 +58,9 @@ class NumpyStepper:
         return state.k - first
 
     def _steps(self, state: State, vectors: Iterable[FloatArray]) -> Iterator[None]:
-        if state.conditions.structure is not self._structure:
-            self._structure = state.conditions.structure
-            self._made = step_code(self.network, self._structure).compiled()
+        if state.conditions.structure is not self._structure or state.own_signals != self._own_signals:
+            self._structure, self._own_signals = state.conditions.structure, state.own_signals
+            self._made = step_code(self.network, self._structure, self._own_signals).compiled()
         return self._made(state, vectors)
 
 
@@ -78,13 +79,14 @@ class NumpyBackend:
         return NumpyStepper(network)
 
 
-def step_code(network: Network, structure: Structure) -> Code:
+def step_code(network: Network, structure: Structure, own_signals: bool = False) -> Code:
     """The code of one step, operation by operation, without what the structure leaves out."""
+    layout = signal_layout(network, own_signals)  # where all has its place, what is left out too
     if structure.gone.any():
         populations = tuple(_without(population, structure.gone) for population in network.populations)
         network = replace(network, populations=populations)
     code = Code(network.dt, network.settable.variables)
-    step = Step(code, network, structure, signal_layout(network), history_depth(network), {}, {})
+    step = Step(code, network, structure, layout, history_depth(network), {}, {})
     for operation in network.program:
         emit(operation, step)
     return code

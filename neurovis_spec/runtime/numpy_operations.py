@@ -42,7 +42,7 @@ from neurovis_spec.compiler.program import (
     Send,
     Update,
 )
-from neurovis_spec.runtime.numpy_arrivals import Step, gathered, sent_by, slots_of
+from neurovis_spec.runtime.numpy_arrivals import Step, gathered, sent_at, sent_by, slots_of
 from neurovis_spec.runtime.numpy_code import FIRST, Cell, Code, emit_change
 from neurovis_spec.runtime.numpy_flows import diffuse, integrate
 from neurovis_spec.runtime.stages import taken_by
@@ -131,7 +131,8 @@ def _let_out(step: Step, number: int) -> None:
 
 @emit.register
 def _send(operation: Send, step: Step) -> None:
-    """w[t]·a[t] of every delayed connection leaves its source; a[t] is remembered for ``pre``."""
+    """w[t]·a[t] of every delayed connection leaves its source, or a[t] where it is shared; a[t] is remembered for
+    ``pre``."""
     code, network = step.code, step.network
     connections = network.connections
     for delay_class in step.layout.classes:
@@ -139,6 +140,9 @@ def _send(operation: Send, step: Step) -> None:
         sent = sent_by(step, delay_class.connections)
         slots = slots_of(code, delay_class.start, delay_class.stop, delay_class.delay)
         code.line(f"multiply({weights}, {sent}, {slots})")
+    for shared in step.layout.shared:
+        slots = slots_of(code, shared.start, shared.stop, shared.delay)
+        code.line(f"{slots}[:] = {sent_at(step, shared.sent)}")
     if step.depth:
         sent = "np.concatenate((activity, outlets))" if network.outlets else "activity"
         code.line(f"history[k % {step.depth}] = {sent}")

@@ -160,12 +160,14 @@ class ReferenceStepper(Seen):
         return found
 
     def send(self, state: State) -> None:
-        """w[t]·a[t] of every delayed connection leaves; a[t] is remembered."""
-        sent = np.concatenate((state.activity, state.outlets))
+        """w[t]·a[t] of every delayed connection leaves, or a[t] where it is shared; a[t] is remembered."""
+        sent, layout = np.concatenate((state.activity, state.outlets)), self.layouts[state.own_signals]
         for connection, delay in enumerate(self.delays.tolist()):
             if delay > 0:
-                signal = float(state.weights[connection]) * float(sent[self.sending[connection]])
-                state.signals[self.offsets[connection] + state.k % delay] = signal
+                leaving = float(sent[self.sending[connection]])
+                if not layout.shares[connection]:
+                    leaving = float(state.weights[connection]) * leaving
+                state.signals[layout.offsets[connection] + state.k % delay] = leaving
         if len(state.history):
             state.history[state.k % len(state.history)] = sent
 

@@ -50,7 +50,8 @@ class Seen:
 
     def __init__(self, network: Network) -> None:
         self.network = network
-        self.offsets = signal_layout(network).offsets
+        #: where signals are under way, by whether each connection has its own
+        self.layouts = {own: signal_layout(network, own) for own in (False, True)}
         variables, connections = network.settable.variables, network.connections
         #: the parameters of definitions in use
         self.settings = {
@@ -122,11 +123,15 @@ class Seen:
         }
 
     def arriving(self, connection: int, state: State) -> float:
-        """w[t−d]·a[t−d]: of this step for d = 0, else what was sent d steps ago."""
-        delay = int(self.delays[connection])
+        """w[t−d]·a[t−d]: of this step for d = 0, else what was sent d steps ago; 0 where that is lost."""
+        delay, layout = int(self.delays[connection]), self.layouts[state.own_signals]
         if delay == 0:
             return float(state.weights[connection]) * self.sent(connection, state)
-        return float(state.signals[self.offsets[connection] + state.k % delay])
+        left = float(state.signals[layout.offsets[connection] + state.k % delay])
+        if not layout.shares[connection]:
+            return left
+        lost = state.k - delay < state.conditions.structure.lost[connection]
+        return 0.0 if lost else float(state.weights[connection]) * left
 
     def sent(self, connection: int, state: State) -> float:
         """What a connection takes now: an activity or an outlet."""

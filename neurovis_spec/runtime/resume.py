@@ -33,21 +33,24 @@ from neurovis_spec.runtime.controls import Controls, lose
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.fitting import of_table
 from neurovis_spec.runtime.recording import Recording
-from neurovis_spec.runtime.signals import signal_layout
+from neurovis_spec.runtime.signals import SignalLayout, signal_layout
 from neurovis_spec.runtime.stages import taken_by
-from neurovis_spec.runtime.state import State, initial_state
+from neurovis_spec.runtime.state import State, have_own_signals, initial_state
 
 
-def resumed_state(network: Network, recording: Recording, functions: Library = NUMPY) -> State:
-    """The state in which a run goes on, with what computes the ``functions`` of formulas. Raises RecordingError where
-    names do not agree or the recording is empty."""
+def resumed_state(
+    network: Network, recording: Recording, functions: Library = NUMPY, own_signals: bool = False
+) -> State:
+    """The state in which a run goes on, with what computes the ``functions`` of formulas; it has ``own_signals``, too,
+    where what is under way left by other weights. Raises RecordingError where names do not agree or the recording is
+    empty."""
     # a table is given the structure of the network first: what it lacks is known by that
     (of_table(recording, network) or recording).check_whole("a run cannot go on from")
     if not len(recording):
         raise RecordingError("the recording holds no step to go on from")
     column_of = _matching_neurons(network, recording)  # of each neuron
     columns, learned = _learned_weights(network, recording)
-    state = initial_state(network)
+    state = initial_state(network, own_signals)
     state.continued, state.drawn = True, recording.reached
     controls = Controls(network, functions)
     _set_again(network, recording, state, controls)
@@ -55,17 +58,25 @@ def resumed_state(network: Network, recording: Recording, functions: Library = N
     depth = int(network.connections.delays.kept.max(initial=1))
     theirs, ours = _same_connections(network, recording)
     kept = _Kept(network, recording) if any(isinstance(one, Integrate) for one in network.program) else None
-    for ago, row in _last_rows(recording, depth):
+    state.weights[learned] = recording.weights_after[columns]
+
+    def weights_at(row: int) -> FloatArray:
         weights = state.weights.copy()
         weights[ours] = recording.all_weights(row)[theirs]
+        return weights
+
+    rows, shares = _last_rows(recording, depth), signal_layout(network, state.own_signals).shares
+    if shares.any() and any(not np.array_equal(weights_at(row)[shares], state.weights[shares]) for _, row in rows):
+        have_own_signals(network, state)
+    layout = signal_layout(network, state.own_signals)
+    for ago, row in rows:
         activity = recording.activity[row][column_of]
         sent, known = (activity, np.True_) if kept is None else kept.sent(activity, row)
-        _send(network, state, -ago, sent, known, weights)
+        _send(network, layout, state, -ago, sent, known, weights_at(row))
     lose(network, state, np.flatnonzero(state.conditions.structure.gone))
     if kept is not None:
         kept.restore(state)
     state.activity = recording.activity[-1][column_of]
-    state.weights[learned] = recording.weights_after[columns]
     return state
 
 
@@ -174,6 +185,7 @@ class _Kept:
 
 def _send(
     network: Network,
+    layout: SignalLayout,
     state: State,
     step: int,
     sent: FloatArray,
@@ -184,11 +196,11 @@ def _send(
     before the run."""
     connections, taken = network.connections, taken_by(network)
     under_way = np.flatnonzero((connections.delays.whole() >= -step) & np.broadcast_to(known, sent.shape)[taken])
-    offsets = signal_layout(network).offsets[under_way]
+    factors = np.where(layout.shares[under_way], 1.0, weights[under_way])
     with np.errstate(all="ignore"):
-        signals = weights[under_way] * sent[taken[under_way]]
+        signals = factors * sent[taken[under_way]]
     # a step is negative here; its remainder is a slot ≥ 0 all the same
-    state.signals[offsets + step % connections.delays[under_way]] = signals
+    state.signals[layout.offsets[under_way] + step % connections.delays[under_way]] = signals
     if -step < len(state.history):
         state.history[step % len(state.history)] = np.where(known, sent, 0.0)
 

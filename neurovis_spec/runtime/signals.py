@@ -1,9 +1,12 @@
-"""Where the signals under way lie: a flat ring buffer with d slots for each connection of delay d ≥ 1.
+"""Where the signals under way lie: a flat ring buffer with d slots for each connection of delay d ≥ 1, or for all
+that take the same.
 
 In: a Network. Out: a SignalLayout. The signal that connection c sends at step t lies in slot
 ``offsets[c] + t mod d``: it is read there when it arrives, at t + d, and then overwritten by the one sent at t + d.
 Connections of the same delay into the same population lie next to each other, so that a backend reads them as one
-slice.
+slice. Where nothing changes a weight in a run, w[t−d] is w[t]: the slots hold what is sent, the activity of a source or
+an outlet, which all such connections of a delay that take it share. Each has it times its weight on arrival, which
+gives the same bits. Where few numbers are saved each has its own all the same: to multiply all at once costs less.
 """
 
 from __future__ import annotations
@@ -12,13 +15,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_spec.arrays import Indices, pieces, width
+from neurovis_spec.arrays import BoolArray, Indices, pieces, width
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.runtime.stages import taken_by
+
+#: the slots that connections of a delay must save by sharing. It stays: a checkpoint holds what is under way as it lies
+LEAST_SAVED = 1 << 15
 
 
 @dataclass(frozen=True, slots=True)
 class DelayClass:
-    """All connections of one delay ≥ 1, as they are stored: the i-th has its slots from ``start + i·delay`` on."""
+    """All connections of one delay ≥ 1 with signals of their own, as they are stored: the i-th has its slots from
+    ``start + i·delay`` on."""
 
     delay: int
     start: int
@@ -33,16 +41,35 @@ class DelayClass:
 
 
 @dataclass(frozen=True, slots=True)
+class SharedSlots:
+    """What connections of one delay ≥ 1 share: the i-th of what is sent has its slots from ``start + i·delay`` on."""
+
+    delay: int
+    start: int
+    #: activities and outlets, as ``Network.sending`` numbers them
+    sent: Indices
+
+    @property
+    def stop(self) -> int:
+        """End of the slots, exclusive."""
+        return self.start + self.delay * len(self.sent)
+
+
+@dataclass(frozen=True, slots=True)
 class SignalLayout:
-    """``offsets`` (m,): the first slot of each connection, −1 with delay 0; ``size``: slots in all."""
+    """``offsets`` (m,): the first slot of each connection, −1 with delay 0; ``size``: slots in all; ``shares`` (m,):
+    the connections whose slots hold what is sent, not signals of their own."""
 
     offsets: Indices
     size: int
     classes: tuple[DelayClass, ...]
+    shared: tuple[SharedSlots, ...]
+    shares: BoolArray
 
 
-def signal_layout(network: Network) -> SignalLayout:
-    """Lay the slots out by delay, then by population of the target, then in the order of the connections."""
+def signal_layout(network: Network, own: bool = False) -> SignalLayout:
+    """Lay the slots out by delay, then by population of the target, then in the order of the connections. With ``own``
+    no connection shares any."""
     connections = network.connections
     population_of = np.zeros(len(network.neurons), dtype=width(0, len(network.populations)))
     for number, population in enumerate(network.populations):
@@ -50,13 +77,58 @@ def signal_layout(network: Network) -> SignalLayout:
     populations = population_of[connections.targets.compact()]
     delays, index_type = connections.delays.compact(), width(0, len(connections))
     offsets = np.full(len(connections), -1, dtype=width(-1, sum(int(piece.sum()) for piece in pieces(delays))))
+    shares = np.zeros(len(connections), dtype=np.bool_) if own else _sharing(network)
     classes: list[DelayClass] = []
+    shared: list[SharedSlots] = []
     size = 0
-    for delay in np.unique(connections.delays.kept[connections.delays.kept > 0]).tolist():
-        members = np.flatnonzero(delays == delay).astype(index_type)
-        if len(network.populations) > 1:
-            members = members[np.argsort(populations[members], kind="stable")]
-        offsets[members] = np.arange(size, size + delay * len(members), delay, dtype=offsets.dtype)
-        classes.append(DelayClass(delay, size, members, populations[members]))
-        size += delay * len(members)
-    return SignalLayout(offsets, size, tuple(classes))
+    for delay in _delays(network):
+        members = np.flatnonzero((delays == delay) & ~shares).astype(index_type)
+        if len(members):
+            if len(network.populations) > 1:
+                members = members[np.argsort(populations[members], kind="stable")]
+            offsets[members] = np.arange(size, size + delay * len(members), delay, dtype=offsets.dtype)
+            classes.append(DelayClass(delay, size, members, populations[members]))
+            size += delay * len(members)
+        members = np.flatnonzero((delays == delay) & shares).astype(index_type)
+        if len(members):
+            sends, taken = _sends(network, members)
+            starts = size + delay * (np.cumsum(sends) - 1)
+            offsets[members] = starts.astype(offsets.dtype)[taken]
+            shared.append(SharedSlots(delay, size, np.flatnonzero(sends)))
+            size = shared[-1].stop
+    return SignalLayout(offsets, size, tuple(classes), tuple(shared), shares)
+
+
+def _sharing(network: Network) -> BoolArray:
+    """The delayed connections (m,) whose weight nothing changes in a run, of each delay where it is worth it. Not where
+    signals are multiplied: before the first one has arrived, a weight below 0 would make −0 of 0, which a sum does not
+    show, but a product."""
+    delays = network.connections.delays.compact()
+    shares = (delays > 0) & (network.connections.rules.compact() < 0)
+    for binding in network.settable.bindings:
+        if binding.weights:
+            shares[binding.indices] = False
+    for population in network.populations:
+        for port in population.ports:
+            if port.combine == "product":
+                shares[port.incoming] = False
+    for delay in _delays(network):
+        members = np.flatnonzero(shares & (delays == delay))
+        if delay * (len(members) - np.count_nonzero(_sends(network, members)[0])) < LEAST_SAVED:
+            shares[members] = False
+    return shares
+
+
+def _sends(network: Network, connections: Indices) -> tuple[BoolArray, Indices]:
+    """Which of all activities and outlets some connections take, and which one each of them does."""
+    taken = taken_by(network)[connections]
+    sends = np.zeros(len(network.neurons) + network.outlet_count, dtype=np.bool_)
+    sends[taken] = True
+    return sends, taken
+
+
+def _delays(network: Network) -> list[int]:
+    """The delays ≥ 1 that there are, ascending."""
+    kept = network.connections.delays.kept
+    found: list[int] = np.unique(kept[kept > 0]).tolist()
+    return found

@@ -48,17 +48,17 @@ class Structure:
     #: (m,) those whose rule is not carried out
     still: Mask
     #: (m,) what a connection has sent before this step never arrives, so that its rule reads 0 as ``pre``; NEVER_LOST
-    #: where nothing is lost, or no rule reads it
+    #: where nothing is lost, or nobody would read it: no rule, and signals of its own are 0
     lost: IntArray
 
     @property
     def whole(self) -> bool:
-        """Whether nothing is left out."""
-        return not (self.gone.any() or self.still.any() or self.has_lost)
+        """Whether no connection is left out or still."""
+        return not (self.gone.any() or self.still.any())
 
     @property
     def has_lost(self) -> bool:
-        """Whether anything that a rule would read of the past never arrives."""
+        """Whether anything that would be read of the past never arrives."""
         return bool((self.lost > NEVER_LOST).any())
 
 
@@ -152,9 +152,9 @@ class State:
 
     ``k`` is the step to compute next; ``activity`` (n,) is a[k−1], ``weights`` (m,) is w[k]; ``outlets`` are what
     connections take of the same step beside activities, as ``Network.outlets`` lays them out; ``signals`` as in
-    ``SignalLayout``; row t mod (depth) of ``history`` (depth, n + outlets) is what is sent at t, for ``pre``;
-    ``cells[owner][name]`` is a state or an output of a definition in use, as long as its members, in the order of the
-    network's ``uses``.
+    ``signal_layout(network, own_signals)``; row t mod (depth) of ``history`` (depth, n + outlets) is what is sent at t,
+    for ``pre``; ``cells[owner][name]`` is a state or an output of a definition in use, as long as its members, in the
+    order of the network's ``uses``.
     ``conditions`` are what events and callers have changed. ``continued`` says that a[−1] is given, so that
     ``initial`` is not used at step 0; ``drawn`` is how many steps earlier runs had, after which random numbers go on.
     """
@@ -177,6 +177,8 @@ class State:
     backend: str = ""
     #: the body as it is for step k; None before step 0, and where the network has none
     body: BodyState | None = None
+    #: whether no connection shares what is under way with others
+    own_signals: bool = False
 
     def copy(self) -> State:
         """A state of its own: no array is shared."""
@@ -197,15 +199,16 @@ class State:
             setattr(self, field.name, getattr(other, field.name))
 
 
-def initial_state(network: Network) -> State:
+def initial_state(network: Network, own_signals: bool = False) -> State:
     """The state before step 0: nothing is under way, weights are w[0], states have their initials."""
+    layout = signal_layout(network, own_signals)
     n, given_states = len(network.neurons), {"neuron": network.neurons.starts, "connection": {}}
     return State(
         k=0,
         activity=np.zeros(n),
         outlets=np.zeros(network.outlet_count),
         weights=np.array(network.connections.weights.whole(), dtype=np.float64),
-        signals=np.zeros(signal_layout(network).size),
+        signals=np.zeros(layout.size),
         history=np.zeros((history_depth(network), n + network.outlet_count)),
         cells={
             use.owner: initial_states(use, holder.members, network.dt, given_states[use.definition.kind.each])
@@ -213,7 +216,32 @@ def initial_state(network: Network) -> State:
         },
         conditions=first_conditions(network),
         network=network.mark,
+        own_signals=not layout.shared,
     )
+
+
+def signals_of_each(network: Network, state: State) -> FloatArray:
+    """What is under way on each connection, as a state with ``own_signals`` has it."""
+    if state.own_signals:
+        return state.signals
+    layout, own = signal_layout(network), signal_layout(network, own=True)
+    lost, result = state.conditions.structure.lost, np.zeros(own.size)
+    for each in own.classes:
+        slots, members = np.arange(each.delay), each.connections
+        sent_at = state.k - each.delay + (slots - state.k) % each.delay
+        first = np.where(layout.shares[members], lost[members], NEVER_LOST)
+        if not state.continued:
+            first = np.maximum(first, 0)
+        factors = np.where(layout.shares[members], state.weights[members], 1.0)
+        with np.errstate(all="ignore"):
+            signals = factors[:, None] * state.signals[layout.offsets[members][:, None] + slots]
+        result[each.start : each.stop] = np.where(sent_at < first[:, None], 0.0, signals).ravel()
+    return result
+
+
+def have_own_signals(network: Network, state: State) -> None:
+    """Have no connection share what is under way with others; it stays what it is."""
+    state.signals, state.own_signals = signals_of_each(network, state), True
 
 
 def by_kind(cells: Cells) -> dict[str, list[FloatArray]]:
