@@ -136,6 +136,7 @@ def test_only_what_the_diagonal_needs_is_computed() -> None:
 # ---- the order of intermediate values ----------------------------------------------------------------------------
 
 
+@settings(max_examples=40)
 @given(st.permutations("abcdef"), st.data())
 def test_names_come_behind_what_they_need_and_else_stay(names: list[str], data: st.DataObject) -> None:
     ranks = data.draw(st.permutations(names))
@@ -153,6 +154,7 @@ def test_names_come_behind_what_they_need_and_else_stay(names: list[str], data: 
         assert name == min(could, key=names.index)
 
 
+@settings(max_examples=30)
 @given(st.integers(1, 5), st.sets(st.sampled_from("abcdef")))
 def test_who_needs_each_other_is_named_from_the_first_on(length: int, others: set[str]) -> None:
     names = [f"c{number}" for number in range(length)]
