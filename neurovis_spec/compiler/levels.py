@@ -202,12 +202,11 @@ class _Coupled:
 
     def _of_sent(self, holds: Callable[[int, str], bool]) -> BoolArray:
         """For each connection what holds of the number of its source's model and of what it takes."""
-        table = [
-            [holds(number, sent_by(model, route.sends)) for route in self.wired.routes]
-            for number, model in enumerate(self.models)
-        ]
-        of_both = np.array(table, dtype=np.bool_).reshape(len(self.models), len(self.wired.routes))
-        return np.asarray(of_both[self.model[self.sources], self.wired.entry.compact()])
+        sends = {name: number for number, name in enumerate(dict.fromkeys(one.sends for one in self.wired.routes))}
+        table = [[holds(number, sent_by(model, one)) for one in sends] for number, model in enumerate(self.models)]
+        of_both = np.array(table, dtype=np.bool_).reshape(len(self.models), len(sends))
+        of_entry = np.array([sends[one.sends] for one in self.wired.routes], dtype=np.int64)
+        return np.asarray(of_both[self.model[self.sources], of_entry[self.wired.entry.compact()]])
 
     @cached_property
     def through(self) -> dict[str, BoolArray]:

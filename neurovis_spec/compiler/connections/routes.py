@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from neurovis_spec.arrays import Indices
-from neurovis_spec.compiler.levels import default_delay, sent_by
+from neurovis_spec.compiler.levels import sent_by
 from neurovis_spec.compiler.names.state_references import no_port
 from neurovis_spec.compiler.network import PLAIN_ROUTE, Route
 from neurovis_spec.compiler.neurons.groups import Built, is_written
@@ -82,10 +82,10 @@ def default_delays(sources: Indices, targets: Indices, route: Route, models: Mod
     """The delays of connections that name none: one for all, or one for each."""
     if not models.flow:
         return 1
-    ports = [name for name, _ in route.ports]
-    table = np.array([
-        [default_delay(source, route.sends, target, ports) for target in models.different]
-        for source in models.different
-    ])  # fmt: skip
-    found = table[models.of[sources], models.of[targets]]
+    starts, ends = models.of[sources], models.of[targets]
+    table = np.ones((len(models.different), len(models.different)), dtype=np.int64)
+    for start in np.unique(starts).tolist():
+        for end in np.unique(ends).tolist():
+            table[start, end] = models.delay(start, end, route)
+    found = table[starts, ends]
     return int(found[0]) if len(found) and (found == found[0]).all() else found

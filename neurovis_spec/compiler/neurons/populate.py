@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain
 from typing import NamedTuple, TypeVar
@@ -18,10 +18,11 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, Indices, IntArray, frozen, narrow
 from neurovis_spec.compiler.events.settable import Assembled
+from neurovis_spec.compiler.levels import default_delay
 from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.compiler.names.references import Directory, key_span
 from neurovis_spec.compiler.names.scope import Scope
-from neurovis_spec.compiler.network import Group, Neurons
+from neurovis_spec.compiler.network import Group, Neurons, Route
 from neurovis_spec.compiler.neurons.groups import Builder, Built, Kinds, unread_neurons
 from neurovis_spec.compiler.neurons.positions import depend_on_positions
 from neurovis_spec.compiler.program import Definition
@@ -34,11 +35,21 @@ Number = TypeVar("Number", np.float64, np.int64)
 _NO_LETTERS = re.compile(r"[^A-Za-z0-9_]+")
 
 
-class Models(NamedTuple):
+@dataclass(frozen=True)
+class Models:
     """The models that there are, and for each neuron the number of its own."""
 
     different: tuple[Definition, ...]
     of: Indices
+    _delays: dict[tuple[int, int, Route], int] = field(default_factory=dict)
+
+    def delay(self, source: int, target: int, route: Route) -> int:
+        """The delay of a connection that names none, from a neuron of one of these models to one of another."""
+        key = source, target, route
+        if key not in self._delays:
+            ports = [name for name, _ in route.ports]
+            self._delays[key] = default_delay(self.different[source], route.sends, self.different[target], ports)
+        return self._delays[key]
 
     @property
     def flow(self) -> bool:
