@@ -145,6 +145,16 @@ def test_a_backend_that_holds_no_states_refuses_them() -> None:
         simulation.restore(other.state())
 
 
+def test_two_clamps_of_a_state_are_told_and_those_of_different_things_are_not() -> None:
+    text = PAIR.replace("NOISE", "0").replace("EVENTS", "events: [EVENTS]")
+    both = "{from: 1, to: 9, clamp: {A.x: 1}}, {from: 5, to: 12, clamp: {A.x: 2}}"
+    (told,) = [one for one in nv.compile_text(text.replace("EVENTS]", f"{both}]")).warnings if "clamp" in one.code]
+    assert told.code == "clamps-overlap"
+    assert "clamp the same state at the steps 5 to 8" in told.message
+    apart = "{from: 1, clamp: {A.x: 1, A.y: 2, A: 3, B.x: 0}}"
+    assert not [one for one in nv.compile_text(text.replace("EVENTS]", f"{apart}]")).warnings if "clamp" in one.code]
+
+
 def test_only_states_of_models_are_held() -> None:
     simulation = Simulation(pair(), "numpy")
     with pytest.raises(UnknownNameError, match=r"'B.size' is an output, made anew at each step"):

@@ -14,21 +14,22 @@ from typing import NamedTuple
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
-from neurovis_spec.compiler.names.references import Directory, key_of, resolve_sum
+from neurovis_spec.compiler.names.references import Directory, key_of, resolve_part, resolve_sum
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.located import Formula, Located
-from neurovis_spec.language.references import Arrow, Sum, parse
+from neurovis_spec.language.references import Arrow, Sum, parse, parse_sum
 from neurovis_spec.language.sections import EventModel
 from neurovis_spec.language.unknown import known
 
 
 class _Clamp(NamedTuple):
-    """A key of a clamp: its neurons, and from which step (inclusive) to which (exclusive) it holds; ``number`` counts
-    the keys in the order written."""
+    """A key of a clamp: its neurons, or whose ``state`` ("" for the activity), and from which step (inclusive) to which
+    (exclusive) it holds; ``number`` counts the keys in the order written."""
 
     number: int
     key: Located[str]
+    state: str
     neurons: IntArray
     begin: float
     end: float
@@ -55,7 +56,8 @@ def check_events(
     _check_learning(models, reader, findings)
     lesions = _lesions(models, reader, findings)
     clamps = [clamp for clamp in reader.clamps(models) if not _is_lesioned(clamp, lesions, findings)]
-    _check_overlaps(clamps, reader.count, findings)
+    for state in dict.fromkeys(clamp.state for clamp in clamps):
+        _check_overlaps([clamp for clamp in clamps if clamp.state == state], reader.count, findings)
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,15 @@ class _Reader:
         found = parse(text.value)
         return self._of(found, text) if isinstance(found, Sum) else np.zeros(0, dtype=np.int64)
 
+    def clamped(self, text: Located[str]) -> tuple[str, IntArray]:
+        """The state that a key of a clamp names, "" for the activity, and whose it is."""
+        part, *others = parse_sum(text.value)
+        name = None if others else self.directory.name_of_state(part)
+        if name is None or isinstance(name.owner, Arrow):
+            return "", self.neurons(text)
+        found = known(resolve_part(name.owner, text, self.directory, self.constants.findings), ())
+        return name.state, np.array(found, dtype=np.int64)
+
     def ends(self, text: Located[str]) -> tuple[IntArray, ...]:
         """The neurons of a reference, or those of either end of a connection."""
         found = parse(text.value)
@@ -101,7 +112,8 @@ class _Reader:
             begin, end = self.step(model.from_), self.step(model.to)
             for name in model.clamp if begin is not None else ():
                 key = key_of(model.source, "clamp", name)
-                yield _Clamp(number, key, self.neurons(key), begin or 0.0, math.inf if end is None else end)
+                state, neurons = self.clamped(key)
+                yield _Clamp(number, key, state, neurons, begin or 0.0, math.inf if end is None else end)
                 number += 1
 
 
@@ -188,8 +200,8 @@ def _last(lesions: _Lesions, neurons: IntArray) -> tuple[float, Span]:
 
 
 def _is_lesioned(clamp: _Clamp, lesions: _Lesions, findings: Findings) -> bool:
-    """Whether the neurons of a clamp are all lesioned before it begins; a warning if so."""
-    if not len(clamp.neurons) or (lesions.since[clamp.neurons] > clamp.begin).any():
+    """Whether the neurons of a clamp are all lesioned before it begins, whose states go on; a warning if so."""
+    if clamp.state or not len(clamp.neurons) or (lesions.since[clamp.neurons] > clamp.begin).any():
         return False
     since, place = _last(lesions, clamp.neurons)
     message = f"'{shorten(clamp.key.value)}' is lesioned from step {since:.0f} on ({place.seen_from(clamp.key.span)})"
@@ -198,7 +210,8 @@ def _is_lesioned(clamp: _Clamp, lesions: _Lesions, findings: Findings) -> bool:
 
 
 def _check_overlaps(clamps: list[_Clamp], count: int, findings: Findings) -> None:
-    """Clamps that hold a neuron while another one does; a warning at the one written later."""
+    """Clamps, all of activities or of one state, that hold a neuron while another one does; a warning at the one
+    written later."""
     end, owner = np.zeros(count), np.zeros(count, dtype=np.int64)  # until when a neuron is clamped, and by which
     order = sorted(clamps, key=lambda one: one.begin)
     told: set[int] = set()
@@ -219,5 +232,6 @@ def _tell(first: _Clamp, second: _Clamp, findings: Findings) -> None:
     when = f"at step {begin:.0f}" if begin == end else when
     one, other = second.key, first.key
     both = f"'{shorten(one.value)}' and '{shorten(other.value)}' ({other.span.seen_from(one.span)})"
-    message = f"{both} clamp the same neuron {when}: this one, written last, holds"
+    what = "state" if first.state else "neuron"
+    message = f"{both} clamp the same {what} {when}: this one, written last, holds"
     findings.warning("clamps-overlap", second.key.span, message, "end one, with 'to', before the other")

@@ -84,7 +84,7 @@ class _Reader:
         known = self.directory.holds(name)
         if not known and output is None and name in self.declared:
             return
-        state = None if known else self.finder.name_of_state(part)
+        state = None if known else self.finder.directory.name_of_state(part)
         if not known and output is not None and output.states:
             states: tuple[StateOf, ...] = output.states
         elif state is not None and not (output is not None or self._fed(name)):

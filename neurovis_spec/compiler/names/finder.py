@@ -27,7 +27,7 @@ from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.program import Definition
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.located import Located
-from neurovis_spec.language.references import Arrow, DottedName, Part, StateName, parse_sum, state_of
+from neurovis_spec.language.references import Arrow, DottedName, Part, StateName, parse_sum
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.likeness import suggest
 
@@ -99,16 +99,6 @@ class Finder:
         near = [name for name in names if source in name.split(" -> ")[0] or target in name.split(" -> ")[-1]]
         return suggest(f"{source} -> {target}", few(arrow.text, near or names), "connections")
 
-    def name_of_state(self, part: Part) -> StateName | None:
-        """A reference that is to a state, and to no neuron or range of neurons."""
-        name = state_of(part)
-        if name is None or isinstance(name.owner, Arrow):
-            return name
-        if self.directory.holds(part.text) or self.directory.instance(part.text):
-            return None
-        owner = name.owner.text
-        return None if self.directory.instance(owner) or owner in self.directory.instances else name
-
     def having(self, text: Located[str], state: Located[str]) -> IntArray | Unknown:
         """The neurons of a reference, whose models must have this state or output; UNKNOWN where it is invalid."""
         neurons = self.neurons(text)
@@ -121,7 +111,7 @@ class Finder:
         """What a key of ``clamp`` names: neurons, or a state of some; UNKNOWN where it is neither, which is
         reported."""
         part, *others = parse_sum(text.value)
-        name = None if others else self.name_of_state(part)
+        name = None if others else self.directory.name_of_state(part)
         if name is None or name.of_rule:
             return self.neurons(text)
         return self.state(name, part, text, self.lasting)

@@ -44,7 +44,7 @@ class _Reader:
         """The outputs in the order written; what is invalid is reported and left out."""
         for name, reference in spec.outputs.items():
             parts = [(part, text) for text in reference.parts for part in parse_sum(text.value)]
-            parts_with_states = [(part, text, self.finder.name_of_state(part)) for part, text in parts]
+            parts_with_states = [(part, text, self.finder.directory.name_of_state(part)) for part, text in parts]
             if any(state_name is not None for _, _, state_name in parts_with_states):
                 output = self._of_states(name, parts_with_states)
             else:

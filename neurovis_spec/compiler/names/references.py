@@ -17,7 +17,17 @@ from neurovis_spec.compiler.network import Group
 from neurovis_spec.diagnostics import Findings, Home, Span, Undeclared, listed, shorten
 from neurovis_spec.language.located import IDENTIFIER, Located
 from neurovis_spec.language.modules import ModuleModel
-from neurovis_spec.language.references import Arrow, NeuronRange, NoReference, Part, Sum, parse, parse_sum
+from neurovis_spec.language.references import (
+    Arrow,
+    NeuronRange,
+    NoReference,
+    Part,
+    StateName,
+    Sum,
+    parse,
+    parse_sum,
+    state_of,
+)
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
@@ -67,6 +77,16 @@ class Directory:
     def known(self) -> tuple[str, ...]:
         """Every name that a reference may use; groups first."""
         return tuple(dict.fromkeys([*self.groups, *self.neurons]))
+
+    def name_of_state(self, part: Part) -> StateName | None:
+        """A reference that is to a state, and to no neuron or range of neurons."""
+        name = state_of(part)
+        if name is None or isinstance(name.owner, Arrow):
+            return name
+        if self.holds(part.text) or self.instance(part.text):
+            return None
+        owner = name.owner.text
+        return None if self.instance(owner) or owner in self.instances else name
 
     def hint(self, name: str) -> str | None:
         """What an unknown name may be meant for: the nearest names, and the numbers that its group has."""
