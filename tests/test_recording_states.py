@@ -10,6 +10,8 @@ from click.testing import CliRunner
 
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
+from neurovis_spec.live.simulated import SimulatedSource
+from neurovis_spec.live.turns import Set
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.recording import Recording
 
@@ -233,3 +235,73 @@ def test_the_hash_knows_which_state_an_output_names() -> None:
     first = nv.compile_text(SPEC).hash
     assert first != nv.compile_text(SPEC.replace("tired: left.K.b", "tired: left.K.v")).hash
     assert first == nv.compile_text(SPEC.replace("membrane: A.v", "membrane: [A1.v, A2..A3.v]")).hash
+
+
+FLOW = """neurovis: 1
+name: flow
+time: {dt: 0.01, steps: 30}
+parameters: {g: 1}
+models:
+  cell:
+    time: ms
+    parameters: {tau: 20, gain: 2}
+    ports: [more]
+    state: {v: {initial: 0.5, derivative: (gain*drive + more - v)/tau}, n: {initial: 0, each_step: n + 1}}
+    outputs: {c: 2*v}
+    activity: v
+modules:
+  leg: {parameters: {own: 1}, neurons: {K: {model: {cell: {gain: own}}, bias: 1}}}
+neurons: {K: {count: 2, model: {cell: {gain: [g, 3*g]}}, bias: 1}, O: {}}
+instances: {left: {module: leg, set: {own: g}}}
+connections: {K -> O: {weight: 1, send: c}}
+outputs: {o: K.c, w: O}
+"""
+
+
+@pytest.fixture(scope="module")
+def flow() -> nv.CompiledNetwork:
+    return nv.compile_text(FLOW)
+
+
+def test_outputs_and_states_that_flow_are_recorded_as_states_are(flow: nv.CompiledNetwork, tmp_path: Path) -> None:
+    made = flow.run(states="all")
+    assert set(made.state_names) == {f"{name}.{state}" for name in ("K1", "K2", "left.K") for state in "vnc"}
+    np.testing.assert_array_equal(made["K.v"], made["K"])
+    np.testing.assert_array_equal(made["o"], 2 * made["K.v"])
+    for suffix in ("npz", "csv", "mcap"):
+        flow.run_to(tmp_path / f"all.{suffix}", states="all")
+        again = nv.load(tmp_path / f"all.{suffix}")
+        assert set(again.state_names) == set(made.state_names)
+        for name in made.state_names:
+            np.testing.assert_array_equal(again[name], made[name])
+    simulation = flow.simulator()
+    for row in made["o"][:5]:
+        np.testing.assert_array_equal(simulation.step()["o"], row)
+    np.testing.assert_array_equal(flow.measure("max(K2.c, last=1)", made), made["K2.c"])
+    asked = flow.run(states=["left.K.c", "K1.v"])
+    assert asked.state_names == ("K1.c", "K2.c", "left.K.c", "K1.v")
+
+
+def test_outputs_and_states_that_flow_are_drawn_as_traces(flow: nv.CompiledNetwork, tmp_path: Path) -> None:
+    flow.render(tmp_path / "a.svg", view={"traces": ["K.c", "left.K.v"]})
+    drawn = (tmp_path / "a.svg").read_text()
+    assert all(name in drawn for name in ("K1.c", "K2.c", "left.K.v"))
+
+
+@pytest.mark.parametrize("backend", ["reference", "numpy"])
+def test_a_slider_reaches_parameters_within_derivatives_at_once(backend: str) -> None:
+    """Those of a definition that follow one of the spec, each by itself, and those of an instance."""
+    flow = nv.compile_text(FLOW)
+    by_event = nv.compile_text(FLOW + "events: [{at: 6, set: {g: 5}}]\n").run(12, backend=backend)
+    source = SimulatedSource(flow.simulator(backend))
+    while source.step < 5:
+        source.advance()
+    source.turn(Set({"g": 5.0}))
+    for step in (6, 7, 8):
+        source.advance()
+        np.testing.assert_array_equal(source.seen().snapshot.activity, by_event.activity[step])
+    source.go(3)
+    np.testing.assert_array_equal(source.seen().snapshot.activity, by_event.activity[3])
+    source.go(8)
+    np.testing.assert_array_equal(source.seen().snapshot.activity, by_event.activity[8])
+    assert (by_event.activity[6, :2] > flow.run(12, backend=backend).activity[6, :2]).all()
