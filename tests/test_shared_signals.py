@@ -350,6 +350,20 @@ def test_full_matrices_and_many_connections_in_c(delay: int, probability: float,
         assert np.concatenate(runs).tobytes() == expected.tobytes()
 
 
+@pytest.mark.parametrize("text", [TEXT, FLOWING])
+def test_exported_c_has_signals_of_each(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is the text of a network in which nothing is shared, also behind a recording."""
+    network = network_of(text=text)
+    recording = network.run(9, backend="numpy", states="all")
+    folders = [tmp_path / name for name in ("shared", "shared on", "own", "own on")]
+    for folder, start in zip(folders, (None, recording) * 2, strict=True):
+        if folder.name == "own":
+            monkeypatch.setattr(signals, "LEAST_SAVED", 1 << 15)
+        network.export(folder, start=start)
+    shared, shared_on, own, own_on = ({path.name: path.read_text() for path in one.iterdir()} for one in folders)
+    assert (shared, shared_on) == (own, own_on)
+
+
 @pytest.mark.filterwarnings("ignore:the backend")
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_a_checkpoint_of_before_goes_on_exactly(backend: str) -> None:
