@@ -97,10 +97,24 @@ def _group(network: Network, group: Group, units: Mapping[tuple[str, str], Mappi
         _defined(group.activation, group.activation_parameters, units["activation", group.activation]),
         _defined(group.model, group.model_parameters, units["model", group.model]),
         group.combine,
-        spread(network.neurons.bias[list(group.indices)].tolist()),
-        group.input or "",
+        ", ".join((spread(network.neurons.bias[list(group.indices)].tolist()), *_port_biases(network, group))),
+        ", ".join(filter(None, (group.input, *_port_inputs(network, group)))),
         group.box or "",
     )
+
+
+def _port_biases(network: Network, group: Group) -> Iterator[str]:
+    """The biases at ports other than drive."""
+    for port, bias in network.neurons.port_bias.items():
+        if bias[list(group.indices)].any():
+            yield f"{port} {spread(bias[list(group.indices)].tolist())}"
+
+
+def _port_inputs(network: Network, group: Group) -> Iterator[str]:
+    """The inputs at ports other than drive."""
+    for port, places in network.neurons.port_input.items():
+        place = int(places[group.start])
+        yield from (f"{port} {one.name}" for one in network.inputs if 0 <= place - one.start < one.size and place >= 0)
 
 
 def _defined(name: str, parameters: Mapping[str, tuple[float, ...]], units: Mapping[str, str]) -> str:
