@@ -131,6 +131,23 @@ def test_an_unknown_state_is_refused_in_words(network: nv.CompiledNetwork, refer
         network.run(2, states=[reference])
 
 
+def test_what_watches_over_a_division_is_no_state() -> None:
+    """Whoever asks for a state that is not there is told of those that are, and of no cell of ours among them."""
+    text = """\
+neurovis: 1
+name: divided
+time: {dt: 0.1}
+models:
+  m: {state: {v: {derivative: 1/(1 + drive) - v}}, outputs: {twice: 2*v}, activity: "clip(1/drive, -1, 1)"}
+neurons: {A: {model: m, bias: 1}}
+"""
+    network = nv.compile_text(text)
+    with pytest.raises(KeyError) as wrong:
+        network.run(2, states=["A.w"])
+    assert "its states are: v, twice" in str(wrong.value)
+    assert "divides" not in str(wrong.value)
+
+
 def test_weights_are_asked_for_by_their_own_name(network: nv.CompiledNetwork) -> None:
     with pytest.raises(KeyError, match=r"weight\('A -> B'\) gives the weight of a connection"):
         network.run(2)["A1 -> O"]

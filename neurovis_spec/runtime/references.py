@@ -119,7 +119,11 @@ def _state(network: Network, part: Part, names: Names) -> StateOf:
 def _holders_of(network: Network, kind: Kind) -> tuple[Holder, ...]:
     """The states of all definitions of a kind, with those that have them."""
     return tuple(
-        Holder(holder.members, use.definition.name, tuple(one.name for one in use.definition.kept))
+        Holder(
+            holder.members,
+            use.definition.name,
+            tuple(one.name for one in use.definition.kept if not isinstance(one, Check)),
+        )
         for holder, use in network.uses
         if use.definition.kind == kind
     )
