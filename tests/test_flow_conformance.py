@@ -15,6 +15,8 @@ import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import SpecError
+from neurovis_spec.live.carry import carried
+from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.runtime import numpy_flows
 from neurovis_spec.runtime.columns import Keep
 from neurovis_spec.runtime.controls import Controls
@@ -104,6 +106,24 @@ def test_a_run_in_pieces_is_the_whole_one(
                 one.step()
             for found, expected in zip(arrays(one.state()).values(), arrays(kept).values(), strict=True):
                 np.testing.assert_array_equal(found, expected)
+
+
+@settings(max_examples=25, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(spec=flowing_specs(), cut=st.integers(0, STEPS - 1))
+def test_an_edit_of_nothing_changes_nothing(spec: Spec, cut: int) -> None:
+    """What flows, what is sent and what rules read of it go on in the edited network, bit for bit."""
+    network = compiled(spec)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        plain, edited = (SimulatedSource(Simulation(network, "numpy")) for _ in range(2))
+        for k in range(STEPS):
+            if k == cut:
+                edited = carried(edited, Simulation(network, "numpy"))
+            for one in (plain, edited):
+                one.advance()
+            seen, expected = edited.seen().snapshot, plain.seen().snapshot
+            np.testing.assert_array_equal(seen.activity, expected.activity)
+            np.testing.assert_array_equal(seen.weights, expected.weights)
 
 
 CHAIN = """

@@ -1,14 +1,15 @@
 """Carrying over: a run goes on in a network that was edited, at the same step, with what was learned.
 
 In: a state of the old network, what was turned in it, the new network. Out: a state of the new one at the same step.
-What has the same name keeps its activity, its weight where it learns, the states of its model and rule, and, with the
-same delay, the signals under way; what is new begins as at step 0. The same body goes on where it was. Parameters,
-clamps and lesions are what the events of the new spec and what was turned by hand make of them by this step.
+What has the same name keeps its activity, what else it sends, its weight where it learns, the states of its model and
+rule, and, with the same delay, the signals under way; what is new begins as at step 0. The same body goes on where it
+was. Parameters, clamps and lesions are what the events of the new spec and what was turned by hand make of them by this
+step.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -111,7 +112,7 @@ def _carry(was: Network, old: State, network: Network, state: State) -> None:
     state.continued, state.drawn = old.continued, old.drawn
     neurons = _shared(was.neurons.names, network.neurons.names)
     connections = _shared(was.connection_names, network.connection_names)
-    _carry_activity(old, state, neurons)
+    _carry_sent(old, state, _shared(_sent(was), _sent(network)))
     learn = was.connections.rules[connections[0]] >= 0
     learn &= network.connections.rules[connections[1]] >= 0
     state.weights[connections[1][learn]] = old.weights[connections[0][learn]]
@@ -119,7 +120,7 @@ def _carry(was: Network, old: State, network: Network, state: State) -> None:
     _carry_signals(was, old, network, state, connections)
 
 
-def _shared(old: Sequence[str], new: Sequence[str]) -> tuple[IntArray, IntArray]:
+def _shared(old: Sequence[Hashable], new: Sequence[Hashable]) -> tuple[IntArray, IntArray]:
     """The places of the names that both have, in the one and in the other."""
     places = {name: index for index, name in enumerate(old)}
     pairs = [(places[name], index) for index, name in enumerate(new) if name in places]
@@ -127,12 +128,22 @@ def _shared(old: Sequence[str], new: Sequence[str]) -> tuple[IntArray, IntArray]
     return both[:, 0], both[:, 1]
 
 
-def _carry_activity(old: State, state: State, neurons: tuple[IntArray, IntArray]) -> None:
-    state.activity[neurons[1]] = old.activity[neurons[0]]
+def _sent(network: Network) -> list[tuple[str, str]]:
+    """What is sent, in order: the activities of all neurons, and outlets, by the names of neurons and of outlets."""
+    names = network.neurons.names
+    members = ((network.populations[one.population].members.tolist(), one.name) for one in network.outlets)
+    return [*((name, "") for name in names), *((names[neuron], name) for own, name in members for neuron in own)]
+
+
+def _carry_sent(old: State, state: State, sent: tuple[IntArray, IntArray]) -> None:
+    """What is sent as it is now, and as it was, for rules."""
+    now = np.concatenate((state.activity, state.outlets))
+    now[sent[1]] = np.concatenate((old.activity, old.outlets))[sent[0]]
+    state.activity, state.outlets = now[: len(state.activity)], now[len(state.activity) :]
     depths = len(old.history), len(state.history)
     for ago in range(1, min(old.k, *depths) + 1):
         step = old.k - ago
-        state.history[step % depths[1], neurons[1]] = old.history[step % depths[0], neurons[0]]
+        state.history[step % depths[1], sent[1]] = old.history[step % depths[0], sent[0]]
 
 
 def _carry_states(
