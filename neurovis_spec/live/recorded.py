@@ -47,9 +47,7 @@ class RecordedSource:
         known = {name: column for column, name in enumerate(recording.state_names)}
         self._states = [known[name] for name in names] if names and known.keys() >= set(names) else None
         self._controls, self._state, self._applied = Controls(network), initial_state(network), 0
-        shown = ShownStates(network)
-        now = self._recording
-        self.history = Recorded(now, shown.put(now.activity, shown.recorded(now)) if shown else None)
+        self.history = Recorded(self._recording, ShownStates(network).recorded(self._recording))
 
     @property
     def step(self) -> int:

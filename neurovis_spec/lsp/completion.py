@@ -202,10 +202,9 @@ def _of_role(role: Role | None, scope: Scope, path: Path, front: str, index: Ind
             yield from _definitions(known(role.kind, index.all_items).values())
         case "setting" | "setting value":
             yield from _settings(role, scope, path, front, index, place)
-        case "state" if path[:2] == ("render", "show"):
-            yield from _states(scope, f"{path[-1]}.", index)
         case "state":
-            yield from _states_of(index, path[:-2])
+            shown = path[:2] == ("render", "show")
+            yield from _states(scope, f"{path[-1]}.", index) if shown else _states_of(index, path[:-2])
         case "port" | "sent":
             yield from _of_ends(role.use, scope, path, index)
         case "pattern":

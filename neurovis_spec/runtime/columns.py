@@ -119,7 +119,7 @@ def columns_of(network: Network, keep: Keep = ALL, body: Sensing | None = None) 
             of_output = list(singles(output.states))
             states.update(dict.fromkeys(of_output))
             outputs[output.name] = tuple(list(states).index(one) for one in of_output), output.scalar
-    shown = (StateOf(one.state, np.array(one.members, np.int64), _NONE) for one in network.render.show)
+    shown = (StateOf(one.state, one.indices, _NONE) for one in network.render.show)
     states.update(dict.fromkeys(singles(shown)))
     for reference in keep.states:
         states.update(dict.fromkeys(singles(find_states(network, reference, names))))

@@ -116,7 +116,8 @@ class Gathered:
         states, own = ShownStates(self.whole), ShownStates(self.network)
         if not self.any:
             found = reached(self.whole, recording)
-            return found.with_shown(own.neurons, states.recorded(recording)) if states else found
+            shown = recording.states[:, own.columns(recording)]
+            return found.with_shown(own.neurons, shown) if own else found
         changing, sources = self.network.changing, self.network.connections.sources.whole()
         fixed = self.total(_weights(recording, slice(0, 0)))
         parts = [self.total(_weights(recording, rows))[:, changing] for rows in _rows(recording)]
@@ -130,8 +131,7 @@ class Gathered:
         found = replace(found, signals=signals)
         if not own:
             return found
-        shown = states.put(recording.activity, states.recorded(recording))
-        return found.with_shown(own.neurons, self.mean(shown)[:, own.neurons])
+        return found.with_shown(own.neurons, self.mean(states.recorded(recording))[:, own.neurons])
 
 
 def _rows(recording: Recording) -> list[slice]:

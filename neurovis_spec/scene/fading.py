@@ -79,9 +79,13 @@ class Fading:
 def snapshots_of(network: Network, recording: Recording, steps: Iterable[int]) -> Iterator[Snapshot]:
     """The snapshots of ascending steps of a recording, with the states that are shown, and the traces of what was
     before. Raises RecordingError."""
-    fading, shown, done = Fading(network), ShownStates(network), 0
+    fading, states, done = Fading(network), ShownStates(network), 0
+    columns = states.columns(recording)
     for step in steps:
-        snapshot = shown.of_row(recording, recording.snapshot(step))
+        snapshot = recording.snapshot(step)
+        if states:
+            now = states.put(snapshot.activity, recording.states[recording.row(step), columns])
+            snapshot = replace(snapshot, shown=now)
         if fading:
             row = recording.row(step)
             done = max(done, int(np.searchsorted(recording.step, step - fading.reach)))

@@ -6,7 +6,7 @@ by neuron.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -20,7 +20,7 @@ from neurovis_spec.runtime.columns import Probe, probe_of
 from neurovis_spec.runtime.errors import RecordingError
 
 if TYPE_CHECKING:
-    from neurovis_spec.runtime.recording import Recording, Snapshot
+    from neurovis_spec.runtime.recording import Recording
     from neurovis_spec.runtime.simulation import Simulation
 
 _NONE: IntArray = np.zeros(0, np.int64)
@@ -43,7 +43,7 @@ class ShownStates:
     @cached_property
     def neurons(self) -> IntArray:
         """The neurons (k,) that show a state, in the order of its values."""
-        return np.array([index for one in self._settings for index in one.members], np.int64)
+        return np.concatenate([_NONE, *(one.indices for one in self._settings)])
 
     @cached_property
     def called(self) -> list[str]:
@@ -57,18 +57,24 @@ class ShownStates:
     @cached_property
     def probe(self) -> Probe:
         """What reads the values (k,) in a run."""
-        return probe_of(
-            self.network, (StateOf(one.state, np.array(one.members, np.int64), _NONE) for one in self._settings)
-        )
+        return probe_of(self.network, (StateOf(one.state, one.indices, _NONE) for one in self._settings))
 
-    def recorded(self, recording: Recording) -> FloatArray:
-        """The values of all rows (rows, k). Raises RecordingError where they were not recorded."""
-        columns = {name: column for column, name in enumerate(recording.state_names)}
-        for name in self.probe.names:
-            if name not in columns:
+    def columns(self, recording: Recording) -> IntArray:
+        """The columns of its states in which the values are (k,). Raises RecordingError where they were not
+        recorded."""
+        known = {name: column for column, name in enumerate(recording.state_names)}
+        names = self.probe.names if self else ()
+        for name in names:
+            if name not in known:
                 hint = f"record it (neurovis run --states '{name}')"
                 raise RecordingError(f"the recording does not hold the state '{name}', which the picture shows: {hint}")
-        return recording.states[:, [columns[name] for name in self.probe.names]]
+        return np.array([known[name] for name in names], np.int64)
+
+    def recorded(self, recording: Recording) -> FloatArray:
+        """What a picture tells of neurons at all rows (rows, n): activities, and the states in their place."""
+        if not self:
+            return recording.activity
+        return self.put(recording.activity, recording.states[:, self.columns(recording)])
 
     def put(self, values: FloatArray, shown: FloatArray) -> FloatArray:
         """Values of all neurons (…, n), with the states that are ``shown`` (…, k) in their place."""
@@ -80,10 +86,3 @@ class ShownStates:
         """``Snapshot.shown`` of the last step of a run."""
         now = run.probed(self.probe) if self else None
         return None if now is None else self.put(run.activity, now)
-
-    def of_row(self, recording: Recording, snapshot: Snapshot) -> Snapshot:
-        """The snapshot of a step of a recording, with what it shows."""
-        if not self:
-            return snapshot
-        now = self.recorded(recording)[recording.row(snapshot.step)]
-        return replace(snapshot, shown=self.put(snapshot.activity, now))

@@ -275,12 +275,11 @@ class Maker:
         bands = bands_of(groups), bands_of([group.partition(".")[0] for group in groups])
         rows, gains, states = self.shots.rows, self.gains, ShownStates(network)
         assert gains is not None
-        values = recording.activity[rows]
-        values = states.put(values, states.recorded(recording)[rows]) if states else values
+        values = states.recorded(recording)
         stateful[states.neurons] = False  # what is shown of these is no spike
 
         def activity(some: IntArray) -> FloatArray:
-            result: FloatArray = values[:, neurons[some]]
+            result: FloatArray = values[rows][:, neurons[some]]
             return result
 
         def colour(some: IntArray) -> FloatArray:

@@ -7,8 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal
 
+import numpy as np
+
+from neurovis_spec.arrays import IntArray
 from neurovis_spec.language.words import Direction
 
 
@@ -115,7 +119,7 @@ class StatedTrace:
     members: tuple[int, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ShownState:
     """A ``state``, or an output, whose value is the colour of the neurons ``members`` in place of their activity;
     ``name`` refers to them."""
@@ -123,6 +127,11 @@ class ShownState:
     state: str
     members: tuple[int, ...]
     name: str
+
+    @cached_property
+    def indices(self) -> IntArray:
+        """The members, as an array."""
+        return np.array(self.members, np.int64)
 
 
 @dataclass(frozen=True, slots=True)
