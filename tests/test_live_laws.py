@@ -80,6 +80,45 @@ connections:
   C -> left1.K: {pattern: all_to_all, weight: gain}
   right.O -> C: 0.5
 """
+FLOWS = """neurovis: 1
+name: flowing
+time: {dt: 10 ms, steps: 40, episode: 15, integrate: {method: exponential, substeps: 2}}
+parameters: {gain: 0.7, pull: {value: 60, unit: ms}}
+inputs: {push: {}, wave: {expression: sin(t) if t >= 0.05 else pull/100}}
+models:
+  rate:
+    time: ms
+    parameters: {tau: {value: 50, unit: ms}}
+    ports: [gate]
+    let: {leak: -v}
+    state:
+      v: {initial: 0.1, derivative: (leak + f(drive)*(1 - gate))/tau, noise: 0.02}
+      w: {derivative: (v - w)/(2*tau), each_step: "clip(w, -1, 1)", each_episode: w/2}
+    outputs: {both: v - w}
+    activity: f(v + drive)
+    send: both
+modules:
+  half:
+    parameters: {tau: {value: 50, unit: ms}}
+    neurons: {K: {count: 2, model: {rate: {tau: [tau, 2*tau]}}, activation: tanh}, O: {model: {rate: {tau: tau}}}}
+    connections: {K -> O: {weight: 0.8, port: {drive: 1, gate: 0.4}, plasticity: {oja: {rate: 0.1}}}}
+neurons:
+  A: {count: 2, model: rate, activation: tanh, bias: {gate: gain}, input: wave}
+  B: {input: push, activation: tanh}
+instances: {left: {module: half, set: {tau: pull}}, right: {module: half, count: 2, set: {tau: 1.5*pull}}}
+connections:
+  A -> left.K: {weight: gain, pattern: all_to_all, send: v}
+  left.O -> A: {weight: -gain, pattern: all_to_all, delay: 2}
+  right.O -> B: 0.4
+  B -> A: {weight: gain, port: gate}
+events:
+  - {from: 4, to: 12, clamp: {A1.v: gain}}
+  - {at: 9, set: {pull: 2*pull}}
+  - {at: 11, lesion: [left.O]}
+  - {at: 14, mend: [left.O]}
+outputs: {seen: A.w}
+render: {show: {A: both}}
+"""
 
 
 #: What can be turned: in order neurons, connections, rules, inputs, and parameters with the values that they are given.
@@ -122,10 +161,18 @@ _LEGS = (
     ["C", "left.K", "left1.K1", "right.O"], ["left.K -> left.O", "right.O -> C", "C -> left1.K"],
     ["left1.K -> left1.O"], (), ["gain"],
 )  # fmt: skip
+_FLOWING = (
+    ["A", "A2", "B", "left.K", "right2.O"],
+    ["A -> left.K", "left.K -> left.O", "B -> A", "left.O -> A"],
+    ["left.K -> left.O"],
+    ["push"],
+    ["gain", "pull"],
+)
 _CARTED = (["P", "A1", "O"], ["P -> O", "W -> O"], ["W -> O"], ["place", "arms"], ["gain", "much"])
 KINDS = {
     "plain": Kind(lambda: nv.compile_text(SPEC), *_PLAIN),
     "parts": Kind(lambda: nv.compile_text(PARTS), *_LEGS),
+    "flows": Kind(lambda: nv.compile_text(FLOWS), *_FLOWING),
     "body": Kind(lambda: carted(spec=_CART), *_CARTED),
     "whole body": Kind(lambda: carted("whole", spec=_CART), *_CARTED),
     "short body": Kind(lambda: carted("short", spec=_CART, each_episode=False), *_CARTED),
