@@ -197,7 +197,7 @@ class _Function(NamedTuple):
 
 def _write(network: Network, layout: SignalLayout) -> Written:
     emitter, tables = Emitter(), Tables("double", LONGEST)
-    small = len(network.neurons) + len(network.connections) <= SMALL
+    small = len(network.neurons) + len(network.connections) <= c_flows.written_out(network, SMALL)
     bodies: list[str] = []
     pointer_lines = _pointer_lines(network)
     watched = bool(network.projections) and not small
@@ -219,7 +219,14 @@ def _write(network: Network, layout: SignalLayout) -> Written:
     defined += [f"#define LOOK_NEURONS ({neurons})", f"#define LOOK_CONNECTIONS ({connections})"]
     defined += [f"#define WATCHED {int(watched)}", f"#define FUSED {int(fused)}"]
     used = words_of(bodies)
-    parts = [_HEAD, "\n".join(defined), emitter.helpers(used), tables.text(used), "\n".join(bodies)]
+    parts = [
+        _HEAD,
+        c_flows.declarations(network),
+        "\n".join(defined),
+        emitter.helpers(used),
+        tables.text(used),
+        "\n".join(bodies),
+    ]
     return Written(
         "\n\n".join(part for part in parts if part) + _TAIL, tuple(tables.passed_in), whole.count if fused else 0
     )

@@ -354,7 +354,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
         network, code, pointer_lines = self.network, self._code(), self._pointer_lines()
         left_out = self._left_out()
         form = Form(
-            written_out=len(network.neurons) + len(network.connections) <= SMALL,
+            written_out=len(network.neurons) + len(network.connections) <= c_flows.written_out(network, SMALL),
             first=self.takes_initial,
             held=self.holding,
             fixed=self.fixing,

@@ -6,8 +6,8 @@ are
     fx  the flow states at the beginning of a substep      fh  what is held at ports over the step
     fy  those of a stage                                   fo  what connections take at a stage
     fk  their derivatives there                            fv  the inputs and the noise of the step, inputs that are
-    fs  sums of derivatives, over stages                       expressions as they are at a stage
-    fg  what their noise is multiplied by
+    fj  how much these change with their own states            expressions as they are at a stage
+    fs  sums of derivatives, over stages                   fg  what their noise is multiplied by
 
 Of a leaky neuron with an input and Heun's method the text is
 
@@ -45,14 +45,14 @@ from neurovis_spec.compiler.flows import Jacobian, jacobian
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import SLOPE_F, Diffuse, Integrate, Port, Use
 from neurovis_spec.language.expressions.derivative import derivative
-from neurovis_spec.language.expressions.emit_c import Made, Value
+from neurovis_spec.language.expressions.emit_c import INEXACT, Made, Value
 from neurovis_spec.language.expressions.parser import formula
 from neurovis_spec.language.expressions.tree import Name
 from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.c_arrivals import Arrivals, incoming_of
 from neurovis_spec.runtime.c_code import Place, words_of
 from neurovis_spec.runtime.c_step import StepCode, write, write_input
-from neurovis_spec.runtime.stages import INSIDE, Formulas, Part, Taken, parts_of
+from neurovis_spec.runtime.stages import INSIDE, Formulas, Part, Taken, parts_of, unfolded
 
 #: Of a substep of the length 1, when the stages of a method are: just behind the beginning, in the middle, just before
 #: the end.
@@ -69,6 +69,8 @@ _CHANGES: Mapping[Method, str] = {
     "exponential": "(h*exprel(h*min(j, 0)))*f",
     "semi_implicit": "(h*f)/(1 - h*min(j, 0))",
 }
+#: Functions of two arguments.
+_OF_TWO = ("atan2", "pow")
 
 
 class _State(NamedTuple):
@@ -87,6 +89,14 @@ class _State(NamedTuple):
     def size(self) -> int:
         """How many numbers it is."""
         return len(self.part.population.members)
+
+    @property
+    def varies(self) -> bool:
+        """Whether more than parameters says how much its derivative changes with it."""
+        slopes, model = jacobian(self.use.definition), self.use.definition
+        let = (*model.let, *slopes.let)
+        read = unfolded(let, [slopes.diagonal[self.name]]).names
+        return not read <= {*self.use.parameters, *dict(let)}
 
 
 @dataclass(frozen=True)
@@ -158,6 +168,7 @@ class Plan:
             "fx": count,
             "fy": count if several else 0,
             "fk": count,
+            "fj": count if self.operation.method in _CHANGES else 0,
             "fs": count if several else 0,
             "fg": count if self.diffuses else 0,
             "fh": sum(len(self.network.populations[number].members) for number, _ in self.held),
@@ -184,6 +195,21 @@ def work_size(network: Network) -> int:
     """How many numbers ``work`` has."""
     plan = plan_of(network)
     return 0 if plan is None else plan.parts[""]
+
+
+def written_out(network: Network, most: int) -> int:
+    """Up to how many neurons and connections a network is written out one by one, if it is up to ``most`` where nothing
+    flows: derivatives take more lines for each, which have to stay in the processor's cache from stage to stage."""
+    return most if plan_of(network) is None else most // 6
+
+
+def declarations(network: Network) -> str:
+    """Where slopes of formulas are made, in which the functions of these come again: that a function gives the same for
+    the same, so that a compiler calls it once."""
+    plan = plan_of(network)
+    if plan is None or plan.operation.method not in _CHANGES:
+        return ""
+    return "\n".join(f"double {name}(double) __attribute__((__const__));" for name in INEXACT if name not in _OF_TWO)
 
 
 def pointer_lines(network: Network, real: str, quick: str, work: str) -> dict[str, str]:
@@ -214,6 +240,7 @@ class _Integration:
         self.method, self.substeps = plan.operation.method, plan.operation.substeps
         #: the flow states of a stage
         self.now = "fy" if "fy" in plan.parts else "fx"
+        self.varying = {(one.part.number, one.name): one.varies for one in plan.states}
 
     def write(self) -> None:
         """All of it."""
@@ -305,8 +332,10 @@ class _Integration:
         if len(stages) == 1:
             with code.block(""):
                 self.stage(times[0], "sub == 0")
-                changed = "fx[i] = fx[i] + fk[i];"
-                self.states(lambda own: [changed if self.method in _CHANGES else f"fx[i] = fx[i] + {own}*fk[i];"])
+                if self.method in _CHANGES:
+                    self.changes(_CHANGES[self.method])
+                else:
+                    self.states(lambda own: [f"fx[i] = fx[i] + {own}*fk[i];"])
             return
         code.line(f"memcpy(fy, fx, {sum(one.size for one in self.plan.states)}*sizeof(fx[0]));")
         with code.block(code.loop("stage", len(stages))):
@@ -326,6 +355,16 @@ class _Integration:
         if when == _BEGIN:
             return f"since + {inside}"
         return f"since + {code.text(h / 2.0)}" if when == _MIDDLE else f"since + {code.text(h)} - {inside}"
+
+    def changes(self, formula_: str) -> None:
+        """x + the change; of all neurons state by state, since a branch within exprel then goes the same way in all."""
+        for one in self.plan.states:
+            with self.code.block(self.code.loop("i", one.start + one.size, one.start)):
+                change: Value = "fk[i]"
+                if one.varies:
+                    h = self.length(one.use.definition.per_second)
+                    change = self.code.value(formula(formula_), {"h": h, "f": "fk[i]", "j": "fj[i]"})
+                self.code.line(f"fx[i] = fx[i] + {self.code.text(change)};")
 
     def heun(self) -> None:
         """x + h/2·(f₁ + f₂)."""
@@ -453,15 +492,17 @@ class _Integration:
                 functions = {**functions, **self.step.activation(part.population, place, own)}
             known = self.step.let(slopes.let, known, [*slopes.diagonal.values()], functions)
         for name, tree in part.derivatives.trees:
-            slope = code.value(tree, known, functions)
+            slope, at = code.value(tree, known, functions), _plus(self.plan.starts[part.number, name], place)
             if changes is not None:
                 own_slope = code.value(slopes.diagonal[name], known, functions)
-                h = self.length(made.per_second)
-                parts: dict[str, Value] = {"h": h, "f": code.let("n", slope), "j": code.let("n", own_slope)}
-                slope = code.value(formula(changes), parts)
+                if self.varying[part.number, name]:
+                    code.line(f"fj[{at}] = {code.text(own_slope)};")
+                else:
+                    parts = {"h": self.length(made.per_second), "f": code.let("n", slope), "j": own_slope}
+                    slope = code.value(formula(changes), parts)
             if held := self.step.held(part.number, name, place):
                 slope = f"held[{held}] ? {code.text(0.0)} : {code.text(slope)}"
-            code.line(f"fk[{_plus(self.plan.starts[part.number, name], place)}] = {code.text(slope)};")
+            code.line(f"fk[{at}] = {code.text(slope)};")
 
     def spread(self, part: Part, place: Place, known: Mapping[str, Value], functions: Mapping[str, Made]) -> None:
         """What the noise of the states of a neuron is multiplied by."""
