@@ -104,8 +104,9 @@ def exprel(x: float) -> float:
     return float(np.expm1(x)) / x if x else 1.0
 
 
-def squid(v: float, m: float, h: float, n: float, current: float) -> tuple[FloatArray, FloatArray]:
+def squid(x: FloatArray, current: float) -> tuple[FloatArray, FloatArray]:
     """The derivatives of Hodgkin and Huxley's cell, and how much each changes with its own state."""
+    v, m, h, n = x
     am, bm = 1 / exprel(-(v + 40) / 10), 4 * np.exp(-(v + 65) / 18)
     ah, bh = 0.07 * np.exp(-(v + 65) / 20), 1 / (1 + np.exp(-(v + 35) / 10))
     an, bn = 0.1 / exprel(-(v + 55) / 10), 0.125 * np.exp(-(v + 65) / 80)
@@ -120,7 +121,7 @@ def test_hodgkin_and_huxleys_cell_is_what_a_loop_by_hand_makes(method: str, boun
     x, steps, dt = np.array([-65, 0.0529, 0.5961, 0.3177]), 1500, 0.01
     expected = [x[0]]
     for k in range(steps):
-        f, j = squid(*x, 10.0 if k >= 500 else 0.0)
+        f, j = squid(x, 10.0 if k >= 500 else 0.0)
         if method == "exponential":
             change = dt * np.array([exprel(dt * min(one, 0.0)) for one in j]) * f
         else:
