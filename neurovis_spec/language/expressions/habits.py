@@ -31,7 +31,7 @@ _WITH_UNIT: Final = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-
 #: Keys that take a time with its unit, those in steps alone, and those that are no times.
 _TIMED: Final = frozenset({"dt", "delay", "at", "from", "to"})
 _IN_STEPS: Final = frozenset({"steps"})
-_NOSECONDS: Final = frozenset({"bias", "initial", "weight"})
+_NO_TIMES: Final = frozenset({"bias", "initial", "weight"})
 #: Units that are no likely names.
 UNITS: Final = frozenset({*SECONDS, *_DEGREES, *_PLAIN})
 
@@ -92,7 +92,7 @@ def unit_hint(number: str, unit: str, key: str | None = None) -> str | None:
             return f"a blank stands before a unit: write {number} {unit}"
         if key in _IN_STEPS:
             return f"'{key}' counts steps: write {seconds}/dt"
-        if key in _NOSECONDS:
+        if key in _NO_TIMES:
             return f"numbers have no units: write {number}"
         return f"numbers have no units: write {seconds} where seconds are wanted, {seconds}/dt where steps are"
     if unit in _DEGREES:
