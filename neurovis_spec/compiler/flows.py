@@ -13,10 +13,15 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-from neurovis_spec.compiler.program import DRIVE, SLOPE_F, Definition, Quantity
+from neurovis_spec.compiler.program import SLOPE_F, Definition, Quantity, ports_of
 from neurovis_spec.language.expressions.derivative import derivative, slope
 from neurovis_spec.language.expressions.tree import Name, Number, Tree, names
 from neurovis_spec.language.words import Method
+
+#: The methods that look at how much a derivative changes with its own state.
+BY_SLOPE: Final[frozenset[Method]] = frozenset(("exponential", "semi_implicit"))
+#: By what a model may call, what is called for its derivative.
+_SLOPES: Final = {"f": SLOPE_F}
 
 
 def reads(definition: Definition, trees: Iterable[Tree | None]) -> frozenset[str]:
@@ -44,7 +49,7 @@ class PortsRead(NamedTuple):
 
 def ports_read_by(definition: Definition) -> PortsRead:
     """Which formulas of a model read which of its ports, ``drive`` among them."""
-    ports = frozenset((DRIVE, *(port.name for port in definition.ports)))
+    ports = frozenset(ports_of(definition))
     flow = reads(definition, (tree for one in definition.flows for tree in (one.derivative, one.noise)))
     stepped = (tree for one in definition.state for tree in (one.each_step, one.each_episode))
     outputs = {one.name: reads(definition, [one.each_step]) & ports for one in definition.gives}
@@ -61,7 +66,7 @@ def flows_by(definition: Definition, sent: str) -> frozenset[str] | None:
         return frozenset() if sent in flowing else None
     read = reads(definition, [one.each_step for one in definition.gives if one.name == sent])
     held = {one.name for one in definition.state} - flowing
-    return None if "k" in read or read & held else read & {DRIVE, *(port.name for port in definition.ports)}
+    return None if "k" in read or read & held else read.intersection(ports_of(definition))
 
 
 def plain_flow(definition: Definition, sent: str = "") -> bool:
@@ -98,11 +103,6 @@ def jacobian(definition: Definition) -> Jacobian:
         diagonal[state.name] = slope(state.derivative, slopes, _SLOPES)
         let += _needed(own, diagonal[state.name])
     return Jacobian(tuple(let), diagonal)
-
-
-_SLOPES = {"f": SLOPE_F}
-#: The methods that look at how much a derivative changes with its own state.
-BY_SLOPE: Final[frozenset[Method]] = frozenset(("exponential", "semi_implicit"))
 
 
 def _needed(let: list[tuple[str, Tree]], by: Tree) -> list[tuple[str, Tree]]:
