@@ -133,6 +133,7 @@ def _shown(network: Network) -> frozenset[str]:
     """The names of states that somebody outside their model asks for: a connection, an output, a picture."""
     found = {route.sends for route in network.connections.routes}
     found |= {state.state for output in network.outputs for state in output.states}
+    found |= {one.state for one in network.render.show}
     return frozenset(found.union(curve.state for panel in network.render.figure for curve in panel.shown or ()))
 
 
