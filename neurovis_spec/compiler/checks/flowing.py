@@ -17,7 +17,7 @@ from neurovis_spec.arrays import BoolArray, FloatArray, integers
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.connections.connect import Connected
 from neurovis_spec.compiler.flows import jacobian, ports_read_by, with_slope
-from neurovis_spec.compiler.levels import Wired, flowing, held_at
+from neurovis_spec.compiler.levels import Cycle, Wired, flowing, held_at, order_of
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.initial_states import initial_states
 from neurovis_spec.compiler.program import Integrate, Population
@@ -66,7 +66,13 @@ def _held_couplings(compiled: Compiled, method: Method, findings: Findings) -> N
     held = held_at(network.neurons, network.inputs, network.noises)
     would = (delays == 1) & flowing(census.models.different, census.models.of, wired, held)
     would &= _varying(network, wired)[wired.sources.compact()] & _to_derivatives(compiled, wired)
+    if not would.any():
+        return
     entry, told = wired.entry.compact(), set[Span]()
+    mended = replace(wired, delays=integers(np.where(would, 0, delays)))
+    hint = "write delay: 0"
+    if isinstance(order_of(census.models.different, census.models.of, mended, held), Cycle):
+        hint += ", but not all around a loop whose neurons send what reads a port"
     for number in np.unique(entry[would]).tolist():
         bundle = compiled.bundles[number]
         body = compiled.entries[bundle.key].body
@@ -80,7 +86,7 @@ def _held_couplings(compiled: Compiled, method: Method, findings: Findings) -> N
         if body.delay is None:
             reason = "sends what reads a port" if model.flows else "has no derivative"
             message += f". That is the default, since the model '{model.name}' of its source {reason}"
-        findings.warning("held-coupling", span, message, "write delay: 0")
+        findings.warning("held-coupling", span, message, hint)
 
 
 def _to_derivatives(compiled: Compiled, wired: Wired) -> BoolArray:
