@@ -295,3 +295,14 @@ outputs: {{oa: A.o, ob: B.o, qa: A.q, qb: B.q, da: A.d, db: B.d}}
         assert np.asarray(found[other]).ravel() == pytest.approx(1000 * np.asarray(found[name]).ravel(), rel=1e-12)
     assert np.asarray(found["oa"]).ravel() == pytest.approx([0, 0.002, 0.004, 0.006])
     assert np.asarray(found["A"]).ravel() == pytest.approx([0.002, 0.004, 0.006, 0.008])
+
+
+def test_a_delay_that_an_edge_writes_is_no_default() -> None:
+    neurons = "neurons: {A: {model: leaky, bias: 1}, B: {model: leaky}}"
+    written, default = (
+        nv.compile_text(f"{HEAD}{neurons}\nconnections: {{A -> B: {body}}}").warnings
+        for body in ("{edges: [[A, B, 1, 1]]}", "{edges: [[A, B, 1]]}")
+    )
+    assert [one.code for one in written] == ["held-coupling"]
+    assert "default" not in written[0].message
+    assert default == ()

@@ -80,10 +80,11 @@ def _held_couplings(compiled: Compiled, method: Method, findings: Findings) -> N
         if span in told:
             continue
         told.add(span)
-        source = int(wired.sources.compact()[np.flatnonzero(would & (entry == number))[0]])
-        model = census.models.different[census.models.of[source]]
+        first = np.flatnonzero(would & (entry == number))[0]
+        start, end = (int(census.models.of[ends.compact()[first]]) for ends in (wired.sources, wired.targets))
         message = f"'{bundle.name}' has a delay of one step, over which {method} holds its signal: its order is 1 then"
-        if body.delay is None:
+        if body.delay is None and census.models.delay(start, end, bundle.route) == 1:
+            model = census.models.different[start]
             reason = "sends what reads a port" if model.flows else "has no derivative"
             message += f". That is the default, since the model '{model.name}' of its source {reason}"
         findings.warning("held-coupling", span, message, hint)
