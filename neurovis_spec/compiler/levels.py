@@ -130,9 +130,10 @@ class _Undelayed(NamedTuple):
     targets: Indices
 
 
-def flowing(models: Sequence[Definition], model: Indices, wired: Wired, held: Mapping[str, BoolArray]) -> BoolArray:
-    """For each connection whether what it brings flows; the arguments are those of ``order_of``."""
-    return _Coupled(models, model, wired, held).flowing
+def made_anew(models: Sequence[Definition], model: Indices, wired: Wired, held: Mapping[str, BoolArray]) -> BoolArray:
+    """For each connection whether what it brings is made anew at each stage. The arguments are those of
+    ``order_of``."""
+    return _Coupled(models, model, wired, held).making
 
 
 def held_at(neurons: Neurons, inputs: Sequence[Input], noises: Sequence[Noise]) -> Mapping[str, BoolArray]:

@@ -16,11 +16,11 @@ import numpy as np
 from neurovis_spec.arrays import BoolArray, FloatArray, integers
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.connections.connect import Connected
-from neurovis_spec.compiler.flows import jacobian, ports_read_by, with_slope
-from neurovis_spec.compiler.levels import Cycle, Wired, flowing, held_at, order_of
+from neurovis_spec.compiler.flows import jacobian, plain_flow, ports_read_by, with_slope
+from neurovis_spec.compiler.levels import Cycle, Wired, held_at, made_anew, order_of
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.initial_states import initial_states
-from neurovis_spec.compiler.program import Integrate, Population
+from neurovis_spec.compiler.program import Definition, Integrate, Population
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
@@ -56,7 +56,8 @@ def _nothing_flows(compiled: Compiled, findings: Findings) -> None:
 
 
 def _held_couplings(compiled: Compiled, method: Method, findings: Findings) -> None:
-    """Connections of delay 1 that bring to a derivative what would flow with delay 0."""
+    """Connections of delay 1 that bring to a derivative, by themselves or through neurons without one, what would flow
+    with delay 0."""
     network, census = compiled.network, compiled.census
     connected = Connected(compiled.bundles, complete=True)
     delays = connected.delays.whole()
@@ -64,8 +65,8 @@ def _held_couplings(compiled: Compiled, method: Method, findings: Findings) -> N
         return
     wired = replace(connected.wired, delays=integers(np.where(delays == 1, 0, delays)))
     held = held_at(network.neurons, network.inputs, network.noises)
-    would = (delays == 1) & flowing(census.models.different, census.models.of, wired, held)
-    would &= _varying(network, wired)[wired.sources.compact()] & _to_derivatives(compiled, wired)
+    would = (delays == 1) & made_anew(census.models.different, census.models.of, wired, held)
+    would &= _varying(network, wired)[wired.sources.compact()]
     if not would.any():
         return
     entry, told = wired.entry.compact(), set[Span]()
@@ -84,22 +85,18 @@ def _held_couplings(compiled: Compiled, method: Method, findings: Findings) -> N
         start, end = (int(census.models.of[ends.compact()[first]]) for ends in (wired.sources, wired.targets))
         message = f"'{bundle.name}' has a delay of one step, over which {method} holds its signal: its order is 1 then"
         if body.delay is None and census.models.delay(start, end, bundle.route) == 1:
-            model = census.models.different[start]
-            reason = "sends what reads a port" if model.flows else "has no derivative"
-            message += f". That is the default, since the model '{model.name}' of its source {reason}"
+            source, target = (census.models.different[model] for model in (start, end))
+            message += f". That is the default, since {_why_held(source, bundle.route.sends, target)}"
         findings.warning("held-coupling", span, message, hint)
 
 
-def _to_derivatives(compiled: Compiled, wired: Wired) -> BoolArray:
-    """For each connection whether a derivative reads what it brings."""
-    models, targets = compiled.census.models, wired.targets.compact()
-    read = [ports_read_by(one).flow for one in models.different]
-    result = np.zeros(len(targets), dtype=np.bool_)
-    for port, line in wired.lines.items():
-        there = np.array([port in ports for ports in read], dtype=np.bool_)[models.of][targets]
-        arriving = slice(None) if line.connections is None else line.connections
-        result[arriving] |= there[arriving]
-    return result
+def _why_held(source: Definition, sends: str, target: Definition) -> str:
+    """Why a connection has a delay of one step by default."""
+    if not source.flows:
+        return f"the model '{source.name}' of its source has no derivative"
+    if plain_flow(source, sends):
+        return f"no derivative of the model '{target.name}' of its target reads it"
+    return f"the model '{source.name}' of its source sends what reads a port"
 
 
 def _varying(network: Network, wired: Wired) -> BoolArray:
