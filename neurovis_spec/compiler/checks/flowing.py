@@ -7,7 +7,7 @@ could be made anew at each stage, at noise that is held, and at a step that is t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -19,12 +19,11 @@ from neurovis_spec.compiler.connections.connect import Connected
 from neurovis_spec.compiler.flows import jacobian, plain_flow, ports_read_by, with_slope
 from neurovis_spec.compiler.levels import Cycle, Wired, held_at, made_anew, order_of
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.neurons.initial_states import initial_states
+from neurovis_spec.compiler.neurons.initial_states import beginning
 from neurovis_spec.compiler.program import Definition, Integrate, Population
 from neurovis_spec.diagnostics import Findings, Span
-from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
-from neurovis_spec.language.expressions.functions import CONSTANTS
-from neurovis_spec.language.expressions.tree import ExpressionError, Tree
+from neurovis_spec.language.expressions.evaluate import Value
+from neurovis_spec.language.expressions.tree import ExpressionError
 from neurovis_spec.language.units import TIMES, measured
 from neurovis_spec.language.words import Method
 
@@ -167,21 +166,17 @@ def _slopes(network: Network) -> Iterator[_Stiffest]:
             slopes, activation = jacobian(model), with_slope(population.activation.definition)
         except ExpressionError:
             continue  # it is too long to be told anything of
-        unit = model.per_second
-        values: dict[str, Value] = {**CONSTANTS, "dt": network.dt * unit, "t": 0.0, "k": 0.0}
-        values |= population.model.parameters
-        values |= {port.name: _resting(network, population, port.name) for port in population.ports}
-        values |= initial_states(population.model, population.members, network.dt, network.neurons.starts)
-        known: dict[str, Value] = {**CONSTANTS, "dt": network.dt, **population.activation.parameters}
-        functions = {name: _function(tree, known) for name, tree in activation.functions.items()}
-        for name, tree in (*model.let, *slopes.let):
-            values[name] = evaluate_array(tree, values, functions=functions)
+        ports: dict[str, Value] = {port.name: _resting(network, population, port.name) for port in population.ports}
+        sloped = replace(population, activation=replace(population.activation, definition=activation))
+        begin = beginning(sloped, network.dt, network.neurons.starts, ports)
+        for name, tree in slopes.let:
+            begin.values[name] = begin.of(tree)
         for state, tree in slopes.diagonal.items():
-            found = np.broadcast_to(evaluate_array(tree, values, functions=functions), population.members.shape)
+            found = np.broadcast_to(begin.of(tree), population.members.shape)
             if np.isfinite(found).any():
                 place = int(np.nanargmin(np.where(np.isfinite(found), found, np.nan)))
                 neuron = network.neurons.names[population.members[place]]
-                yield _Stiffest(neuron, state, float(found[place]) * unit)
+                yield _Stiffest(neuron, state, float(found[place]) * model.per_second)
 
 
 def _resting(network: Network, population: Population, port: str) -> FloatArray:
@@ -190,11 +185,6 @@ def _resting(network: Network, population: Population, port: str) -> FloatArray:
     bias = neurons.port_bias.get(port, neurons.bias if port == population.drive.name else np.zeros(len(neurons)))
     combined = next(one.combine for one in population.ports if one.name == port)
     return np.asarray(bias[population.members] + (1.0 if combined == "product" else 0.0), dtype=np.float64)
-
-
-def _function(tree: Tree, known: Mapping[str, Value]) -> Callable[..., Value]:
-    """A function of an activation."""
-    return lambda x: evaluate_array(tree, {**known, "x": x})
 
 
 def _shown(seconds: float, written: str) -> str:

@@ -9,7 +9,7 @@ without a single connection is a sketch: of its neurons only those are reported 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -20,12 +20,10 @@ from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.events.settable import bias_of
 from neurovis_spec.compiler.names.references import key_span
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.neurons.initial_states import initial_states
+from neurovis_spec.compiler.neurons.initial_states import beginning
 from neurovis_spec.compiler.program import DRIVE, Definition, Population, is_activation
 from neurovis_spec.diagnostics import Findings, Span
-from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
-from neurovis_spec.language.expressions.functions import CONSTANTS
-from neurovis_spec.language.expressions.tree import Tree, walk
+from neurovis_spec.language.expressions.tree import walk
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 
@@ -264,31 +262,17 @@ def _stays_at_zero(population: Population, network: Network) -> Mask:
     if any(port.combine == "product" for port in population.ports) or not model.read.isdisjoint(("k", "t")):
         return np.zeros(count, dtype=np.bool_)
     result = np.ones(count, dtype=np.bool_)
-    dt = network.dt * model.per_second
-    values: dict[str, Value] = {**CONSTANTS, "dt": dt, **population.model.parameters}
-    values |= dict.fromkeys((port.name for port in population.ports), 0.0)
-    states = initial_states(population.model, population.members, network.dt, network.neurons.starts)
-    values |= states
-    functions = _functions(population, {**CONSTANTS, "dt": network.dt, **population.activation.parameters})
-    for name, tree in model.let:
-        values[name] = evaluate_array(tree, values, functions=functions)
+    begin = beginning(
+        population, network.dt, network.neurons.starts, dict.fromkeys((port.name for port in population.ports), 0.0)
+    )
     for state in model.state:
-        old = states[state.name]
+        old = begin.values[state.name]
         for change, still in ((state.each_step, old), (state.each_episode, old), (state.derivative, 0.0)):
             if change is not None:
-                result &= np.broadcast_to(evaluate_array(change, values, functions=functions) == still, (count,))
+                result &= np.broadcast_to(begin.of(change) == still, (count,))
         if network.outlets:  # it may be sent
-            result &= states[state.name] == 0
+            result &= old == 0
     for given in model.gives:
         assert given.each_step is not None
-        result &= np.broadcast_to(evaluate_array(given.each_step, values, functions=functions) == 0, (count,))
+        result &= np.broadcast_to(begin.of(given.each_step) == 0, (count,))
     return result
-
-
-def _functions(population: Population, known: Mapping[str, Value]) -> Mapping[str, Callable[..., Value]]:
-    """What formulas of the model may call: the neurons' activation."""
-
-    def of(tree: Tree) -> Callable[..., Value]:
-        return lambda x: evaluate_array(tree, {**known, "x": x})
-
-    return {name: of(tree) for name, tree in population.activation.definition.functions.items()}
