@@ -87,7 +87,7 @@ class StateModel(Model):
     def _foreign(cls, name: str) -> tuple[str, str] | None:
         if name == "derivative":
             return "rules have no 'derivative' yet, models have", "write each_step: x + dt*(…), x being the state"
-        return not_yet(name, "on_pre", "on_post")
+        return not_yet(name, "on_pre", "on_post", "unit")
 
 
 class NeuronStateModel(StateModel):
@@ -256,6 +256,10 @@ class RuleModel(DefinitionModel):
         """What it says."""
         weight = self.weight
         return Parts(self.parameters, self.let, weight.each_step, weight.each_episode, self.state, self.signals)
+
+    @classmethod
+    def _foreign(cls, name: str) -> tuple[str, str] | None:
+        return not_yet(name, "time")
 
     @classmethod
     def _without(cls, name: str, data: Mapping) -> str:
