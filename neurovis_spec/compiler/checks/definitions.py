@@ -41,7 +41,7 @@ _RESULT_NOUN: AnyMapping[Kind, str] = {ACTIVATION: "the value", MODEL: "the acti
 _NOUNS = {"let": "intermediate value", "signals": "signal", "parameters": "parameter", "ports": "port"}
 
 
-# Parts that nothing reads, and weights that are replaced
+# Parts that nothing reads
 
 
 def check_formulas(compiled: Compiled, findings: Findings) -> None:
@@ -198,6 +198,9 @@ def _place_of(state: str, group: Built, libraries: Iterable[Library]) -> Span:
     if derivative is not None:
         return derivative.span
     return group.model.source.span if choice is None else choice.name.span
+
+
+# Weights that are replaced where a change is meant
 
 
 def _check_replaced(model: DefinitionModel, rule: Defined, findings: Findings) -> None:
