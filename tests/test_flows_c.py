@@ -57,6 +57,28 @@ def same_bits(network: nv.CompiledNetwork, steps: int) -> None:
         np.testing.assert_array_equal(getattr(made[1], part), getattr(made[0], part), part)
 
 
+DISTANCES = """
+neurovis: 1
+name: distances
+time: {dt: 0.01}
+models:
+  near: {ports: {far: distance}, state: {v: {initial: 0.1, derivative: far - v}}, activity: v}
+  free: {state: {v: {initial: 0.5, derivative: 1 - v}}, activity: v}
+neurons: {S: {bias: 0.7}, F: {model: free}, T: {count: 2, model: near}}
+connections:
+  S -> T: {pattern: all_to_all, weight: 0.5, delay: 1, port: far}
+  F -> T1: {weight: 0.5, port: far}
+"""
+
+
+@FORMS
+def test_a_distance_is_one_where_only_some_neurons_are_given_what_flows(
+    small: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(c_backend, "SMALL", small)
+    same_bits(nv.compile_text(DISTANCES), 5)
+
+
 @FORMS
 @settings(max_examples=12, deadline=None, phases=(Phase.explicit, Phase.generate))
 @given(spec=flowing_specs())

@@ -273,7 +273,9 @@ class Arrivals:
             return self._finished(self.code.text(start)) if self._begins is not None else start
         if isinstance(place, int):
             edges: list[Place] = list(range(int(self.ends[place]), int(self.ends[place + 1])))
-            return self._terms(start, edges, [slice(None)] * len(edges)) if edges else start
+            if not edges:
+                return start if isinstance(start, float) else self._finished(start)
+            return self._terms(start, edges, [slice(None)] * len(edges))
         assert 0 <= self.degree <= _FEW, "others go on in lanes"
         columns = [slice(column, None, self.degree) for column in range(self.degree)]
         return self._terms(start, [place] * self.degree, columns)
