@@ -193,3 +193,17 @@ def test_a_full_matrix_adds_up_in_the_same_order(plastic: str, growth: str, monk
     assert runs[0].states.tobytes() == runs[1].states.tobytes()
     assert runs[0].weights.tobytes() == runs[1].weights.tobytes()
     assert np.isinf(runs[0].states).any() == ("300" in growth)
+
+
+def test_a_matrix_that_only_noise_reads_has_the_weights_of_the_step() -> None:
+    network = nv.compile_text("""
+neurovis: 1
+name: noisy
+time: {dt: 0.05, integrate: euler}
+models: {m: {ports: [p], state: {v: {initial: 0.3, derivative: -v, noise: p}}, activity: v}}
+neurons: {A: {count: 65, model: m}}
+connections: {A -> A: {weight: 0.1, pattern: all_to_all, port: p, plasticity: oja}}
+""").network
+    runs = [record(network, Course(4, backend=backend)).activity for backend in ("reference", "numpy")]
+    assert np.ptp(runs[0][-1]) > 0
+    np.testing.assert_allclose(runs[1], runs[0], rtol=1e-12)

@@ -146,10 +146,9 @@ class _Flow:
                     self.hold(part, port)
             with code.function(stage, "t"):
                 _Stage(self).emit()
-            for line in self.filled:
+            spread = self.emit_spread(f"t + {times(0.0, h).first!r}")
+            for line in (*self.filled, f"t = (k - 1) * {self.network.dt!r}", *spread):
                 code.line(line)
-            code.line(f"t = (k - 1) * {self.network.dt!r}")
-            self.emit_spread(f"t + {times(0.0, h).first!r}")
             if substeps > 1:
                 code.line("start = t")
                 code.line(f"for substep in range({substeps}):")
@@ -174,19 +173,20 @@ class _Flow:
         self.code.line(f"    held, values = held_among(fixed, {self.code.constant(starts)})")
         self.code.line(f"    {self.x}[held] = values")
 
-    def emit_spread(self, t: str) -> None:
-        """What the noise of the flow states is multiplied by, at the first stage."""
+    def emit_spread(self, t: str) -> tuple[str, ...]:
+        """The function of what the noise of the flow states is multiplied by; gives the lines that call it at the first
+        stage."""
         keys = [(part.number, name) for part in self.parts for name, _ in part.spread.trees]
         if not keys:
-            return
+            return ()
         function = self.code.name("spread")
         with self.code.function(function, "t"):
             stage = _Stage(self)
             values = [value for part in self.parts for value in stage.values(part, part.spread).values()]
             self.code.line(f"return {', '.join(values)},")
         self.step.spread.update((key, self.code.name("g")) for key in keys)
-        self.code.line(f"{self.y}[:] = {self.x}")
-        self.code.line(f"{', '.join(self.step.spread[key] for key in keys)}, = {function}({t})")
+        made = ", ".join(self.step.spread[key] for key in keys)
+        return f"{self.y}[:] = {self.x}", f"{made}, = {function}({t})"
 
     def hold(self, part: Part, port: Port) -> None:
         """What of a port is made before the stages."""
