@@ -346,6 +346,13 @@ def test_a_neuron_without_anything_is_0_and_an_input_reaches_only_its_own(backen
     assert run(build(units, inputs=[two]), 1, backend).activity.tolist() == [[0, 2, 11, 2]]
 
 
+@pytest.mark.parametrize("backend", BOTH)
+def test_an_input_reaches_its_own_where_one_parameter_is_the_bias_of_all(backend: str) -> None:
+    text = "neurovis: 1\nname: x\nparameters: {b: 0.5}\ninputs: {one: {expression: '1'}}\n"
+    network = compile_text(text + "neurons: {A: {count: 2, bias: b, input: one}, B: {bias: b}}").network
+    assert run(network, 1, backend).activity.tolist() == [[1.5, 1.5, 0.5]]
+
+
 def test_names_of_the_author_never_reach_the_code() -> None:
     evil = model("f(v) + __import__", {"v": ("0", "v + lambda_", None)}, ["lambda_", "__import__"])
     twice, values = activation("x * exec", exec=2.0), {"lambda_": 1.5, "__import__": 0.25}

@@ -59,7 +59,9 @@ def with_bias(step: Step, population: Population, port: Port, arriving: str) -> 
     # a sum that begins with 0.0 is never −0.0, so adding 0.0 changes nothing; a product may be
     if arriving and not (code.is_set(key) or any_given(bias) or port.combine == "product"):
         return arriving
-    return code.let("u", f"{arriving or nothing} + {code.numbers(key, biases, population.members, share=False)}")
+    # a bias that can be set may be one number for all members: each has its own from here on
+    arriving = arriving or code.constant(np.full(len(population.members), nothing))
+    return code.let("u", f"{arriving} + {code.numbers(key, biases, population.members, share=False)}")
 
 
 def with_step_values(step: Step, population: Population, port: Port, drive: str, vector: str = "s") -> str:
