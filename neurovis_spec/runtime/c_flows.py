@@ -41,10 +41,8 @@ from typing import NamedTuple
 import numpy as np
 
 from neurovis_spec.arrays import Indices, IntArray
-from neurovis_spec.compiler.flows import Jacobian, jacobian
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import SLOPE_F, Diffuse, Integrate, Port, Use
-from neurovis_spec.language.expressions.derivative import derivative
+from neurovis_spec.compiler.program import Diffuse, Integrate, Port, Use
 from neurovis_spec.language.expressions.emit_c import INEXACT, Made, Value
 from neurovis_spec.language.expressions.parser import formula
 from neurovis_spec.language.expressions.tree import Name
@@ -483,22 +481,18 @@ class _Integration:
     def slope(self, part: Part, place: Place, known: Mapping[str, Value], functions: Mapping[str, Made]) -> None:
         """The derivatives of the states of a neuron, or what these change by."""
         code, changes = self.code, _CHANGES.get(self.method)
-        made, activation = part.population.model.definition, part.population.activation.definition
-        slopes = Jacobian((), {}) if changes is None else jacobian(made)
-        if changes is not None:
-            value = activation.given.each_step if made.reads_activation else None
-            if SLOPE_F not in functions and value is not None:
-                own = {SLOPE_F: derivative(value, "x")}
-                functions = {**functions, **self.step.activation(part.population, place, own)}
-            known = self.step.let(slopes.let, known, [*slopes.diagonal.values()], functions)
+        made = part.population.model.definition
+        diagonal = dict(part.slopes.trees)
+        more = tuple((name, tree) for name, tree in part.slopes.let if name not in known)
+        known = self.step.let(more, known, [*diagonal.values()], functions)
         for name, tree in part.derivatives.trees:
             slope, at = code.value(tree, known, functions), _plus(self.plan.starts[part.number, name], place)
             if changes is not None:
-                own_slope = code.value(slopes.diagonal[name], known, functions)
+                own_slope = code.value(diagonal[name], known, functions)
                 if self.varying[part.number, name]:
                     code.line(f"fj[{at}] = {code.text(own_slope)};")
                 else:
-                    parts = {"h": self.length(made.per_second), "f": code.let("n", slope), "j": own_slope}
+                    parts: dict[str, Value] = {"h": self.length(made.per_second), "f": code.let("n", slope), "j": own_slope}
                     slope = code.value(formula(changes), parts)
             if held := self.step.held(part.number, name, place):
                 slope = f"held[{held}] ? {code.text(0.0)} : {code.text(slope)}"

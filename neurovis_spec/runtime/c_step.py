@@ -304,10 +304,8 @@ class StepCode:
         start = self.network.state_places.get((number, name)) if self.form.fixed else None
         return "" if start is None else str(start + place if isinstance(place, int) else f"{start} + {place}")
 
-    def activation(
-        self, population: Population, place: Place, formulas: Mapping[str, Tree] | None = None
-    ) -> dict[str, Made]:
-        """The functions of the activation of a neuron, or these, for formulas of its model."""
+    def activation(self, population: Population, place: Place) -> dict[str, Made]:
+        """The functions of the activation of a neuron, for formulas of its model."""
         code = self.code
 
         def called(x: Value, formula: Tree) -> Value:
@@ -315,7 +313,7 @@ class StepCode:
             seen = parameters | ({"x": code.let("x", x)} if "x" in names(formula) else {})
             return code.let("y", code.value(formula, seen))
 
-        known = population.activation.definition.functions if formulas is None else formulas
+        known = population.activation.definition.functions
         return {name: partial(called, formula=tree) for name, tree in known.items()}
 
     def clock(self, made: Definition) -> dict[str, Value]:
