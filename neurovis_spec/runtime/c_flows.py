@@ -50,7 +50,7 @@ from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.c_arrivals import Arrivals, incoming_of
 from neurovis_spec.runtime.c_code import Place, words_of
 from neurovis_spec.runtime.c_step import StepCode, write, write_input
-from neurovis_spec.runtime.stages import INSIDE, Formulas, Part, Taken, parts_of, unfolded
+from neurovis_spec.runtime.stages import INSIDE, Formulas, Part, Taken, apart, parts_of, taken_by, unfolded
 
 #: Of a substep of the length 1, when the stages of a method are: just behind the beginning, in the middle, just before
 #: the end.
@@ -135,7 +135,7 @@ class Plan:
         for part in self.of_stage:
             formulas = (part.derivatives, part.spread, *(one.formulas for one in part.taken))
             for port in dict.fromkeys(chain.from_iterable(one.ports for one in formulas)):
-                if len(port.incoming) > len(_staged(port)):
+                if len(apart(port)[0]):
                     found[part.number, port.name] = start
                     start += len(part.population.members)
         return found
@@ -153,9 +153,7 @@ class Plan:
 
     def sent(self, connections: Indices) -> IntArray:
         """Where what connections take stands among that."""
-        network = self.network
-        sending = network.connections.sources if network.sending is None else network.sending
-        return np.asarray(self.places[sending[connections]], dtype=np.int64)
+        return np.asarray(self.places[taken_by(self.network)[connections]], dtype=np.int64)
 
     @cached_property
     def parts(self) -> Mapping[str, int]:
@@ -219,11 +217,6 @@ def pointer_lines(network: Network, real: str, quick: str, work: str) -> dict[st
     return {name: f"{real} *{quick} const {name} = {work} + {start};" for name, start in parts.items()}
 
 
-def _staged(port: Port) -> Indices:
-    """The positions of the signals that are made at each stage."""
-    return np.zeros(0, dtype=np.int64) if port.staged is None else port.staged
-
-
 def _some(port: Port, positions: Indices) -> Port:
     """The port with some of its signals alone."""
     factors = None if port.factors is None else port.factors[positions]
@@ -285,8 +278,8 @@ class _Integration:
 
     def hold(self, part: Part, port: Port) -> None:
         """What is held at a port over the step; a root is taken of all together, with the signals of a stage."""
-        start, staged = self.plan.held[part.number, port.name], _staged(port)
-        arrivals = self.arrivals(part, _some(port, np.delete(np.arange(len(port.incoming)), staged)))
+        start, (held, staged) = self.plan.held[part.number, port.name], apart(port)
+        arrivals = self.arrivals(part, _some(port, held))
         arrivals.finished = not len(staged)
 
         def kept(place: Place, totals: Mapping[int, str]) -> None:
@@ -310,6 +303,7 @@ class _Integration:
     def at_stage(self, part: Part, port: Port) -> Arrivals:
         """What arrives at a port at a stage: what is held, and on top of it what flows."""
         held, start = self.plan.held.get((part.number, port.name)), 1.0 if port.combine == "product" else 0.0
+        _, staged = apart(port)
 
         def begins(place: Place) -> Value:
             return start if held is None else f"fh[{_plus(held, place)}]"
@@ -317,8 +311,8 @@ class _Integration:
         def sent(connections: Indices, place: Place) -> str:
             return f"fo[{self.code.at(self.plan.sent(connections), place)}]"
 
-        arrivals = self.arrivals(part, _some(port, _staged(port)), begins, sent)
-        arrivals.finished = held is None or len(_staged(port)) > 0  # else what is held is
+        arrivals = self.arrivals(part, _some(port, staged), begins, sent)
+        arrivals.finished = held is None or len(staged) > 0  # else what is held is
         return arrivals
 
     # ---- stages ------------------------------------------------------------------------------------------------

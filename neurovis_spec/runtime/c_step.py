@@ -16,7 +16,7 @@ and where K's signals are shared, ``weights[0]*signals[0]`` and ``signals[0] = a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from functools import partial, singledispatch
 from itertools import chain
@@ -48,6 +48,7 @@ from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, incoming_of, ta
 from neurovis_spec.runtime.c_code import Code, Form, Place, state_name
 from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import SharedSlots, SignalLayout
+from neurovis_spec.runtime.stages import unfolded
 from neurovis_spec.runtime.state import Mask
 
 _NONE: Mapping[str, Made] = {}
@@ -219,13 +220,14 @@ class StepCode:
                 at = outlet.start + place if isinstance(place, int) else f"{outlet.start} + {place}"
                 code.line(f"outlets[{at}] = {value};")
 
-    def read_at_update(self, population: Population) -> set[str]:
+    def read_at_update(self, population: Population) -> frozenset[str]:
         """The names that are read when a population is updated, derivatives left out."""
         made = population.model.definition
         if not made.flows:
-            return {*made.read}
+            return made.read
         ends = [] if self.network.episode is None else [one.each_episode for one in made.lasting]
-        return read_through(made.let, [*(one.each_step for one in (*made.lasting, *made.fleeting)), *ends])
+        readers = [*(one.each_step for one in (*made.lasting, *made.fleeting)), *ends]
+        return unfolded(made.let, readers).names
 
     def at_port(self, number: int, port_number: int, place: Place, total: str) -> Value:
         """A port at u[t]: what arrives, combined, + bias + input + noise."""
@@ -355,7 +357,7 @@ class StepCode:
         if self.network.episode is None or not any(tree is not None for tree in ends.values()):
             return new, given
         changed = {name for name in steps if steps[name] is not None or ends[name] is not None}
-        needed = changed | read_through(made.let, list(ends.values()))
+        needed = changed | unfolded(made.let, ends.values()).names
         if fleeting:  # all of them: so models have always been written
             changed = needed = set(stored)
         variables = {name: code.variable("e", new.get(name, cell)) for name, cell in stored.items() if name in needed}
@@ -397,11 +399,9 @@ class StepCode:
         functions: Mapping[str, Made] = _NONE,
     ) -> dict[str, Value]:
         """The intermediate values that somebody reads, in order, beside the names known."""
-        wanted = read_through(let, readers)
         result = dict(known)
-        for name, tree in let:
-            if name in wanted:
-                result[name] = self.code.let("m", self.code.value(tree, result, functions))
+        for name, tree in unfolded(let, readers).let:
+            result[name] = self.code.let("m", self.code.value(tree, result, functions))
         return result
 
     # ---- signals -----------------------------------------------------------------------------------------------
@@ -633,15 +633,6 @@ def _plain(population: Population) -> bool:
 def _common_delay(delays: IntArray) -> int:
     """The delay that all of these connections have; 0 where they differ, and where there are none."""
     return int(delays[0]) if len(delays) and (delays == delays[0]).all() else 0
-
-
-def read_through(let: tuple[tuple[str, Tree], ...], readers: Iterable[Tree | None]) -> set[str]:
-    """The names that expressions read, by themselves or through intermediate values."""
-    wanted: set[str] = set().union(*(names(tree) for tree in readers if tree is not None))
-    for name, tree in reversed(let):
-        if name in wanted:
-            wanted |= names(tree)
-    return wanted
 
 
 def write_input(code: Code, network: Network, entry: Input, vector: str, clock: Mapping[str, Value] = _NO_CLOCK) -> str:
