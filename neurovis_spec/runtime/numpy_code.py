@@ -41,7 +41,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
-from types import MappingProxyType
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -130,14 +129,13 @@ class Code:
             self.head_lines.add(f"t_{unit:.0f} = t_ * {unit!r}")
         return {"dt": self.constant(np.float64(self.dt * unit)), "t": f"t_{unit:.0f}"}
 
-    def functions(self, use: Use, seen: Mapping[str, str] = MappingProxyType({})) -> Functions:
-        """The functions of an activation in use, which formulas of a model call; in these ``seen`` goes before what
-        they see otherwise."""
+    def functions(self, use: Use) -> Functions:
+        """The functions of an activation in use, which formulas of a model call."""
 
         def call(tree: Tree, argument: str) -> str:
             # the argument gets an identifier, so that it is computed once
             x = argument if argument.isidentifier() else self.let("x", argument)
-            return self.expression(tree, self.parameters(use) | {**seen, "x": x})
+            return self.expression(tree, self.parameters(use) | {"x": x})
 
         return {name: partial(call, tree) for name, tree in use.definition.functions.items()}
 

@@ -223,9 +223,7 @@ class _Stage:
         self.flow, self.step, self.code, self.network = flow, flow.step, flow.code, flow.network
         #: the names that formulas of a population see, and the functions, as far as they are known
         self.known: dict[int, dict[str, str]] = {}
-        self.functions = {
-            part.number: self.code.functions(part.population.activation, {"t": "t"}) for part in flow.parts
-        }
+        self.functions = {part.number: self.code.functions(part.population.activation) for part in flow.parts}
         self.vector = self.emit_inputs()
         self.sent = False
 

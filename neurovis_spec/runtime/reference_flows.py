@@ -144,7 +144,7 @@ class Flow:
         states = {name: values.tolist() for name, values in stage.state.cells[population.model.owner].items()}
         states |= {name: stage.x[Place(part.number, name)] for name in part.flows}
         for position in range(len(population.members)):
-            functions = seen.functions_of(population, position, stage.state, stage.t)
+            functions = seen.functions_of(population, position, stage.state)
             known = seen.known(population.model, position, stage.state, stage.t)
             known |= {name: values[position] for name, values in (*states.items(), *ports.items())}
             with_let(known, formulas.let, functions)

@@ -112,11 +112,9 @@ class Seen:
             known[name] = numbers.at(place, state)
         return known
 
-    def functions_of(
-        self, population: Population, position: int, state: State, t: float | None = None
-    ) -> dict[str, Callable[..., float]]:
+    def functions_of(self, population: Population, position: int, state: State) -> dict[str, Callable[..., float]]:
         """The functions of a neuron's activation, which formulas of its model call."""
-        shape = self.known(population.activation, position, state, t)
+        shape = self.known(population.activation, position, state)
         return {
             name: lambda x, value=value: evaluate(value, shape | {"x": x})
             for name, value in population.activation.definition.functions.items()
