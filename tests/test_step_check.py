@@ -114,3 +114,9 @@ def test_a_network_with_a_body_is_refused() -> None:
     spec = Path(__file__).parents[1] / "specs" / "walk" / "walk.yaml"
     with pytest.raises(InputError, match="--no-body"):
         nv.compile(spec).check_step(steps=3)
+
+
+def test_numbers_that_are_given_for_all_steps_are_so_in_shorter_ones() -> None:
+    text = PAIR.replace("neurons: {H: {", "inputs: {two: {size: 2}}\nneurons: {H: {input: two, ") % "rk4"
+    for_each_step = np.tile([0.1, -0.2], (60, 1))
+    assert errors(text, inputs={"two": [0.1, -0.2]}) == errors(text, inputs={"two": for_each_step})

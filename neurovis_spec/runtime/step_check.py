@@ -102,7 +102,9 @@ def _begins(step: int, parts: int) -> int:
 def _run(network: Network, course: Course, parts: int, progress: Progress | None) -> Recording:
     finer = stretched(network, parts)
     steps = _begins(course.length(network), parts)
-    given = {name: _repeated(values, parts) for name, values in _held(network, course.inputs).items()}
+    sizes = {entry.name: entry.size for entry in network.inputs}
+    held = _held(network, course.inputs)
+    given = {name: _repeated(values, sizes.get(name, 1), parts) for name, values in held.items()}
     run = replace(course, steps=steps, every=course.every * parts, inputs=given or None)
     return record(finer, run if parts > 1 else course, progress)
 
@@ -121,10 +123,11 @@ def _held(network: Network, given: Mapping[str, npt.ArrayLike] | None) -> dict[s
     return found
 
 
-def _repeated(values: npt.ArrayLike, parts: int) -> npt.ArrayLike:
-    """Rows for shorter steps: that of step k for all whose time ends after (k − 1)·dt, and by k·dt."""
+def _repeated(values: npt.ArrayLike, size: int, parts: int) -> npt.ArrayLike:
+    """Rows of an input of this size for shorter steps: that of step k for all whose time ends after (k − 1)·dt, and by
+    k·dt. What is given for all steps at once has no rows."""
     rows = np.asarray(values)
-    if rows.ndim == 0 or not len(rows):
+    if rows.ndim < (2 if size > 1 else 1) or not len(rows):
         return values
     return rows[-(-np.arange((len(rows) - 1) * parts + 1) // parts)]
 
