@@ -50,7 +50,17 @@ from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.c_arrivals import Arrivals, incoming_of
 from neurovis_spec.runtime.c_code import Place, words_of
 from neurovis_spec.runtime.c_step import StepCode, write, write_input
-from neurovis_spec.runtime.stages import INSIDE, Formulas, Part, Taken, apart, parts_of, taken_by, unfolded
+from neurovis_spec.runtime.stages import (
+    INSIDE,
+    Formulas,
+    Part,
+    Taken,
+    apart,
+    parts_of,
+    places_among_taken,
+    taken_by,
+    unfolded,
+)
 
 #: Of a substep of the length 1, when the stages of a method are: just behind the beginning, in the middle, just before
 #: the end.
@@ -144,12 +154,7 @@ class Plan:
     def places(self) -> IntArray:
         """Where each activity and each outlet, as ``Network.sending`` has them, stands among what is taken at a stage;
         −1 for none."""
-        result = np.full(len(self.network.neurons) + self.network.outlet_count, -1, dtype=np.int64)
-        start = 0
-        for one in chain.from_iterable(part.taken for part in self.of_stage):
-            result[one.places] = start + np.arange(len(one.places))
-            start += len(one.places)
-        return result
+        return places_among_taken(self.network, self.of_stage)
 
     def sent(self, connections: Indices) -> IntArray:
         """Where what connections take stands among that."""
@@ -486,7 +491,8 @@ class _Integration:
                 if self.varying[part.number, name]:
                     code.line(f"fj[{at}] = {code.text(own_slope)};")
                 else:
-                    parts: dict[str, Value] = {"h": self.length(made.per_second), "f": code.let("n", slope), "j": own_slope}
+                    h = self.length(made.per_second)
+                    parts: dict[str, Value] = {"h": h, "f": code.let("n", slope), "j": own_slope}
                     slope = code.value(formula(changes), parts)
             if held := self.step.held(part.number, name, place):
                 slope = f"held[{held}] ? {code.text(0.0)} : {code.text(slope)}"

@@ -45,7 +45,7 @@ from neurovis_spec.runtime.numpy_arrivals import (
     with_step_values,
 )
 from neurovis_spec.runtime.numpy_code import FIRST, shared
-from neurovis_spec.runtime.stages import Formulas, Part, apart, parts_of, taken_by, times
+from neurovis_spec.runtime.stages import Formulas, Part, apart, parts_of, places_among_taken, taken_by, times
 
 #: fewer signals are added one by one, however they lie
 _DENSE = 4096
@@ -90,21 +90,16 @@ class _Flow:
         #: where each flow state, by its population and name, lies among all of them
         self.places: dict[tuple[int, str], slice] = {}
         #: where in what is taken at a stage each activity and each outlet lies, −1 for the others
-        self.taken = np.full(len(self.network.neurons) + self.network.outlet_count, -1, dtype=np.int64)
-        size = count = 0
+        self.taken = places_among_taken(self.network, self.parts)
+        self.size, self.taken_count = 0, int(self.taken.max(initial=-1)) + 1
         for part in self.parts:
-            members = len(part.population.members)
             for name in part.flows:
-                self.places[part.number, name] = slice(size, size + members)
-                size += members
-            for taken in part.taken:
-                self.taken[taken.places] = count + np.arange(members)
-                count += members
-        self.size, self.taken_count = size, count
+                begin, self.size = self.size, self.size + len(part.population.members)
+                self.places[part.number, name] = slice(begin, self.size)
         #: the states at the beginning of the step, those where a stage looks, the derivatives there, their slopes
         self.x, self.y, self.k = self.temporary(), self.temporary(), self.temporary()
         self.j = self.temporary() if any(part.slopes.trees for part in self.parts) else ""
-        self.sent = self.code.array("f", f"np.empty({count})") if count else ""
+        self.sent = self.code.array("f", f"np.empty({self.taken_count})") if self.taken_count else ""
         #: each state where a stage looks
         self.now = {key: self.code.array("f", f"{self.y}[{_text(place)}]") for key, place in self.places.items()}
         #: by population and port what is made of it once a step, before the stages: all that is at the port, where that

@@ -156,29 +156,31 @@ def taken_by(network: Network) -> Indices:
     return network.connections.sources.compact() if network.sending is None else network.sending
 
 
+def places_among_taken(network: Network, parts: Iterable[Part]) -> IntArray:
+    """Where each activity and each outlet, as ``taken_by`` has them, stands among all that is taken at a stage; −1 for
+    what is not."""
+    result = np.full(len(network.neurons) + network.outlet_count, -1, dtype=np.int64)
+    start = 0
+    for one in (taken for part in parts for taken in part.taken):
+        result[one.places] = start + np.arange(len(one.places))
+        start += len(one.places)
+    return result
+
+
 def _taken(network: Network, operation: Integrate) -> dict[tuple[int, str], IntArray]:
     """By population and name what is taken at a stage, and its places."""
     n, sending = len(network.neurons), taken_by(network)
-    asked = np.unique(
-        np.concatenate(
-            [
-                np.zeros(0, dtype=np.int64),
-                *(
-                    sending[port.incoming[port.staged]]
-                    for number in operation.populations
-                    for port in network.populations[number].ports
-                    if port.staged is not None
-                ),
-            ]
-        )
-    )
+    asked = np.zeros(n + network.outlet_count, dtype=np.bool_)
+    for number in operation.populations:
+        for port in network.populations[number].ports:
+            if port.staged is not None:
+                asked[sending[port.incoming[port.staged]]] = True
     found: dict[tuple[int, str], IntArray] = {}
     for number in operation.populations:
         members = network.populations[number].members
-        if np.isin(members, asked).any():
-            found[number, _ACTIVITY] = members
-        for outlet in network.outlets:
-            places = n + outlet.start + np.arange(len(members))
-            if outlet.population == number and np.isin(places, asked).any():
-                found[number, outlet.name] = places
+        beside = [one for one in network.outlets if one.population == number]
+        outlets = [(one.name, n + one.start + np.arange(len(members))) for one in beside]
+        for name, places in ((_ACTIVITY, members), *outlets):
+            if asked[places].any():
+                found[number, name] = places
     return found
