@@ -42,6 +42,7 @@ def test_a_number_in_the_wanted_unit_is_itself(number: str) -> None:
         ("3 nS", "pS", 3000.0),
         ("1.5 kHz", "Hz", 1500.0),
         ("2 MOhm", "kΩ", 2000.0),
+        ("2 1/s", "1/s", 2.0),
     ],
 )
 def test_a_unit_is_moved_by_powers_of_ten(written: str, wanted: str, value: float) -> None:

@@ -32,7 +32,7 @@ _BASES: Final = ("s", "V", "A", "S", "F", "C", "N", "Pa", "m", "g", "M", "mol", 
 _WORDS: Final = frozenset({"if", "else", "and", "or", "not"})
 #: A decimal, a blank, a unit.
 _WRITTEN: Final = re.compile(
-    r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?)[ ]+([^\W\d_][\w^/*·.-]*|[°%])\s*"
+    r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?)[ ]+((?:1/)?[^\W\d_][\w^/*·.-]*|[°%])\s*"
 )
 
 
@@ -72,6 +72,8 @@ def measured(text: str) -> Measured | None:
 
     >>> measured("1.5 ms"), measured("1.5*ms"), measured("x if y else z")
     (Measured(number='1.5', unit='ms'), None, None)
+    >>> measured("2 1/s")
+    Measured(number='2', unit='1/s')
     """
     match = _WRITTEN.fullmatch(text)
     return None if match is None or match[2] in _WORDS else Measured(match[1], match[2])
