@@ -205,7 +205,7 @@ def peer(case: Case, tool: str, method: str, python: str, exact: FloatArray) -> 
         np.savez(path, dt=case.dt, steps=case.steps, **case.given)  # type: ignore[arg-type]
         network = next(name for name in ("wilson_cowan", "jansen_rit", "ctrnn") if name[:3] in case.name.lower())
         command = [python, str(HERE / "dynamics_peers.py"), tool, network, str(path), method, str(output)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         if done.returncode:
             print(f"{tool}: {done.stderr[-300:]}", file=sys.stderr)
             return None
