@@ -20,6 +20,7 @@ from __future__ import annotations
 import argparse
 import ctypes
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -467,7 +468,8 @@ def main() -> None:
     parser.add_argument("--only", choices=("compared", "stiff"))
     asked = parser.parse_args()
     if asked.only != "stiff":
-        compare(None if asked.no_peers else asked.peers)
+        peers = asked.peers and str(Path(shutil.which(asked.peers) or asked.peers).absolute())
+        compare(None if asked.no_peers else peers)
     if asked.only != "compared":
         stiff()
 
