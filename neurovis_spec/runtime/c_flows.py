@@ -101,10 +101,10 @@ class _State(NamedTuple):
     @property
     def varies(self) -> bool:
         """Whether more than parameters says how much its derivative changes with it."""
-        slopes, model = jacobian(self.use.definition), self.use.definition
-        let = (*model.let, *slopes.let)
-        read = unfolded(let, [slopes.diagonal[self.name]]).names
-        return not read <= {*self.use.parameters, *dict(let)}
+        let, diagonal = self.part.slopes.let, dict(self.part.slopes.trees)
+        if self.name not in diagonal:  # the method does not look at that
+            return False
+        return not unfolded(let, [diagonal[self.name]]).names <= {*self.use.parameters, *dict(let)}
 
 
 @dataclass(frozen=True)
