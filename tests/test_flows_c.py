@@ -116,3 +116,8 @@ def test_numbers_of_32_bits(method: str, tmp_path: Path) -> None:
     for row in expected:
         controller.step()
         np.testing.assert_allclose(controller.activity, row, rtol=0, atol=1e-4)
+
+
+def test_nothing_is_differentiated_where_no_method_asks_for_it() -> None:
+    text = (Path(__file__).parent / "errors/flows_slope_too_long.yaml").read_text().replace("exponential", "rk4")
+    same_bits(nv.compile_text(text), 3)
