@@ -121,3 +121,18 @@ def test_numbers_of_32_bits(method: str, tmp_path: Path) -> None:
 def test_nothing_is_differentiated_where_no_method_asks_for_it() -> None:
     text = (Path(__file__).parent / "errors/flows_slope_too_long.yaml").read_text().replace("exponential", "rk4")
     same_bits(nv.compile_text(text), 3)
+
+
+@pytest.mark.parametrize("method", ["exponential", "semi_implicit"])
+def test_a_state_that_is_held_stays_where_its_slope_is_undefined(method: str) -> None:
+    text = f"""
+neurovis: 1
+name: held
+time: {{dt: 0.1, integrate: {{method: {method}, substeps: 2}}}}
+models: {{m: {{state: {{v: {{initial: 1, derivative: sqrt(v)}}, w: {{derivative: v - w}}}}, activity: w}}}}
+neurons: {{A: {{model: m}}}}
+events: [{{from: 2, clamp: {{A.v: -1}}}}]
+"""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        same_bits(nv.compile_text(text), 5)

@@ -486,15 +486,18 @@ class _Integration:
         known = self.step.let(more, known, [*diagonal.values()], functions)
         for name, tree in part.derivatives.trees:
             slope, at = code.value(tree, known, functions), _plus(self.plan.starts[part.number, name], place)
+            held = self.step.held(part.number, name, place)
             if changes is not None:
                 own_slope = code.value(diagonal[name], known, functions)
                 if self.varying[part.number, name]:
+                    if held:  # 0, so that the change is 0 even where this is NaN
+                        own_slope = f"held[{held}] ? {code.text(0.0)} : {code.text(own_slope)}"
                     code.line(f"fj[{at}] = {code.text(own_slope)};")
                 else:
                     h = self.length(made.per_second)
                     parts: dict[str, Value] = {"h": h, "f": code.let("n", slope), "j": own_slope}
                     slope = code.value(formula(changes), parts)
-            if held := self.step.held(part.number, name, place):
+            if held:
                 slope = f"held[{held}] ? {code.text(0.0)} : {code.text(slope)}"
             code.line(f"fk[{at}] = {code.text(slope)};")
 
