@@ -126,6 +126,53 @@ def test_an_edit_of_nothing_changes_nothing(spec: Spec, cut: int) -> None:
             np.testing.assert_array_equal(seen.weights, expected.weights)
 
 
+LOOP = """
+neurovis: 1
+name: loop
+time: {dt: 0.1}
+models:
+  m:
+    time: ms
+    ports: [p]
+    let: {y: 2*x + 1}
+    state: {x: {initial: 0.1, derivative: 0.001*(drive - x) + 0.0001*p, noise: 0.02}}
+    outputs: {OUTPUTS}
+    activity: f(x)
+neurons:
+  A: {model: m, activation: tanh, count: 2, initial: {x: [0.3, -0.2]}}
+  B: {model: m, activation: sigmoid, bias: 0.2, noise: "normal(0, 0.1)"}
+  C: {model: m, bias: 0.3}
+  S: {activation: tanh}
+connections:
+  - A -> A: {weight: 0.7, pattern: all_to_all}
+  - A -> B: {weight: 1, pattern: all_to_all}
+  - B -> A: {weight: -1, send: scaled, port: {drive: 0.5, p: 1}, pattern: all_to_all}
+  - B -> C: {weight: 1, send: x}
+  - C -> B: {weight: 0.5, send: scaled}
+  - C -> S: {weight: 1, delay: 0}
+events:
+  - {from: 5, to: 9, clamp: {B: 0.4}}
+  - {from: 10, to: 14, clamp: {A1.x: 0.2}}
+  - {at: 12, lesion: C}
+  - {at: 16, mend: C}
+  - {at: 18, lesion: A -> B}
+"""
+BACKENDS = ["reference", "numpy", pytest.param("c", marks=pytest.mark.compiler)]
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_an_output_that_reads_a_port_makes_no_circle_of_states_that_drive_each_other(backend: str) -> None:
+    """What is sent is known behind the integration: the network is the same as without that output."""
+    runs = []
+    for outputs in ("scaled: f(y)", "scaled: f(y), current: drive + p"):
+        network = nv.compile_text(LOOP.replace("OUTPUTS", outputs)).network
+        runs.append(record(network, Course(25, backend=backend, keep=Keep(states=("all",)))))
+    plain, made = runs
+    np.testing.assert_array_equal(made.activity, plain.activity)
+    np.testing.assert_array_equal(made["A1.x"], plain["A1.x"])
+    np.testing.assert_allclose(made["C.current"][5], made["B.x"][5] + 0.3, rtol=1e-12)
+
+
 CHAIN = """
 neurovis: 1
 name: chain

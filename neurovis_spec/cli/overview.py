@@ -15,7 +15,7 @@ from neurovis_spec.cli.files import count
 from neurovis_spec.cli.tables import number, spread, table
 from neurovis_spec.compiler.flows import ports_read_by
 from neurovis_spec.compiler.network import PLAIN_ROUTE
-from neurovis_spec.compiler.program import Diffuse, Integrate, Update
+from neurovis_spec.compiler.program import Diffuse, Integrate, SendAhead, Update
 from neurovis_spec.describe import wired
 from neurovis_spec.diagnostics import printable
 
@@ -185,6 +185,8 @@ def _program(network: Network) -> str:
                 for one in several:
                     for name, staged in _into_derivatives(network, one):
                         (anew if staged else held).add(name)
+            case SendAhead(population=one, names=names):
+                rows.append(("send ahead", _members(network, one), ", ".join(names)))
             case Diffuse(populations=several):
                 noisy = [(one, network.populations[one].model.definition) for one in several]
                 rows += [

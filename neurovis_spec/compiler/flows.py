@@ -74,6 +74,17 @@ def plain_flow(definition: Definition, sent: str = "") -> bool:
     return flows_by(definition, sent) == frozenset()
 
 
+def known_behind_flow(definition: Definition, sent: str = "") -> bool:
+    """Whether what a model sends is known as soon as its states are integrated: it is made of flow states, parameters
+    and ``t`` alone, and no ``each_step`` changes one of these states afterwards."""
+    if not plain_flow(definition, sent):
+        return False
+    sent = sent or definition.send or definition.given.name
+    changed = {one.name for one in definition.state if one.each_step is not None}
+    read = reads(definition, [one.each_step for one in definition.gives if one.name == sent])
+    return changed.isdisjoint(read | {sent})
+
+
 class Jacobian(NamedTuple):
     """How much each derivative changes with its own state, all else but what depends on this being constant: a formula
     by each flow state, and further intermediate values that these read, in order, behind those of the definition."""

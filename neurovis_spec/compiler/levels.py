@@ -6,20 +6,22 @@ neurons that wait for each other.
 A neuron is updated behind all that reach it with delay 0. Where states flow, their integration is one more node of that
 graph: behind what does not flow and reaches a derivative without delay, and before all neurons whose states flow. What
 *flows* is a function of states with a derivative, parameters, the time, and ports at which only what flows arrives; it
-reaches derivatives at each stage, so that such connections may form cycles, unless an output closes them.
+reaches derivatives at each stage, so that such connections may form cycles, unless an output closes them. What is made
+of such states alone is known behind the integration: where neurons would wait for each other, nobody waits for that.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
 from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray, IntColumn, frozen, narrow
-from neurovis_spec.compiler.flows import PortsRead, flows_by, plain_flow, ports_read_by
+from neurovis_spec.compiler.flows import PortsRead, flows_by, known_behind_flow, plain_flow, ports_read_by
 from neurovis_spec.compiler.network import PLAIN_ROUTE, Input, Neurons, Noise, Route
 from neurovis_spec.compiler.program import DRIVE, MODEL, Definition
 
@@ -54,11 +56,13 @@ class Cycle(NamedTuple):
 
 class Stages(NamedTuple):
     """The integration: its level; by ports which signals of their Line are made anew at each stage; for each neuron
-    whether anything that is sent is."""
+    whether anything that is sent is. ``ahead``: by names of what is sent for each neuron whether others read it behind
+    the integration, before the neuron is updated."""
 
     level: int
     staged: Mapping[str, BoolArray]
     made: BoolArray
+    ahead: Mapping[str, BoolArray] = MappingProxyType({})
 
 
 class Order(NamedTuple):
@@ -273,7 +277,11 @@ class _Coupled:
         stage = self._stages()
         if isinstance(stage, Cycle):
             return stage
-        level = levels_along(n + 1, *self._waits())
+        ahead: Mapping[str, BoolArray] = {}
+        level = levels_along(n + 1, *self._waits(np.zeros(len(self.sources), dtype=np.bool_)))
+        if isinstance(level, Cycle):  # perhaps not where nobody waits for what is known behind the integration
+            known = self._of_sent(lambda number, sent: known_behind_flow(self.models[number], sent))
+            level, ahead = levels_along(n + 1, *self._waits(known)), self._ahead(known)
         if isinstance(level, Cycle):
             return level
         staged = {}
@@ -282,7 +290,21 @@ class _Coupled:
             staged[port][among] = self.staged[port]
         made = np.zeros(n, dtype=np.bool_)
         made[self.sources[self.making]] = True
-        return Order(level[:n], stage, Stages(int(level[n]), staged, made))
+        return Order(level[:n], stage, Stages(int(level[n]), staged, made, ahead))
+
+    def _ahead(self, known: BoolArray) -> dict[str, BoolArray]:
+        """By names of what is sent for each neuron whether a neuron that does not wait for it reads it. ``known``: the
+        connections (m,) whose signal is known behind the integration."""
+        waiting = np.zeros(len(self.sources), dtype=np.bool_)
+        for port, (_, connections, _, targets) in self.undelayed.items():
+            waiting[connections[self.by_update[port][targets]]] = True
+        result: dict[str, BoolArray] = {}
+        for name in dict.fromkeys(sent_by(model, one.sends) for model in self.models for one in self.wired.routes):
+            taking = self._of_sent(partial(_is, name)) & waiting & known
+            if taking.any():
+                result[name] = np.zeros(len(self.model), dtype=np.bool_)
+                result[name][self.sources[taking]] = True
+        return result
 
     def _stages(self) -> IntArray | Cycle:
         """For each neuron its level within a stage."""
@@ -293,8 +315,9 @@ class _Coupled:
         level = levels_along(len(self.model), *_joined(edges))
         return level._replace(algebraic=True) if isinstance(level, Cycle) else level
 
-    def _waits(self) -> tuple[Indices, Indices, Indices]:
-        """Who waits for whom within a step: the connection (−1 for none), the first, and the one that waits."""
+    def _waits(self, known: BoolArray) -> tuple[Indices, Indices, Indices]:
+        """Who waits for whom within a step: the connection (−1 for none), the first, and the one that waits. ``known``:
+        the connections (m,) whose signal is known behind the integration, so that nobody waits for their source."""
         integration = len(self.model)
         flows = np.flatnonzero(np.array([bool(one.flows) for one in self.models], dtype=np.bool_)[self.model])
         edges: list[tuple[Indices, Indices, Indices]] = [
@@ -302,10 +325,16 @@ class _Coupled:
         ]
         for port, (_, connections, sources, targets) in self.undelayed.items():
             updated = self.by_update[port][targets]
-            edges.append((connections[updated], sources[updated], targets[updated]))
+            begins = np.where(known[connections], integration, sources)
+            edges.append((connections[updated], begins[updated], targets[updated]))
             before = self.by_flow[port][targets] & ~self.flowing[connections]
             edges.append((connections[before], sources[before], np.full(int(before.sum()), integration)))
         return _joined(edges)
+
+
+def _is(name: str, number: int, sent: str) -> bool:
+    """Whether this is sent, of whatever model."""
+    return sent == name
 
 
 def _joined(edges: list[tuple[Indices, Indices, Indices]]) -> tuple[Indices, Indices, Indices]:

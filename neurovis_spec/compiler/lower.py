@@ -6,7 +6,7 @@ Projections (connections that learn by one rule) and the program, an ordered lis
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import chain, pairwise
 from typing import NamedTuple
 
@@ -32,6 +32,7 @@ from neurovis_spec.compiler.program import (
     Projection,
     ReadInputs,
     Send,
+    SendAhead,
     Update,
     Use,
 )
@@ -67,7 +68,15 @@ def _integration(populations: tuple[Population, ...], stages: Stages, by: Integr
     numbers = sorted({*flowing, *made}, key=lambda number: (populations[number].stage, number))
     noisy = tuple(n for n in flowing if any(one.noise is not None for one in populations[n].model.definition.flows))
     diffuse = (Diffuse(noisy),) if noisy else ()
-    return Integrate(tuple(numbers), by.method, by.substeps), *diffuse
+    return Integrate(tuple(numbers), by.method, by.substeps), *diffuse, *_sends_ahead(populations, stages)
+
+
+def _sends_ahead(populations: tuple[Population, ...], stages: Stages) -> Iterator[Operation]:
+    """What is made of flow states alone and read by neurons that are updated before those that send it."""
+    for number, population in enumerate(populations):
+        names = tuple(name for name, neurons in stages.ahead.items() if neurons[population.members].any())
+        if names:
+            yield SendAhead(number, names)
 
 
 def make_populations(census: Census, wired: Wired, order: Order) -> tuple[Population, ...]:

@@ -320,6 +320,15 @@ class Diffuse(Operation):
 
 
 @dataclass(frozen=True, slots=True)
+class SendAhead(Operation):
+    """What connections take of a population, by its names, where it is made of flow states alone: behind their
+    integration, for neurons that are updated before this population."""
+
+    population: int
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Send(Operation):
     """w[t]·a[t] of every delayed connection leaves its source; a[t] is remembered for ``pre``."""
 

@@ -42,7 +42,7 @@ import numpy as np
 
 from neurovis_spec.arrays import Indices, IntArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Diffuse, Integrate, Port, Use
+from neurovis_spec.compiler.program import MODEL, Diffuse, Integrate, Port, SendAhead, Use
 from neurovis_spec.language.expressions.emit_c import INEXACT, Made, Value
 from neurovis_spec.language.expressions.parser import formula
 from neurovis_spec.language.expressions.tree import Name
@@ -56,6 +56,8 @@ from neurovis_spec.runtime.stages import (
     Part,
     Taken,
     apart,
+    formulas_of,
+    given,
     parts_of,
     places_among_taken,
     taken_by,
@@ -422,8 +424,8 @@ class _Integration:
     def inputs(self) -> None:
         """Inputs that are formulas, at the time of a stage, but those that somebody has given for the step."""
         code, network = self.code, self.network
-        for name, given in network.held_inputs.items():
-            with code.block(f"if (s[{given}] == {code.text(0.0)})"):
+        for name, held in network.held_inputs.items():
+            with code.block(f"if (s[{held}] == {code.text(0.0)})"):
                 write_input(code, network, network.input_index[name], "fv", {"t": "ts"})
 
     def neurons(
@@ -526,6 +528,32 @@ def _integrate(operation: Integrate, step: StepCode) -> None:
     assert plan is not None
     with step.unless_first():
         _Integration(step, plan).write()
+
+
+@write.register
+def _send_ahead(operation: SendAhead, step: StepCode) -> None:
+    """What connections take of a population, where flow states are all that it is made of."""
+    code, number = step.code, operation.population
+    population = step.network.populations[number]
+    use = population.model
+
+    def shown(place: Place, totals: Mapping[int, str]) -> None:
+        step.hold_states(number, place)
+        neuron, functions = code.at(population.members, place), step.activation(population, place)
+        seen: Mapping[str, Value] = {
+            **code.parameters(use, place), **step.clock(use.definition), **step.states(use, place),
+        }  # fmt: skip
+        for name in operation.names:
+            formulas = formulas_of(population, [(name, given(use.definition, name))])
+            ((_, tree),) = formulas.trees
+            value = code.let("y", code.value(tree, step.let(formulas.let, seen, [tree], functions), functions))
+            if name == MODEL.gives:
+                step.put_activity(neuron, value)
+            for outlet in step.network.outlets:
+                if (outlet.population, outlet.name) == (number, name):
+                    step.put_out(outlet, place, neuron, code.text(value))
+
+    step.each(len(population.members), {}, shown)
 
 
 @write.register

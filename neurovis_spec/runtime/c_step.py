@@ -26,7 +26,7 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray, Indices, IntArray
 from neurovis_spec.compiler.events.settable import BIAS, HIGH, LOW, bias_of
-from neurovis_spec.compiler.network import Input, Network
+from neurovis_spec.compiler.network import Input, Network, Outlet
 from neurovis_spec.compiler.program import (
     DRIVE,
     Definition,
@@ -210,15 +210,24 @@ class StepCode:
 
     def let_out(self, number: int, place: Place, neuron: Place) -> None:
         """What connections take of a neuron beside its activity; nothing of one that is lesioned."""
-        code, population = self.code, self.network.populations[number]
-        stored = self.states(population.model, place)
+        stored = self.states(self.network.populations[number].model, place)
         for outlet in self.network.outlets:
             if outlet.population == number:
-                value = stored[outlet.name]
-                if self.form.held:
-                    value = f"lesioned[{neuron}] ? {code.text(0.0)} : {value}"
-                at = outlet.start + place if isinstance(place, int) else f"{outlet.start} + {place}"
-                code.line(f"outlets[{at}] = {value};")
+                self.put_out(outlet, place, neuron, stored[outlet.name])
+
+    def put_out(self, outlet: Outlet, place: Place, neuron: Place, value: str) -> None:
+        """A value is what connections take of a neuron; 0 where it is lesioned."""
+        if self.form.held:
+            value = f"lesioned[{neuron}] ? {self.code.text(0.0)} : {value}"
+        at = outlet.start + place if isinstance(place, int) else f"{outlet.start} + {place}"
+        self.code.line(f"outlets[{at}] = {value};")
+
+    def put_activity(self, neuron: Place, value: Value) -> None:
+        """A value is the activity of a neuron, unless that is held."""
+        self.code.line(f"activity[{neuron}] = {self.code.text(value)};")
+        if self.form.held:
+            self.code.line(f"if (held[{neuron}])")
+            self.code.line(f"    activity[{neuron}] = holding[{neuron}];")
 
     def read_at_update(self, population: Population) -> frozenset[str]:
         """The names that are read when a population is updated, derivatives left out."""
@@ -286,10 +295,7 @@ class StepCode:
         made, stored = population.model.definition, self.states(population.model, place)
         seen: Mapping[str, Value] = {**code.parameters(population.model, place), **self.clock(made), **ports}
         states = {one.name: stored[one.name] for one in made.state}
-        for name, cell in states.items():
-            if at := self.held(number, name, place):
-                code.line(f"if (held[{at}])")
-                code.line(f"    {cell} = holding[{at}];")
+        self.hold_states(number, place)
 
         def fixed(name: str, value: Value) -> Value:
             at = self.held(number, name, place)
@@ -300,6 +306,15 @@ class StepCode:
         self.store([(stored[name], value) for name, value in new.items()])
         self.store([(stored[one.name], given[one.name]) for one in made.outputs])
         self.store([(f"activity[{neuron}]", given["activity"])])
+
+    def hold_states(self, number: int, place: Place) -> None:
+        """The states of a member of a population that are held, at what they are held at."""
+        use = self.network.populations[number].model
+        stored = self.states(use, place)
+        for one in use.definition.state:
+            if at := self.held(number, one.name, place):
+                self.code.line(f"if (held[{at}])")
+                self.code.line(f"    {stored[one.name]} = holding[{at}];")
 
     def held(self, number: int, name: str, place: Place) -> str:
         """The code of where a state of a member of a population stands among what can be held; "" where none is."""

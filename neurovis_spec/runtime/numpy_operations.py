@@ -29,8 +29,9 @@ import numpy as np
 from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.events.settable import HIGH, LOW
 from neurovis_spec.compiler.flows import ports_read_by
-from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.network import Network, Outlet
 from neurovis_spec.compiler.program import (
+    MODEL,
     Diffuse,
     Gather,
     Integrate,
@@ -40,12 +41,13 @@ from neurovis_spec.compiler.program import (
     Projection,
     ReadInputs,
     Send,
+    SendAhead,
     Update,
 )
 from neurovis_spec.runtime.numpy_arrivals import Step, gathered, sent_at, sent_by, slots_of
 from neurovis_spec.runtime.numpy_code import FIRST, Cell, Code, emit_change
 from neurovis_spec.runtime.numpy_flows import diffuse, integrate
-from neurovis_spec.runtime.stages import taken_by
+from neurovis_spec.runtime.stages import formulas_of, given, taken_by
 from neurovis_spec.runtime.state import NEVER_LOST
 
 
@@ -118,15 +120,43 @@ def _update(operation: Update, step: Step) -> None:
 
 
 def _let_out(step: Step, number: int) -> None:
-    """What connections take of a population beside its activities; 0 of neurons that are lesioned."""
-    code, network = step.code, step.network
-    population = network.populations[number]
-    for outlet in network.outlets:
+    """What connections take of a population beside its activities."""
+    for outlet in step.network.outlets:
         if outlet.population == number:
-            place = code.view("outlets", f"{outlet.start}:{outlet.start + len(population.members)}")
-            code.line(f"{place}[:] = {code.state(population.model, outlet.name)}")
-            lesioned = f"state.conditions.lesioned_neurons[{code.constant(population.members)}]"
-            code.line(f"if holds and holds[{number}]: {place}[{lesioned}] = 0.0")
+            _put_out(step, outlet, step.code.state(step.network.populations[number].model, outlet.name))
+
+
+def _put_out(step: Step, outlet: Outlet, values: str) -> None:
+    """These values are what connections take; 0 of neurons that are lesioned."""
+    code, members = step.code, step.network.populations[outlet.population].members
+    place = code.view("outlets", f"{outlet.start}:{outlet.start + len(members)}")
+    code.line(f"{place}[:] = {values}")
+    lesioned = f"state.conditions.lesioned_neurons[{code.constant(members)}]"
+    code.line(f"if holds and holds[{outlet.population}]: {place}[{lesioned}] = 0.0")
+
+
+@emit.register
+def _send_ahead(operation: SendAhead, step: Step) -> None:
+    """What connections take of a population, where flow states are all that it is made of."""
+    code, network, number = step.code, step.network, operation.population
+    population = network.populations[number]
+    model = population.model
+    code.line(f"if fixed: hold_cells(fixed, {code.constant(model.owner)}, cells)")
+    states = {one.name: code.state(model, one.name) for one in model.definition.state}
+    functions = code.functions(population.activation)
+    for name in operation.names:
+        formulas = formulas_of(population, [(name, given(model.definition, name))])
+        known = code.parameters(model) | states
+        for one, tree in formulas.let:
+            known[one] = code.fresh("m", tree, known, functions)
+        ((_, tree),) = formulas.trees
+        value = code.let("y", code.expression(tree, known, functions))
+        if name == MODEL.gives:
+            code.line(f"activity{code.position(population.members, len(network.neurons))} = {value}")
+            code.line(f"if holds and holds[{number}]: activity[holds[{number}][0]] = holds[{number}][1]")
+        for outlet in network.outlets:
+            if (outlet.population, outlet.name) == (number, name):
+                _put_out(step, outlet, value)
 
 
 @emit.register

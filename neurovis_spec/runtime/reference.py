@@ -15,8 +15,9 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.events.settable import HIGH, LOW
-from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.network import Network, Outlet
 from neurovis_spec.compiler.program import (
+    MODEL,
     Diffuse,
     Gather,
     Integrate,
@@ -25,6 +26,7 @@ from neurovis_spec.compiler.program import (
     Population,
     ReadInputs,
     Send,
+    SendAhead,
     Update,
     Use,
 )
@@ -34,6 +36,7 @@ from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.backend import Availability, Capabilities
 from neurovis_spec.runtime.reference_flows import Flow
 from neurovis_spec.runtime.reference_seen import NO_FUNCTIONS, Functions, NetworkArray, Seen, is_first, with_let
+from neurovis_spec.runtime.stages import formulas_of, given
 from neurovis_spec.runtime.state import State
 
 
@@ -94,9 +97,7 @@ class ReferenceStepper(Seen):
         what of these is sent."""
         network = self.network
         population = network.populations[number]
-        for (owner, name), (positions, values) in (state.conditions.fixed or {}).items():
-            if owner == population.model.owner:
-                state.cells[owner][name][positions] = values
+        self.hold_states(population, state)
         for position, neuron in enumerate(population.members.tolist()):
             initial = float(network.neurons.initial[neuron])
             if is_first(state) and not math.isnan(initial):
@@ -107,11 +108,41 @@ class ReferenceStepper(Seen):
             held = state.conditions.held_at(neuron)
             if held is not None:
                 state.activity[neuron] = held
-        silent = state.conditions.lesioned_neurons[population.members]
         for outlet in network.outlets:
             if outlet.population == number:
-                values = np.where(silent, 0.0, state.cells[population.model.owner][outlet.name])
-                state.outlets[outlet.start : outlet.start + len(values)] = values
+                self.let_out(outlet, state.cells[population.model.owner][outlet.name], state)
+
+    def hold_states(self, population: Population, state: State) -> None:
+        """The states of a population that are held, at what they are held at."""
+        for (owner, name), (positions, values) in (state.conditions.fixed or {}).items():
+            if owner == population.model.owner:
+                state.cells[owner][name][positions] = values
+
+    def let_out(self, outlet: Outlet, values: FloatArray, state: State) -> None:
+        """What connections take of a population beside its activities; 0 of neurons that are lesioned."""
+        silent = state.conditions.lesioned_neurons[self.network.populations[outlet.population].members]
+        state.outlets[outlet.start : outlet.start + len(values)] = np.where(silent, 0.0, values)
+
+    def send_ahead(self, operation: SendAhead, state: State) -> None:
+        """What connections take of a population, where flow states are all that it is made of."""
+        population = self.network.populations[operation.population]
+        self.hold_states(population, state)
+        cells = state.cells[population.model.owner]
+        for name in operation.names:
+            formulas = formulas_of(population, [(name, given(population.model.definition, name))])
+            values = np.zeros(len(population.members))
+            for position, neuron in enumerate(population.members.tolist()):
+                functions = self.functions_of(population, position, state)
+                known = self.known(population.model, position, state)
+                known |= {one: float(numbers[position]) for one, numbers in cells.items()}
+                with_let(known, formulas.let, functions)
+                values[position] = evaluate(formulas.trees[0][1], known, functions)
+                held = state.conditions.held_at(neuron)
+                if name == MODEL.gives:
+                    state.activity[neuron] = values[position] if held is None else held
+            for outlet in self.network.outlets:
+                if (outlet.population, outlet.name) == (operation.population, name):
+                    self.let_out(outlet, values, state)
 
     def advance(self, population: Population, position: int, ports: dict[str, float], state: State) -> float:
         """One neuron's step: its states and outputs are replaced, its activity is returned."""
@@ -252,6 +283,11 @@ def _integrate(operation: Integrate, by: ReferenceStepper, state: State, inputs:
 def _diffuse(operation: Diffuse, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
     for flow in by.flows:
         flow.diffuse(state, inputs)
+
+
+@perform.register
+def _send_ahead(operation: SendAhead, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
+    by.send_ahead(operation, state)
 
 
 @perform.register

@@ -118,7 +118,7 @@ def parts_of(network: Network, operation: Integrate) -> tuple[Part, ...]:
                 number,
                 population,
                 tuple(
-                    Taken(formulas_of(population, [(name, _given(model, name))]), places, name == _ACTIVITY)
+                    Taken(formulas_of(population, [(name, given(model, name))]), places, name == _ACTIVITY)
                     for name, places in own
                 ),
                 formulas_of(population, [(one.name, one.derivative) for one in model.flows]),
@@ -145,7 +145,7 @@ def apart(port: Port) -> tuple[IntArray, IntArray]:
     return np.flatnonzero(~anew), np.flatnonzero(anew)
 
 
-def _given(model: Definition, name: str) -> Tree | None:
+def given(model: Definition, name: str) -> Tree | None:
     """The formula of the activity or of an output; a state is its own."""
     formulas = {one.name: one.each_step for one in model.gives}
     return formulas.get(name, Name(name))
