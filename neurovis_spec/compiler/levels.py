@@ -281,9 +281,10 @@ class _Coupled:
         level = levels_along(n + 1, *self._waits(np.zeros(len(self.sources), dtype=np.bool_)))
         if isinstance(level, Cycle):  # perhaps not where nobody waits for what is known behind the integration
             known = self._of_sent(lambda number, sent: known_behind_flow(self.models[number], sent))
-            level, ahead = levels_along(n + 1, *self._waits(known)), self._ahead(known)
-        if isinstance(level, Cycle):
-            return level
+            other = levels_along(n + 1, *self._waits(known))
+            if isinstance(other, Cycle):
+                return level
+            level, ahead = other, self._ahead(known)
         staged = {}
         for port, (among, *_) in self.undelayed.items():
             staged[port] = np.zeros(len(among), dtype=np.bool_)
