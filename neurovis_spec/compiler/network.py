@@ -379,6 +379,11 @@ class Network:
         return frozen(result)
 
     @cached_property
+    def port_names(self) -> frozenset[str]:
+        """The names of the ports that its neurons have."""
+        return frozenset(port.name for population in self.populations for port in population.ports)
+
+    @cached_property
     def outlets(self) -> tuple[Outlet, ...]:
         """What connections can take beside activities, in the order of the populations and of what these keep."""
         asked = {route.sends for route in self.connections.routes}

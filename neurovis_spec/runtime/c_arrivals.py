@@ -18,6 +18,7 @@ from neurovis_spec.compiler.events.settable import CENTRES
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Port
 from neurovis_spec.language.expressions.emit_c import Value
+from neurovis_spec.language.words import Combine
 from neurovis_spec.runtime.c_code import Code, Form, Place
 from neurovis_spec.runtime.signals import SignalLayout
 from neurovis_spec.runtime.stages import taken_by
@@ -69,8 +70,8 @@ def _in_lanes(ends: IntArray) -> tuple[_Lanes, Indices]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Incoming:
-    """The connections that arrive at the neurons of a population, whatever is made of them: neuron by neuron, each
-    neuron's in their order, those of the i-th neuron up to ``ends[i + 1]``."""
+    """The connections that arrive at a port of the neurons of a population, whatever is made of them: neuron by neuron,
+    each neuron's in their order, those of the i-th neuron up to ``ends[i + 1]``."""
 
     connections: Indices
     ends: IntArray
@@ -84,6 +85,8 @@ class Incoming:
     lanes: tuple[_Lanes, Indices] | None
     #: what each signal is multiplied by; None where that is 1
     factors: FloatArray | None
+    #: how what arrives at a neuron is put together
+    combine: Combine
 
 
 def incoming_of(network: Network, port: Port, count: int, fusible: bool = True) -> Incoming:
@@ -109,7 +112,7 @@ def incoming_of(network: Network, port: Port, count: int, fusible: bool = True) 
         beside, read = _in_lanes(ends)
         lanes = beside, read
     fused = fusible and len(delays) > 0 and bool((delays == 1).all() and (rules < 0).all())
-    return Incoming(own, ends, degree, fused, full, lanes, factors)
+    return Incoming(own, ends, degree, fused, full, lanes, factors, port.combine)
 
 
 def taken(network: Network, code: Code, connections: Indices, place: Place) -> str:
@@ -119,16 +122,17 @@ def taken(network: Network, code: Code, connections: Indices, place: Place) -> s
     return taken_at(network, code, network.sending[connections], place)
 
 
-def taken_at(network: Network, code: Code, index: Indices, place: Place) -> str:
-    """One of some activities and outlets, as ``Network.sending`` numbers them."""
+def taken_at(network: Network, code: Code, index: Indices, place: Place, behind: str = "outlets") -> str:
+    """One of some numbers, by indices into all activities, followed by the array that is called so: outlets, as
+    ``Network.sending`` numbers them, or the inputs of a step."""
     n = len(network.neurons)
     own = index if not isinstance(place, int) else index[place : place + 1]
     if (own < n).all():
         return f"activity[{code.at(index, place)}]"
     if (own >= n).all():
-        return f"outlets[{code.at(index - n, place)}]"
+        return f"{behind}[{code.at(index - n, place)}]"
     where = code.at(index, place)
-    return f"({where} < {n} ? activity[{where}] : outlets[{where} - {n}])"
+    return f"({where} < {n} ? activity[{where}] : {behind}[{where} - {n}])"
 
 
 def _different(delays: Indices) -> list[int]:
@@ -151,8 +155,6 @@ class Arrivals:
     def __init__(
         self,
         network: Network,
-        port: Port,
-        count: int,
         incoming: Incoming,
         code: Code,
         form: Form,
@@ -160,7 +162,8 @@ class Arrivals:
         begins: Callable[[Place], Value] | None = None,
         sent: Callable[[Indices, Place], str] | None = None,
     ) -> None:
-        self.network, self.combine, self.count, self.code, self.form = network, port.combine, count, code, form
+        self.network, self.code, self.form = network, code, form
+        self.combine, self.count = incoming.combine, len(incoming.ends) - 1
         #: where the weights begin among those packed
         self.begin = 0
         self.can_be_fused, self.ends, self.degree = incoming.can_be_fused, incoming.ends, incoming.degree

@@ -52,6 +52,13 @@ def _is_regular(indices: Indices, first: int, stride: int) -> bool:
     )
 
 
+def plus(start: int, place: Place) -> Place:
+    """An index so many places on."""
+    if isinstance(place, int):
+        return start + place
+    return f"{start} + {place}" if start else place
+
+
 class Tables:
     """Constant arrays, each once. Those of more than ``longest`` items are not written into the text but passed in at
     run time: ``passed_in`` holds them in order."""

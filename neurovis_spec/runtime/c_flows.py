@@ -48,7 +48,7 @@ from neurovis_spec.language.expressions.parser import formula
 from neurovis_spec.language.expressions.tree import Name
 from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.c_arrivals import Arrivals, incoming_of
-from neurovis_spec.runtime.c_code import Place, words_of
+from neurovis_spec.runtime.c_code import Place, plus, words_of
 from neurovis_spec.runtime.c_step import StepCode, write, write_input
 from neurovis_spec.runtime.stages import (
     INSIDE,
@@ -277,7 +277,7 @@ class _Integration:
                 now = cell = self.step.states(one.use, place)[one.name]
                 if held := self.step.held(one.part.number, one.name, place):
                     now = f"held[{held}] ? holding[{held}] : {cell}"
-                self.code.line(line.format(cell=cell, now=now, at=_plus(one.start, place)))
+                self.code.line(line.format(cell=cell, now=now, at=plus(one.start, place)))
 
             self.step.each(one.size, {}, copied)
 
@@ -291,7 +291,7 @@ class _Integration:
 
         def kept(place: Place, totals: Mapping[int, str]) -> None:
             total = totals.get(0, "") or self.code.text(arrivals.combined(place))
-            self.code.line(f"fh[{_plus(start, place)}] = {total};")
+            self.code.line(f"fh[{plus(start, place)}] = {total};")
 
         self.step.each(len(part.population.members), {0: arrivals}, kept)
 
@@ -303,9 +303,9 @@ class _Integration:
         sent: Callable[[Indices, Place], str] | None = None,
     ) -> Arrivals:
         """What arrives at a port of a population."""
-        step, count = self.step, len(part.population.members)
-        incoming = incoming_of(self.network, port, count, fusible=False)
-        return Arrivals(self.network, port, count, incoming, self.code, step.form, step.layout, begins, sent)
+        step, network = self.step, self.network
+        incoming = incoming_of(network, port, len(part.population.members), fusible=False)
+        return Arrivals(network, incoming, self.code, step.form, step.layout, begins, sent)
 
     def at_stage(self, part: Part, port: Port) -> Arrivals:
         """What arrives at a port at a stage: what is held, and on top of it what flows."""
@@ -313,7 +313,7 @@ class _Integration:
         _, staged = apart(port)
 
         def begins(place: Place) -> Value:
-            return start if held is None else f"fh[{_plus(held, place)}]"
+            return start if held is None else f"fh[{plus(held, place)}]"
 
         def sent(connections: Indices, place: Place) -> str:
             return f"fo[{self.code.at(self.plan.sent(connections), place)}]"
@@ -360,7 +360,7 @@ class _Integration:
         for one in self.plan.states:
             with self.code.block(self.code.loop("i", one.start + one.size, one.start)):
                 change: Value = "fk[i]"
-                if one.varies:
+                if self.varying[one.part.number, one.name]:
                     h = self.length(one.use.definition.per_second)
                     change = self.code.value(formula(formula_), {"h": h, "f": "fk[i]", "j": "fj[i]"})
                 self.code.line(f"fx[i] = fx[i] + {self.code.text(change)};")
@@ -461,7 +461,7 @@ class _Integration:
         per_second = use.definition.per_second
         known: dict[str, Value] = {**self.code.parameters(use, place), **self.step.states(use, place)}
         for name in part.flows:
-            known[name] = f"{self.now}[{_plus(self.plan.starts[part.number, name], place)}]"
+            known[name] = f"{self.now}[{plus(self.plan.starts[part.number, name], place)}]"
         known["t"] = _clock(per_second)
         known["dt"] = self.network.dt * per_second
         return known
@@ -487,7 +487,7 @@ class _Integration:
         more = tuple((name, tree) for name, tree in part.slopes.let if name not in known)
         known = self.step.let(more, known, [*diagonal.values()], functions)
         for name, tree in part.derivatives.trees:
-            slope, at = code.value(tree, known, functions), _plus(self.plan.starts[part.number, name], place)
+            slope, at = code.value(tree, known, functions), plus(self.plan.starts[part.number, name], place)
             held = self.step.held(part.number, name, place)
             if changes is not None:
                 own_slope = code.value(diagonal[name], known, functions)
@@ -507,19 +507,12 @@ class _Integration:
         """What the noise of the states of a neuron is multiplied by."""
         for name, tree in part.spread.trees:
             value = self.code.text(self.code.value(tree, known, functions))
-            self.code.line(f"fg[{_plus(self.plan.starts[part.number, name], place)}] = {value};")
+            self.code.line(f"fg[{plus(self.plan.starts[part.number, name], place)}] = {value};")
 
 
 def _clock(per_second: float) -> str:
     """The name of the time of a stage, in units of which a second has so many."""
     return "ts" if per_second == 1.0 else f"ts{per_second:.0f}"
-
-
-def _plus(start: int, place: Place) -> Place:
-    """An index so many places on."""
-    if isinstance(place, int):
-        return start + place
-    return f"{start} + {place}" if start else place
 
 
 @write.register
@@ -574,7 +567,7 @@ def _diffuse(operation: Diffuse, step: StepCode) -> None:
                 drawn: IntArray = drawn,
                 root: str = root,
             ) -> None:
-                cell, spread = step.states(one.use, place)[one.name], f"fg[{_plus(one.start, place)}]"
+                cell, spread = step.states(one.use, place)[one.name], f"fg[{plus(one.start, place)}]"
                 if held := step.held(one.part.number, one.name, place):
                     code.line(f"if (!held[{held}])")
                 code.line(f"{cell} = {cell} + {spread}*{root}*s[{code.at(drawn, place)}];")

@@ -25,10 +25,9 @@ from typing import NamedTuple
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, Indices, IntArray
-from neurovis_spec.compiler.events.settable import BIAS, HIGH, LOW, bias_of
+from neurovis_spec.compiler.events.settable import HIGH, LOW, bias_of
 from neurovis_spec.compiler.network import Input, Network, Outlet
 from neurovis_spec.compiler.program import (
-    DRIVE,
     Definition,
     Gather,
     Key,
@@ -45,7 +44,7 @@ from neurovis_spec.compiler.program import (
 from neurovis_spec.language.expressions.emit_c import Made, Value
 from neurovis_spec.language.expressions.tree import Name, Tree, names
 from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, incoming_of, taken, taken_at
-from neurovis_spec.runtime.c_code import Code, Form, Place, state_name
+from neurovis_spec.runtime.c_code import Code, Form, Place, plus, state_name
 from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import SharedSlots, SignalLayout
 from neurovis_spec.runtime.stages import unfolded
@@ -68,13 +67,11 @@ class StepCode:
         self.network, self.code, self.form, self.layout = network, code, form, layout
         self.depth = history_depth(network)
         #: what ports have beside what arrives, by their names
-        self.own = {port.name: _own(network, port.name) for one in network.populations for port in one.ports}
+        self.own = {name: _own(network, name) for name in network.port_names}
+        #: the names that are read when a population is updated
+        self.read_at_update = [self._read_at_update(one.model.definition) for one in network.populations]
         self.arrivals = [
-            [
-                Arrivals(network, port, len(population.members), one, code, form, self.layout)
-                for port, one in zip(population.ports, own, strict=True)
-            ]
-            for population, own in zip(network.populations, incoming, strict=True)
+            [Arrivals(network, one, code, form, self.layout) for one in of_population] for of_population in incoming
         ]
         #: connections that are fused, (m,)
         self.fuses = np.zeros(len(network.connections), dtype=np.bool_)
@@ -124,7 +121,7 @@ class StepCode:
     def population(self, number: int) -> None:
         """The neurons of a population."""
         population = self.network.populations[number]
-        read = self.read_at_update(population)
+        read = self.read_at_update[number]
         arrivals = {
             one: own
             for one, (port, own) in enumerate(zip(population.ports, self.arrivals[number], strict=True))
@@ -194,7 +191,7 @@ class StepCode:
             code.line(f"    activity[{neuron}] = {value};")
             code.line("} else {")
             code.indent += 1
-        read = self.read_at_update(population)
+        read = self.read_at_update[number]
         ports: dict[str, Value] = {}
         for one, port in enumerate(population.ports):
             total = totals.get(one, "")
@@ -203,9 +200,7 @@ class StepCode:
         if may_take:
             code.indent -= 1
             code.line("}")
-        if self.form.held:
-            code.line(f"if (held[{neuron}])")
-            code.line(f"    activity[{neuron}] = holding[{neuron}];")
+        self.hold_activity(neuron)
         self.let_out(number, place, neuron)
 
     def let_out(self, number: int, place: Place, neuron: Place) -> None:
@@ -219,19 +214,21 @@ class StepCode:
         """A value is what connections take of a neuron; 0 where it is lesioned."""
         if self.form.held:
             value = f"lesioned[{neuron}] ? {self.code.text(0.0)} : {value}"
-        at = outlet.start + place if isinstance(place, int) else f"{outlet.start} + {place}"
-        self.code.line(f"outlets[{at}] = {value};")
+        self.code.line(f"outlets[{plus(outlet.start, place)}] = {value};")
 
     def put_activity(self, neuron: Place, value: Value) -> None:
         """A value is the activity of a neuron, unless that is held."""
         self.code.line(f"activity[{neuron}] = {self.code.text(value)};")
+        self.hold_activity(neuron)
+
+    def hold_activity(self, neuron: Place) -> None:
+        """The activity of a neuron, if it is held, at what it is held at."""
         if self.form.held:
             self.code.line(f"if (held[{neuron}])")
             self.code.line(f"    activity[{neuron}] = holding[{neuron}];")
 
-    def read_at_update(self, population: Population) -> frozenset[str]:
-        """The names that are read when a population is updated, derivatives left out."""
-        made = population.model.definition
+    def _read_at_update(self, made: Definition) -> frozenset[str]:
+        """The names that a model reads when its neurons are updated, derivatives left out."""
         if not made.flows:
             return made.read
         ends = [] if self.network.episode is None else [one.each_episode for one in made.lasting]
@@ -256,7 +253,7 @@ class StepCode:
         """What arrives at a port, + bias + input + noise; ``step_value`` gives the code of a number of the step."""
         code, members = self.code, population.members
         own = self.own[port.name]
-        bias = 0.0 if own.bias is None else code.settable(own.key, own.bias, members, place)
+        bias = code.settable(own.key, own.bias, members, place)
         value = total
         if isinstance(value, float) and isinstance(bias, float):
             value += bias
@@ -264,8 +261,7 @@ class StepCode:
             # a sum that begins with 0 is never −0, so adding 0 changes nothing; a product may be
             value = f"{code.text(value)} + {code.text(bias)}"
         for fed in (own.input, own.noise):
-            if fed is not None:
-                value = self._plus_step_value(value, fed[members], place, step_value)
+            value = self._plus_step_value(value, fed[members], place, step_value)
         return value
 
     def step_value(self, index_in_s: IntArray, place: Place) -> str:
@@ -319,7 +315,7 @@ class StepCode:
     def held(self, number: int, name: str, place: Place) -> str:
         """The code of where a state of a member of a population stands among what can be held; "" where none is."""
         start = self.network.state_places.get((number, name)) if self.form.fixed else None
-        return "" if start is None else str(start + place if isinstance(place, int) else f"{start} + {place}")
+        return "" if start is None else str(plus(start, place))
 
     def activation(self, population: Population, place: Place) -> dict[str, Made]:
         """The functions of the activation of a neuron, for formulas of its model."""
@@ -595,31 +591,22 @@ class StepCode:
 
     def signal(self, indices: IntArray, place: Place) -> str:
         """A signal of a rule: an activity or an input."""
-        code, n = self.code, len(self.network.neurons)
-        own = indices if not isinstance(place, int) else indices[place : place + 1]
-        if (own < n).all():
-            return f"activity[{code.at(indices, place)}]"
-        if (own >= n).all():
-            return f"s[{code.at(indices - n, place)}]"
-        index = code.at(indices, place)
-        return f"({index} < {n} ? activity[{index}] : s[{index} - {n}])"
+        return taken_at(self.network, self.code, indices, place, behind="s")
 
 
 class _Own(NamedTuple):
     """What a port has beside what arrives, each (n,): its bias, and what that is called; where its input and its noise
-    stand in the vector of the step, −1 for nowhere. None where no neuron has any."""
+    stand in the vector of the step, −1 for nowhere."""
 
     key: Key
-    bias: FloatArray | None
-    input: IntArray | None
-    noise: IntArray | None
+    bias: FloatArray
+    input: IntArray
+    noise: IntArray
 
 
 def _own(network: Network, port: str) -> _Own:
     neurons = network.neurons
-    if port == DRIVE:
-        return _Own(BIAS, neurons.bias, neurons.input, network.noise_index)
-    return _Own(bias_of(port), neurons.port_bias.get(port), neurons.port_input.get(port), network.noise_of(port))
+    return _Own(bias_of(port), neurons.bias_at(port), neurons.input_at(port), network.noise_of(port))
 
 
 def begins_otherwise(network: Network) -> bool:

@@ -66,9 +66,9 @@ class Seen:
         #: what each connection takes: an index into the activities followed by the outlets
         self.sending = connections.sources.whole() if network.sending is None else network.sending
         #: by ports
-        names = {port.name for population in network.populations for port in population.ports}
-        self.bias = {name: NetworkArray(network.neurons.bias_at(name), variables.get(bias_of(name))) for name in names}
-        self.fed = {name: (network.neurons.input_at(name), network.noise_of(name)) for name in names}
+        names, neurons = network.port_names, network.neurons
+        self.bias = {name: NetworkArray(neurons.bias_at(name), variables.get(bias_of(name))) for name in names}
+        self.fed = {name: (neurons.input_at(name), network.noise_of(name)) for name in names}
         self.centres = NetworkArray(connections.centres.whole(), variables.get(CENTRES))
 
     def signals(
