@@ -20,11 +20,11 @@ from neurovis_spec.compiler.flows import jacobian, plain_flow, ports_read_by, wi
 from neurovis_spec.compiler.levels import Cycle, Wired, held_at, made_anew, order_of
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.initial_states import beginning
-from neurovis_spec.compiler.program import Definition, Integrate, Population
+from neurovis_spec.compiler.program import Definition, Integrate, Population, Port
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.evaluate import Value
 from neurovis_spec.language.expressions.tree import ExpressionError
-from neurovis_spec.language.units import TIMES, measured
+from neurovis_spec.language.units import TIMES
 from neurovis_spec.language.words import Method
 
 #: How far into the negative a method stays stable: the least h·∂f/∂x. Others are not limited.
@@ -149,7 +149,7 @@ def _stiff(compiled: Compiled, by: Integrate, findings: Findings) -> None:
     if worst is None or network.dt / by.substeps * worst.slope >= limit:
         return
     reached = network.dt / by.substeps * worst.slope
-    most = _shown(limit / worst.slope * by.substeps, str(time.dt.node.value))
+    most = _shown(limit / worst.slope * by.substeps, network.dt_unit)
     message = f"dt·∂{worst.state}'/∂{worst.state} is {reached:.3g} at '{worst.neuron}'; the limit of {by.method} is"
     hint = f"take a dt of at most {most}, or integrate: exponential"
     findings.warning("stiff-step", time.dt.span, f"{message} {limit:g}: the run will diverge", hint)
@@ -166,7 +166,7 @@ def _slopes(network: Network) -> Iterator[_Stiffest]:
             slopes, activation = jacobian(model), with_slope(population.activation.definition)
         except ExpressionError:
             continue  # it is too long to be told anything of
-        ports: dict[str, Value] = {port.name: _resting(network, population, port.name) for port in population.ports}
+        ports: dict[str, Value] = {port.name: _resting(network, population, port) for port in population.ports}
         sloped = replace(population, activation=replace(population.activation, definition=activation))
         begin = beginning(sloped, network.dt, network.neurons.starts, ports)
         for name, tree in slopes.let:
@@ -179,18 +179,14 @@ def _slopes(network: Network) -> Iterator[_Stiffest]:
                 yield _Stiffest(neuron, state, float(found[place]) * model.per_second)
 
 
-def _resting(network: Network, population: Population, port: str) -> FloatArray:
+def _resting(network: Network, population: Population, port: Port) -> FloatArray:
     """What a port is where nothing arrives: its bias."""
-    neurons = network.neurons
-    bias = neurons.port_bias.get(port, neurons.bias if port == population.drive.name else np.zeros(len(neurons)))
-    combined = next(one.combine for one in population.ports if one.name == port)
-    return np.asarray(bias[population.members] + (1.0 if combined == "product" else 0.0), dtype=np.float64)
+    bias = network.neurons.bias_at(port.name)[population.members]
+    return np.asarray(bias + (1.0 if port.combine == "product" else 0.0), dtype=np.float64)
 
 
-def _shown(seconds: float, written: str) -> str:
-    """A time, rounded down to two digits, in the unit in which another one is written."""
-    found = measured(written)
-    unit = "s" if found is None else found.unit
+def _shown(seconds: float, unit: str) -> str:
+    """A time in this unit, rounded down to two digits."""
     value = seconds / float(TIMES[unit])
     power = 10.0 ** (math.floor(math.log10(value)) - 1)
     return f"{math.floor(value / power) * power:.2g} {unit}"
