@@ -21,8 +21,8 @@ from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
 from neurovis_spec.compiler.drawing.sections import layout_settings, render_settings
 from neurovis_spec.compiler.events.bound import found_in, make_settable, own_weights
-from neurovis_spec.compiler.flows import BY_SLOPE
-from neurovis_spec.compiler.levels import Cycle, Order, held_at, order_of, sent_by
+from neurovis_spec.compiler.flows import BY_SLOPE, sent_by
+from neurovis_spec.compiler.levels import Cycle, Order, held_at, order_of
 from neurovis_spec.compiler.limits import MOST_SIGNALS, MOST_SUBSTEPS, Limits, amount
 from neurovis_spec.compiler.lower import Integration, make_populations, make_program, make_projections
 from neurovis_spec.compiler.names.expand import Expander, constants_of

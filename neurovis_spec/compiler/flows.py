@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-from neurovis_spec.compiler.program import SLOPE_F, Definition, Quantity, ports_of
+from neurovis_spec.compiler.program import MODEL, SLOPE_F, Definition, Quantity, ports_of
 from neurovis_spec.language.expressions.derivative import derivative, slope
 from neurovis_spec.language.expressions.tree import Name, Number, Tree, names
 from neurovis_spec.language.words import Method
@@ -57,10 +57,15 @@ def ports_read_by(definition: Definition) -> PortsRead:
     return PortsRead(flow & ports, update, outputs)
 
 
+def sent_by(model: Definition, sends: str) -> str:
+    """What a connection takes of a neuron of this model that is told to take this; "" is what the model sends."""
+    return sends or model.send or MODEL.gives
+
+
 def flows_by(definition: Definition, sent: str) -> frozenset[str] | None:
     """The ports that have to flow so that something flows that a model sends: a state or an output by its name, ""
     what it sends unless a connection says otherwise. None where it does not flow, whatever arrives."""
-    sent = sent or definition.send or definition.given.name
+    sent = sent_by(definition, sent)
     flowing = {one.name for one in definition.flows}
     if any(one.name == sent for one in definition.state):
         return frozenset() if sent in flowing else None
@@ -79,7 +84,7 @@ def known_behind_flow(definition: Definition, sent: str = "") -> bool:
     and ``t`` alone, and no ``each_step`` changes one of these states afterwards."""
     if not plain_flow(definition, sent):
         return False
-    sent = sent or definition.send or definition.given.name
+    sent = sent_by(definition, sent)
     changed = {one.name for one in definition.state if one.each_step is not None}
     read = reads(definition, [one.each_step for one in definition.gives if one.name == sent])
     return changed.isdisjoint(read | {sent})

@@ -21,14 +21,9 @@ from typing import NamedTuple
 import numpy as np
 
 from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray, IntColumn, frozen, narrow
-from neurovis_spec.compiler.flows import PortsRead, flows_by, known_behind_flow, plain_flow, ports_read_by
+from neurovis_spec.compiler.flows import PortsRead, flows_by, known_behind_flow, plain_flow, ports_read_by, sent_by
 from neurovis_spec.compiler.network import PLAIN_ROUTE, Input, Neurons, Noise, Route
-from neurovis_spec.compiler.program import DRIVE, MODEL, Definition
-
-
-def sent_by(model: Definition, sends: str) -> str:
-    """What a connection takes of a neuron of this model that is told to take this; "" is what the model sends."""
-    return sends or model.send or MODEL.gives
+from neurovis_spec.compiler.program import DRIVE, Definition
 
 
 def default_delay(source: Definition, sends: str, target: Definition, ports: Sequence[str]) -> int:

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from neurovis_spec.arrays import Indices
-from neurovis_spec.compiler.levels import sent_by
+from neurovis_spec.compiler.flows import sent_by
 from neurovis_spec.compiler.names.state_references import no_port
 from neurovis_spec.compiler.network import PLAIN_ROUTE, Route
 from neurovis_spec.compiler.neurons.groups import Built, is_written
