@@ -254,3 +254,17 @@ connections: {A -> A: {weight: 0.1, pattern: all_to_all, port: p, plasticity: oj
     runs = [record(network, Course(4, backend=backend)).activity for backend in ("reference", "numpy")]
     assert np.ptp(runs[0][-1]) > 0
     np.testing.assert_allclose(runs[1], runs[0], rtol=1e-12)
+
+
+@pytest.mark.parametrize("integrate", ["euler", "heun", "rk4", "{method: euler, substeps: 3}", "exponential"])
+def test_noise_times_the_state_itself_is_that_of_the_beginning_of_the_step(integrate: str) -> None:
+    network = nv.compile_text(f"""
+neurovis: 1
+name: noisy
+time: {{dt: 0.1, integrate: {integrate}}}
+models: {{m: {{state: {{v: {{initial: 0.3, derivative: -3*v + t, noise: v}}}}, activity: v}}}}
+neurons: {{A: {{count: 3, model: m}}}}
+""").network
+    runs = [record(network, Course(6, backend=backend)).activity for backend in ("reference", "numpy")]
+    assert np.ptp(runs[0][-1]) > 0
+    np.testing.assert_allclose(runs[1], runs[0], rtol=1e-12)

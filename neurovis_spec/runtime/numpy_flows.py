@@ -139,18 +139,24 @@ class _Flow:
             for part in self.parts:
                 for port in part.ports:
                     self.hold(part, port)
-            with code.function(stage, "t"):
+            spread = self.make_spread()
+            with code.function(stage, "t", *(("first=False",) if spread else ())):
                 _Stage(self).emit()
-            spread = self.emit_spread(f"t + {times(0.0, h).first!r}")
-            for line in (*self.filled, f"t = (k - 1) * {self.network.dt!r}", *spread):
+            for line in (*self.filled, f"t = (k - 1) * {self.network.dt!r}"):
                 code.line(line)
             if substeps > 1:
                 code.line("start = t")
                 code.line(f"for substep in range({substeps}):")
                 code.indent += 1
                 code.line(f"t = start + substep * {h!r}")
-            inside = times(0.0, h).first
-            calls = [f"{stage}(t + {inside!r})", f"{stage}(t + {h / 2.0!r})", f"{stage}(t + {h!r} - {inside!r})"]
+            inside, is_first = times(0.0, h).first, ""
+            if spread:
+                is_first = ", substep == 0" if substeps > 1 else ", True"
+            calls = [
+                f"{stage}(t + {inside!r}{is_first})",
+                f"{stage}(t + {h / 2.0!r})",
+                f"{stage}(t + {h!r} - {inside!r})",
+            ]
             for line in _METHODS[self.operation.method](self, *calls):
                 code.line(line)
             code.line(f"if fixed: {self.x}[held] = values")
@@ -168,20 +174,12 @@ class _Flow:
         self.code.line(f"    held, values = held_among(fixed, {self.code.constant(starts)})")
         self.code.line(f"    {self.x}[held] = values")
 
-    def emit_spread(self, t: str) -> tuple[str, ...]:
-        """The function of what the noise of the flow states is multiplied by; gives the lines that call it at the first
-        stage."""
-        keys = [(part.number, name) for part in self.parts for name, _ in part.spread.trees]
-        if not keys:
-            return ()
-        function = self.code.name("spread")
-        with self.code.function(function, "t"):
-            stage = _Stage(self)
-            values = [value for part in self.parts for value in stage.values(part, part.spread).values()]
-            self.code.line(f"return {', '.join(values)},")
-        self.step.spread.update((key, self.code.name("g")) for key in keys)
-        made = ", ".join(self.step.spread[key] for key in keys)
-        return f"{self.y}[:] = {self.x}", f"{made}, = {function}({t})"
+    def make_spread(self) -> bool:
+        """Room for what the noise of the flow states is multiplied by, where there is any."""
+        for part in self.parts:
+            for name, _ in part.spread.trees:
+                self.step.spread[part.number, name] = self.code.array("g", f"np.empty({len(part.population.members)})")
+        return bool(self.step.spread)
 
     def hold(self, part: Part, port: Port) -> None:
         """What of a port is made before the stages."""
@@ -223,12 +221,21 @@ class _Stage:
         self.sent = False
 
     def emit(self) -> None:
-        """The derivatives of all flow states, and how much they change with these, where the method looks at that."""
+        """The derivatives of all flow states, and how much they change with these, where the method looks at that; at
+        the first stage of a step what their noise is multiplied by, too."""
         for part in self.flow.parts:
             for array, formulas in ((self.flow.k, part.derivatives), (self.flow.j, part.slopes)):
                 for name, value in self.values(part, formulas).items():
                     self.code.line(f"{array}[{_text(self.flow.places[part.number, name])}] = {value}")
         self.code.line(f"if fixed: {self.flow.k}[held] = 0.0")
+        if not self.step.spread:
+            return
+        self.code.line("if first:")
+        self.code.indent += 1
+        for part in self.flow.parts:
+            for name, value in self.values(part, part.spread).items():
+                self.code.line(f"{self.step.spread[part.number, name]}[:] = {value}")
+        self.code.indent -= 1
 
     def emit_inputs(self) -> str:
         """The vector of the step, in which inputs that are formulas are made anew."""
