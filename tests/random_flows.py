@@ -125,7 +125,8 @@ def _group(chooser: random.Random, kind: str, size: int) -> Plain:
         group["count"] = size
     port = chooser.choice([one for one in PORTS[kind] if isinstance(one, str)])
     if chooser.random() < 0.5:
-        group["bias"] = {port: 0.3} if chooser.random() < 0.5 else 0.2
+        bias = chooser.choice([0.2, 0.3, "level"])
+        group["bias"] = {port: bias} if chooser.random() < 0.5 else bias
     if chooser.random() < 0.5:
         source = "rows" if size == 3 and chooser.random() < 0.5 else "wave"
         group["input"] = {port: source} if chooser.random() < 0.5 else source
@@ -139,7 +140,7 @@ def _connection(
 ) -> Plain:
     body: dict[str, Plain] = {"weight": chooser.choice(["w*(1 + i - j)/3", 0.5, -0.7])}
     if sizes[source] > 1 or sizes[target] > 1:
-        body["pattern"] = "all_to_all"
+        body["pattern"] = chooser.choice(["all_to_all", "all_to_all", {"random": {"probability": 0.6}}])
     delay = chooser.choice([None, None, 0, 1, 3])
     if delay is not None:
         body["delay"] = delay
