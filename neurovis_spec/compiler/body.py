@@ -64,17 +64,17 @@ class Place:
 
 
 def body_settings(
-    model: BodyModel, around: Surroundings, constants: Constants, place: Place | None, *, dt_known: bool
+    model: BodyModel, around: Surroundings, constants: Constants, place: Place | None
 ) -> BodySettings | None:
-    """The ``body`` section of a spec. What is invalid in it is reported and left out. ``dt_known``: the spec's dt is
-    in order. Without a ``place`` the body is not opened, and its own names are not checked."""
+    """The ``body`` section of a spec. What is invalid in it is reported and left out. Without a ``place`` the body is
+    not opened, and its own names are not checked."""
     findings = constants.findings
     kind, given = next(iter(model.kinds.items()), ("", None))
     substeps = None if model.substeps is None else constants.integer(model.substeps, "'substeps'", 1, MOST_SUBSTEPS)
     path = body = None
     if given is not None and len(model.kinds) == 1 and place is not None:
         clock = None
-        if dt_known and substeps is not UNKNOWN:
+        if constants.timed and substeps is not UNKNOWN:
             time = around.spec.time
             clock = Clock(constants.dt, substeps, model.substeps, time is None or time.dt is None)
         path, body = find_body(kind, given, place, clock, findings)

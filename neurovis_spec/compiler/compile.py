@@ -81,8 +81,6 @@ class _Declared(NamedTuple):
 
     seed: int
     constants: Constants
-    #: whether ``dt`` is in order, or left out
-    dt_known: bool
     steps: int
     episode: int | None
     integration: Integration
@@ -141,7 +139,7 @@ def _compile_sections(spec: Spec, request: Request, findings: Findings) -> _Sect
         render = replace(render, figure=figure_of(spec, census, outputs, finder))
     around = Surroundings(spec, scopes[0], inputs, outputs)
     ros = _ros(around, constants)
-    body = _body(around, request, constants, dt_known=declared.dt_known)
+    body = _body(around, request, constants)
     noises = make_noises(census, sum(entry.size for entry in inputs))
     declared.expansion.depend()  # last, as every section may have made parameters of instances structural
     order = _order(connected, census, inputs, noises, findings)
@@ -168,7 +166,7 @@ def _declare(spec: Spec, request: Request, findings: Findings) -> _Declared:
     seed = 0 if spec.seed is None else spec.seed.value
     seed = seed if request.seed is None else request.seed
     constants = Constants(names_of(spec, "parameters", {}), 1.0, findings)
-    dt_known = constants.timed = _step_length(spec, constants)
+    constants.timed = _step_length(spec, constants)
     library = library_of(spec, request.includes, request.base, constants.dt, findings)
     make_parameters(spec, constants, request.parameters)
     _check_names_set(spec, constants, request.parameters)
@@ -187,7 +185,6 @@ def _declare(spec: Spec, request: Request, findings: Findings) -> _Declared:
     return _Declared(
         seed=seed,
         constants=constants,
-        dt_known=dt_known,
         steps=steps,
         episode=episode,
         integration=integration,
@@ -248,7 +245,7 @@ def _ros(around: Surroundings, constants: Constants) -> RosSettings:
     return ros_settings(around.spec.ros, around, constants)
 
 
-def _body(around: Surroundings, request: Request, constants: Constants, *, dt_known: bool) -> BodySettings | None:
+def _body(around: Surroundings, request: Request, constants: Constants) -> BodySettings | None:
     """The ``body`` section, of the spec or of the file that is asked for. Most specs have none: nothing that reads it
     is imported then."""
     model, body_of_spec = around.spec.body, None
@@ -256,13 +253,13 @@ def _body(around: Surroundings, request: Request, constants: Constants, *, dt_kn
         from neurovis_spec.compiler.body import Place, body_settings
 
         place = Place(request.base, request.root) if request.body is True else None
-        body_of_spec = body_settings(model, around, constants, place, dt_known=dt_known)
+        body_of_spec = body_settings(model, around, constants, place)
     if isinstance(request.body, Path):
-        return _body_of_file(request.body, around, constants, dt_known=dt_known)
+        return _body_of_file(request.body, around, constants)
     return body_of_spec if request.body else None
 
 
-def _body_of_file(path: Path, around: Surroundings, constants: Constants, *, dt_known: bool) -> BodySettings | None:
+def _body_of_file(path: Path, around: Surroundings, constants: Constants) -> BodySettings | None:
     """The ``body`` section of another file, whose paths are relative to its own folder."""
     from neurovis_spec.compiler.body import Place, body_settings
     from neurovis_spec.language.shape import read_body
@@ -270,7 +267,7 @@ def _body_of_file(path: Path, around: Surroundings, constants: Constants, *, dt_
     model = read_body(path, constants.findings)
     if model is None:
         return None
-    return body_settings(model, around, constants, Place(path.parent, path.parent), dt_known=dt_known)
+    return body_settings(model, around, constants, Place(path.parent, path.parent))
 
 
 def _check_modules_without_instance(expander: Expander, limits: Limits, seed: int) -> None:

@@ -220,7 +220,7 @@ class Constants:
     path: str = ""
     #: where they are declared
     home: Home = PARAMETERS
-    #: whether ``dt`` is in order
+    #: whether ``dt`` is in order, or left out
     timed: bool = True
     #: the units of the parameters that have one
     units: dict[str, str] = field(default_factory=dict)
