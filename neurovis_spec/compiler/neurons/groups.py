@@ -69,7 +69,7 @@ class WrittenNoise(NamedTuple):
 
     port: str
     formula: Formula
-    tree: Tree | Unknown
+    tree: Tree
 
 
 class Built(NamedTuple):
@@ -237,11 +237,9 @@ class Builder:
 
     def _noises(self, model: GroupModel, name: str, kind: NeuronType) -> tuple[WrittenNoise, ...]:
         """The noise by ports, as far as it is in order."""
-        found = (
-            WrittenNoise(port, formula, _noise_of(formula, self.constants))
-            for port, formula in self._at_ports(model.noise, name, kind, model)
-        )
-        return tuple(one for one in found if one.tree is not UNKNOWN)
+        written = self._at_ports(model.noise, name, kind, model)
+        found = ((port, formula, _noise_of(formula, self.constants)) for port, formula in written)
+        return tuple(WrittenNoise(port, formula, tree) for port, formula, tree in found if tree is not UNKNOWN)
 
     def _position(self, model: GroupModel, n: int | Unknown) -> tuple[FloatArray | Unknown, list[Part]]:
         """The positions, NaN without any, and what of them follows parameters."""

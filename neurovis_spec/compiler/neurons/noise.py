@@ -24,7 +24,6 @@ from neurovis_spec.language.expressions.tree import Chain, Conditional, Draw, Nu
 from neurovis_spec.language.located import Formula
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
-from neurovis_spec.language.unknown import UNKNOWN
 
 _NOISE = formula_at(GroupModel, "noise")
 #: normal(0, 1)
@@ -46,12 +45,11 @@ def make_noises(census: Census, inputs: int) -> tuple[Noise, ...]:
 def _written(one: Built, members: IntArray) -> Iterator[Noise]:
     """The noise that a group writes, by ports."""
     for port, formula, tree in one.noises:
-        if tree is not UNKNOWN:
-            constants = one.constants
-            widths = _check_deviations(tree, formula, one.group.count, constants)
-            name = one.group.name if port == DRIVE else f"{one.group.name}.{port}"
-            slots = slots_named(tree, constants.settable)
-            yield Noise(name, members, 0, tree, dict(constants.parameters), slots, widths, port)
+        constants = one.constants
+        widths = _check_deviations(tree, formula, one.group.count, constants)
+        name = one.group.name if port == DRIVE else f"{one.group.name}.{port}"
+        slots = slots_named(tree, constants.settable)
+        yield Noise(name, members, 0, tree, dict(constants.parameters), slots, widths, port)
 
 
 def _of_states(one: Built, members: IntArray) -> Iterator[Noise]:
