@@ -24,7 +24,7 @@ from neurovis_spec.compiler.names.state_references import (
 )
 from neurovis_spec.compiler.neurons.groups import is_written
 from neurovis_spec.compiler.neurons.populate import Census
-from neurovis_spec.compiler.program import Definition
+from neurovis_spec.compiler.program import Definition, Quantity
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.references import Arrow, DottedName, Part, StateName, parse_sum
@@ -144,16 +144,22 @@ def finder_of(census: Census, made: Connected, findings: Findings) -> Finder:
         first, start = start, start + len(bundle.sources)
         if bundle.learning is not None:
             rule, members = bundle.learning.rule, np.arange(first, start)
-            rules.append(Holder(members, rule.name, tuple(quantity.name for quantity in rule.state)))
+            rules.append(_holder(members, rule.name, rule.state))
     names = tuple(bundle.name for bundle in made.bundles)
     empty = tuple(bundle.empty for bundle in made.bundles if bundle.empty is not None)
     wiring = Wiring(made.sources.compact(), made.targets.compact(), names, tuple(rules), made.complete, empty)
-    return Finder(census.directory, _models(census), _models(census, outputs=False), wiring, findings)
+    models = _models(census)
+    kept = tuple(_holder(members, model.name, model.kept) for model, members in models)
+    lasting = tuple(_holder(members, model.name, model.state) for model, members in models)
+    return Finder(census.directory, kept, lasting, wiring, findings)
 
 
-def _models(census: Census, outputs: bool = True) -> tuple[Holder, ...]:
-    """The states of the models of groups, with their outputs or without, by models; nothing is known of a group whose
-    model is invalid."""
+def _holder(members: IntArray, name: str, states: tuple[Quantity, ...]) -> Holder:
+    return Holder(members, name, tuple(one.name for one in states))
+
+
+def _models(census: Census) -> list[tuple[Definition, IntArray]]:
+    """The models of groups, each with its neurons; nothing is known of a group whose model is invalid."""
     members: dict[str, list[range]] = {}
     models: dict[str, Definition] = {}
     for one in census.groups:
@@ -162,11 +168,4 @@ def _models(census: Census, outputs: bool = True) -> tuple[Holder, ...]:
             continue
         models[model.name] = model
         members.setdefault(model.name, []).append(one.group.indices)
-    return tuple(
-        Holder(
-            np.fromiter(chain.from_iterable(members[name]), np.int64),
-            name,
-            tuple(quantity.name for quantity in (model.kept if outputs else model.state)),
-        )
-        for name, model in models.items()
-    )
+    return [(models[name], np.fromiter(chain.from_iterable(some), np.int64)) for name, some in members.items()]
