@@ -249,9 +249,6 @@ def as_formulas(node: Node, info: ValidationInfo) -> Formula | FormulaList:
     return as_formula(node, info)
 
 
-FormulasField = Annotated[Formula | FormulaList, Leaf(as_formulas, FORMULAS)]
-
-
 class Initial(NamedTuple):
     """What a group begins with: its activity at step 0 (None: it is computed), and states of its model."""
 
