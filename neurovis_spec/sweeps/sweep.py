@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Final, Unpack
 
@@ -132,8 +132,9 @@ def planned(
     how: CompileKeywords = COMPILE,
 ) -> CheckedSweep:
     """A sweep before anything is run: of each point this ``course``, compiled so. Raises what ``sweep`` raises."""
-    grid = axes(over, partial(_unit_of, source))
-    spec = source if isinstance(source, Source) else _read(source)
+    units = cache(partial(_units, source))  # read only where a value has a unit
+    grid = axes(over, lambda name: units().get(name, ""))
+    spec = _read(source)
     named = named_metrics(metrics)
     for one in named.values():
         parsed(one, LABEL)
@@ -233,17 +234,18 @@ def _pair(text: str) -> tuple[str, str]:
     return (match[1], match[2].strip()) if match else (" ".join(text.split()), text)
 
 
-def _unit_of(source: str | Path | Mapping[str, object] | Source, name: str) -> str:
-    """The unit of a parameter of a spec, as far as that can be read."""
-    spec = source if isinstance(source, Source) else _read(source)
+def _units(source: str | Path | Mapping[str, object] | Source) -> Mapping[str, str]:
+    """The units of the parameters of a spec, as far as that can be read; "" for one that has none."""
+    spec = _read(source)
     document = read_text(spec.text, spec.file, Findings())
     model = None if document is None else read_spec(document, Findings())
-    parameter = None if model is None else model.parameters.get(name)
-    return "" if parameter is None else parameter.measure
+    return {} if model is None else {name: parameter.measure for name, parameter in model.parameters.items()}
 
 
-def _read(source: str | Path | Mapping[str, object]) -> Source:
+def _read(source: str | Path | Mapping[str, object] | Source) -> Source:
     """A spec, read once, so that it is the same at every point."""
+    if isinstance(source, Source):
+        return source
     if isinstance(source, Mapping):
         return Source(text_of(source), "<mapping>", Path())
     path = arguments.path("source", source)
