@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 from neurovis_spec.body import BodyError, Port, open_body
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Integrate
 
 
 def describe(network: Network, engine: tuple[str, str]) -> dict[str, object]:
@@ -90,7 +89,7 @@ def _routes(network: Network) -> list[dict[str, object]]:
 
 def _integration(network: Network) -> dict[str, object]:
     """How states are integrated, where there are some with a derivative."""
-    by = next((one for one in network.program if isinstance(one, Integrate)), None)
+    by = network.integration
     return {} if by is None else {"integrate": {"method": by.method, "substeps": by.substeps}}
 
 

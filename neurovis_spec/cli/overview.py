@@ -172,6 +172,8 @@ def _port(of_route: tuple[str, float]) -> str:
 
 def _program(network: Network) -> str:
     """The order of a step where states flow: what is integrated together, and what of it is held."""
+    if network.integration is None:
+        return ""
     rows: list[tuple[str, str, str]] = []
     anew: set[str] = set()
     held: set[str] = set()
@@ -193,8 +195,6 @@ def _program(network: Network) -> str:
                     ("noise", _members(network, one), ", ".join(state.name for state in model.flows if state.noise))
                     for one, model in noisy
                 ]
-    if not any(isinstance(operation, Integrate) for operation in network.program):
-        return ""
     by_default = {network.connections.entries[entry] for entry in network.connections.undelayed}
     notes = [("made anew at each stage", anew), ("held over a step", held), ("delay 0 by default", by_default)]
     told = [(what, ", ".join(name for name in network.connections.entries if name in of)) for what, of in notes if of]

@@ -251,9 +251,8 @@ def _print(network: CompiledNetwork, recording: Recording, summary: str, asked: 
 def _print_check(network: CompiledNetwork, check: StepCheck) -> None:
     """How far runs with shorter steps are from each other."""
     from neurovis_spec.cli.tables import number, table
-    from neurovis_spec.compiler.program import Integrate
 
-    by = next((one for one in network.network.program if isinstance(one, Integrate)), None)
+    by = network.network.integration
     what = "" if by is None else f"{by.method}, "
     steps = " s, ".join(number(check.dt / parts) for parts in (1, 2, 4))
     click.echo(f"{network.name}: {count(check.steps, 'step')} of {steps} s, {what}backend {check.backend}")

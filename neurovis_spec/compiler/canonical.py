@@ -24,7 +24,6 @@ from neurovis_spec.compiler.program import (
     MODEL,
     RULE,
     Definition,
-    Integrate,
     Population,
     Projection,
     Quantity,
@@ -90,7 +89,8 @@ def _flows(network: Network, places: IntArray) -> Iterator[tuple[object, ...]]:
     if neurons.port_input:
         yield "port_input", {port: np.append(places, -1)[given] for port, given in neurons.port_input.items()}
     yield from (("noise", one.name, one.port, one.state) for one in network.noises if one.port != DRIVE)
-    yield from (("integrate", by.method, by.substeps) for by in network.program if isinstance(by, Integrate))
+    if (by := network.integration) is not None:
+        yield "integrate", by.method, by.substeps
 
 
 def _arranged(inputs: Sequence[Input]) -> tuple[list[Input], IntArray]:

@@ -343,16 +343,20 @@ class Network:
     def _drawn_end(self) -> int:
         return self.input_size + sum(len(noise.members) for noise in self.noises)
 
+    @property
+    def integration(self) -> Integrate | None:
+        """How states with a derivative are integrated; None where nothing flows."""
+        return next((one for one in self.program if isinstance(one, Integrate)), None)
+
     @cached_property
     def held_inputs(self) -> Mapping[str, int]:
         """Of each input that is a formula and reaches what flows, by its name: where it stands in the vector of a step
         whether it is held over the step, as it is where a caller gives its value (1); else (0) its formula holds, at
         each stage."""
+        by = self.integration
         fed = [
             self.neurons.input_at(port.name)[population.members]
-            for operation in self.program
-            if isinstance(operation, Integrate)
-            for population in map(self.populations.__getitem__, operation.populations)
+            for population in map(self.populations.__getitem__, by.populations if by is not None else ())
             for port in population.ports
         ]
         reached = frozenset(np.concatenate(fed).tolist()) if fed else frozenset()

@@ -17,7 +17,6 @@ from neurovis_spec.arguments import callers_level
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Integrate
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.state import State
@@ -310,7 +309,7 @@ def _beyond(network: Network) -> tuple[tuple[str, bool], ...]:
     """What only a backend has that says so (``Capabilities.flows``), and whether a network asks for it."""
     ports = [port for population in network.populations for port in population.ports]
     return (
-        ("derivatives", any(isinstance(operation, Integrate) for operation in network.program)),
+        ("derivatives", network.integration is not None),
         ("ports", len(ports) > len(network.populations) or any(port.factors is not None for port in ports)),
         ("outputs of models", any(population.model.definition.outputs for population in network.populations)),
         ("states that are sent", bool(network.outlets)),

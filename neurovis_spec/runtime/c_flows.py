@@ -188,10 +188,10 @@ class Plan:
 
 def plan_of(network: Network) -> Plan | None:
     """The plan of a network; None where nothing flows."""
-    operations = [one for one in network.program if isinstance(one, Integrate)]
-    if not operations:
+    by = network.integration
+    if by is None:
         return None
-    return Plan(network, operations[0], any(isinstance(one, Diffuse) for one in network.program))
+    return Plan(network, by, any(isinstance(one, Diffuse) for one in network.program))
 
 
 def work_size(network: Network) -> int:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Definition, Integrate, is_activation
+from neurovis_spec.compiler.program import Definition, is_activation
 from neurovis_spec.language.expressions.emit_c import INEXACT
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.expressions.tree import Call, Tree, walk
@@ -135,7 +135,7 @@ def _calls_a_stage(part: Part) -> int:
 def _integration(exported: Exported) -> tuple[int, list[str]]:
     """How many functions the integration calls in a step, and what else it takes; none where nothing flows."""
     network = exported.network
-    by = next((one for one in network.program if isinstance(one, Integrate)), None)
+    by = network.integration
     if by is None:
         return 0, []
     parts, stages = parts_of(network, by), len(STAGES[by.method]) * by.substeps

@@ -26,7 +26,7 @@ from neurovis_spec.arrays import BoolArray, FloatArray, IntArray
 from neurovis_spec.compiler.events.patch import PatchError
 from neurovis_spec.compiler.names.state_references import StateOf
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Holder, Integrate, Key, Use
+from neurovis_spec.compiler.program import Holder, Key, Use
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.controls import Controls, lose
@@ -57,7 +57,7 @@ def resumed_state(
     _lesion_again(network, recording, state, controls)
     depth = int(network.connections.delays.kept.max(initial=1))
     theirs, ours = _same_connections(network, recording)
-    kept = _Kept(network, recording) if any(isinstance(one, Integrate) for one in network.program) else None
+    kept = None if network.integration is None else _Kept(network, recording)
     state.weights[learned] = recording.weights_after[columns]
 
     def weights_at(row: int) -> FloatArray:

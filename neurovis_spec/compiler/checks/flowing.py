@@ -35,7 +35,7 @@ _HIGHER: Final = frozenset(("heun", "rk4"))
 
 def check_flowing(compiled: Compiled, findings: Findings) -> None:
     """Warn of what makes an integration worse than it could be. Most specs have none."""
-    by = next((one for one in compiled.network.program if isinstance(one, Integrate)), None)
+    by = compiled.network.integration
     if by is None:
         _nothing_flows(compiled, findings)
         return
