@@ -50,10 +50,12 @@ def check_formulas(compiled: Compiled, findings: Findings) -> None:
     for library in compiled.libraries:
         for kind, result_noun in _RESULT_NOUN.items():
             for name, model in library.definitions[kind.section].items():
-                _check_parts(model, result_noun, findings)
-                _check_flows(model, shown, findings)
+                written = model.parts()
+                parts = _parts_of(model, written)
+                _check_parts(parts, written, result_noun, findings)
+                _check_flows(parts, written, shown, findings)
                 if kind.lasting:
-                    _check_replaced(model, compiled.library.definitions.of(kind).known()[name], findings)
+                    _check_replaced(parts, written, compiled.library.definitions.of(kind).known()[name], findings)
 
 
 class _Part(NamedTuple):
@@ -70,15 +72,14 @@ def _names_read(*formulas: Formula | None) -> frozenset[str]:
     return frozenset().union(*(names(parse(text, extra_functions={"f": 1})) for text in texts))
 
 
-def _parts_of(definition: DefinitionModel) -> dict[str, _Part]:
+def _parts_of(definition: DefinitionModel, written: Parts) -> dict[str, _Part]:
     """What a definition declares, by name."""
     reads: dict[tuple[str, str], frozenset[str]] = {}
-    parts = definition.parts()
-    for name, value in parts.parameters.items():
+    for name, value in written.parameters.items():
         reads["parameters", name] = _names_read(value.value, value.minimum, value.maximum)
-    for name, formula in parts.let.items():
+    for name, formula in written.let.items():
         reads["let", name] = _names_read(formula)
-    for name, state in (parts.state or {}).items():
+    for name, state in (written.state or {}).items():
         flow = state.flow
         read = _names_read(state.initial, state.each_step, state.each_episode, flow.derivative, flow.noise)
         reads["state", name] = read
@@ -86,8 +87,8 @@ def _parts_of(definition: DefinitionModel) -> dict[str, _Part]:
         name: _Part(section, key_of(definition.source, section, name).span, read)
         for (section, name), read in reads.items()
     }
-    found |= {port.name.value: _Part("ports", port.name.span, frozenset()) for port in parts.ports}
-    return found | {signal.value: _Part("signals", signal.span, frozenset()) for signal in parts.signals}
+    found |= {port.name.value: _Part("ports", port.name.span, frozenset()) for port in written.ports}
+    return found | {signal.value: _Part("signals", signal.span, frozenset()) for signal in written.signals}
 
 
 def _reached(names: Iterable[str], parts: AnyMapping[str, _Part]) -> set[str]:
@@ -102,14 +103,12 @@ def _reached(names: Iterable[str], parts: AnyMapping[str, _Part]) -> set[str]:
     return found
 
 
-def _check_parts(definition: DefinitionModel, result_noun: str, findings: Findings) -> None:
+def _check_parts(parts: AnyMapping[str, _Part], written: Parts, result_noun: str, findings: Findings) -> None:
     """Warn of each part that neither the result nor any state depends on. All states count as read, as an output, or
     whoever runs the network, can record them. A part that only such parts read is not reported: that follows from
     these."""
-    parts, written = _parts_of(definition), definition.parts()
-    wanted = _given(written)
     states = [name for name, part in parts.items() if part.section == "state"]
-    used = _reached([*wanted, *states], parts)
+    used = _reached([*_given(written), *states], parts)
     unused = {name: part for name, part in parts.items() if name not in used}
     for name, (section, span, _) in unused.items():
         if any(name in part.reads for other, part in unused.items() if other != name):
@@ -137,10 +136,9 @@ def _shown(network: Network) -> frozenset[str]:
     return frozenset(found.union(curve.state for panel in network.render.figure for curve in panel.shown or ()))
 
 
-def _check_flows(definition: DefinitionModel, shown: Collection[str], findings: Findings) -> None:
+def _check_flows(parts: AnyMapping[str, _Part], written: Parts, shown: Collection[str], findings: Findings) -> None:
     """Warn of each state with a derivative on which nothing depends: neither what the definition gives or sends, nor
     another state."""
-    parts, written = _parts_of(definition), definition.parts()
     states = written.state or {}
     for name, state in states.items():
         derivative = state.flow.derivative
@@ -203,11 +201,11 @@ def _place_of(state: str, group: Built, libraries: Iterable[Library]) -> Span:
 # Weights that are replaced where a change is meant
 
 
-def _check_replaced(model: DefinitionModel, rule: Defined, findings: Findings) -> None:
+def _check_replaced(parts: AnyMapping[str, _Part], written: Parts, rule: Defined, findings: Findings) -> None:
     """``weight: {each_step: 0.01 * pre * post}``: a formula that reads what is active but nothing that outlasts the
     step, neither the weight nor a state that builds up, and that is 0 where all activities are 0, as a change would be.
     A weight that follows states, the time or a signal, or that has a value then, is not reported."""
-    parts, written, weight = _parts_of(model), model.parts(), rule.definition.given
+    weight = rule.definition.given
     for formula, tree, when in (
         (written.each_step, weight.each_step, "each step"),
         (written.each_episode, weight.each_episode, "the end of each episode"),
@@ -221,7 +219,7 @@ def _check_replaced(model: DefinitionModel, rule: Defined, findings: Findings) -
             findings.warning("replaces-weight", formula.span, message, "for a change write weight + …")
 
 
-def _any_lasts(names: set[str], parts: dict[str, _Part]) -> bool:
+def _any_lasts(names: set[str], parts: AnyMapping[str, _Part]) -> bool:
     """Whether there is among some names one whose value outlasts a step: the weight, or a state that reads itself."""
     states = [name for name in names if name in parts and parts[name].section == "state"]
     return "weight" in names or any(name in _reached(parts[name].reads, parts) for name in states)
