@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from neurovis_spec.arrays import IntArray
     from neurovis_spec.compiled import CompiledNetwork
     from neurovis_spec.compiler.body_settings import BodySettings
-    from neurovis_spec.compiler.network import Connections, Group, Input, Network
+    from neurovis_spec.compiler.network import Connections, Group, Input, Network, Route
 
 #: The largest network whose connection matrix is shown, in neurons.
 _MATRIX = 24
@@ -139,15 +139,15 @@ def _entries(network: Network) -> list[tuple[str, ...]]:
     connections = network.connections
     entry = connections.entry.compact()
     return [
-        _entry(connections, index, name, np.flatnonzero(entry == index))
-        for index, name in enumerate(connections.entries)
+        _entry(connections, index, route, np.flatnonzero(entry == index))
+        for index, route in enumerate(connections.each_route)
     ]
 
 
-def _entry(connections: Connections, index: int, name: str, members: IntArray) -> tuple[str, ...]:
+def _entry(connections: Connections, index: int, route: Route, members: IntArray) -> tuple[str, ...]:
+    name = connections.entries[index]
     if not len(members):
         return name, "0", "", "", "", "", "", ""
-    route = connections.routes[index] if connections.routes else PLAIN_ROUTE
     return (
         name,
         f"{len(members):,}",

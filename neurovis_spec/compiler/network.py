@@ -169,6 +169,11 @@ class Connections:
     def __len__(self) -> int:
         return len(self.sources)
 
+    @property
+    def each_route(self) -> tuple[Route, ...]:
+        """The route of every entry."""
+        return self.routes or (PLAIN_ROUTE,) * len(self.entries)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Input:
@@ -414,7 +419,7 @@ class Network:
             return None
         connections = self.connections
         result, entry = connections.sources.whole().astype(np.int64), connections.entry.whole()
-        routes = connections.routes or (PLAIN_ROUTE,) * len(connections.entries)
+        routes = connections.each_route
         for name in dict.fromkeys(route.sends for route in routes):
             taking = np.isin(entry, [number for number, route in enumerate(routes) if route.sends == name])
             result[taking] = self._taken(name)[result[taking]]

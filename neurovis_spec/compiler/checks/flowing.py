@@ -15,7 +15,6 @@ import numpy as np
 
 from neurovis_spec.arrays import BoolArray, FloatArray, integers
 from neurovis_spec.compiler.checks.compiled import Compiled
-from neurovis_spec.compiler.connections.connect import Connected
 from neurovis_spec.compiler.flows import jacobian, plain_flow, ports_read_by, with_slope
 from neurovis_spec.compiler.levels import Cycle, Wired, held_at, made_anew, order_of
 from neurovis_spec.compiler.network import Network
@@ -57,12 +56,12 @@ def _nothing_flows(compiled: Compiled, findings: Findings) -> None:
 def _held_couplings(compiled: Compiled, method: Method, findings: Findings) -> None:
     """Connections of delay 1 that bring to a derivative, by themselves or through neurons without one, what would flow
     with delay 0."""
-    network, census = compiled.network, compiled.census
-    connected = Connected(compiled.bundles, complete=True)
-    delays = connected.delays.whole()
+    network, census, made = compiled.network, compiled.census, compiled.network.connections
+    delays = made.delays.whole()
     if not (delays == 1).any():
         return
-    wired = replace(connected.wired, delays=integers(np.where(delays == 1, 0, delays)))
+    shorter = integers(np.where(delays == 1, 0, delays))
+    wired = Wired(made.sources, made.targets, shorter, made.entry, made.each_route)
     held = held_at(network.neurons, network.inputs, network.noises)
     would = (delays == 1) & made_anew(census.models.different, census.models.of, wired, held)
     would &= _varying(network, wired)[wired.sources.compact()]
