@@ -17,7 +17,6 @@ import click
 
 from neurovis_spec import plugins
 from neurovis_spec.cli.completion import input_files, one_of, paths, settings
-from neurovis_spec.language.units import measured
 from neurovis_spec.likeness import suggest
 
 Command: TypeAlias = Callable[..., object]
@@ -86,6 +85,8 @@ def _once(pairs: Iterable[tuple[str, str]]) -> dict[str, str]:
 
 def _settings(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, float | str]:
     """Name to number, or to a number with a unit."""
+    from neurovis_spec.language.units import measured
+
     settings: dict[str, float | str] = {}
     for name, text in _once(_pair(value, "name=value") for value in values).items():
         if measured(text) is not None:
