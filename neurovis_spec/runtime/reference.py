@@ -127,22 +127,16 @@ class ReferenceStepper(Seen):
         """What connections take of a population, where flow states are all that it is made of."""
         population = self.network.populations[operation.population]
         self.hold_states(population, state)
-        cells = state.cells[population.model.owner]
-        for name in operation.names:
-            formulas = formulas_of(population, [(name, given(population.model.definition, name))])
-            values = np.zeros(len(population.members))
-            for position, neuron in enumerate(population.members.tolist()):
-                functions = self.functions_of(population, position, state)
-                known = self.known(population.model, position, state)
-                known |= {one: float(numbers[position]) for one, numbers in cells.items()}
-                with_let(known, formulas.let, functions)
-                values[position] = evaluate(formulas.trees[0][1], known, functions)
-                held = state.conditions.held_at(neuron)
-                if name == MODEL.gives:
-                    state.activity[neuron] = values[position] if held is None else held
+        own = {name: values.tolist() for name, values in state.cells[population.model.owner].items()}
+        trees = [(name, given(population.model.definition, name)) for name in operation.names]
+        for name, values in self.values(population, formulas_of(population, trees), own, state).items():
+            if name == MODEL.gives:
+                for neuron, value in zip(population.members.tolist(), values, strict=True):
+                    held = state.conditions.held_at(neuron)
+                    state.activity[neuron] = value if held is None else held
             for outlet in self.network.outlets:
                 if (outlet.population, outlet.name) == (operation.population, name):
-                    self.let_out(outlet, values, state)
+                    self.let_out(outlet, np.array(values), state)
 
     def advance(self, population: Population, position: int, ports: dict[str, float], state: State) -> float:
         """One neuron's step: its states and outputs are replaced, its activity is returned."""

@@ -14,11 +14,10 @@ from typing import Final, NamedTuple, TypeAlias
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.program import Integrate, Port
-from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.functions import FUNCTIONS, divide, minimum
 from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.inputs import at_stage
-from neurovis_spec.runtime.reference_seen import Seen, is_first, with_let
+from neurovis_spec.runtime.reference_seen import Seen, is_first
 from neurovis_spec.runtime.stages import Formulas, Part, Times, apart, parts_of, times
 from neurovis_spec.runtime.state import State
 
@@ -136,21 +135,12 @@ class Flow:
 
     def values(self, part: Part, formulas: Formulas, stage: Stage) -> dict[str, list[float]]:
         """The values of formulas at a stage by their names, of each one a member."""
-        result: dict[str, list[float]] = {name: [] for name, _ in formulas.trees}
-        if not result:
-            return result
-        population, seen = part.population, self.seen
-        ports = {port.name: self.port(part, port, stage) for port in formulas.ports}
-        states = {name: values.tolist() for name, values in stage.state.cells[population.model.owner].items()}
-        states |= {name: stage.x[Place(part.number, name)] for name in part.flows}
-        for position in range(len(population.members)):
-            functions = seen.functions_of(population, position, stage.state)
-            known = seen.known(population.model, position, stage.state, stage.t)
-            known |= {name: values[position] for name, values in (*states.items(), *ports.items())}
-            with_let(known, formulas.let, functions)
-            for name, tree in formulas.trees:
-                result[name].append(evaluate(tree, known, functions))
-        return result
+        if not formulas.trees:
+            return {}
+        own = {name: values.tolist() for name, values in stage.state.cells[part.population.model.owner].items()}
+        own |= {name: stage.x[Place(part.number, name)] for name in part.flows}
+        own |= {port.name: self.port(part, port, stage) for port in formulas.ports}
+        return self.seen.values(part.population, formulas, own, stage.state, stage.t)
 
     def port(self, part: Part, port: Port, stage: Stage) -> list[float]:
         """What each member is given at a port at a stage."""

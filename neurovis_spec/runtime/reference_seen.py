@@ -17,6 +17,7 @@ from neurovis_spec.compiler.program import Definition, Key, Population, Port, Us
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.signals import signal_layout
+from neurovis_spec.runtime.stages import Formulas, taken_by
 from neurovis_spec.runtime.state import State, constants
 
 #: What formulas may call, by name.
@@ -64,7 +65,7 @@ class Seen:
         # one connection after the other is slow in columns
         self.targets, self.delays = connections.targets.whole(), connections.delays.whole()
         #: what each connection takes: an index into the activities followed by the outlets
-        self.sending = connections.sources.whole() if network.sending is None else network.sending
+        self.sending = taken_by(network)
         #: by ports
         names, neurons = network.port_names, network.neurons
         self.bias = {name: NetworkArray(neurons.bias_at(name), variables.get(bias_of(name))) for name in names}
@@ -119,6 +120,26 @@ class Seen:
             name: lambda x, value=value: evaluate(value, shape | {"x": x})
             for name, value in population.activation.definition.functions.items()
         }
+
+    def values(
+        self,
+        population: Population,
+        formulas: Formulas,
+        own: Mapping[str, Sequence[float]],
+        state: State,
+        t: float | None = None,
+    ) -> dict[str, list[float]]:
+        """The values of formulas by their names, of each one a member; ``own`` are what they see of states and ports,
+        ``t`` the seconds of a stage."""
+        result: dict[str, list[float]] = {name: [] for name, _ in formulas.trees}
+        for position in range(len(population.members)):
+            functions = self.functions_of(population, position, state)
+            known = self.known(population.model, position, state, t)
+            known |= {name: values[position] for name, values in own.items()}
+            with_let(known, formulas.let, functions)
+            for name, tree in formulas.trees:
+                result[name].append(evaluate(tree, known, functions))
+        return result
 
     def arriving(self, connection: int, state: State) -> float:
         """w[t−d]·a[t−d]: of this step for d = 0, else what was sent d steps ago; 0 where that is lost."""
