@@ -16,7 +16,7 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.body import Skeleton
 from neurovis_spec.compiler.names.state_references import StateOf, singles
 from neurovis_spec.compiler.network import Located, Network
-from neurovis_spec.compiler.program import Owner
+from neurovis_spec.compiler.program import Each, Owner
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.references import find_neurons, find_states
@@ -29,9 +29,6 @@ class Sensing(Protocol):
 
     sensor_names: tuple[str, ...]
     skeleton: Skeleton | None
-
-
-_NONE: IntArray = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -112,14 +109,14 @@ def columns_of(network: Network, keep: Keep = ALL, body: Sensing | None = None) 
     """What is kept of a network, and of the body that it has in a run; states that its pictures show are, as those that
     its outputs name. Raises KeyError with the nearest names."""
     names = names_of(network) if keep.neurons or keep.states else None
-    states: dict[tuple[str, str, int], None] = {}
+    states: dict[tuple[str, Each, int], None] = {}
     outputs: dict[str, tuple[tuple[int, ...], bool]] = {}
     for output in network.outputs:
         if output.states:
             of_output = list(singles(output.states))
             states.update(dict.fromkeys(of_output))
             outputs[output.name] = tuple(list(states).index(one) for one in of_output), output.scalar
-    shown = (StateOf(one.state, one.indices, _NONE) for one in network.render.show)
+    shown = (StateOf.of("neuron", one.state, one.indices) for one in network.render.show)
     states.update(dict.fromkeys(singles(shown)))
     for reference in keep.states:
         states.update(dict.fromkeys(singles(find_states(network, reference, names))))
@@ -147,13 +144,13 @@ def probe_of(network: Network, states: Iterable[StateOf]) -> Probe:
     return _probe(network, list(singles(states)))
 
 
-def _probe(network: Network, wanted: list[tuple[str, str, int]]) -> Probe:
+def _probe(network: Network, wanted: list[tuple[str, Each, int]]) -> Probe:
     """A probe of single states: the name, what has it ("neuron", "connection"), and the index of that."""
     places: dict[tuple[Owner, str], tuple[list[int], list[int]]] = {}
-    located: dict[str, Located] = {}
+    located: dict[Each, Located] = {}
     for column, (state, what, index) in enumerate(wanted):
         if what not in located:
-            located[what] = network.located("neuron" if what == "neuron" else "connection")
+            located[what] = network.located(what)
         holders, numbers, positions = located[what]
         uses = holders[int(numbers[index])].uses
         owner = next(use.owner for use in uses if any(one.name == state for one in use.definition.kept))
@@ -166,9 +163,7 @@ def _probe(network: Network, wanted: list[tuple[str, str, int]]) -> Probe:
     )
     names: list[str] = []
     for state, what, index in wanted:
-        one = np.array([index], dtype=np.int64)
-        neuron = what == "neuron"
-        names += network.state_names([StateOf(state, one if neuron else _NONE, _NONE if neuron else one)])
+        names += network.state_names([StateOf.of(what, state, np.array([index], dtype=np.int64))])
     return Probe(tuple(names), reads)
 
 

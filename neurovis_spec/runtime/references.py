@@ -90,9 +90,8 @@ def find_model_state(network: Network, reference: str) -> StateOf | None:
 
 def all_states(network: Network) -> tuple[StateOf, ...]:
     """All that models and rules keep, outputs of models among it."""
-    none: IntArray = np.zeros(0, dtype=np.int64)
     return tuple(
-        StateOf(one.name, *((holder.members, none) if use.definition.kind.each == "neuron" else (none, holder.members)))
+        StateOf.of(use.definition.kind.each, one.name, holder.members)
         for holder, use in network.uses
         for one in use.definition.kept
         if not isinstance(one, Check)

@@ -153,9 +153,7 @@ class _Kept:
 
     def _columns_of(self, holder: Holder, use: Use, state: str) -> IntArray:
         """The columns of a state of all members, −1 where it was not recorded."""
-        none: IntArray = np.zeros(0, dtype=np.int64)
-        members = np.asarray(holder.members, dtype=np.int64)
-        one = StateOf(state, *((members, none) if use.definition.kind.each == "neuron" else (none, members)))
+        one = StateOf.of(use.definition.kind.each, state, holder.members)
         return np.array([self._columns.get(name, -1) for name in self.network.state_names([one])], dtype=np.int64)
 
     def sent(self, activity: FloatArray, row: int) -> tuple[FloatArray, BoolArray]:

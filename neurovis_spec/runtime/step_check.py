@@ -17,8 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, integers
-from neurovis_spec.compiler.names.state_references import StateOf
-from neurovis_spec.compiler.network import Group, Network
+from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Definition
 from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.progress import Progress
@@ -73,9 +72,8 @@ def check_step(network: Network, course: Course, progress: Progress | None = Non
         found = [run.activity[:, group.start : group.start + group.count] for run in runs]
         errors.append(_compared(group.name, found, reason))
         for _, name in (one for one in states if one[0] is group):
-            errors.append(
-                _compared(f"{group.name}.{name}", [_state(network, group, name, run) for run in runs], reason)
-            )
+            state = f"{group.name}.{name}"
+            errors.append(_compared(state, [run[state] for run in runs], reason))
     return StepCheck(network.dt, course.length(network), runs[0].backend, tuple(errors))
 
 
@@ -132,14 +130,8 @@ def _repeated(values: npt.ArrayLike, size: int, parts: int) -> npt.ArrayLike:
     return rows[-(-np.arange((len(rows) - 1) * parts + 1) // parts)]
 
 
-def _state(network: Network, group: Group, name: str, run: Recording) -> FloatArray:
-    none = np.zeros(0, np.int64)
-    named = network.state_names([StateOf(name, np.array(group.indices, np.int64), none)])
-    return run.states[:, [run.state_names.index(one) for one in named]]
-
-
 def _compared(name: str, runs: list[FloatArray], why: str) -> StepError:
-    """The values of three runs, each (rows, members)."""
+    """The values of three runs, each (rows, members), or (rows,) of a single one."""
     with np.errstate(invalid="ignore", over="ignore"):
         first, second = (float(np.abs(one - other).max(initial=0.0)) for one, other in pairwise(runs))
         largest = float(np.abs(runs[-1]).max(initial=0.0))

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
@@ -18,8 +17,6 @@ from neurovis_spec.layout.labels import names_in_parts, parts_of
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.scene.shown_states import ShownStates
-
-_NONE: npt.NDArray[np.int64] = np.zeros(0, dtype=np.int64)
 
 
 def values_of(curve: Curve, network: Network, recording: Recording) -> FloatArray:
@@ -39,9 +36,8 @@ def values_of(curve: Curve, network: Network, recording: Recording) -> FloatArra
 def full_name(curve: Curve, network: Network) -> str:
     """How the spec calls it: ``K1``, ``K1 -> O``, ``K1.v``, ``(K1 -> O).eligibility``."""
     if curve.state:
-        index = np.array([curve.index], dtype=np.int64)
-        own = (index, _NONE) if curve.of == "neuron" else (_NONE, index)
-        return network.state_names([StateOf(curve.state, *own)])[0]
+        one = StateOf.of(curve.of, curve.state, np.array([curve.index], dtype=np.int64))
+        return network.state_names([one])[0]
     return network.neurons.names[curve.index] if curve.of == "neuron" else network.connection_names[curve.index]
 
 

@@ -57,7 +57,7 @@ class ShownStates:
     @cached_property
     def probe(self) -> Probe:
         """What reads the values (k,) in a run."""
-        return probe_of(self.network, (StateOf(one.state, one.indices, _NONE) for one in self._settings))
+        return probe_of(self.network, (StateOf.of("neuron", one.state, one.indices) for one in self._settings))
 
     def columns(self, recording: Recording) -> IntArray:
         """The columns of its states in which the values are (k,). Raises RecordingError where they were not

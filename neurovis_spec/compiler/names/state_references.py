@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from neurovis_spec.arrays import Indices, IntArray
-from neurovis_spec.compiler.program import MODEL, Definition, ports_of
+from neurovis_spec.compiler.program import MODEL, Definition, Each, ports_of
 from neurovis_spec.diagnostics import Home, Undeclared, shorten
 from neurovis_spec.language.references import StateName
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
@@ -27,6 +27,11 @@ class StateOf(NamedTuple):
     state: str
     neurons: IntArray
     connections: IntArray
+
+    @classmethod
+    def of(cls, each: Each, state: str, members: IntArray) -> StateOf:
+        """A state of these neurons, or of these connections."""
+        return cls(state, members, _NONE) if each == "neuron" else cls(state, _NONE, members)
 
     @property
     def size(self) -> int:
@@ -81,7 +86,7 @@ def model_state(name: StateName, neurons: Sequence[int], models: Iterable[Holder
     if lacking:
         holder = lacking[min(lacking)]
         return no_state("model", holder.kind, f"of '{shorten(name.owner.text)}'", name.state, holder.states)
-    return StateOf(name.state, wanted, _NONE)
+    return StateOf.of("neuron", name.state, wanted)
 
 
 def connections_state(name: StateName, connections: IntArray, wiring: Wiring) -> StateOf | Refusal | Unknown:
@@ -90,7 +95,7 @@ def connections_state(name: StateName, connections: IntArray, wiring: Wiring) ->
     holders = [holder for holder in wiring.rules if np.isin(connections, holder.members).any()]
     having = [holder.members for holder in holders if name.state in holder.states]
     if having:
-        return StateOf(name.state, _NONE, connections[np.isin(connections, np.concatenate(having))])
+        return StateOf.of("connection", name.state, connections[np.isin(connections, np.concatenate(having))])
     if not wiring.complete:
         return UNKNOWN
     if not len(connections):
@@ -118,7 +123,7 @@ def no_port(port: str, group: str, model: Definition) -> Refusal | None:
     return Refusal(f"'{group}' has no port '{shorten(port)}'", suggest(port, known, "ports"), lost)
 
 
-def singles(states: Iterable[StateOf]) -> Iterator[tuple[str, str, int]]:
+def singles(states: Iterable[StateOf]) -> Iterator[tuple[str, Each, int]]:
     """Each number by itself: the state, what has it (a neuron, a connection), and its index."""
     for one in states:
         yield from ((one.state, "neuron", index) for index in one.neurons.tolist())
