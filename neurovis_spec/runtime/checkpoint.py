@@ -28,7 +28,7 @@ from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.files import regular_size, replacing
 from neurovis_spec.runtime.npz_file import Array, put_arrays, read_array, recording_errors
-from neurovis_spec.runtime.signals import signal_layout
+from neurovis_spec.runtime.signals import slots_of_each
 from neurovis_spec.runtime.state import BodyState, State, by_kind, initial_state
 
 #: bytes that the text may have, and those of all headers together
@@ -89,7 +89,7 @@ def load_state(network: Network, path: Path) -> State:
     with recording_errors(path, "a checkpoint"):
         state = initial_state(network)
         wanted = _arrays(state)
-        own_size = signal_layout(network, own=True).size
+        own_size = slots_of_each(network)
         size, most = regular_size(path), 8 * own_size + sum(array.nbytes for array in wanted.values())
         most += state.conditions.structure.lost.nbytes + (0 if network.body is None else _BODY)
         if size > most + len(network.neurons) * _CLAMPS + _ROOM:

@@ -25,6 +25,8 @@ from neurovis_spec.runtime.state import Conditions, State
 
 def lose(network: Network, state: State, connections: IntArray) -> None:
     """Nothing is under way on these connections: what they have sent so far never arrives."""
+    if not len(connections):
+        return
     layout, delays = signal_layout(network, state.own_signals), network.connections.delays.whole()
     for connection in connections[~layout.shares[connections]].tolist():
         if delays[connection]:

@@ -65,10 +65,11 @@ def resumed_state(
         weights[ours] = recording.all_weights(row)[theirs]
         return weights
 
-    rows, shares = _last_rows(recording, depth), signal_layout(network, state.own_signals).shares
+    rows, layout = _last_rows(recording, depth), signal_layout(network, state.own_signals)
+    shares = layout.shares
     if shares.any() and any(not np.array_equal(weights_at(row)[shares], state.weights[shares]) for _, row in rows):
         have_own_signals(network, state)
-    layout = signal_layout(network, state.own_signals)
+        layout = signal_layout(network, own=True)
     for ago, row in rows:
         activity = recording.activity[row][column_of]
         sent, known = (activity, np.True_) if kept is None else kept.sent(activity, row)

@@ -76,7 +76,7 @@ def signal_layout(network: Network, own: bool = False) -> SignalLayout:
         population_of[population.members] = number
     populations = population_of[connections.targets.compact()]
     delays, index_type = connections.delays.compact(), width(0, len(connections))
-    offsets = np.full(len(connections), -1, dtype=width(-1, sum(int(piece.sum()) for piece in pieces(delays))))
+    offsets = np.full(len(connections), -1, dtype=width(-1, slots_of_each(network)))
     shares = np.zeros(len(connections), dtype=np.bool_) if own else _sharing(network)
     classes: list[DelayClass] = []
     shared: list[SharedSlots] = []
@@ -97,6 +97,11 @@ def signal_layout(network: Network, own: bool = False) -> SignalLayout:
             shared.append(SharedSlots(delay, size, np.flatnonzero(sends)))
             size = shared[-1].stop
     return SignalLayout(offsets, size, tuple(classes), tuple(shared), shares)
+
+
+def slots_of_each(network: Network) -> int:
+    """How many slots there are where no connection shares any."""
+    return sum(int(piece.sum()) for piece in pieces(network.connections.delays.compact()))
 
 
 def _sharing(network: Network) -> BoolArray:
