@@ -59,6 +59,8 @@ PORTS: dict[str, list[Plain]] = {
 }
 #: a state of each of these models
 _STATES = {"leaky": "v", "rate": "v", "mixed": "x", "through": "z"}
+BIASES: list[Plain] = [0.2, 0.3, "level"]
+PATTERNS: list[Plain] = ["all_to_all", "all_to_all", {"random": {"probability": 0.6}}]
 EXACT = ["euler", "heun", "rk4", "semi_implicit"]
 METHODS = [*EXACT, "exponential"]
 
@@ -125,7 +127,7 @@ def _group(chooser: random.Random, kind: str, size: int) -> Plain:
         group["count"] = size
     port = chooser.choice([one for one in PORTS[kind] if isinstance(one, str)])
     if chooser.random() < 0.5:
-        bias = chooser.choice([0.2, 0.3, "level"])
+        bias = chooser.choice(BIASES)
         group["bias"] = {port: bias} if chooser.random() < 0.5 else bias
     if chooser.random() < 0.5:
         source = "rows" if size == 3 and chooser.random() < 0.5 else "wave"
@@ -140,7 +142,7 @@ def _connection(
 ) -> Plain:
     body: dict[str, Plain] = {"weight": chooser.choice(["w*(1 + i - j)/3", 0.5, -0.7])}
     if sizes[source] > 1 or sizes[target] > 1:
-        body["pattern"] = chooser.choice(["all_to_all", "all_to_all", {"random": {"probability": 0.6}}])
+        body["pattern"] = chooser.choice(PATTERNS)
     delay = chooser.choice([None, None, 0, 1, 3])
     if delay is not None:
         body["delay"] = delay
