@@ -23,13 +23,13 @@ models:
   leaky: {state: {v: {derivative: drive - v}}, activity: v}
   direct: {state: {v: {derivative: drive - v}}, outputs: {twice: 2*v}, activity: v + 0.5*drive}
   cell:
-    ports: [q, {p}]
+    ports: {q: sum, p: product}
     state: {v: {derivative: f(drive) + p - v, noise: 0.1}}
     outputs: {rate: v + q}
     activity: v
     send: rate
   counter: {state: {n: {each_step: n + drive}}, activity: n}
-""".replace("[q, {p}]", "{q: sum, p: product}")
+"""
 
 
 def compiled(text: str) -> Network:
