@@ -12,6 +12,7 @@ import pytest
 from hypothesis import settings
 
 from neurovis_spec.interrupts import ENDING
+from neurovis_spec.runtime import c_backend
 from neurovis_spec.runtime.backend import ENVIRONMENT_VARIABLE
 
 if TYPE_CHECKING:
@@ -58,6 +59,15 @@ def signal_handlers() -> Iterator[None]:
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
+
+
+@pytest.fixture(params=[0, 600], ids=["loops", "written out"])
+def small(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Both ways to write a network in C."""
+    monkeypatch.setattr(c_backend, "SMALL", request.param)
+    c_backend.forget()
+    yield
+    c_backend.forget()
 
 
 @pytest.fixture(params=("kilted", "jazzy", "one"))

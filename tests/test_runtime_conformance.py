@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -89,15 +88,6 @@ def follow(network: Network, backend: Backend, steps: int = 24) -> None:
             plain.step(state, reader.at(k))
             fast.step(other, reader.at(k))
             agree(state, other, backend.capabilities.exactness == "bits")
-
-
-@pytest.fixture(params=[0, 600], ids=["loops", "written out"])
-def small(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Both ways to write a network in C."""
-    monkeypatch.setattr(c_backend, "SMALL", request.param)
-    c_backend.forget()
-    yield
-    c_backend.forget()
 
 
 @pytest.mark.compiler

@@ -23,7 +23,7 @@ import neurovis_spec as nv
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.live.carry import carried
 from neurovis_spec.live.simulated import SimulatedSource
-from neurovis_spec.runtime import c_backend, signals
+from neurovis_spec.runtime import signals
 from neurovis_spec.runtime.checkpoint import load_state, save_state
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.signals import signal_layout
@@ -287,15 +287,6 @@ def test_in_any_network_in_which_something_flows(spec: Spec, backend: str) -> No
         shared.signals = own.signals
         for found, expected in zip(arrays(shared).values(), arrays(own).values(), strict=True):
             assert found.tobytes() == expected.tobytes()
-
-
-@pytest.fixture(params=[0, 600], ids=["loops", "written out"])
-def small(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Both ways to write a network in C."""
-    monkeypatch.setattr(c_backend, "SMALL", request.param)
-    c_backend.forget()
-    yield
-    c_backend.forget()
 
 
 ALL_TURNS = [
