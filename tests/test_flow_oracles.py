@@ -1,4 +1,5 @@
-"""Models of the literature, written as their equations stand, against SciPy's DOP853."""
+"""Models of the literature, written as their equations stand, against SciPy's DOP853 and against loops by hand, and
+noise beside its theory."""
 
 from __future__ import annotations
 
@@ -16,25 +17,26 @@ from neurovis_spec.runtime.record import record
 Derivatives = Callable[[float, FloatArray], FloatArray]
 
 
-def run(text: str, steps: int) -> FloatArray:
+def run(text: str, steps: int, backend: str = "numpy") -> FloatArray:
     """The activities at the steps 0 to ``steps``."""
-    return record(nv.compile_text("neurovis: 1\n" + text).network, Course(steps + 1, backend="numpy")).activity
+    return record(nv.compile_text("neurovis: 1\nname: x\n" + text).network, Course(steps + 1, backend=backend)).activity
 
 
-def exact(derivatives: Derivatives, start: list[float], dt: float, steps: int) -> FloatArray:
+def exact(
+    derivatives: Derivatives, start: list[float], dt: float, steps: int, rtol: float = 1e-12, atol: float = 1e-12
+) -> FloatArray:
     """The states at the steps 0 to ``steps``: (steps, states)."""
     times = [k * dt for k in range(steps + 1)]
-    found: FloatArray = solve_ivp(derivatives, (0, times[-1]), start, "DOP853", times, rtol=1e-12, atol=1e-12).y.T
+    found: FloatArray = solve_ivp(derivatives, (0, times[-1]), start, "DOP853", times, rtol=rtol, atol=atol).y.T
     return found
 
 
 HODGKIN_HUXLEY = """
-name: hodgkin_huxley
 time: {dt: DT, integrate: METHOD}
 models:
-  hodgkin_huxley:
+  squid:
     time: ms
-    parameters: {gNa: 120, gK: 36, gL: 0.3, ENa: 50, EK: -77, EL: -54.4}
+    parameters: {C: 1, gNa: 120, gK: 36, gL: 0.3, ENa: 50, EK: -77, EL: -54.387}
     let:
       am: 1/exprel(-(v + 40)/10)
       bm: 4*exp(-(v + 65)/18)
@@ -43,29 +45,37 @@ models:
       an: 0.1/exprel(-(v + 55)/10)
       bn: 0.125*exp(-(v + 65)/80)
     state:
-      v: {initial: -65, unit: mV, derivative: drive - gNa*m^3*h*(v - ENa) - gK*n_^4*(v - EK) - gL*(v - EL)}
-      m: {initial: 0.05, derivative: am*(1 - m) - bm*m}
-      h: {initial: 0.6, derivative: ah*(1 - h) - bh*h}
-      n_: {initial: 0.32, derivative: an*(1 - n_) - bn*n_}
+      v: {initial: -65, unit: mV, derivative: (drive - gNa*m^3*h*(v - ENa) - gK*n^4*(v - EK) - gL*(v - EL))/C}
+      m: {initial: 0.0529, derivative: am*(1 - m) - bm*m}
+      h: {initial: 0.5961, derivative: ah*(1 - h) - bh*h}
+      n: {initial: 0.3177, derivative: an*(1 - n) - bn*n}
     activity: v
-neurons: {N: {model: hodgkin_huxley, bias: 10}}
+inputs: {current: {expression: 10 if t >= 0.005 else 0}}
+neurons: {A: {model: squid, DRIVE}}
 """
+RESTING = [-65, 0.0529, 0.5961, 0.3177]
 
 
-def hodgkin_huxley(t: float, x: FloatArray) -> FloatArray:
+def exprel(x: float) -> float:
+    return float(np.expm1(x)) / x if x else 1.0
+
+
+def squid(x: FloatArray, current: float) -> tuple[FloatArray, FloatArray]:
+    """The derivatives of Hodgkin and Huxley's cell, and how much each changes with its own state."""
     v, m, h, n = x
-    am, an = 0.1 * (v + 40) / (1 - np.exp(-(v + 40) / 10)), 0.01 * (v + 55) / (1 - np.exp(-(v + 55) / 10))
+    am, bm = 1 / exprel(-(v + 40) / 10), 4 * np.exp(-(v + 65) / 18)
     ah, bh = 0.07 * np.exp(-(v + 65) / 20), 1 / (1 + np.exp(-(v + 35) / 10))
-    bm, bn = 4 * np.exp(-(v + 65) / 18), 0.125 * np.exp(-(v + 65) / 80)
-    current = 10 - 120 * m**3 * h * (v - 50) - 36 * n**4 * (v + 77) - 0.3 * (v + 54.4)
-    return np.array([current, am * (1 - m) - bm * m, ah * (1 - h) - bh * h, an * (1 - n) - bn * n])
+    an, bn = 0.1 / exprel(-(v + 55) / 10), 0.125 * np.exp(-(v + 65) / 80)
+    dv = current - 120 * m**3 * h * (v - 50) - 36 * n**4 * (v + 77) - 0.3 * (v + 54.387)
+    f = np.array([dv, am * (1 - m) - bm * m, ah * (1 - h) - bh * h, an * (1 - n) - bn * n])
+    return f, np.array([-(120 * m**3 * h + 36 * n**4 + 0.3), -(am + bm), -(ah + bh), -(an + bn)])
 
 
 @pytest.mark.parametrize(("method", "bound"), [("rk4", 2e-4), ("heun", 0.3), ("euler", 8.0), ("exponential", 50.0)])
 def test_hodgkin_huxley(method: str, bound: float) -> None:
     """20 ms with spikes at 0.01 ms, in mV: the methods err as the published figures say."""
-    text = HODGKIN_HUXLEY.replace("DT", "1e-5").replace("METHOD", method)
-    expected = exact(hodgkin_huxley, [-65, 0.05, 0.6, 0.32], 0.01, 2000)[:, 0]
+    text = HODGKIN_HUXLEY.replace("DT", "1e-5").replace("METHOD", method).replace("DRIVE", "bias: 10")
+    expected = exact(lambda t, x: squid(x, 10)[0], RESTING, 0.01, 2000)[:, 0]
     error = np.abs(run(text, 2000)[:, 0] - expected).max()
     assert error < bound
     assert expected.max() > 30  # it spikes
@@ -74,40 +84,65 @@ def test_hodgkin_huxley(method: str, bound: float) -> None:
         assert error / finer > 13
 
 
+@pytest.mark.parametrize("method", ["exponential", "semi_implicit", "euler"])
+def test_hodgkin_and_huxleys_cell_is_what_a_loop_by_hand_makes(method: str) -> None:
+    """The first spike and a half, step by step. The current is on from 5 ms on, so in the step that begins there."""
+    x, steps, dt = np.array(RESTING), 1500, 0.01
+    expected = [x[0]]
+    for k in range(steps):
+        f, j = squid(x, 10.0 if k >= 500 else 0.0)
+        if method == "exponential":
+            change = dt * np.array([exprel(dt * min(one, 0.0)) for one in j]) * f
+        else:
+            change = dt * f / (1 - dt * j) if method == "semi_implicit" else dt * f
+        x = x + change
+        expected.append(x[0])
+    text = HODGKIN_HUXLEY.replace("DT", "0.01 ms").replace("METHOD", method).replace("DRIVE", "input: current")
+    assert max(expected) > 30
+    assert np.abs(run(text, steps)[:, 0] - expected).max() < 1e-9
+
+
 ADEX = """
-name: adex
-time: {dt: 1e-4}
+time: {dt: DT}
 models:
   adex:
     time: ms
-    parameters: {C: 281, gL: 30, EL: -70.6, VT: -50.4, DT: 2, a: 4, tau_w: 144}
+    parameters: {C: 281, gL: 30, EL: -70.6, VT: -50.4, DT: 2, tau_w: 144, a: 4}
     state:
-      v: {initial: EL, derivative: (-gL*(v - EL) + gL*DT*exp((v - VT)/DT) - w + drive)/C}
-      w: {derivative: (a*(v - EL) - w)/tau_w}
+      v: {initial: EL, unit: mV, derivative: (gL*DT*exp((v - VT)/DT) - gL*(v - EL) - w + drive)/C}
+      w: {initial: 0, unit: pA, derivative: (a*(v - EL) - w)/tau_w}
     activity: v
-neurons: {N: {model: adex, input: current}}
 inputs: {current: {expression: 450*sin(40*t)}}
+neurons: {A: {model: adex, DRIVE}}
 """
 
 
-def test_adex_below_its_threshold() -> None:
-    def adex(t: float, x: FloatArray) -> FloatArray:
-        v, w = x
-        current = 450 * np.sin(0.04 * t)
-        return np.array(
-            [
-                (-30 * (v + 70.6) + 60 * np.exp((v + 50.4) / 2) - w + current) / 281,
-                (4 * (v + 70.6) - w) / 144,
-            ]
-        )
+def adex(x: FloatArray, current: float) -> FloatArray:
+    v, w = x
+    upswing = 60 * np.exp((v + 50.4) / 2)
+    return np.array([(upswing - 30 * (v + 70.6) - w + current) / 281, (4 * (v + 70.6) - w) / 144])
 
-    expected = exact(adex, [-70.6, 0], 0.1, 2000)[:, 0]
+
+def test_adex_below_its_threshold() -> None:
+    text = ADEX.replace("dt: DT", "dt: 1e-4").replace("DRIVE", "input: current")
+    expected = exact(lambda t, x: adex(x, 450 * np.sin(0.04 * t)), [-70.6, 0], 0.1, 2000)[:, 0]
     assert -52 > expected.max() > -60
-    assert np.abs(run(ADEX, 2000)[:, 0] - expected).max() < 1e-6
+    assert np.abs(run(text, 2000)[:, 0] - expected).max() < 1e-6
+
+
+@pytest.mark.parametrize("backend", ["numpy", pytest.param("c", marks=pytest.mark.compiler)])
+def test_adex_overshoots_below_its_threshold_and_rises_above_it(backend: str) -> None:
+    """Brette and Gerstner 2005: with 500 pA it stays below, and overshoots; with 1,000 pA it rises without end."""
+    text = ADEX.replace("dt: DT", "dt: 0.01 ms")
+    expected = exact(lambda t, x: adex(x, 500), [-70.6, 0], 1, 60)[:, 0]
+    found = run(text.replace("DRIVE", "bias: 500"), 6000, backend)[:, 0]
+    assert np.abs(found[::100] - expected).max() < 1e-9
+    assert found.max() > found[-1] + 0.03  # w follows slowly
+    with pytest.warns(RuntimeWarning, match="is (inf|nan)"):
+        run(text.replace("DRIVE", "bias: 1000"), 3000, backend)
 
 
 WILSON_COWAN = """
-name: wilson_cowan
 time: {dt: 5e-4}
 activations:
   response: {parameters: {a: 1, theta: 0}, value: 1/(1 + exp(-a*(x - theta))) - 1/(1 + exp(a*theta))}
@@ -124,26 +159,42 @@ connections: {E -> E: {weight: 16}, I -> E: {weight: -12}, E -> I: {weight: 15},
 """
 
 
+#: the same in other words: one group, a matrix, the response in the model
+WILSON_COWAN_IN_ONE = """
+time: {dt: 0.01 ms}
+models:
+  population:
+    time: ms
+    parameters: {a: 1.3, theta: 4}
+    let: {S: sigmoid(a*(drive - theta)) - sigmoid(-a*theta)}
+    state: {rate: {initial: 0.1, derivative: (-rate + (1 - rate)*S)/10}}
+    activity: rate
+neurons: {N: {count: 2, model: {population: {a: [1.3, 2], theta: [4, 3.7]}}, bias: [1.25, 0]}}
+connections: {N -> N: {matrix: [[16, 15], [-12, -3]]}}
+"""
+
+
+def wilson_cowan(x: FloatArray, tau: float) -> FloatArray:
+    slope, threshold = np.array([1.3, 2.0]), np.array([4.0, 3.7])
+    drive = x @ np.array([[16.0, 15.0], [-12.0, -3.0]]) + [1.25, 0.0]
+    response = 1 / (1 + np.exp(-slope * (drive - threshold))) - 1 / (1 + np.exp(slope * threshold))
+    return np.asarray((-x + (1 - x) * response) / tau)
+
+
 def test_wilson_cowan() -> None:
     """The limit cycle of their Fig. 11 (1972)."""
-
-    def response(x: float, a: float, theta: float) -> float:
-        return float(1 / (1 + np.exp(-a * (x - theta))) - 1 / (1 + np.exp(a * theta)))
-
-    def wilson_cowan(t: float, x: FloatArray) -> FloatArray:
-        e, i = x
-        de = -e + (1 - e) * response(16 * e - 12 * i + 1.25, 1.3, 4)
-        di = -i + (1 - i) * response(15 * e - 3 * i, 2, 3.7)
-        return np.array([de, di]) / 8
-
-    expected = exact(wilson_cowan, [0.1, 0.1], 0.5, 600)
+    expected = exact(lambda t, x: wilson_cowan(x, 8), [0.1, 0.1], 0.5, 600)
     found = run(WILSON_COWAN, 600)
     assert np.abs(found - expected).max() < 1e-5
     assert np.ptp(expected[300:, 0]) > 0.1  # it oscillates
 
 
+def test_wilson_and_cowan_to_the_last_bits_that_an_adaptive_method_has() -> None:
+    expected = exact(lambda t, x: wilson_cowan(x, 10), [0.1, 0.1], 30, 1, rtol=3e-14, atol=1e-15)[-1]
+    assert np.abs(run(WILSON_COWAN_IN_ONE, 3000)[-1] - expected).max() < 5e-12
+
+
 JANSEN_RIT = """
-name: jansen_rit
 time: {dt: 1e-3}
 activations: {firing: {value: 5/(1 + exp(0.56*(6 - x)))}}
 models:
@@ -181,3 +232,15 @@ def test_jansen_rit() -> None:
     assert np.ptp(eeg) > 4
     finer = np.abs(run(JANSEN_RIT.replace("1e-3", "5e-4"), 2000)[::2] - expected).max()
     assert np.abs(found - expected).max() / finer > 13
+
+
+def test_the_noise_of_two_hundred_has_the_deviation_of_theory() -> None:
+    spec = """
+time: {dt: 0.001, integrate: euler}
+models:
+  ou: {parameters: {tau: 0.05, sigma: 2}, state: {x: {derivative: -x/tau, noise: sigma*sqrt(2/tau)}}, activity: x}
+neurons: {X: {count: 200, model: ou}}
+"""
+    late = run(spec, 5000)[500:]
+    assert late.std() == pytest.approx(2.0, rel=0.02)  # of Euler and Maruyama 1 % more than the 2 of theory
+    assert late.mean() == pytest.approx(0.0, abs=0.05)
