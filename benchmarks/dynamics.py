@@ -61,6 +61,8 @@ REPEATS = 9
 class Case:
     """A network, its equations, and the numbers that peers are given."""
 
+    #: as ``dynamics_peers.py`` calls it
+    network: str
     name: str
     spec: str
     flow: Flow
@@ -107,7 +109,7 @@ connections: {N -> N: {matrix: [[16, 15], [-12, -3]]}}"""
     given = {"sources": [0, 1, 0, 1], "targets": [0, 0, 1, 1], "weights": [16.0, -12, 15, -3]}
     given |= {"p": bias, "s": slope, "h": threshold, "initial": [0.1, 0.1]}
     numbers = {name: np.asarray(values) for name, values in given.items()}
-    return Case("Wilson-Cowan, 2/4", spec, flow, lambda x: x, np.full(2, 0.1), 1e-4, 30000, numbers)
+    return Case("wilson_cowan", "Wilson-Cowan, 2/4", spec, flow, lambda x: x, np.full(2, 0.1), 1e-4, 30000, numbers)
 
 
 def jansen_rit(n: int = 100) -> Case:
@@ -132,8 +134,10 @@ connections:
 
     given: dict[str, Numbers] = {"sources": sources, "targets": targets, "weights": weights, "p": bias}
     given["initial"] = np.zeros(n)
-    name = f"Jansen-Rit × {n}, {5 * n}"
-    return Case(name, spec, flow, lambda x: x[:, n : 2 * n] - x[:, 2 * n : 3 * n], np.zeros(6 * n), 5e-4, 4000, given)
+    name, start = f"Jansen-Rit × {n}, {5 * n}", np.zeros(6 * n)
+    return Case(
+        "jansen_rit", name, spec, flow, lambda x: x[:, n : 2 * n] - x[:, 2 * n : 3 * n], start, 5e-4, 4000, given
+    )
 
 
 def ctrnn(n: int = 1000) -> Case:
@@ -153,7 +157,7 @@ connections:
     given: dict[str, Numbers] = {"sources": sources, "targets": targets, "weights": weights, "p": bias}
     given["tau"] = taus
     given["initial"] = np.zeros(n)
-    return Case(f"CTRNN, {n}/{10 * n}", spec, flow, np.tanh, np.zeros(n), 0.02, 1000, given)
+    return Case("ctrnn", f"CTRNN, {n}/{10 * n}", spec, flow, np.tanh, np.zeros(n), 0.02, 1000, given)
 
 
 @dataclass(frozen=True)
@@ -204,8 +208,7 @@ def peer(case: Case, tool: str, method: str, python: str, exact: FloatArray) -> 
     with tempfile.TemporaryDirectory() as folder:
         path, output = Path(folder) / "network.npz", Path(folder) / "shown.npy"
         np.savez(path, dt=case.dt, steps=case.steps, **case.given)  # type: ignore[arg-type]
-        network = next(name for name in ("wilson_cowan", "jansen_rit", "ctrnn") if name[:3] in case.name.lower())
-        command = [python, str(HERE / "dynamics_peers.py"), tool, network, str(path), method, str(output)]
+        command = [python, str(HERE / "dynamics_peers.py"), tool, case.network, str(path), method, str(output)]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         if done.returncode:
             print(f"{tool}: {done.stderr[-300:]}", file=sys.stderr)
