@@ -74,9 +74,9 @@ class _Reader:
         """How many neurons there are."""
         return self.directory.members.stop
 
-    def step(self, formula: Formula | None) -> float | None:
-        """A step, which may be an expression."""
-        return None if formula is None else known(self.constants.scalar(formula), None)
+    def step(self, formula: Formula | None) -> int | None:
+        """A step, which may be an expression, or a time."""
+        return None if formula is None else known(self.constants.steps(formula, "a step", 0), None)
 
     def neurons(self, text: Located[str]) -> IntArray:
         """The neurons of a reference."""
