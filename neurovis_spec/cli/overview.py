@@ -44,7 +44,8 @@ def _parts(compiled: CompiledNetwork, network: Network) -> Iterator[str]:
         units = {name: one.unit.value for name, one in written.items() if one.unit is not None}
         values = [(name, _in_unit(number(value), units.get(name))) for name, value in network.parameters.items()]
         yield "parameters\n" + table(values)
-    groups = [_group(network, group, _units(network)) for group in network.neurons.groups]
+    of_definitions = _units(network)
+    groups = [_group(network, group, of_definitions) for group in network.neurons.groups]
     yield "neurons\n" + table(*_without_empty(groups, _OF_GROUPS))
     if len(network.connections):
         yield "connections\n" + table(*_without_empty(_entries(network), _OF_ENTRIES))
