@@ -21,9 +21,8 @@ from neurovis_spec.compiler.events.settable import bias_of
 from neurovis_spec.compiler.names.references import key_span
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.initial_states import beginning
-from neurovis_spec.compiler.program import DRIVE, Definition, Population, is_activation
+from neurovis_spec.compiler.program import DRIVE, Definition, Population
 from neurovis_spec.diagnostics import Findings, Span
-from neurovis_spec.language.expressions.tree import walk
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 
@@ -96,8 +95,7 @@ class _Reads(NamedTuple):
 
 
 def _reads(model: Definition) -> _Reads:
-    calls = any(is_activation(node) for tree in model.formulas for node in walk(tree))
-    return _Reads(calls, DRIVE in model.read)
+    return _Reads(model.reads_activation, DRIVE in model.read)
 
 
 def _ignored(model: Definition, reads: _Reads, group: GroupModel) -> Iterator[tuple[Span, str, str]]:
