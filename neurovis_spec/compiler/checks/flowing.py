@@ -15,6 +15,7 @@ import numpy as np
 
 from neurovis_spec.arrays import BoolArray, FloatArray, integers
 from neurovis_spec.compiler.checks.compiled import Compiled
+from neurovis_spec.compiler.checks.neurons import unreached
 from neurovis_spec.compiler.flows import jacobian, plain_flow, ports_read_by, with_slope
 from neurovis_spec.compiler.levels import Cycle, Wired, held_at, made_anew, order_of
 from neurovis_spec.compiler.network import Network
@@ -108,12 +109,7 @@ def _varying(network: Network, wired: Wired) -> BoolArray:
         model = population.model.definition
         if model.state or not model.read.isdisjoint(("t", "k")):
             result[population.members] = True
-    sources, targets = wired.sources.compact(), wired.targets.compact()
-    while True:
-        before = int(result.sum())
-        result[targets[result[sources]]] = True
-        if int(result.sum()) == before:
-            return result
+    return ~unreached(~result, wired.sources.compact(), wired.targets.compact())
 
 
 def _held_noise(compiled: Compiled, findings: Findings) -> None:

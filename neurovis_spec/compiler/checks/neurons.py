@@ -142,7 +142,7 @@ def _idle(network: Network) -> Mask:
         if any(use.owner in owners for use in population.uses):
             quiet[population.members] = False
     sources, targets = connections.sources.compact(), connections.targets.compact()
-    idle = _unreached(quiet, sources, targets)
+    idle = unreached(quiet, sources, targets)
     return _first_causes(idle, sources, targets) if idle.any() else idle
 
 
@@ -203,7 +203,7 @@ class _Ways:
         return found
 
 
-def _unreached(quiet: Mask, sources: Indices, targets: Indices) -> Mask:
+def unreached(quiet: Mask, sources: Indices, targets: Indices) -> Mask:
     """The quiet neurons that no way leads to from one that is not."""
     reached = ~quiet
     for _ in range(_WHOLE_ARRAY_PASSES):

@@ -40,7 +40,7 @@ class StateOf(NamedTuple):
 
 
 class Refusal(NamedTuple):
-    """Why a reference is to no state."""
+    """Why a reference is to no state, or to no port."""
 
     message: str
     hint: str | None = None
