@@ -42,7 +42,7 @@ SCHEMA: Mapping[type, Content] = {
     Connections: content(
         "Connections",
         "sources targets weights centres delays rules entry low high entries",
-        "descriptions learns labels routes undelayed",
+        "descriptions learns labels routes undelayed synapses twins lags",
     ),
     Input: content("Input", "name start size expression table", "slots parts"),
     Output: content("Output", "name neurons scalar", "states"),

@@ -165,6 +165,15 @@ class Connections:
     routes: tuple[Route, ...] = ()
     #: the entries that name no delay and make connections of delay 0, by their numbers
     undelayed: tuple[int, ...] = ()
+    #: the synapse of each entry as the author wrote it, for display (``phase(lag=0.5)``); None without one; empty where
+    #: none has one
+    synapses: tuple[str | None, ...] = ()
+    #: of each connection of an entry that is symmetric the index of its twin, which leads back, else −1; None where
+    #: there are none
+    twins: IntColumn | None = None
+    #: of each connection whose delay is continuous, so that what it brings to a derivative is read between steps, that
+    #: delay in steps, else NaN; None where there are none
+    lags: FloatColumn | None = None
 
     def __len__(self) -> int:
         return len(self.sources)

@@ -7,7 +7,7 @@ projections say for which neurons and connections which are in use; operations a
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, TypeAlias
 
 from neurovis_spec.arrays import FloatArray, Indices, IntArray
@@ -73,6 +73,8 @@ ACTIVATION = Kind("activation", "neuron", "f", function=True)
 MODEL = Kind("model", "neuron", "activity")
 #: How a weight changes, within its bounds, from pre, sent, post and signals.
 RULE = Kind("rule", "connection", "weight", lasting=True)
+#: What a connection brings to its ports, from its weight, what is known of both ends, and states of its own.
+SYNAPSE = Kind("synapse", "connection", "signal")
 
 #: The function of an activation that says whether it is undefined for an argument.
 UNDEFINED_F = "f is undefined"
@@ -80,6 +82,19 @@ UNDEFINED_F = "f is undefined"
 SLOPE_F = "slope of f"
 #: The port that all neurons have.
 DRIVE = "drive"
+
+
+class EndName(NamedTuple):
+    """What a formula of a connection reads of an end, ``pre.v``: the activity, a state, an output or a parameter of the
+    model there."""
+
+    side: Literal["pre", "post"]
+    name: str
+
+    @property
+    def text(self) -> str:
+        """As it is written in formulas, and called in trees."""
+        return f"{self.side}.{self.name}"
 
 
 class PortOf(NamedTuple):
@@ -114,6 +129,9 @@ class Definition:
     per_second: float = 1.0
     #: the units of parameters that have one, as they are written, to be shown
     units: tuple[tuple[str, str], ...] = ()
+    #: of a synapse what says how its line ends: above 0 in an arrow, below 0 in a bar, at 0 in nothing; None: as its
+    #: weight does
+    sign: Tree | None = None
 
     @property
     def outputs(self) -> tuple[Quantity, ...]:
@@ -162,6 +180,17 @@ class Definition:
     def read(self) -> frozenset[str]:
         """All names that its formulas read in a run."""
         return frozenset().union(*map(names, self.formulas))
+
+    @property
+    def end_names(self) -> tuple[EndName, ...]:
+        """What it reads of the ends of a connection beside ``pre``, ``sent`` and ``post``, in the order of the
+        texts."""
+        shown = () if self.sign is None else names(self.sign)
+        return tuple(
+            EndName("pre" if side == "pre" else "post", name)
+            for side, dot, name in (one.partition(".") for one in sorted({*self.read, *shown}))
+            if dot and side in ("pre", "post")
+        )
 
     @property
     def reads_activation(self) -> bool:
@@ -251,17 +280,35 @@ class Population:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Projection:
-    """Connections of the same definitions: today of one rule. ``signals`` gives, for each signal of these, one index a
-    connection into the activities of all neurons followed by the vector of all inputs."""
+    """Connections of the same definition, a rule or a synapse, which is its only one in use; a connection is a member
+    of one for its synapse, and of one for each of its rules.
+
+    ``signals`` gives, for each signal of a rule, one index a connection into the activities of all neurons, followed by
+    the outlets, followed by the vector of all inputs. ``ends`` gives the same for what is read of the ends, by the
+    texts of ``EndName`` (``pre.v``), among activities and outlets: of the source d steps ago, of the target now. What
+    is a parameter at an end is one of the definition here, by the same text."""
 
     members: IntArray
     uses: tuple[Use, ...]
     signals: Mapping[str, IntArray]
+    ends: Mapping[str, IntArray] = field(default_factory=dict)
+    #: of a rule its place among those of its connections
+    place: int = 0
 
     @property
     def read(self) -> frozenset[str]:
         """All names that its definitions read in a run."""
         return frozenset().union(*(use.definition.read for use in self.uses))
+
+    @property
+    def use(self) -> Use:
+        """The definition that is in use."""
+        return self.uses[0]
+
+    @property
+    def kind(self) -> Kind:
+        """What its definition is."""
+        return self.uses[0].definition.kind
 
     @property
     def rule(self) -> Use:
@@ -303,12 +350,14 @@ class Update(Operation):
 
 @dataclass(frozen=True, slots=True)
 class Integrate(Operation):
-    """The flow states of these populations, together, over a step from k − 1 to k; none at step 0. What does not flow
-    is held. ``populations`` are in the order in which their outputs are made at a stage."""
+    """The flow states of these populations and projections, together, over a step from k − 1 to k; none at step 0. What
+    does not flow is held. ``populations`` are in the order in which their outputs are made at a stage; ``projections``
+    are those with flow states, of synapses and of rules."""
 
     populations: tuple[int, ...]
     method: Method
     substeps: int
+    projections: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -334,7 +383,21 @@ class Send(Operation):
 
 
 @dataclass(frozen=True, slots=True)
-class Learn(Operation):
-    """The rule of a projection, step and (where it has them) episode: w[t+1] and its states, from old values."""
+class Receive(Operation):
+    """The states of a synapse that have an ``each_step`` or an ``each_episode``, from old values, before the ports of
+    its targets are made."""
 
     projection: int
+
+
+#: What of a rule is carried out together: what each step changes, derivatives among it, and an episode's end.
+Phase: TypeAlias = Literal["each_step", "each_episode"]
+
+
+@dataclass(frozen=True, slots=True)
+class Learn(Operation):
+    """The rule of a projection, step and (where it has them) episode: w[t+1] and its states, from old values. Where
+    connections have several rules, one phase of all of them comes before the next."""
+
+    projection: int
+    phases: tuple[Phase, ...] = ("each_step", "each_episode")
