@@ -17,6 +17,7 @@ from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.data.edge_list import EdgeTable
 from neurovis_spec.language.data.files import NamedFile, read_edges, read_table
 from neurovis_spec.language.located import Located
+from neurovis_spec.language.modules import INCLUDED
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.language.yaml.source import AnyList, Node, Scalar
@@ -24,7 +25,7 @@ from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 
 Plain: TypeAlias = "bool | int | float | str | list[Plain] | dict[str, Plain] | None"
 #: sections that an included file brings in
-_BROUGHT = ("modules", "activations", "models", "rules")
+_BROUGHT = INCLUDED
 
 
 def whole_text(spec: Spec, request: Request, sources: Mapping[str, str]) -> str:

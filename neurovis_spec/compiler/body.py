@@ -268,7 +268,7 @@ def _command(actuator: str, formula: Formula, around: Surroundings, constants: C
     made = {output.name: output for output in around.outputs}
     outputs = names_of(around.spec, "outputs", {**dict.fromkeys(around.spec.outputs, UNKNOWN), **made})
     known = _Bases(Together((outputs, constants.names, ALWAYS)))
-    tree = parse_formula(formula, Sight(known, "outputs and parameters", home=_HOME), findings, subscripts=True)
+    tree = parse_formula(formula, Sight(known, "outputs and parameters", home=_HOME), findings, naming="subscripts")
     if tree is UNKNOWN:
         return UNKNOWN
     constants.read |= names(tree)

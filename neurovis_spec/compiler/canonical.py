@@ -23,6 +23,7 @@ from neurovis_spec.compiler.program import (
     DRIVE,
     MODEL,
     RULE,
+    SYNAPSE,
     Definition,
     Population,
     Projection,
@@ -139,17 +140,21 @@ def _definition(made: Definition) -> Record:
         return Record("Model", {**named, **inner, "activity": made.given.each_step, **_beyond(made)})
     if made.kind == RULE:
         steps = {"each_step": made.given.each_step, "each_episode": made.given.each_episode}
-        return Record("Rule", {**named, "signals": sorted(made.signals), **inner, **steps})
+        return Record("Rule", {**named, "signals": sorted(made.signals), **inner, **steps, **_beyond(made)})
+    if made.kind == SYNAPSE:
+        return Record("Synapse", {**named, **inner, "signal": made.given.each_step, **_beyond(made)})
     raise TypeError(f"no schema says what of a {made.kind.name} is content")
 
 
-def _beyond(model: Definition) -> dict[str, object]:
-    """What of a model is content that the first models had not: as far as it is there."""
+def _beyond(made: Definition) -> dict[str, object]:
+    """What of a definition is content that the first ones had not: as far as it is there."""
     found: dict[str, object] = {
-        "flows": [(one.name, one.derivative, one.noise) for one in sorted(model.flows, key=lambda one: one.name)],
-        "ports": sorted((port.name, port.combine) for port in model.ports),
-        "outputs": [(one.name, one.each_step) for one in sorted(model.outputs, key=lambda one: one.name)],
-        "send": model.send,
-        "per_second": None if model.per_second == 1 else model.per_second,
+        "flows": [(one.name, one.derivative, one.noise) for one in sorted(made.flows, key=lambda one: one.name)],
+        "ports": sorted((port.name, port.combine) for port in made.ports),
+        "outputs": [(one.name, one.each_step) for one in sorted(made.outputs, key=lambda one: one.name)],
+        "send": made.send,
+        "derivative": made.given.derivative,
+        "gives": "" if made.given.name == made.kind.gives else made.given.name,
+        "per_second": None if made.per_second == 1 else made.per_second,
     }
     return {name: value for name, value in found.items() if value}

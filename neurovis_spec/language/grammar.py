@@ -16,7 +16,17 @@ from pydantic.json_schema import JsonSchemaValue
 
 #: What a name names. Groups, neurons, inputs and instances share their names; "local" is known in one definition.
 Kind: TypeAlias = Literal[
-    "parameter", "neuron", "input", "instance", "output", "module", "activation", "model", "rule", "local"
+    "parameter",
+    "neuron",
+    "input",
+    "instance",
+    "output",
+    "module",
+    "activation",
+    "model",
+    "rule",
+    "synapse",
+    "local",
 ]
 #: What a text is for. A ``choice`` names a definition, a ``setting`` one of its parameters or signals.
 Use: TypeAlias = Literal[
@@ -57,6 +67,8 @@ class Role:
     sees: tuple[str, ...] = ()
     draws: bool = False
     functions: tuple[str, ...] = ()
+    #: whether it knows ``pre.X`` and ``post.X``, what X is at the ends of a connection
+    ends: bool = False
 
 
 #: Formulas, by what they see.
@@ -67,17 +79,26 @@ GROUP_DRAWN: Final = Role("formula", sees=("i", "n"), draws=True)
 NOISE: Final = Role("formula", sees=("k", "t", "i", "n"), draws=True)
 PAIR: Final = Role("formula", sees=("i", "j", "n_from", "n_to", "distance"), draws=True)
 CELL: Final = Role("formula", sees=("i", "j", "n_from", "n_to"), draws=True)
+#: What the settings of a rule or a synapse see.
+_OF_PAIRS: Final = ("i", "j", "n_from", "n_to")
 #: The value of a rule's setting: a formula, or the references of a signal.
-RULE_SETTING: Final = Role("setting value", "rule", sees=("i", "j", "n_from", "n_to"))
+RULE_SETTING: Final = Role("setting value", "rule", sees=_OF_PAIRS)
+SYNAPSE_SETTING: Final = Role("setting value", "synapse", sees=_OF_PAIRS)
 #: What an actuator is told: a formula that names outputs, too.
 COMMAND: Final = Role("formula", "output")
 IN_ACTIVATION: Final = Role("formula", sees=("x",))
 IN_MODEL: Final = Role("formula", sees=("drive", "k", "t"), functions=("f",))
 #: What of a model is no matter of its activation: how much noise there is, what an episode's end does.
 WITHOUT_F: Final = Role("formula", sees=("drive", "k", "t"))
-#: The activities that a rule sees.
+#: The activities that a rule and a synapse see.
 ACTIVITIES: Final = ("pre", "sent", "post")
-IN_RULE: Final = Role("formula", sees=(*ACTIVITIES, "weight", "k", "t"))
+IN_RULE: Final = Role("formula", sees=(*ACTIVITIES, "weight", "k", "t"), ends=True)
+#: And one that changes the centre.
+IN_CENTRE: Final = Role("formula", sees=(*ACTIVITIES, "centre", "k", "t"), ends=True)
+#: A synapse sees what a rule does.
+IN_SYNAPSE: Final = IN_RULE
+#: How a line ends is said once, not step by step.
+IN_SIGN: Final = Role("formula", sees=("weight",), ends=True)
 #: A text with formulas in braces.
 LABEL: Final = Role("template", sees=("i", "n", "number"))
 #: A port of the neurons that something goes to; what connections take of their sources.

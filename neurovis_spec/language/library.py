@@ -1,4 +1,4 @@
-"""Definitions: activations, models and rules of one's own, and the file that holds them.
+"""Definitions: activations, models, rules and synapses of one's own, and the file that holds them.
 
 In: nodes. Out: frozen models whose leaves know their places.
 """
@@ -13,11 +13,15 @@ from pydantic import Field, ValidationInfo
 
 from neurovis_spec.language.grammar import (
     IN_ACTIVATION,
+    IN_CENTRE,
     IN_MODEL,
     IN_RULE,
+    IN_SIGN,
+    IN_SYNAPSE,
     PLAIN,
     WITHOUT_F,
     Needs,
+    NotWith,
     OneOf,
     Plain,
     declaring,
@@ -42,11 +46,13 @@ from neurovis_spec.language.model import Model, Named
 from neurovis_spec.language.unknown import Unknown
 from neurovis_spec.language.values import LOCAL, ParameterField, ParameterModel, PortsField, WrittenPort
 from neurovis_spec.language.words import TimeUnit
-from neurovis_spec.language.yaml.source import Mapping, Node, Scalar
+from neurovis_spec.language.yaml.source import Node, Scalar
 
 LANGUAGE_VERSION = 1
 VERSION = Plain({"const": LANGUAGE_VERSION})
 _TIMES: Final = {"s": "Seconds.", "ms": "Milliseconds."}
+#: How other languages call the derivative of a state.
+_CHANGES: Final = dict.fromkeys(("ode", "dot", "flow", "equation", "rate"), "derivative")
 
 
 def version_field(node: Node, info: ValidationInfo) -> Located[int]:
@@ -62,58 +68,83 @@ def version_field(node: Node, info: ValidationInfo) -> Located[int]:
 
 
 class Flow(NamedTuple):
-    """What is written of a state beside what becomes of it at each step: nothing, of a rule."""
+    """What is written of a state beside what becomes of it at each step."""
 
     derivative: Formula | None = None
     noise: Formula | None = None
     unit: str = ""
 
 
+_DERIVATIVE: Final = "What it changes by, per second (or millisecond: time): what an equation has behind dx/dt."
+#: What a rule changes step by step it does not change within a step.
+_WITHOUT_STEPS: Final = NotWith(
+    ("each_step",),
+    "'{own}' beside '{other}': a rule changes something within a step or from step to step",
+    "keep '{other}' or '{own}'; with x + dt*(…) as '{other}' it is Euler's method",
+)
+
+
 class StateModel(Model):
-    """A state: of a rule, and what states of models have in common with that."""
+    """A state: what those of models, rules and synapses have in common."""
 
     BARE: ClassVar[str] = "initial"
+    ELSEWHERE: ClassVar[AnyMapping[str, str]] = _CHANGES
 
     initial: Annotated[FormulaField, PLAIN] | None = Field(None, description="Its value before step 0 (default 0).")
     each_step: FormulaField | None = Field(None, description="Its new value at each step.")
     each_episode: FormulaField | None = Field(None, description="Its new value at an episode's end.")
-
-    @property
-    def flow(self) -> Flow:
-        """How it changes over the time of a step."""
-        return Flow()
-
-    @classmethod
-    def _foreign(cls, name: str) -> tuple[str, str] | None:
-        if name == "derivative":
-            return "rules have no 'derivative' yet, models have", "write each_step: x + dt*(…), x being the state"
-        return not_yet(name, "on_pre", "on_post", "unit")
-
-
-class NeuronStateModel(StateModel):
-    """A state of a model."""
-
-    ELSEWHERE: ClassVar[AnyMapping[str, str]] = {
-        **dict.fromkeys(("ode", "dot", "flow", "equation", "rate"), "derivative"),
-        **dict.fromkeys(("sigma", "diffusion"), "noise"),
-    }
-
-    each_episode: Annotated[FormulaField, WITHOUT_F] | None = Field(
-        None, description="Its new value at an episode's end."
-    )
-    derivative: FormulaField | None = Field(
-        None, description="What it changes by, per second (or millisecond: time): what an equation has behind dx/dt."
-    )
-    noise: Annotated[
-        Annotated[FormulaField, WITHOUT_F] | None,
-        Needs(("derivative",), "'noise' disturbs what has a 'derivative'", "add derivative: 0, or what it changes by"),
-    ] = Field(None, description="What white noise is multiplied by that is added to the derivative.")
+    derivative: FormulaField | None = Field(None, description=_DERIVATIVE)
     unit: TextField | None = Field(None, description="Its unit, which is shown.")
 
     @property
     def flow(self) -> Flow:
         """How it changes over the time of a step."""
-        return Flow(self.derivative, self.noise, value_or(self.unit, ""))
+        return Flow(self.derivative, unit=value_or(self.unit, ""))
+
+    @classmethod
+    def _foreign(cls, name: str) -> tuple[str, str] | None:
+        if name in ("noise", "jump"):
+            return f"'{name}' is of the states of models alone", "leave it out"
+        return None
+
+
+class RuleStateModel(StateModel):
+    """A state of a rule."""
+
+    derivative: Annotated[FormulaField | None, _WITHOUT_STEPS] = Field(None, description=_DERIVATIVE)
+
+    @classmethod
+    def _foreign(cls, name: str) -> tuple[str, str] | None:
+        return not_yet(name, "on_pre", "on_post") or super()._foreign(name)
+
+
+class SynapseStateModel(StateModel):
+    """A state of a synapse."""
+
+    @classmethod
+    def _foreign(cls, name: str) -> tuple[str, str] | None:
+        if name == "on_post":
+            return "'on_post' is of rules: a synapse does not learn", "make a rule of it, with plasticity: …"
+        return not_yet(name, "on_pre") or super()._foreign(name)
+
+
+class NeuronStateModel(StateModel):
+    """A state of a model."""
+
+    ELSEWHERE: ClassVar[AnyMapping[str, str]] = {**_CHANGES, **dict.fromkeys(("sigma", "diffusion"), "noise")}
+
+    each_episode: Annotated[FormulaField, WITHOUT_F] | None = Field(
+        None, description="Its new value at an episode's end."
+    )
+    noise: Annotated[
+        Annotated[FormulaField, WITHOUT_F] | None,
+        Needs(("derivative",), "'noise' disturbs what has a 'derivative'", "add derivative: 0, or what it changes by"),
+    ] = Field(None, description="What white noise is multiplied by that is added to the derivative.")
+
+    @property
+    def flow(self) -> Flow:
+        """How it changes over the time of a step."""
+        return super().flow._replace(noise=self.noise)
 
     @classmethod
     def _foreign(cls, name: str) -> tuple[str, str] | None:
@@ -126,13 +157,16 @@ def not_yet(name: str, *later: str) -> tuple[str, str] | None:
 
 
 class Parts(NamedTuple):
-    """What a definition says, whatever its kind: what it gives at each step and at an episode's end, and of what that
-    is made. ``state`` and ``outputs`` are None where the kind has none."""
+    """What a definition says, whatever its kind: what it gives at each step and at an episode's end, or changes by over
+    the time of a step, and of what that is made. ``gives`` is how that is called where it is not as in all definitions
+    of the kind, ``state`` and ``outputs`` are None where the kind has none."""
 
     parameters: AnyMapping[str, ParameterModel]
     let: AnyMapping[str, Formula]
     each_step: Formula | None
     each_episode: Formula | None = None
+    derivative: Formula | None = None
+    gives: str = ""
     state: AnyMapping[str, StateModel] | None = None
     signals: tuple[Located[str], ...] = ()
     spikes: bool = False
@@ -140,6 +174,7 @@ class Parts(NamedTuple):
     outputs: AnyMapping[str, Formula] | None = None
     send: Located[str] | None = None
     time: TimeUnit = "s"
+    sign: Formula | None = None
 
 
 class DefinitionModel(Model):
@@ -169,12 +204,22 @@ class ActivationModel(DefinitionModel):
         return Parts(self.parameters, self.let, self.value)
 
 
-class ModelModel(DefinitionModel):
-    """A neuron model of one's own: how the activity follows from the drive."""
+class TimedModel(DefinitionModel):
+    """A definition that may have derivatives."""
 
     time: Annotated[Located[TimeUnit], words(TimeUnit, abouts=_TIMES)] | None = Field(
         None, description="The unit of t, dt and derivatives in it: s or ms (default s)."
     )
+
+    @property
+    def unit_of_time(self) -> TimeUnit:
+        """The unit of t, dt and derivatives in it."""
+        return value_or(self.time, "s")
+
+
+class ModelModel(TimedModel):
+    """A neuron model of one's own: how the activity follows from the drive."""
+
     parameters: Annotated[Named[ParameterField], LOCAL] = Field(default_factory=dict, description="Names and defaults.")
     ports: Annotated[PortsField, LOCAL] = Field(
         default=(), description="Names of inputs beside drive, or how what arrives at each is combined."
@@ -211,7 +256,7 @@ class ModelModel(DefinitionModel):
             ports=self.ports,
             outputs=self.outputs,
             send=self.send,
-            time=value_or(self.time, "s"),
+            time=self.unit_of_time,
         )
 
     @classmethod
@@ -219,25 +264,62 @@ class ModelModel(DefinitionModel):
         return not_yet(name, "spike")
 
 
-class WeightModel(Model):
+class ChangeModel(Model):
+    """How a rule changes what it changes: the weight, or the centre."""
+
+    ELSEWHERE: ClassVar[AnyMapping[str, str]] = _CHANGES
+
+    each_step: Annotated[FormulaField, IN_RULE] | None = None
+    each_episode: Annotated[FormulaField, IN_RULE] | None = None
+    derivative: Annotated[Annotated[FormulaField, IN_RULE] | None, _WITHOUT_STEPS] = None
+
+    @classmethod
+    def _foreign(cls, name: str) -> tuple[str, str] | None:
+        return not_yet(name, "on_pre", "on_post")
+
+
+_NO_CHANGE: Final = "a rule says how the weight changes: add weight: {each_step: …}, or {each_episode: …}"
+
+
+def _one_change(what: str) -> OneOf:
+    return OneOf(
+        ("each_step", "each_episode", "derivative"),
+        f"a rule changes the {what} in 'each_step' or in 'each_episode', or says its 'derivative'",
+    )
+
+
+class WeightModel(ChangeModel):
     """How a rule changes the weight."""
 
-    ONE_OF: ClassVar[OneOf | None] = OneOf(
-        ("each_step", "each_episode"), "a rule changes the weight in 'each_step' or in 'each_episode'"
-    )
+    ONE_OF: ClassVar[OneOf | None] = _one_change("weight")
 
     each_step: Annotated[FormulaField, IN_RULE] | None = Field(
         None, description="w[t+1], an expression of weight, pre, post, …."
     )
     each_episode: Annotated[FormulaField, IN_RULE] | None = Field(None, description="The weight after an episode.")
+    derivative: Annotated[Annotated[FormulaField, IN_RULE] | None, _WITHOUT_STEPS] = Field(
+        None, description="What the weight changes by, per second (or millisecond: time)."
+    )
 
-    @classmethod
-    def _foreign(cls, name: str) -> tuple[str, str] | None:
-        return not_yet(name, "on_pre", "on_post", "derivative")
+
+class CentreModel(ChangeModel):
+    """How a rule changes the centre, which targets that combine by distance compare what arrives with."""
+
+    ONE_OF: ClassVar[OneOf | None] = _one_change("centre")
+
+    each_step: Annotated[FormulaField, IN_CENTRE] | None = Field(
+        None, description="c[t+1], an expression of centre, pre, post, …."
+    )
+    each_episode: Annotated[FormulaField, IN_CENTRE] | None = Field(None, description="The centre after an episode.")
+    derivative: Annotated[Annotated[FormulaField, IN_CENTRE] | None, _WITHOUT_STEPS] = Field(
+        None, description="What the centre changes by, per second (or millisecond: time)."
+    )
 
 
-class RuleModel(DefinitionModel):
+class RuleModel(TimedModel):
     """A plasticity rule of one's own."""
+
+    ONE_OF: ClassVar[OneOf | None] = OneOf(("weight", "centre"), "the key 'weight' is missing", _NO_CHANGE)
 
     parameters: Annotated[Named[ParameterField], LOCAL] = Field(default_factory=dict, description="Names and defaults.")
     signals: Annotated[TextsField, LOCAL] = Field(
@@ -246,24 +328,66 @@ class RuleModel(DefinitionModel):
     let: Annotated[Named[Annotated[FormulaField, IN_RULE]], LOCAL] = Field(
         default_factory=dict, description="Intermediate values; one may read others."
     )
-    state: Annotated[Named[Annotated[StateModel, IN_RULE]], LOCAL] = Field(
+    state: Annotated[Named[Annotated[RuleStateModel, IN_RULE]], LOCAL] = Field(
         default_factory=dict, description="States, one for each connection."
     )
-    weight: WeightModel = Field(description="How the weight changes.")
+    weight: WeightModel | None = Field(None, description="How the weight changes; a rule has this or centre.")
+    centre: Annotated[
+        CentreModel | None,
+        NotWith(("weight",), "'{own}' beside '{other}': a rule changes one of the two", "make two rules of it"),
+    ] = Field(None, description="How the centre changes, in place of the weight, where targets combine by distance.")
+    description: TextField | None = Field(None, description="What it is, its equation and its source.")
+
+    @property
+    def change(self) -> ChangeModel | None:
+        """How what it changes changes."""
+        return self.centre if self.weight is None else self.weight
+
+    def parts(self) -> Parts:
+        """What it says."""
+        change = self.change
+        return Parts(
+            self.parameters,
+            self.let,
+            None if change is None else change.each_step,
+            None if change is None else change.each_episode,
+            None if change is None else change.derivative,
+            "centre" if isinstance(change, CentreModel) else "",
+            state=self.state,
+            signals=self.signals,
+            time=self.unit_of_time,
+        )
+
+
+class SynapseModel(TimedModel):
+    """A synapse of one's own: what a connection brings to its port."""
+
+    BARE: ClassVar[str] = "signal"
+
+    parameters: Annotated[Named[ParameterField], LOCAL] = Field(default_factory=dict, description="Names and defaults.")
+    let: Annotated[Named[Annotated[FormulaField, IN_SYNAPSE]], LOCAL] = Field(
+        default_factory=dict, description="Intermediate values; one may read others."
+    )
+    state: Annotated[Named[Annotated[SynapseStateModel, IN_SYNAPSE]], LOCAL] = Field(
+        default_factory=dict, description="States, one for each connection."
+    )
+    signal: Annotated[FormulaField, IN_SYNAPSE] = Field(
+        description="What arrives at the port, an expression of weight, pre, post, pre.X, post.X, …."
+    )
+    sign: Annotated[FormulaField, IN_SIGN] | None = Field(
+        None, description="How its line ends: above 0 in an arrow, below 0 in a bar, at 0 in nothing (default weight)."
+    )
     description: TextField | None = Field(None, description="What it is, its equation and its source.")
 
     def parts(self) -> Parts:
         """What it says."""
-        weight = self.weight
-        return Parts(self.parameters, self.let, weight.each_step, weight.each_episode, self.state, self.signals)
+        return Parts(self.parameters, self.let, self.signal, state=self.state, time=self.unit_of_time, sign=self.sign)
 
     @classmethod
     def _foreign(cls, name: str) -> tuple[str, str] | None:
-        return not_yet(name, "time")
-
-    @classmethod
-    def _without(cls, name: str, data: Mapping) -> str:
-        return "a rule says how the weight changes: add weight: {each_step: …}, or {each_episode: …}"
+        if name == "ports":
+            return "'ports' are of models; the connection says to which its synapse goes", "write port: … there"
+        return not_yet(name, "shared", "spike", "on_pre")
 
 
 class Library(Model):
@@ -283,12 +407,16 @@ class Library(Model):
     rules: Annotated[Named[RuleModel], declaring("rule")] = Field(
         default_factory=dict, description="Plasticity rules of one's own."
     )
-
-    @classmethod
-    def _foreign(cls, name: str) -> tuple[str, str] | None:
-        return not_yet(name, "synapses")
+    synapses: Annotated[Named[SynapseModel], declaring("synapse")] = Field(
+        default_factory=dict, description="Synapses of one's own: what connections bring to their ports."
+    )
 
     @property
     def definitions(self) -> AnyMapping[str, AnyMapping[str, DefinitionModel]]:
         """All definitions, by section and name."""
-        return {"activations": self.activations, "models": self.models, "rules": self.rules}
+        return {
+            "activations": self.activations,
+            "models": self.models,
+            "rules": self.rules,
+            "synapses": self.synapses,
+        }

@@ -19,7 +19,7 @@ from neurovis_spec.language.sections import ConnectionsField, GroupsField, Input
 from neurovis_spec.language.values import ParametersField
 
 #: the sections of an included file
-INCLUDED = ("modules", "activations", "models", "rules")
+INCLUDED = ("modules", "activations", "models", "rules", "synapses")
 
 
 class InstanceModel(Model):

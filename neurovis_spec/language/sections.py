@@ -79,6 +79,7 @@ from neurovis_spec.language.values import (
     NoiseField,
     Pair,
     RuleField,
+    SynapseField,
     as_file,
     at_ports,
     pair,
@@ -344,6 +345,9 @@ class ConnectionModel(Model):
     send: Annotated[TextField, SENT] | None = Field(
         None, description="What is sent: a state or an output of the source's model, or its activity."
     )
+    synapse: SynapseField | None = Field(
+        None, description="What it brings to its port, in place of weight times what is sent: name, or {name: {…}}."
+    )
     plasticity: RuleField | None = Field(None, description="A rule: name, or {name: {parameter: value, signal: …}}.")
     bounds: Annotated[
         Annotated[Pair, pair("bounds [low, high]")] | None,
@@ -354,7 +358,7 @@ class ConnectionModel(Model):
 
     @classmethod
     def _foreign(cls, name: str) -> tuple[str, str] | None:
-        if (later := not_yet(name, "synapse", "symmetric")) is not None:
+        if (later := not_yet(name, "symmetric")) is not None:
             return later
         taken_by = [one.name for one in PATTERNS.values() if name in one.settings]
         if name in ("rate", "target", "learning_rate", "eta"):

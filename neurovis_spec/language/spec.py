@@ -36,7 +36,7 @@ class Spec(Library):
     PLACE: ClassVar[str] = "the top level"
     ELSEWHERE: ClassVar[AnyMapping[str, str]] = {
         **dict.fromkeys(("groups", "layers", "nodes", "populations", "cells", "units"), "neurons"),
-        **dict.fromkeys(("edges", "synapses", "links", "projections", "weights", "wiring"), "connections"),
+        **dict.fromkeys(("edges", "links", "projections", "weights", "wiring"), "connections"),
         **dict.fromkeys(("params", "constants", "variables"), "parameters"),
         **dict.fromkeys(("stimuli", "stimulus", "signals"), "inputs"),
         **dict.fromkeys(("simulation", "clock"), "time"),
@@ -51,9 +51,7 @@ class Spec(Library):
     time: Time | None = Field(None, description="The clock: dt, steps, episode.")
     seed: IntegerField | None = Field(None, description="The only source of randomness (default 0).")
     parameters: ParametersField = Field(default_factory=dict, description="Named constants, in order.")
-    include: TextsField = Field(
-        default=(), description="Files whose modules, activations, models and rules are used here."
-    )
+    include: TextsField = Field(default=(), description="Files whose modules and definitions are used here.")
     modules: ModulesField = Field(default_factory=dict, description="Networks to be used several times.")
     inputs: InputsField = Field(default_factory=dict, description="Signals from outside the network.")
     neurons: GroupsField = Field(default_factory=dict, description="Groups of neurons.")

@@ -23,6 +23,7 @@ from neurovis_spec.language.grammar import (
     REFERENCE,
     REFERENCES,
     RULE_SETTING,
+    SYNAPSE_SETTING,
     TEXT,
     TWO,
     UNNAMED,
@@ -70,7 +71,7 @@ LOCAL = declaring("local")
 
 
 class Choice(NamedTuple):
-    """``name`` or ``{name: {parameter: value, …}}``: an activation, a model or a rule with its settings."""
+    """``name`` or ``{name: {parameter: value, …}}``: a definition with its settings."""
 
     name: Located[str]
     settings: Mapping
@@ -130,6 +131,7 @@ def _choice(kind: Kind, value: Role) -> Either:
 ActivationField = Annotated[Choice, Leaf(as_choice, _choice("activation", GROUP)), Role("choice", "activation")]
 ModelField = Annotated[Choice, Leaf(as_choice, _choice("model", GROUP)), Role("choice", "model")]
 RuleField = Annotated[Choice, Leaf(as_choice, _choice("rule", RULE_SETTING)), Role("choice", "rule")]
+SynapseField = Annotated[Choice, Leaf(as_choice, _choice("synapse", SYNAPSE_SETTING)), Role("choice", "synapse")]
 
 
 class FileReference(NamedTuple):

@@ -143,7 +143,7 @@ class _Check(NamedTuple):
     of: tuple[str, ...]
 
 
-_DEFINITIONS = ("activations", "models", "rules")
+_DEFINITIONS = ("activations", "models", "rules", "synapses")
 #: All checks, in the order in which findings of one place are told.
 _CHECKS = (
     _Check(_inputs, ("inputs",)),

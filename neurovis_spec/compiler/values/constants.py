@@ -37,6 +37,7 @@ from neurovis_spec.diagnostics import Findings, Home, Undeclared, shorten
 from neurovis_spec.language.expressions.evaluate import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS, DRAWS, FUNCTIONS, GIVEN, meaning
 from neurovis_spec.language.expressions.habits import UNITS, unit_hint
+from neurovis_spec.language.expressions.lexer import Naming
 from neurovis_spec.language.expressions.mistakes import INSTEAD
 from neurovis_spec.language.expressions.parser import ExpressionError, parse, unknown_names
 from neurovis_spec.language.expressions.tree import Draw, Number, Tree, draws, names
@@ -75,9 +76,9 @@ class Scope(Collection[str]):
 
 
 @lru_cache(maxsize=4096)
-def _parsed(text: str, random: bool, functions: tuple[tuple[str, int], ...], subscripts: bool) -> Tree:
+def _parsed(text: str, random: bool, functions: tuple[tuple[str, int], ...], naming: Naming) -> Tree:
     """The tree of a text. A list may hold the same one a hundred thousand times."""
-    return parse(text, random=random, extra_functions=dict(functions), subscripts=subscripts)
+    return parse(text, random=random, extra_functions=dict(functions), naming=naming)
 
 
 class Outside(NamedTuple):
@@ -93,15 +94,20 @@ PARAMETERS = Home((), ("parameters",))
 
 
 class Sight(NamedTuple):
-    """What a formula sees: the ``known`` names, which are ``what`` in the words of a finding. And what it does not see,
-    and why: names that come ``later``, behind it, and those that are ``outside``; ``home`` is where its names are
-    declared."""
+    """What a formula sees: the ``known`` names, which are ``what`` in the words of a finding, and of connections what
+    is at their ``ends``. And what it does not see, and why: names that come ``later``, behind it, and those that are
+    ``outside``; ``home`` is where its names are declared."""
 
     known: Collection[str]
     what: str = "known here"
     later: Collection[str] = ()
     outside: Outside = NOTHING_OUTSIDE
     home: Home = PARAMETERS
+    ends: bool = False
+
+    def sees(self, name: str) -> bool:
+        """Whether a name means something; those with a point are of ends, and who uses the definition knows more."""
+        return name in self.known or (self.ends and "." in name)
 
 
 def parse_formula(
@@ -111,26 +117,26 @@ def parse_formula(
     *,
     random: bool = False,
     functions: Mapping[str, int] | None = None,
-    subscripts: bool = False,
+    naming: Naming = "",
 ) -> Tree | Unknown:
-    """The tree of a formula whose names are all known; else findings at the invalid characters. ``subscripts`` allows
-    names such as ``legs[3]``."""
+    """The tree of a formula whose names are all known; else findings at the invalid characters. ``naming`` says which
+    names there may be beside plain ones."""
     known = sight.known
     if formula.value is UNKNOWN:
         return UNKNOWN
     if not isinstance(formula.value, str):
         return Number(float(formula.value))
     try:
-        tree = _parsed(formula.value, random, tuple((functions or {}).items()), subscripts)
+        tree = _parsed(formula.value, random, tuple((functions or {}).items()), naming)
     except ExpressionError as error:
         for mistake in (error, *error.others):
             if mistake.code == "draw-not-allowed" and findings.is_invalid(formula.span):
                 continue  # a comma has cut it: what it was meant to be is not sure
             place = formula.node.at(mistake.start, mistake.end)
             findings.error(mistake.code, place, mistake.message, mistake.hint)
-        used = [use for use in error.used if use[0] not in known]
+        used = [use for use in error.used if not sight.sees(use[0])]
     else:
-        unused = [name for name in names(tree) if name not in known]
+        unused = [name for name in names(tree) if not sight.sees(name)]
         if not unused:
             return tree
         unknown = unknown_names(tree, names(tree).difference(unused))

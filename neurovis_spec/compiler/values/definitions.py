@@ -1,4 +1,4 @@
-"""Definitions: activations, models and rules, from their formulas to checked trees.
+"""Definitions: activations, models, rules and synapses, from their formulas to checked trees.
 
 In: the models of a library file or of a spec's own sections. Out: Definitions by name. A definition sees its own
 parameters, states and intermediate values, and what its kind is given (``x``; ``drive``; ``pre``, ``post``, …); never
@@ -8,7 +8,7 @@ the spec's parameters. It is checked even if nobody uses it. What is written of 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from graphlib import CycleError, TopologicalSorter
 from heapq import heappop, heappush
 from types import MappingProxyType
@@ -17,7 +17,7 @@ from typing import Final, NamedTuple, TypeAlias
 import numpy as np
 
 from neurovis_spec.compiler.limits import PATIENCE
-from neurovis_spec.compiler.program import ACTIVATION, DRIVE, MODEL, RULE, Definition, Kind, PortOf, Quantity
+from neurovis_spec.compiler.program import ACTIVATION, DRIVE, MODEL, RULE, SYNAPSE, Definition, Kind, PortOf, Quantity
 from neurovis_spec.compiler.values.constants import (
     ALWAYS,
     Outside,
@@ -31,6 +31,7 @@ from neurovis_spec.compiler.values.constants import (
 from neurovis_spec.diagnostics import Findings, Home, Span, shorten
 from neurovis_spec.language.expressions.evaluate import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS, meaning
+from neurovis_spec.language.expressions.lexer import Naming
 from neurovis_spec.language.expressions.tree import (
     ExpressionError,
     Name,
@@ -42,7 +43,7 @@ from neurovis_spec.language.expressions.tree import (
     substitute,
     with_products,
 )
-from neurovis_spec.language.grammar import Role
+from neurovis_spec.language.grammar import IN_SIGN, Role
 from neurovis_spec.language.library import (
     ActivationModel,
     DefinitionModel,
@@ -50,6 +51,7 @@ from neurovis_spec.language.library import (
     ModelModel,
     RuleModel,
     StateModel,
+    SynapseModel,
 )
 from neurovis_spec.language.located import IDENTIFIER, Formula, Located, bad_name, name_hint
 from neurovis_spec.language.model import names_of
@@ -105,18 +107,21 @@ class Definitions:
 
 
 class Reading(NamedTuple):
-    """How definitions of a kind are read: what their formulas see (``role``), and whether intermediate values are put
-    into what is given (``inlined``)."""
+    """How definitions of a kind are read: what their formulas see (``role``), whether intermediate values are put into
+    what is given (``inlined``), and whether x^3 and x^4 are products in all of them (``products``), not only where
+    something is integrated."""
 
     kind: Kind
     role: Role
     inlined: bool = False
+    products: bool = False
 
 
 _READINGS = (
     Reading(ACTIVATION, formula_at(ActivationModel, "value"), inlined=True),
     Reading(MODEL, formula_at(ModelModel, "activity")),
     Reading(RULE, formula_at(RuleModel, "weight", "each_step")),
+    Reading(SYNAPSE, formula_at(SynapseModel, "signal"), products=True),
 )
 
 #: Keys of a definition that declare what is named where it is used, and those that declare names for its formulas.
@@ -164,14 +169,21 @@ class _Checker:
         self.constants = {**CONSTANTS, "dt": around.dt * _PER_SECOND[self.parts.time]}
         self.outside = around.outside
         self.home = Home(place, _SECTIONS)
+        #: what is given, which a rule sees by its name
+        self.given_name = self.parts.gives or reading.kind.gives
+        given = (self.given_name if name == reading.kind.gives else name for name in reading.role.sees)
         #: where each name is declared; nowhere those that are given
-        self.known = Names[Span | None](
-            dict.fromkeys((*ALWAYS, *reading.role.sees)), not model.unknown.isdisjoint(_DECLARING)
-        )
+        self.known = Names[Span | None](dict.fromkeys((*ALWAYS, *given)), not model.unknown.isdisjoint(_DECLARING))
+        #: of connections it knows what there is at their ends
+        self.naming: Naming = "ends" if reading.role.ends else ""
         for key in (entry.key for entry in model.source.entries if entry.name in _LATER):
             self.known.declared[str(key.value)] = key.span
-        #: whether anything is integrated in it; there x^3 and x^4 are products
-        self.flows = any(one.flow.derivative is not None for one in (self.parts.state or {}).values())
+        #: whether x^3 and x^4 are products
+        self.products = (
+            reading.products
+            or self.parts.derivative is not None
+            or any(one.flow.derivative is not None for one in (self.parts.state or {}).values())
+        )
 
     def declare(self, section: str, name: str) -> None:
         """A parameter, state, signal or intermediate value; each name once, and none that is given."""
@@ -214,24 +226,24 @@ class _Checker:
         self,
         formula: Formula,
         functions: Mapping[str, int] = _NO_FUNCTIONS,
-        known: Collection[str] | None = None,
-        what: str = "known in this definition",
+        sight: Sight | None = None,
     ) -> Tree:
-        """The tree of a formula over what is declared so far, or what is ``known``; 0 in the place of one that is
+        """The tree of a formula over what is declared so far, or what is in ``sight``; 0 in the place of one that is
         invalid, as nothing is computed with it any more."""
-        tree = self.read(formula, self.sight(known, what), functions)
+        tree = self.read(formula, sight or self.sight(), functions)
         if tree is not UNKNOWN and is_constant(tree) and not calls(tree, functions):
             check_finite(evaluate_array(tree, self.constants), formula, self.findings)
         return Number(0.0) if tree is UNKNOWN else tree
 
     def sight(self, known: Collection[str] | None = None, what: str = "known in this definition") -> Sight:
         """What a formula sees: what is declared so far, or what is ``known``."""
-        return Sight(self.known if known is None else known, what, outside=self.outside, home=self.home)
+        ends = self.naming == "ends" and known is None
+        return Sight(self.known if known is None else known, what, outside=self.outside, home=self.home, ends=ends)
 
     def read(self, formula: Formula, sight: Sight, functions: Mapping[str, int] = _NO_FUNCTIONS) -> Tree | Unknown:
         """The tree of a formula; UNKNOWN where it is invalid, which is reported."""
-        tree = parse_formula(formula, sight, self.findings, functions=functions)
-        if tree is UNKNOWN or not self.flows:
+        tree = parse_formula(formula, sight, self.findings, functions=functions, naming=self.naming)
+        if tree is UNKNOWN or not self.products:
             return tree
         try:
             made = with_products(tree)
@@ -356,15 +368,22 @@ class _Checker:
             self.findings.error(error.code, span, message, error.hint)
             return Number(0.0)
 
+    def sign(self, formula: Formula | None, defaults: Defaults) -> Tree | None:
+        """How lines end, of parameters here and at the ends, and of the weight."""
+        if formula is None:
+            return None
+        known = (*ALWAYS, *(default.name for default in defaults), *IN_SIGN.sees)
+        return self.tree(formula, sight=self.sight(known, "known here")._replace(ends=True))
+
     def states(self, state: Mapping[str, StateModel], defaults: Defaults) -> tuple[Quantity, ...]:
         """The states; their right-hand sides see everything, their initial values the parameters alone."""
-        constant = (*ALWAYS, *(default.name for default in defaults))
+        constant = self.sight((*ALWAYS, *(default.name for default in defaults)), "known here")
         return tuple(
             Quantity(
                 name,
                 self.optional(model.each_step, self.functions),
                 self.optional(model.each_episode),
-                Number(0.0) if model.initial is None else self.tree(model.initial, known=constant, what="known here"),
+                Number(0.0) if model.initial is None else self.tree(model.initial, sight=constant),
                 self.optional(model.flow.derivative, self.functions),
                 self.optional(model.flow.noise),
                 model.flow.unit,
@@ -417,14 +436,15 @@ def definition_of(
     if unfolded is UNKNOWN:
         return UNKNOWN
     each_step, each_episode = checker.given(parts.each_step), checker.given(parts.each_episode)
+    given = Quantity(checker.given_name, each_step, each_episode, derivative=checker.optional(parts.derivative))
     if reading.inlined and parts.each_step is not None and each_step is not None:
-        let, each_step = (), checker.with_let(each_step, unfolded, parts.each_step.span)
+        let, given = (), replace(given, each_step=checker.with_let(each_step, unfolded, parts.each_step.span))
     outputs = () if parts.outputs is None else checker.outputs(parts.outputs)
     definition = Definition(
         kind=kind,
         name=name,
         parameters=tuple(default.name for default in defaults),
-        gives=(Quantity(kind.gives, each_step, each_episode), *outputs),
+        gives=(given, *outputs),
         let=let,
         state=state,
         signals=signals,
@@ -433,6 +453,7 @@ def definition_of(
         send=checker.sent(parts.send),
         per_second=_PER_SECOND[parts.time],
         units=tuple((name, one.unit.value) for name, one in parts.parameters.items() if one.unit is not None),
+        sign=checker.sign(parts.sign, defaults),
     )
     return Defined(definition, defaults)
 

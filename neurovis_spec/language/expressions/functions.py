@@ -47,10 +47,12 @@ GIVEN: Final[Mapping[str, str]] = {
     "x": "In an activation, the combined input.",
     "drive": "In a model, the combined input with bias, input and noise: u[t].",
     "f": "In a model, the neuron's activation: f(v).",
-    "pre": "In a rule, the signal that reaches the synapse: the source's activity d steps ago, d being the delay.",
-    "sent": "In a rule, the source's activity of this step.",
-    "post": "In a rule, the target's activity of this step.",
-    "weight": "In a rule, the weight before the step.",
+    "pre": "In a rule or a synapse, what the connection sends, d steps ago, d being the delay; pre.X is what X was of "
+    "the source then: a state, an output, a parameter, or its activity.",
+    "sent": "In a rule or a synapse, what the connection sends in this step.",
+    "post": "In a rule or a synapse, the target's activity; post.X is X of the target.",
+    "weight": "In a rule, the weight before the step; in a synapse, the weight.",
+    "centre": "In a rule that changes the centre, that before the step.",
 }
 #: Names that no parameter may have.
 RESERVED: Final = ("t", "k", "dt", "i", "j", "n", "pi", "e")

@@ -11,7 +11,7 @@ import math
 import re
 import unicodedata
 from collections.abc import Mapping, Sequence
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypeAlias
 
 from neurovis_spec.diagnostics import shorten
 from neurovis_spec.language.expressions.habits import UNITS, ungrouped, ungrouped_hint, unit_hint, unit_of
@@ -42,6 +42,8 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _REFERENCE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(?:\.{1,2}[A-Za-z_][A-Za-z0-9_]*)*")
 #: And ``(K1 -> O).eligibility``, ``(A -> B (2)).x``: an arrow stands nowhere else.
 _OF_RULE = re.compile(r"\([^()]*->[^()]*(?:\([0-9]+\)\s*)?\)\s*\.\s*[A-Za-z_][A-Za-z0-9_]*")
+#: What a connection reads of an end: ``pre.v``.
+_OF_END = re.compile(r"(?:pre|post)\.[A-Za-z_][A-Za-z0-9_]*")
 #: One number of several: ``legs[3]``.
 _SUBSCRIPT = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)\[(?:\s*([0-9]{1,9})\s*\])?")
 _KEYWORD = re.compile(r"=(?!=)")
@@ -86,10 +88,16 @@ _LOOKALIKES: Mapping[str, str] = {
 }  # fmt: skip
 
 
-def tokens(text: str, *, references: bool = False, subscripts: bool = False) -> tuple[Token, ...]:
-    """The tokens of an expression. Raises ExpressionError. With ``references`` names may hold points, the state of a
-    rule is a name, and ``=`` stands behind the name of an argument. With ``subscripts`` a name may have a number behind
-    it, as in ``legs[3]``.
+#: What names an expression may hold beside plain ones; "" are none.
+#:
+#: - ``references``: with points, and the state of a rule, ``(K -> O).e``; ``=`` stands behind the name of an argument;
+#: - ``subscripts``: with a number behind them, as in ``legs[3]``;
+#: - ``ends``: of what a connection reads of its ends, as in ``pre.v``.
+Naming: TypeAlias = Literal["", "references", "subscripts", "ends"]
+
+
+def tokens(text: str, naming: Naming = "") -> tuple[Token, ...]:
+    """The tokens of an expression. Raises ExpressionError.
 
     >>> [token.text for token in tokens("-x^2 <= .5e-3")]
     ['-', 'x', '^', '2', '<=', '.5e-3', '']
@@ -108,8 +116,7 @@ def tokens(text: str, *, references: bool = False, subscripts: bool = False) -> 
         if blank := _BLANK.match(text, at):
             at = blank.end()
             continue
-        token = _referring(text, at, found) if references else _subscripted(text, at) if subscripts else None
-        token = token or _token(text, at, after=found[-1] if found else None)
+        token = _special(text, at, naming, found) or _token(text, at, after=found[-1] if found else None)
         found.append(token)
         at = token.end
     found.append(Token("end", "", len(text), len(text)))
@@ -130,6 +137,19 @@ def _check_habits(text: str) -> None:
 def is_operand(token: Token | None) -> bool:
     """Whether a value ends with this token, so that an operator may follow."""
     return token is not None and (token.kind in ("number", "name") or token.text == ")")
+
+
+def _special(text: str, at: int, naming: Naming, found: Sequence[Token]) -> Token | None:
+    """What only some expressions hold."""
+    match naming:
+        case "references":
+            return _referring(text, at, found)
+        case "subscripts":
+            return _subscripted(text, at)
+        case "ends":
+            end = _OF_END.match(text, at)
+            return None if end is None else Token("name", end.group(), at, end.end())
+    return None
 
 
 def _referring(text: str, at: int, found: Sequence[Token]) -> Token | None:

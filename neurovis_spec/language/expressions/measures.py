@@ -70,7 +70,7 @@ class _Parser(Parser):
     """The parser of expressions, with windows."""
 
     def __init__(self, text: str) -> None:
-        super().__init__(text, False, {"rms": 1, "mean": 1}, references=True)
+        super().__init__(text, False, {"rms": 1, "mean": 1}, "references")
         self.windows: list[Window] = []
         self._within: Token | None = None
 

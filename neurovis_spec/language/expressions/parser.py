@@ -16,7 +16,7 @@ from typing import Literal, TypeAlias, cast
 
 from neurovis_spec.language.expressions import mistakes
 from neurovis_spec.language.expressions.functions import DRAWS, FUNCTIONS
-from neurovis_spec.language.expressions.lexer import Token, tokens
+from neurovis_spec.language.expressions.lexer import Naming, Token, tokens
 from neurovis_spec.language.expressions.tree import (
     Binary,
     BinaryOperator,
@@ -54,19 +54,19 @@ _LEVELS: Mapping[str, int] = {
 
 
 def parse(
-    text: str, *, random: bool = False, extra_functions: Mapping[str, int] | None = None, subscripts: bool = False
+    text: str, *, random: bool = False, extra_functions: Mapping[str, int] | None = None, naming: Naming = ""
 ) -> Tree:
     """The tree of an expression. Raises ExpressionError.
 
     ``random`` allows ``normal(m, s)`` and ``uniform(a, b)``, which become Draws numbered from 0 as they are written;
     ``extra_functions`` are functions of this place besides those of all expressions, with their arities, which become
-    Calls; ``subscripts`` allows names such as ``legs[3]``.
+    Calls; ``naming`` says what names there may be beside plain ones, such as ``legs[3]`` or ``pre.v``.
 
     >>> parse("-x^2")
     Unary(operator='-', operand=Binary(operator='^', left=Name(name='x', start=1, end=2), \
 right=Number(value=2.0, start=3, end=4), start=1, end=4), start=0, end=4)
     """
-    return Parser(text, random, dict(extra_functions or {}), subscripts=subscripts).whole()
+    return Parser(text, random, dict(extra_functions or {}), naming).whole()
 
 
 @cache
@@ -100,16 +100,8 @@ def _takes(arity: Arity | None, given: int) -> bool:
 class Parser:
     """Goes through the tokens once. Each method starts at the first token of what it is named after."""
 
-    def __init__(
-        self,
-        text: str,
-        random: bool,
-        extra_functions: Mapping[str, int],
-        *,
-        references: bool = False,
-        subscripts: bool = False,
-    ) -> None:
-        self.tokens = tokens(text, references=references, subscripts=subscripts)
+    def __init__(self, text: str, random: bool, extra_functions: Mapping[str, int], naming: Naming = "") -> None:
+        self.tokens = tokens(text, naming)
         self.at = 0
         self.nesting = 0
         self.draws = 0
