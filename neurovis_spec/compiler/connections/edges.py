@@ -84,6 +84,8 @@ class EdgeReader:
     stream: Stream
     #: how many connections may be made; None where that is not known
     most: int | None = None
+    #: whether a derivative of any target reads what they bring
+    into_flow: bool = False
 
     def read(self, edges: EdgeRows | FileReference) -> EdgeList | Unknown:
         """All edges; UNKNOWN where one is invalid."""
@@ -167,7 +169,7 @@ class EdgeReader:
             key = int(cells.kinds[cell]), float(cells.numbers[cell]) if cells.kinds[cell] != NULL else 0.0
             if key not in found:
                 formula = time_of(cells.node(cell), self.constants.findings)
-                found[key] = UNKNOWN if formula is UNKNOWN else self.constants.delay(formula)
+                found[key] = UNKNOWN if formula is UNKNOWN else self.constants.delay(formula, self.into_flow)
             result[place] = known(found[key], 0)
         return UNKNOWN if UNKNOWN in found.values() else result
 

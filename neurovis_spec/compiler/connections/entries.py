@@ -25,6 +25,7 @@ from neurovis_spec.compiler.connections.plasticity import ConnectionEnds, Learni
 from neurovis_spec.compiler.connections.routes import default_delays, route_of
 from neurovis_spec.compiler.connections.weight_scale import Scaled, check_scale, scaled
 from neurovis_spec.compiler.events.settable import Assembled, Distance, Part
+from neurovis_spec.compiler.flows import ports_read_by
 from neurovis_spec.compiler.limits import Limits, amount
 from neurovis_spec.compiler.names.references import Directory
 from neurovis_spec.compiler.names.scope import Scope
@@ -125,6 +126,16 @@ class EntryBuilder:
         """What its connections take, and where they bring it."""
         return route_of(self.body, self.sources, self.targets, self.context.census, self.constants)
 
+    @cached_property
+    def into_flow(self) -> bool:
+        """Whether a derivative of any of its targets reads what it brings."""
+        census = self.context.census
+        if not census.models.flow or self.targets is UNKNOWN or self.route is UNKNOWN:
+            return False
+        ports = [name for name, _ in self.route.ports]
+        models = np.unique(census.models.of[self.targets]).tolist()
+        return any(not ports_read_by(census.models.different[one]).flow.isdisjoint(ports) for one in models)
+
     def _stream(self, purpose: str) -> Stream:
         return Stream(self.context.seed, purpose, self.context.scope.declares(self.name))
 
@@ -138,7 +149,7 @@ class EntryBuilder:
         errors_before_entry = findings.errors
         if body.label is not None:
             check_length(body.label, findings)
-        delay = 1 if body.delay is None else self.constants.delay(body.delay)
+        delay = 1 if body.delay is None else self.constants.delay(body.delay, self.into_flow)
         route = self.route
         errors_before_shape = findings.errors
         # what is collected here stands at cells of the matrix, what ``centre_parts`` collects at connections
@@ -302,7 +313,13 @@ class EntryBuilder:
             End(neurons, self.context.directory, called, path) for neurons in (self.sources, self.targets)
         )
         reader = EdgeReader(
-            sources, targets, self.constants, self.context.scope.files, self._stream("weight"), self.context.room
+            sources,
+            targets,
+            self.constants,
+            self.context.scope.files,
+            self._stream("weight"),
+            self.context.room,
+            self.into_flow,
         )
         with self.constants.following() as parts:
             edges = reader.read(self.body.edges)
