@@ -47,6 +47,7 @@ EMITTERS = {
     "Syntax": 4,
     "fault": 2,
     "refuse": 4,
+    "report": 0,
 }
 #: Codes that are put together, and codes that stand in a table or a default.
 MADE = {"f'unknown-{what}'": {"unknown-activation", "unknown-model", "unknown-rule"}}

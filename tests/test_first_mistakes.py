@@ -179,7 +179,7 @@ def test_indentation_that_is_no_blank_is_named(character: str) -> None:
         ("time: {dt: 0.1*ms}\n", "3:16", "write 0.0001 where seconds are wanted"),
         ("time: {dt: 20 \u00b5s}\n", "3:12", "is no unit of time | write us"),
         ("time: {steps: 1 hour}\n", "3:15", "'steps' counts steps: write 3600/dt"),
-        ("parameters: {tau: 20 ms}\n", "3:19", "write 0.02 where seconds are wanted, 0.02/dt where steps are"),
+        ("parameters: {tau: 20 ms}\n", "3:19", "0.02/dt where steps are, 20 in a model with time: ms"),
         ("events: [{at: 5 ms, lesion: A}]\n", "3:15", "a whole number of steps, this is 0.005 | a step is 1 s long"),
         (
             "events: [{from: 1, to: 1 h, clamp: {A: 1}}]\n",

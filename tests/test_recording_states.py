@@ -144,7 +144,7 @@ neurons: {A: {model: m, bias: 1}}
     network = nv.compile_text(text)
     with pytest.raises(KeyError) as wrong:
         network.run(2, states=["A.w"])
-    assert "its states are: v, twice" in str(wrong.value)
+    assert "its states and outputs are: v, twice" in str(wrong.value)
     assert "divides" not in str(wrong.value)
 
 

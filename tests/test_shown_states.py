@@ -159,5 +159,5 @@ def test_a_recording_without_it_is_refused_with_what_to_do(tmp_path: Path) -> No
 
 
 def test_a_state_that_there_is_not_is_told_at_its_place() -> None:
-    with pytest.raises(SpecError, match=r"7:20.*no state 'thta'"):
+    with pytest.raises(SpecError, match=r"7:20.*no state and no output 'thta'"):
         network_of(PHASES + "render: {show: {N: thta}}\n")

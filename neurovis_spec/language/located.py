@@ -12,6 +12,7 @@ import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Generic, NamedTuple, NoReturn, TypeAlias, TypeVar, get_args
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
@@ -23,7 +24,7 @@ from neurovis_spec.language import grammar
 from neurovis_spec.language.expressions.habits import ungrouped_hint, unit_hint, unit_of
 from neurovis_spec.language.expressions.lexer import decimal_hint
 from neurovis_spec.language.grammar import FORMULA, REFERENCE, TEXT, TEXTS, Either, ListOf, Plain, Shape
-from neurovis_spec.language.units import UnitError, measured, number_in, seconds_of
+from neurovis_spec.language.units import Measured, UnitError, measured, number_in, seconds_of
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.yaml.scalars import INTEGER_HIGH, INTEGER_LOW
 from neurovis_spec.language.yaml.source import AnyList, Node, Scalar, describe, one_or_more
@@ -216,29 +217,38 @@ def as_formula(node: Node, info: ValidationInfo) -> Formula:
     return formula
 
 
-def time_of(node: Node, findings: Findings) -> Formula | Unknown:
-    """A time with its unit, as Seconds, or what ``formula_of`` takes; UNKNOWN where it is neither."""
-    written = measured(node.value) if isinstance(node, Scalar) and isinstance(node.value, str) else None
-    if written is None or not isinstance(node, Scalar):
-        return formula_of(node, findings)
+def _with_unit(value: object) -> Measured | None:
+    """What is written as a number with a unit; None where it is something else."""
+    return measured(value) if isinstance(value, str) else None
+
+
+def _converted(convert: Callable[[Measured], float], written: Measured, node: Scalar, findings: Findings) -> Formula:
+    """A number with a unit, converted; UNKNOWN where its unit does not fit, which is reported."""
     try:
-        return Located(seconds_of(written), node)
+        return Located(convert(written), node)
     except UnitError as error:
         findings.error("bad-unit", node.span, str(error), error.hint)
-        return UNKNOWN
+        return Located(UNKNOWN, node)
+
+
+def time_of(node: Node, findings: Findings) -> Formula | Unknown:
+    """A time with its unit, as Seconds, or what ``formula_of`` takes; UNKNOWN where it is neither."""
+    if isinstance(node, Scalar) and (written := _with_unit(node.value)) is not None:
+        return _converted(seconds_of, written, node, findings)
+    return formula_of(node, findings)
 
 
 def as_time(node: Node, info: ValidationInfo) -> Formula:
     """A time with its unit (``1.5 ms``), or a finite number, or the text of an expression."""
-    if not isinstance(node, Scalar) or not isinstance(node.value, str) or measured(node.value) is None:
-        return as_formula(node, info)
-    formula = time_of(node, findings_of(info))
-    return give_up() if formula is UNKNOWN else formula
+    if isinstance(node, Scalar) and (written := _with_unit(node.value)) is not None:
+        formula = _converted(seconds_of, written, node, findings_of(info))
+        return give_up() if formula.value is UNKNOWN else formula
+    return as_formula(node, info)
 
 
 def as_measured(node: Node, info: ValidationInfo) -> Formula:
     """A finite number, which may have a unit, or the text of an expression."""
-    if isinstance(node, Scalar) and isinstance(node.value, str) and measured(node.value) is not None:
+    if isinstance(node, Scalar) and isinstance(node.value, str) and _with_unit(node.value) is not None:
         return Located(node.value, node)
     return as_formula(node, info)
 
@@ -246,14 +256,10 @@ def as_measured(node: Node, info: ValidationInfo) -> Formula:
 def in_unit(formula: Formula, unit: str, findings: Findings) -> Formula:
     """The same; where it is a number with a unit, that number in this unit. Without one it stays as it is, which is no
     expression."""
-    written = measured(formula.value) if unit and isinstance(formula.value, str) else None
+    written = _with_unit(formula.value) if unit else None
     if written is None:
         return formula
-    try:
-        return Located(number_in(unit, written), formula.node)
-    except UnitError as error:
-        findings.error("bad-unit", formula.span, str(error), error.hint)
-        return Located(UNKNOWN, formula.node)
+    return _converted(partial(number_in, unit), written, formula.node, findings)
 
 
 def as_number(node: Node, info: ValidationInfo) -> Located[float]:

@@ -74,18 +74,13 @@ def find_model_state(network: Network, reference: str) -> StateOf | None:
     """The state of models that ``K.v`` names, which lasts, as outputs do not; None for what is no such reference.
     Raises KeyError with the nearest names."""
     part, *others = parse_sum(reference)
-    name = None if others else state_of(part)
-    if name is None or name.of_rule or isinstance(names_of(network).find(name.owner.text), str):
+    name, names = None if others else state_of(part), names_of(network)
+    if name is None or isinstance(name.owner, Arrow) or isinstance(names.find(name.owner.text), str):
         return None
-    (one,) = find_states(network, reference)
-    holders = network.located("neuron").holders
-    if any(
-        output.name == one.state and np.isin(one.neurons, holder.members).any()
-        for holder in holders
-        for output in holder.uses[-1].definition.outputs
-    ):
+    neurons = find_neurons(name.owner.text, names)
+    if any(name.state in one.outputs and np.isin(neurons, one.members).any() for one in _holders_of(network, MODEL)):
         raise UnknownNameError(f"'{reference}' is an output, made anew at each step: clamp a state, or the neurons")
-    return one
+    return _state(network, part, names, outputs=False)
 
 
 def all_states(network: Network) -> tuple[StateOf, ...]:
@@ -98,7 +93,7 @@ def all_states(network: Network) -> tuple[StateOf, ...]:
     )
 
 
-def _state(network: Network, part: Part, names: Names) -> StateOf:
+def _state(network: Network, part: Part, names: Names, *, outputs: bool = True) -> StateOf:
     text = part.text
     if not isinstance(names.find(text), str):
         raise UnknownNameError(f"'{text}' is no state: its activity is recorded as that of a neuron, group or output")
@@ -108,10 +103,13 @@ def _state(network: Network, part: Part, names: Names) -> StateOf:
     if isinstance(name.owner, Arrow):
         one = connections_state(name, _between(network, name.owner, names), _wiring_of(network))
     else:
-        one = model_state(name, find_neurons(name.owner.text, names), _holders_of(network, MODEL))
+        holders = _holders_of(network, MODEL)
+        if not outputs:
+            holders = tuple(holder._replace(outputs=()) for holder in holders)
+        one = model_state(name, find_neurons(name.owner.text, names), holders)
     assert one is not UNKNOWN  # no connection of a network is invalid
     if isinstance(one, Refusal):
-        raise UnknownNameError(f"'{text}': {one.message}" + (f"; {one.hint}" if one.hint else ""))
+        raise UnknownNameError(f"'{text}': {one}")
     return one
 
 
@@ -121,7 +119,8 @@ def _holders_of(network: Network, kind: Kind) -> tuple[Holder, ...]:
         Holder(
             holder.members,
             use.definition.name,
-            tuple(one.name for one in use.definition.kept if not isinstance(one, Check)),
+            tuple(one.name for one in use.definition.state if not isinstance(one, Check)),
+            tuple(one.name for one in use.definition.outputs),
         )
         for holder, use in network.uses
         if use.definition.kind == kind

@@ -23,7 +23,7 @@ from neurovis_spec.compiler.program import ACTIVATION, MODEL, RULE, Kind
 from neurovis_spec.compiler.values.builtin import installed
 from neurovis_spec.compiler.values.constants import value_of
 from neurovis_spec.compiler.values.definitions import Defined
-from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.diagnostics import Findings, Span, listed
 from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.parser import parse
@@ -155,13 +155,20 @@ def check_dt(spec: Spec, included: Iterable[Library], groups: Iterable[Built], f
     """Report a derivative in use where nothing says how long a step is."""
     if "time" in spec.unknown or (spec.time is not None and (spec.time.dt or "dt" in spec.time.unknown)):
         return
-    group = next((group for group in groups if group.kind.model.definition.flows), None)
-    if group is None:
+    needing: dict[str, Built] = {}
+    for one in groups:
+        if one.kind.model.definition.flows:
+            needing.setdefault(one.kind.model.definition.name, one)
+    if not needing:
         return
+    group, *others = needing.values()
     model = group.kind.model.definition
     first = model.flows[0].name
     unit = "second" if model.per_second == 1 else "millisecond"
     message = f"the derivative of '{first}' is per {unit}, and no 'dt' says how long a step is"
+    if others:
+        names = listed([f"'{one.kind.model.definition.name}'" for one in others])
+        message += f". Others that need it: {names}"
     hint = "say it at the top, as in time: {dt: 0.1 ms}"
     findings.error("dt-needed", _place_of(first, group, (spec, *included)), message, hint)
 

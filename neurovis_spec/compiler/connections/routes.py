@@ -57,8 +57,7 @@ def _ports(
         assert port is not None
         found = (no_port(port.value, one.name, one.kind.model.definition) for one in groups)
         if (refusal := next(filter(None, found), None)) is not None:
-            findings = constants.findings
-            findings.error("unknown-port", port.span, refusal.message, refusal.hint, undeclared=refusal.undeclared)
+            refusal.report("unknown-port", port.span, constants.findings)
         value = 1.0 if factor is None else constants.scalar(factor, structural=True)
         yield port.value, math.nan if value is UNKNOWN else value
 

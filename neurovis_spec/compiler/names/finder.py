@@ -133,7 +133,7 @@ class Finder:
         return one
 
     def _refused(self, why: Refusal, span: Span) -> Unknown:
-        self.findings.error("unknown-state", span, why.message, why.hint, undeclared=why.undeclared)
+        why.report("unknown-state", span, self.findings)
         return UNKNOWN
 
 
@@ -149,13 +149,13 @@ def finder_of(census: Census, made: Connected, findings: Findings) -> Finder:
     empty = tuple(bundle.empty for bundle in made.bundles if bundle.empty is not None)
     wiring = Wiring(made.sources.compact(), made.targets.compact(), names, tuple(rules), made.complete, empty)
     models = _models(census)
-    kept = tuple(_holder(members, model.name, model.kept) for model, members in models)
+    kept = tuple(_holder(members, model.name, model.state, model.outputs) for model, members in models)
     lasting = tuple(_holder(members, model.name, model.state) for model, members in models)
     return Finder(census.directory, kept, lasting, wiring, findings)
 
 
-def _holder(members: IntArray, name: str, states: tuple[Quantity, ...]) -> Holder:
-    return Holder(members, name, tuple(one.name for one in states))
+def _holder(members: IntArray, name: str, states: tuple[Quantity, ...], outputs: tuple[Quantity, ...] = ()) -> Holder:
+    return Holder(members, name, tuple(one.name for one in states), tuple(one.name for one in outputs))
 
 
 def _models(census: Census) -> list[tuple[Definition, IntArray]]:

@@ -7,16 +7,18 @@ wrong with it. A name that is a neuron's is never a state's.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
 from neurovis_spec.arrays import Indices, IntArray
 from neurovis_spec.compiler.program import MODEL, Definition, Each, ports_of
-from neurovis_spec.diagnostics import Home, Undeclared, shorten
+from neurovis_spec.diagnostics import Findings, Home, Span, Undeclared, shorten
 from neurovis_spec.language.references import StateName
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.likeness import suggest
+
+Names: TypeAlias = tuple[str, ...]
 
 _NONE: IntArray = np.zeros(0, dtype=np.int64)
 
@@ -46,13 +48,23 @@ class Refusal(NamedTuple):
     hint: str | None = None
     undeclared: Undeclared | None = None
 
+    def report(self, code: str, span: Span, findings: Findings) -> None:
+        """Report it, as an error at a place."""
+        findings.error(code, span, self.message, self.hint, undeclared=self.undeclared)
+
+    def __str__(self) -> str:
+        """In one line."""
+        return self.message + (f"; {self.hint}" if self.hint else "")
+
 
 class Holder(NamedTuple):
-    """Members (neurons, or connections) whose model or rule is ``kind`` and has these states."""
+    """Members (neurons, or connections) whose model or rule is ``kind`` and has these states, and these outputs beside
+    them, where outputs are asked for, too."""
 
     members: IntArray
     kind: str
     states: tuple[str, ...]
+    outputs: tuple[str, ...] = ()
 
 
 class Wiring(NamedTuple):
@@ -81,11 +93,12 @@ def model_state(name: StateName, neurons: Sequence[int], models: Iterable[Holder
     lacking = {
         int(found.min()): holder
         for holder in models
-        if name.state not in holder.states and len(found := wanted[np.isin(wanted, holder.members)])
+        if name.state not in (*holder.states, *holder.outputs) and len(found := wanted[np.isin(wanted, holder.members)])
     }
     if lacking:
         holder = lacking[min(lacking)]
-        return no_state("model", holder.kind, f"of '{shorten(name.owner.text)}'", name.state, holder.states)
+        of = f"of '{shorten(name.owner.text)}'"
+        return no_state("model", holder.kind, of, name.state, holder.states, holder.outputs)
     return StateOf.of("neuron", name.state, wanted)
 
 
@@ -105,13 +118,20 @@ def connections_state(name: StateName, connections: IntArray, wiring: Wiring) ->
     return no_state("rule", holders[0].kind, f"of '{shorten(name.owner.text)}'", name.state, holders[0].states)
 
 
-def no_state(what: Literal["model", "rule"], name: str, of: str, state: str, states: tuple[str, ...]) -> Refusal:
-    """That a model or a rule, ``of`` somebody, has not this state, but ``states``."""
+def no_state(
+    what: Literal["model", "rule"], name: str, of: str, state: str, states: Names, outputs: Names = ()
+) -> Refusal:
+    """That a model or a rule, ``of`` somebody, has not this state, but ``states``, and not this output, but
+    ``outputs``."""
     owner = f"the {what} '{name}' {of}"
-    if not states:
+    if not states and not outputs:
         return Refusal(f"{owner} has no states")
-    lost = Undeclared(state, Home((f"{what}s", name), ("state",)))
-    return Refusal(f"{owner} has no state '{shorten(state)}'", suggest(state, states, "its states are"), lost)
+    if not outputs:
+        lost = Undeclared(state, Home((f"{what}s", name), ("state",)))
+        return Refusal(f"{owner} has no state '{shorten(state)}'", suggest(state, states, "its states are"), lost)
+    lost = Undeclared(state, Home((f"{what}s", name), ("state", "outputs")))
+    hint = suggest(state, (*states, *outputs), "its states and outputs are")
+    return Refusal(f"{owner} has no state and no output '{shorten(state)}'", hint, lost)
 
 
 def no_port(port: str, group: str, model: Definition) -> Refusal | None:

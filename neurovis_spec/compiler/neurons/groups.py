@@ -217,8 +217,7 @@ class Builder:
             if port is not None and is_written(kind, model):
                 refusal = no_port(port.value, name, kind.model.definition)
                 if refusal is not None:
-                    message, hint, lost = refusal
-                    self.constants.findings.error("unknown-port", port.span, message, hint, undeclared=lost)
+                    refusal.report("unknown-port", port.span, self.constants.findings)
             yield DRIVE if port is None else port.value, value
 
     def _bias(
@@ -260,8 +259,7 @@ class Builder:
         for state, formulas in given.states:
             if model_known and state.value not in states:
                 found = no_state("model", neuron.name, f"of '{name}'", state.value, states)
-                findings = self.constants.findings
-                findings.error("unknown-state", state.span, found.message, found.hint, undeclared=found.undeclared)
+                found.report("unknown-state", state.span, self.constants.findings)
             values = self._drawn(formulas, n, "initial", name, state.value)
             if values is not UNKNOWN:
                 result[state.value] = values

@@ -77,8 +77,8 @@ def unit_of(text: str) -> tuple[str, str] | None:
 def unit_hint(number: str, unit: str, key: str | None = None) -> str | None:
     """The help line for a number with a unit behind it; ``key`` is the key that it is the value of.
 
-    >>> unit_hint("0.1", "ms")
-    'numbers have no units: write 0.0001 where seconds are wanted, 0.0001/dt where steps are'
+    >>> unit_hint("5", "ms")[24:]
+    'write 0.005 where seconds are wanted, 0.005/dt where steps are, 5 in a model with time: ms'
     >>> unit_hint("-65", "mV"), unit_hint("2", "feet")
     ('numbers have no units: write -65', None)
     >>> unit_hint("0.1", "ms", "dt"), unit_hint("5", "s", "steps")
@@ -94,7 +94,8 @@ def unit_hint(number: str, unit: str, key: str | None = None) -> str | None:
             return f"'{key}' counts steps: write {seconds}/dt"
         if key in _NO_TIMES:
             return f"numbers have no units: write {number}"
-        return f"numbers have no units: write {seconds} where seconds are wanted, {seconds}/dt where steps are"
+        hint = f"numbers have no units: write {seconds} where seconds are wanted, {seconds}/dt where steps are"
+        return f"{hint}, {float(number) * SECONDS[unit] * 1e3:.12g} in a model with time: ms"
     if unit in _DEGREES:
         return f"angles are in radians: write {number}*pi/180"
     if unit == "%" and math.isfinite(float(number)):
