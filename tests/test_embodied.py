@@ -59,7 +59,7 @@ def by_hand(steps: int, given: str, backend: str) -> Recording:
 
 
 @pytest.mark.parametrize("given", ["plain", "short"])
-@pytest.mark.parametrize("backend", ["reference", "numpy", "c"])
+@pytest.mark.parametrize("backend", ["reference", "numpy", pytest.param("c", marks=pytest.mark.compiler)])
 def test_a_run_with_a_body_is_the_loop_that_one_would_write(given: str, backend: str) -> None:
     if not available(backend).available:
         pytest.fail("the tests need a compiler")

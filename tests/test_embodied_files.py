@@ -304,7 +304,7 @@ def test_a_recorded_simulation_goes_forward_alone(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("given", ["plain", "short"])
-@pytest.mark.parametrize("backend", ["reference", "numpy", "c"])
+@pytest.mark.parametrize("backend", ["reference", "numpy", pytest.param("c", marks=pytest.mark.compiler)])
 def test_parts_of_a_run_are_the_run_in_one_go(given: str, backend: str, tmp_path: Path) -> None:
     whole, checkpoint = carted(given).run(150, backend=backend), tmp_path / "run.state"
     parts = [carted(given).run(steps, backend=backend, checkpoint=checkpoint) for steps in (40, 17, 23, 70)]

@@ -11,6 +11,8 @@ from scipy.integrate import solve_ivp
 
 import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.program import MODEL
+from neurovis_spec.compiler.values.definitions import LATER
 from neurovis_spec.manual.builtins import builtins
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.record import record
@@ -224,5 +226,6 @@ def test_each_names_its_source_and_what_its_parameters_are() -> None:
 
 def test_a_model_of_ones_own_with_such_a_name_is_no_finding() -> None:
     text = "neurovis: 1\nname: x\nmodels: {{{0}: {{activity: f(drive)}}}}\nneurons: {{A: {{model: {0}, bias: 1}}}}"
-    assert nv.compile_text(text.format("leaky")).warnings == ()
+    assert all(nv.compile_text(text.format(name)).warnings == () for name in LATER[MODEL])
+    assert LATER[MODEL] == {one.name for one in builtins() if one.kind == "model" and (one.time or one.name == "cfc")}
     assert [one.code for one in nv.compile_text(text.format("adaptive")).warnings] == ["replaces-builtin"]

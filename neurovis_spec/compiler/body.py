@@ -34,7 +34,7 @@ from neurovis_spec.likeness import suggest
 from neurovis_spec.real_paths import real_path
 
 #: More steps of a body within one of the network are a mistake.
-MOST_SUBSTEPS: Final = 1_000_000
+MOST_STEPS_WITHIN: Final = 1_000_000
 #: Bytes of all files that a body is made of; each is as large as any data file at most.
 LARGEST_TOGETHER: Final = 1 << 30
 #: What is wrong with places where there is nothing to open.
@@ -70,7 +70,7 @@ def body_settings(
     not opened, and its own names are not checked."""
     findings = constants.findings
     kind, given = next(iter(model.kinds.items()), ("", None))
-    substeps = None if model.substeps is None else constants.integer(model.substeps, "'substeps'", 1, MOST_SUBSTEPS)
+    substeps = None if model.substeps is None else constants.integer(model.substeps, "'substeps'", 1, MOST_STEPS_WITHIN)
     path = body = None
     if given is not None and len(model.kinds) == 1 and place is not None:
         clock = None

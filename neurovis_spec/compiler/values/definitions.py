@@ -117,6 +117,13 @@ class Reading(NamedTuple):
     products: bool = False
 
 
+#: The built-in definitions that came when specs may have had one of their own of this name, which replaces it.
+LATER: Final[Mapping[Kind, frozenset[str]]] = {
+    MODEL: frozenset({
+        "leaky", "fitzhugh_nagumo", "matsuoka", "hopf", "van_der_pol", "wilson_cowan", "jansen_rit", "phase_oscillator",
+        "amplitude_oscillator", "ornstein_uhlenbeck", "cfc",
+    }),
+}  # fmt: skip
 _READINGS = (
     Reading(ACTIVATION, formula_at(ActivationModel, "value"), inlined=True),
     Reading(MODEL, formula_at(ModelModel, "activity")),
@@ -488,13 +495,11 @@ def sorted_by_need(needs: Mapping[str, Collection[str]]) -> tuple[list[str], lis
 
 
 def define(library: Library, findings: Findings, builtin: Definitions, around: Around = NOTHING_AROUND) -> Definitions:
-    """The definitions of a file. Who replaces a built-in one is warned, unless that came when specs may have had one of
-    their own of this name: those with ports and derivatives did."""
+    """The definitions of a file. Who replaces a built-in one is warned, unless that is one of ``LATER``."""
     for reading in _READINGS:
         node, replaced = library.source.get(reading.kind.section), builtin.of(reading.kind).known()
         for entry in node.entries if isinstance(node, SourceMapping) else ():
-            old = None if entry.name not in replaced else replaced[entry.name].definition
-            if old is not None and not old.flows and not old.ports:
+            if entry.name in replaced and entry.name not in LATER.get(reading.kind, ()):
                 message = f"'{entry.name}' replaces the built-in of that name"
                 findings.warning("replaces-builtin", entry.key.span, message)
     return Definitions({reading.kind: _defined(reading, library, findings, around) for reading in _READINGS})
