@@ -8,7 +8,15 @@ import pytest
 from hypothesis import given, settings
 
 import neurovis_spec as nv
-from neurovis_spec.compiler.flows import flows_by, jacobian, plain_flow, ports_read_by, reads, with_slope
+from neurovis_spec.compiler.flows import (
+    flows_by,
+    jacobian,
+    known_behind_flow,
+    plain_flow,
+    ports_read_by,
+    reads,
+    with_slope,
+)
 from neurovis_spec.compiler.program import Definition
 from neurovis_spec.compiler.values.definitions import sorted_by_need
 from neurovis_spec.language.expressions.evaluate import evaluate
@@ -251,6 +259,29 @@ activations: {{a: {{value: {LONG}}}}}
 neurons: {{M: {{model: m, activation: a}}}}"""
     run = nv.compile_text(text).run(3, backend=backend)
     assert np.isfinite(run.activity).all()
+
+
+@pytest.mark.parametrize("backend", ["reference", "numpy", pytest.param("c", marks=pytest.mark.compiler)])
+def test_a_state_without_a_formula_is_constant_as_a_parameter_is(backend: str) -> None:
+    """What reads it flows, so that a connection has delay 0 by default, and the run is the same."""
+    text = f"""{HEAD}models:
+  m:
+    parameters: {{p: 1}}
+    state: {{v: {{initial: 1, derivative: drive - v}}, g: {{initial: 1}}}}
+    activity: tanh(GAIN*v)
+neurons: {{A: {{model: m, count: 3, INITIAL}}}}
+connections: {{A -> A: {{weight: 2*i - j, pattern: all_to_all}}}}"""
+    drawn = text.replace("GAIN", "g").replace("INITIAL", "initial: {g: [1, 2, 0.5]}")
+    given = text.replace("GAIN", "p").replace("model: m, count: 3, INITIAL", "model: {m: {p: [1, 2, 0.5]}}, count: 3")
+    runs = [nv.compile_text(one).run(6, backend=backend) for one in (drawn, given)]
+    assert nv.compile_text(drawn).network.connections.delays.whole().max() == 0
+    assert np.array_equal(runs[0].activity, runs[1].activity)
+
+
+@pytest.mark.parametrize(("more", "known"), [("", True), (", each_step: 2*v", False), (", each_episode: 0", False)])
+def test_what_a_step_changes_is_not_known_ahead_of_it(more: str, known: bool) -> None:
+    made = model(f"state: {{v: {{derivative: -v{more}}}}}\n    outputs: {{twice: 2*v}}\n    activity: v")
+    assert known_behind_flow(made, "twice") == known
 
 
 def test_an_activation_in_a_derivative_is_used() -> None:

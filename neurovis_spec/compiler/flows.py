@@ -3,8 +3,8 @@
 In: a Definition. Out: names, with intermediate values (``let``) unfolded; and trees.
 
 A state with a derivative *flows*, and so does what is made of such states, parameters, ``t`` and what flows in through
-ports alone: it has a value at each stage of the integration. What reads a state without a derivative, ``k``, or
-something that is held over a step, does not.
+ports alone: it has a value at each stage of the integration. What reads a state that steps change, ``k``, or something
+that is held over a step, does not. A state without any formula keeps what it began with, as a parameter does.
 """
 
 from __future__ import annotations
@@ -66,11 +66,10 @@ def flows_by(definition: Definition, sent: str) -> frozenset[str] | None:
     """The ports that have to flow so that something flows that a model sends: a state or an output by its name, ""
     what it sends unless a connection says otherwise. None where it does not flow, whatever arrives."""
     sent = sent_by(definition, sent)
-    flowing = {one.name for one in definition.flows}
+    held = {one.name for one in definition.state if one.derivative is None and (one.each_step or one.each_episode)}
     if any(one.name == sent for one in definition.state):
-        return frozenset() if sent in flowing else None
+        return None if sent in held else frozenset()
     read = reads(definition, [one.each_step for one in definition.gives if one.name == sent])
-    held = {one.name for one in definition.state} - flowing
     return None if "k" in read or read & held else read.intersection(ports_of(definition))
 
 
@@ -81,11 +80,11 @@ def plain_flow(definition: Definition, sent: str = "") -> bool:
 
 def known_behind_flow(definition: Definition, sent: str = "") -> bool:
     """Whether what a model sends is known as soon as its states are integrated: it is made of flow states, parameters
-    and ``t`` alone, and no ``each_step`` changes one of these states afterwards."""
+    and ``t`` alone, and no ``each_step`` or ``each_episode`` changes one of these states afterwards."""
     if not plain_flow(definition, sent):
         return False
     sent = sent_by(definition, sent)
-    changed = {one.name for one in definition.state if one.each_step is not None}
+    changed = {one.name for one in definition.state if one.each_step or one.each_episode}
     read = reads(definition, [one.each_step for one in definition.gives if one.name == sent])
     return changed.isdisjoint(read | {sent})
 
