@@ -144,6 +144,14 @@ def _shown(whole: int) -> str:
     return str(whole) if abs(whole) < 10**15 else f"about {'-' if whole < 0 else ''}2^{whole.bit_length() - 1}"
 
 
+class CodedWarning(UserWarning):
+    """A warning of a run that has its page in the catalogue: ``code`` is what ``neurovis explain`` takes."""
+
+    def __init__(self, code: str, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+
+
 def callers_level() -> int:
     """The ``stacklevel`` by which ``warnings.warn``, called where this is called, points at the line that called this
     package."""

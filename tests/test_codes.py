@@ -48,6 +48,7 @@ EMITTERS = {
     "fault": 2,
     "refuse": 4,
     "report": 0,
+    "CodedWarning": 0,
 }
 #: Codes that are put together, and codes that stand in a table or a default.
 MADE = {"f'unknown-{what}'": {"unknown-activation", "unknown-model", "unknown-rule"}}

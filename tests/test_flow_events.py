@@ -6,8 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import neurovis_spec as nv
+from neurovis_spec.arguments import CodedWarning
+from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.carry import carried
 from neurovis_spec.live.simulated import SimulatedSource
@@ -176,9 +179,20 @@ def test_a_run_goes_on_from_a_recording_with_all_states(backend: str) -> None:
     rest = record(network, Course(15, backend=backend, keep=keep, start=first))
     np.testing.assert_array_equal(rest.states, whole.states[25:])
     np.testing.assert_array_equal(rest.activity, whole.activity[25:])
-    with pytest.warns(UserWarning, match=r"lacks states with a derivative, as of A, which begin anew"):
+    with pytest.warns(CodedWarning, match=r"lacks states with a derivative, as of A, which begin anew") as told:
         anew = record(network, Course(3, backend=backend, start=record(network, Course(25, backend=backend))))
+    assert [one.message.code for one in told] == ["states-begin-anew"]  # type: ignore[union-attr]
     assert abs(anew.activity[0, 0] - 1) < 0.1
+
+
+def test_the_warning_of_states_that_begin_anew_has_its_code_on_the_command_line(tmp_path: Path) -> None:
+    spec, first = tmp_path / "spec.yaml", str(tmp_path / "first.npz")
+    spec.write_text("neurovis: 1\nname: x\ntime: {dt: 1 ms}\nneurons: {A: {model: hopf}}\n")
+    for more, told in (("-o", ""), ("--from", "warning[states-begin-anew]: the recording lacks states")):
+        result = CliRunner().invoke(neurovis, ["run", str(spec), "--steps", "3", more, first])
+        assert result.exit_code == 0
+        assert result.stderr.startswith(told)
+        assert ("begin anew" in result.stderr) == bool(told)
 
 
 @pytest.mark.parametrize("backend", BOTH)

@@ -168,7 +168,8 @@ def _plain_warnings() -> Iterator[None]:
         file: object = None,
         line: str | None = None,
     ) -> None:
-        click.echo(f"{getattr(category, 'prefix', 'warning')}: {message}", err=True)
+        code = f"[{code}]" if (code := getattr(message, "code", "")) else ""
+        click.echo(f"{getattr(category, 'prefix', 'warning')}{code}: {message}", err=True)
 
     with warnings.catch_warnings():
         warnings.showwarning = show

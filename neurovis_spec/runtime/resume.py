@@ -21,7 +21,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from neurovis_spec.arguments import callers_level
+from neurovis_spec.arguments import CodedWarning, callers_level
 from neurovis_spec.arrays import BoolArray, FloatArray, IntArray
 from neurovis_spec.compiler.events.patch import PatchError
 from neurovis_spec.compiler.names.state_references import StateOf
@@ -146,11 +146,9 @@ class _Kept:
         ]
         if self.anew:
             flows = sorted({network.neurons.names[int(one.members[0])] for one in self.anew})
-            warnings.warn(
-                f"the recording lacks states with a derivative, as of {flows[0]}, which begin anew: record them "
-                "(run --states all)",
-                stacklevel=callers_level(),
-            )
+            message = f"the recording lacks states with a derivative, as of {flows[0]}, which begin anew: record them "
+            message += "(run --states all)"
+            warnings.warn(CodedWarning("states-begin-anew", message), stacklevel=callers_level())
 
     def _columns_of(self, holder: Holder, use: Use, state: str) -> IntArray:
         """The columns of a state of all members, −1 where it was not recorded."""
