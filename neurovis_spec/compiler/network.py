@@ -434,6 +434,25 @@ class Network:
             result[taking] = self._taken(name)[result[taking]]
         return frozen(result)
 
+    @cached_property
+    def taken(self) -> IntArray:
+        """Which of the outlets (``State.outlets``) connections do take, ascending."""
+        taken = np.zeros(self.outlet_count, dtype=np.bool_)
+        if self.sending is not None:
+            beside = self.sending[self.sending >= len(self.neurons)]
+            taken[beside - len(self.neurons)] = True
+        return frozen(np.flatnonzero(taken).astype(np.int64))
+
+    @cached_property
+    def sent(self) -> tuple[StateOf, ...]:
+        """What these are: states and outputs of neurons, in the same order."""
+        found: list[StateOf] = []
+        for outlet in self.outlets:
+            members = self.populations[outlet.population].members
+            places = self.taken[(self.taken >= outlet.start) & (self.taken < outlet.start + len(members))]
+            found.append(StateOf.of("neuron", outlet.name, members[places - outlet.start]))
+        return tuple(one for one in found if one.size)
+
     def _taken(self, name: str) -> IntArray:
         """What of each neuron (n,) is taken by a connection that sends this, "" for what the neuron's model sends."""
         result = np.arange(len(self.neurons), dtype=np.int64)

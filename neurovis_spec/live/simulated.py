@@ -45,6 +45,7 @@ from neurovis_spec.runtime.simulation import ParameterError, Simulation
 from neurovis_spec.runtime.state import State
 from neurovis_spec.scene.fading import Fading
 from neurovis_spec.scene.shown_states import ShownStates
+from neurovis_spec.scene.signals import Signals
 
 
 class SimulatedSource:
@@ -66,7 +67,8 @@ class SimulatedSource:
         self._rules = rules(self.network)
         self._all_learn: Mapping[str, bool | None] = {rule.connections: True for rule in self._rules}
         self._simulation, self._room = simulation, room
-        self._probe, self._shown = columns_of(self.network).probe, ShownStates(self.network)
+        self._probe = columns_of(self.network).probe
+        self._shown, self._signals = ShownStates(self.network), Signals(self.network)
         self._origin = simulation.state() if origin is None else origin
         self._begin(self._origin if begin is None else begin, turned, fed or {})
         self.body = drawn(simulation.skeleton, tuple(simulation.sensors), self._seen.snapshot.pose)
@@ -313,7 +315,8 @@ class SimulatedSource:
         activity, shown = run.activity, self._shown.of_run(run)
         self.history.note(step, activity if shown is None else shown, weights)
         seen = self._fading.follow(np.array([step]), activity[None]) if self._fading else None
-        snapshot = Snapshot(step, activity, weights, previous, seen, pose, run.sensed, shown)
+        sent = self._signals.of_run(run)
+        snapshot = Snapshot(step, activity, weights, previous, seen, pose, run.sensed, shown, sent)
         return Seen(snapshot, *lesioned, held, run.probed(self._probe))
 
 

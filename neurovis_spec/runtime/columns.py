@@ -107,7 +107,8 @@ class Columns:
 
 def columns_of(network: Network, keep: Keep = ALL, body: Sensing | None = None) -> Columns:
     """What is kept of a network, and of the body that it has in a run; states that its pictures show are, as those that
-    its outputs name. Raises KeyError with the nearest names."""
+    its outputs name, and where all is there that a picture needs, those that connections send (Eq. 3). Raises KeyError
+    with the nearest names."""
     names = names_of(network) if keep.neurons or keep.states else None
     states: dict[tuple[str, Each, int], None] = {}
     outputs: dict[str, tuple[tuple[int, ...], bool]] = {}
@@ -118,6 +119,8 @@ def columns_of(network: Network, keep: Keep = ALL, body: Sensing | None = None) 
             outputs[output.name] = tuple(list(states).index(one) for one in of_output), output.scalar
     shown = (StateOf.of("neuron", one.state, one.indices) for one in network.render.show)
     states.update(dict.fromkeys(singles(shown)))
+    if keep.weights and not keep.neurons:
+        states.update(dict.fromkeys(singles(network.sent)))
     for reference in keep.states:
         states.update(dict.fromkeys(singles(find_states(network, reference, names))))
     return Columns(

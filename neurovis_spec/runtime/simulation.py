@@ -301,6 +301,11 @@ class Simulation:
         since. Its weights are those of all connections (m,)."""
         return replace(end_values(self.network, self._state), weights=self.connection_weights)
 
+    @property
+    def outlets(self) -> FloatArray:
+        """What connections take of the last step beside activities, as ``Network.outlets`` lays it out; a copy."""
+        return self._state.outlets.copy()
+
     def probed(self, probe: Probe) -> FloatArray | None:
         """The states of models and rules that a probe reads, (columns,); None where it reads none."""
         return probe.now(self._state) if probe.names else None

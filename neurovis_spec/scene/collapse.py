@@ -28,8 +28,9 @@ from neurovis_spec.compiler.network import Connections, Group, Instance, Network
 from neurovis_spec.compiler.program import Projection
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.lesions import lesions_of
-from neurovis_spec.scene.reached import Reached, reached, reached_by
+from neurovis_spec.scene.reached import Reached, largest_signals, reached, reached_by
 from neurovis_spec.scene.shown_states import ShownStates
+from neurovis_spec.scene.signals import Signals, weights_of
 
 if TYPE_CHECKING:
     from neurovis_spec.runtime.recording import Recording, Snapshot
@@ -104,12 +105,11 @@ class Gathered:
         return states.put(activity, self.mean(shown)[..., states.neurons])
 
     def signals(self, snapshot: Snapshot) -> FloatArray | None:
-        """What a step of the whole sends along each line that is drawn; None where this is weight times activity."""
+        """What a step of the whole sends along each line that is drawn, added up; None where nothing is collapsed."""
         if not self.any:
             return None
         with np.errstate(over="ignore", invalid="ignore"):
-            seen = snapshot.activity if snapshot.seen is None else snapshot.seen
-            return self.total(seen[self.whole.connections.sources.whole()] * snapshot.weights)
+            return self.total(Signals(self.whole).at(snapshot).value)
 
     def reached(self, recording: Recording) -> Reached:
         """How far a recording of the whole takes what is drawn."""
@@ -119,16 +119,10 @@ class Gathered:
             shown = recording.states[:, own.columns(recording)]
             return found.with_shown(own.neurons, shown) if own else found
         changing, sources = self.network.changing, self.network.connections.sources.whole()
-        fixed = self.total(_weights(recording, slice(0, 0)))
-        parts = [self.total(_weights(recording, rows))[:, changing] for rows in _rows(recording)]
+        fixed = self.total(weights_of(recording, slice(0, 0)))
+        parts = [self.total(weights_of(recording, rows))[:, changing] for rows in _rows(recording)]
         found = reached_by(sources, fixed[0], self.mean(recording.activity), np.concatenate(parts), changing)
-        signals = np.zeros(len(self.counts))
-        with np.errstate(over="ignore", invalid="ignore"):
-            for rows in _rows(recording):
-                sent = recording.activity[rows][:, recording.sources] * _weights(recording, rows)
-                sizes = np.abs(self.total(sent))
-                signals = np.maximum(signals, np.where(np.isfinite(sizes), sizes, 0.0).max(axis=0, initial=0.0))
-        found = replace(found, signals=signals)
+        found = replace(found, signals=largest_signals(self.whole, recording, self.total))
         if not own:
             return found
         return found.with_shown(own.neurons, self.mean(states.recorded(recording))[:, own.neurons])
@@ -136,17 +130,6 @@ class Gathered:
 
 def _rows(recording: Recording) -> list[slice]:
     return [slice(first, first + _CHUNK) for first in range(0, max(len(recording.activity), 1), _CHUNK)]
-
-
-def _weights(recording: Recording, rows: slice) -> FloatArray:
-    """All weights of these rows of a recording (rows, m); without rows one, with the changing ones 0."""
-    changing = recording.weights[rows]
-    weights = np.zeros((max(len(changing), 1), len(recording.sources)))
-    fixed = np.delete(np.arange(len(recording.sources)), recording.plastic)
-    weights[:, fixed] = recording.weights_static
-    if len(changing):
-        weights[:, recording.plastic] = changing
-    return weights
 
 
 def _added(values: FloatArray, to: IntArray, count: int) -> FloatArray:

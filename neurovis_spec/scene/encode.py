@@ -23,6 +23,7 @@ from neurovis_spec.scene.lesions import FAINT
 from neurovis_spec.scene.model import Disc, Group, Point, Scene, Shape, Spline, Text, ended
 from neurovis_spec.scene.plan import Plan
 from neurovis_spec.scene.shown_states import ShownStates
+from neurovis_spec.scene.signals import Signal, Signals
 from neurovis_spec.scene.themes import colours, readable
 
 if TYPE_CHECKING:
@@ -55,16 +56,13 @@ class Looks:
 def looks(
     network: Network, snapshot: Snapshot, gains: Gains, widest: float, signals: FloatArray | None = None
 ) -> Looks:
-    """What a step looks like, with lines of at most this width; ``signals`` (m,) are what leaves the source of each
-    connection, where that is not its activity times the weight."""
-    connections = network.connections
+    """What a step looks like, with lines of at most this width; ``signals`` (m,) are what is sent along lines that
+    stand for several connections."""
     widths = encoding.line_width(snapshot.weights, gains.thickness, widest)
     changes = encoding.glow(snapshot.weights, snapshot.previous_weights, gains.change)
     seen = snapshot.activity if snapshot.seen is None else snapshot.seen
-    if signals is None:
-        lines = encoding.connection_colour(seen[connections.sources.whole()], snapshot.weights, gains.signal)
-    else:
-        lines = encoding.connection_colour(signals, np.ones_like(signals), gains.signal)
+    signal = Signals(network).at(snapshot) if signals is None else Signal(signals, np.ones_like(signals))
+    lines = encoding.connection_colour(signal.sent, signal.weight, gains.signal)
     if snapshot.shown is not None:
         states = ShownStates(network)
         seen = states.put(seen, snapshot.shown[states.neurons])

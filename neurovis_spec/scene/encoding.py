@@ -38,8 +38,8 @@ def neuron_colour(activity: FloatArray, gain: Gain, centre: Gain = 0.0) -> Float
 
 
 def connection_colour(sent: FloatArray, weight: FloatArray, gain: Gain) -> FloatArray:
-    """Eq. 3: CC_ij[t] = clip(−1, γ_CC · a_i[t] · w_ij[t], 1); ``sent`` is the activity of the source of each. A signal
-    that is no number is drawn as none."""
+    """Eq. 3: CC_ij[t] = clip(−1, γ_CC · a_i[t] · w_ij[t], 1); ``sent`` is the activity of the source of each, or what
+    it takes in its place (``Signals``). A signal that is no number is drawn as none."""
     with _quiet():
         result: FloatArray = np.nan_to_num(np.clip(gain * sent * weight, -1.0, 1.0), nan=0.0)
     return result

@@ -17,6 +17,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.recording import Recording, Snapshot
 from neurovis_spec.scene.film_size import frames_a_second
 from neurovis_spec.scene.shown_states import ShownStates
+from neurovis_spec.scene.signals import Signals
 
 #: Seconds of a film in which the trace of a spike fades to 1/e, where the spec does not say; and the least steps.
 _SECONDS, _STEPS = 0.2, 2.0
@@ -77,15 +78,19 @@ class Fading:
 
 
 def snapshots_of(network: Network, recording: Recording, steps: Iterable[int]) -> Iterator[Snapshot]:
-    """The snapshots of ascending steps of a recording, with the states that are shown, and the traces of what was
-    before. Raises RecordingError."""
+    """The snapshots of ascending steps of a recording, with the states that are shown and sent, and the traces of what
+    was before. Raises RecordingError."""
     fading, states, done = Fading(network), ShownStates(network), 0
-    columns = states.columns(recording)
+    columns, sending = states.columns(recording), Signals(network).recorded(recording)
     for step in steps:
         snapshot = recording.snapshot(step)
         if states:
             now = states.put(snapshot.activity, recording.states[recording.row(step), columns])
             snapshot = replace(snapshot, shown=now)
+        if sending is not None:
+            row = recording.row(step)
+            (sent,) = sending.rows(slice(row, row + 1))
+            snapshot = replace(snapshot, sent=sent)
         if fading:
             row = recording.row(step)
             done = max(done, int(np.searchsorted(recording.step, step - fading.reach)))

@@ -47,6 +47,7 @@ from neurovis_spec.scene.model import Arrowhead, Group, Rectangle, Shape, Spline
 from neurovis_spec.scene.obstacles import Obstacles
 from neurovis_spec.scene.scaling import scaled, scaled_group
 from neurovis_spec.scene.shown import Shown, shown
+from neurovis_spec.scene.signals import Signals
 from neurovis_spec.scene.spots import beyond
 from neurovis_spec.scene.teachers import Teacher, dash, dotted, fewer, label_of, room_of, teachers_of
 from neurovis_spec.scene.themes import theme_of, tints_of
@@ -172,6 +173,8 @@ class _Content:
     #: who has a dotted line to whom
     teachers: Sequence[Teacher]
     lesions: Lesions
+    #: what connections send, times their weight
+    sends: str
     notes: tuple[str, ...]
     extent: Rect
 
@@ -188,8 +191,9 @@ def _content(drawn: Gathered, layout: Layout, settings: RenderSettings, weights:
     beside = room_beside(network, RADIUS * UNIT) if settings.labels else []
     beside = [(index, reach) for index, reach in beside if index not in rooms]
     extent = _extent(positions, radii, routes, boxes, beside, rooms.values())
+    lesions, sends = lesions_of(network), Signals(drawn.whole).called
     return _Content(
-        network, positions, routes, seen, radii, rooms, sides, boxes, teachers, lesions_of(network), notes, extent
+        network, positions, routes, seen, radii, rooms, sides, boxes, teachers, lesions, sends, notes, extent
     )
 
 
@@ -450,7 +454,7 @@ def _frame(wanted: _Wanted, gains: Gains, delayed: str, margin: float) -> tuple[
     items: list[LegendEntry] = []
     if settings.legend:
         contents = legend.Contents(
-            lines=len(network.connections) > 0,
+            sends=content.sends if len(network.connections) else "",
             learns=len(network.changing) > 0,
             teaches=label_of(content.teachers) if content.teachers else "",
             delays=delayed,

@@ -5,7 +5,7 @@ In: the activities and weights of a run. Out: Reached. Values that are not finit
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy.typing as npt
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.recording import Recording
+from neurovis_spec.scene.signals import Signals
 
 #: Rows looked at together.
 _CHUNK = 256
@@ -26,8 +27,8 @@ _SHARES = (0.02, 0.5, 0.98)
 @dataclass(frozen=True, eq=False)
 class Reached:
     """Of n neurons the ``lowest`` and the ``highest`` a, and the geometric mean of |a| while they are not at rest
-    (``typical``); of m connections the largest |w| (``weights``), |w·a| (``signals``) and |w[t] − w[t−1]|
-    (``changes``). 0 where there is nothing."""
+    (``typical``); of m connections the largest |w| (``weights``), |w·a| with what is sent in place of a (``signals``)
+    and |w[t] − w[t−1]| (``changes``). 0 where there is nothing."""
 
     lowest: FloatArray
     highest: FloatArray
@@ -66,7 +67,19 @@ def reached(network: Network, recording: Recording) -> Reached:
     fixed = np.zeros(len(recording.sources))
     fixed[np.delete(np.arange(len(fixed)), recording.plastic)] = recording.weights_static
     sources, follows = network.connections.sources.whole(), np.diff(recording.step) == 1
-    return reached_by(sources, fixed, recording.activity, recording.weights, recording.plastic, follows)
+    found = reached_by(sources, fixed, recording.activity, recording.weights, recording.plastic, follows)
+    return replace(found, signals=largest_signals(network, recording)) if Signals(network) else found
+
+
+def largest_signals(
+    network: Network, recording: Recording, along: Callable[[FloatArray], FloatArray] = np.asarray
+) -> FloatArray:
+    """The largest magnitude of what a recording sends ``along`` each line, which connections are unless it is said how
+    many of them (rows, m) make a line."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        parts = [_largest(along(part)) for part in Signals(network).parts(recording)]
+    result: FloatArray = np.max(parts, axis=0)
+    return result
 
 
 def nothing(network: Network) -> Reached:

@@ -23,6 +23,7 @@ from neurovis_spec.runtime.simulation import Simulation
 from neurovis_spec.scene.fading import Fading, snapshots_of
 from neurovis_spec.scene.look import Look
 from neurovis_spec.scene.shown_states import ShownStates
+from neurovis_spec.scene.signals import Signals
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ def steps_from(network: Network, start: int, steps: int | None, recording: Recor
 def snapshots_of_run(run: Simulation, look: Look) -> Iterator[Snapshot]:
     """Those of the frames of a film, of a run that is made while they are asked for."""
     network, start = run.network, look.first or 0
-    fading, states, seen = Fading(network), ShownStates(network), None
+    fading, states, signals, seen = Fading(network), ShownStates(network), Signals(network), None
     before, weights = None, run.connection_weights
     for step in range(start + look.count):
         pose = run.pose
@@ -103,7 +104,8 @@ def snapshots_of_run(run: Simulation, look: Look) -> Iterator[Snapshot]:
         if fading:
             seen = fading.follow(np.array([step]), run.activity[None])
         if step >= start and (step - start) % look.every == 0:
-            yield Snapshot(step, run.activity, weights, before, seen, pose, run.sensed, states.of_run(run))
+            shown, sent = states.of_run(run), signals.of_run(run)
+            yield Snapshot(step, run.activity, weights, before, seen, pose, run.sensed, shown, sent)
         before, weights = weights, run.connection_weights if len(network.changing) else weights
 
 

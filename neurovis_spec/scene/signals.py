@@ -1,0 +1,186 @@
+"""Signals: what each connection sends, which colours its line (Eq. 3).
+
+In: a network; a step of a run, or rows of a recording. Out: what is sent along each connection. Connections that take
+a state or an output of their source (``send``) need more than activities and weights tell: a Snapshot has it as
+``sent``, a recording among its states.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.arguments import callers_level
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.diagnostics import listed
+from neurovis_spec.runtime.columns import Probe, probe_of
+
+if TYPE_CHECKING:
+    from neurovis_spec.runtime.recording import Recording, Snapshot
+    from neurovis_spec.runtime.simulation import Simulation
+
+Mask = npt.NDArray[np.bool_]
+
+#: Rows of a recording that are looked at together.
+_CHUNK = 64
+
+
+class Signal(NamedTuple):
+    """What leaves the source of each connection, (…, m): ``weight`` times what it takes there, ``sent``."""
+
+    sent: FloatArray
+    weight: FloatArray
+
+    @property
+    def value(self) -> FloatArray:
+        """The product."""
+        return self.sent * self.weight
+
+
+class Lesion(NamedTuple):
+    """An event: from step ``at`` on neurons are mended, and others lesioned. Masks (k,) of what they send."""
+
+    at: int
+    mended: Mask
+    lesioned: Mask
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedSent:
+    """What is sent beside activities by the rows of a recording: states (k,) in these columns, but 0 by neurons that
+    are lesioned, whose states go on; those that were lesioned by hand from a row on (k,)."""
+
+    recording: Recording
+    columns: IntArray
+    lesions: Sequence[Lesion]
+    by_hand: IntArray
+
+    def rows(self, rows: slice) -> FloatArray:
+        """Of some rows (rows, k)."""
+        states, step = self.recording.states[rows][:, self.columns], self.recording.step[rows]
+        silent = np.arange(len(self.recording))[rows, None] >= self.by_hand
+        for at, mended, lesioned in self.lesions:
+            after = step >= at
+            silent[np.ix_(after, mended)] = False
+            silent[np.ix_(after, lesioned)] = True
+        return np.where(silent, 0.0, states)
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """The signals of a network of n neurons and m connections, which take k numbers beside activities."""
+
+    network: Network
+
+    def __bool__(self) -> bool:
+        """Whether a connection takes anything beside activities."""
+        return len(self.network.taken) > 0
+
+    @property
+    def called(self) -> str:
+        """What connections take, for a legend: ``a``, the activity, or the one state or output that all take."""
+        names = {one.state for one in self.network.sent}
+        if not names:
+            return "a"
+        alone = len(names) == 1 and bool((self._sources >= len(self.network.neurons)).all())
+        return names.pop() if alone else "what is sent"
+
+    @cached_property
+    def _probe(self) -> Probe:
+        """What reads the k numbers in a run."""
+        return probe_of(self.network, self.network.sent)
+
+    @cached_property
+    def _neurons(self) -> IntArray:
+        """The neurons (k,) whose states these are."""
+        return np.concatenate([np.zeros(0, np.int64), *(one.neurons for one in self.network.sent)])
+
+    @cached_property
+    def _sources(self) -> IntArray:
+        """Where what each connection takes (m,) stands among n activities and k further numbers."""
+        sending, n = self.network.sending, len(self.network.neurons)
+        if sending is None:
+            return self.network.connections.sources.whole()
+        return np.where(sending < n, sending, n + np.searchsorted(self.network.taken, sending - n))
+
+    def _of(self, activity: FloatArray, sent: FloatArray | None, weights: FloatArray) -> Signal:
+        """Signals by activities (…, n), what is sent beside them (…, k), and weights (…, m)."""
+        if self:
+            if sent is None:
+                sent = np.full((*activity.shape[:-1], len(self.network.taken)), np.nan)
+            activity = np.concatenate([activity, sent], axis=-1)
+        return Signal(activity[..., self._sources], weights)
+
+    def at(self, snapshot: Snapshot) -> Signal:
+        """The signals (m,) of a step, of what a picture shows of activities; NaN where they are not known."""
+        seen = snapshot.activity if snapshot.seen is None else snapshot.seen
+        return self._of(seen, snapshot.sent, snapshot.weights)
+
+    def of_run(self, run: Simulation) -> FloatArray | None:
+        """``Snapshot.sent`` of the last step of a run."""
+        return run.outlets[self.network.taken] if self else None
+
+    def recorded(self, recording: Recording) -> RecordedSent | None:
+        """What a recording holds of what is sent beside activities. None where that is nothing, and where it lacks some
+        of it, of which it warns (RuntimeWarning): the lines have no colour then."""
+        known = {name: column for column, name in enumerate(recording.state_names)}
+        missing = [name for name in self._probe.names if name not in known] if self else []
+        if missing:
+            warnings.warn(
+                f"the recording does not hold {listed(missing)}, which connections send: their lines have no colour",
+                RuntimeWarning,
+                stacklevel=callers_level(),
+            )
+        if missing or not self:
+            return None
+        columns = np.array([known[name] for name in self._probe.names], np.int64)
+        return RecordedSent(recording, columns, self._lesions, self._by_hand(recording))
+
+    @cached_property
+    def _lesions(self) -> list[Lesion]:
+        """What events do to the neurons that send more than activities."""
+        found = (
+            Lesion(
+                change.at, *(np.isin(self._neurons, one) for one in (change.mended_neurons, change.lesioned_neurons))
+            )
+            for change in self.network.changes
+        )
+        return [one for one in found if one.lesioned.any() or one.mended.any()]
+
+    def _by_hand(self, recording: Recording) -> IntArray:
+        """The row from which on each of the k numbers is silent since its neuron was lesioned, and by no event: as far
+        as a recording tells, behind the last one in which that was active."""
+        result = np.full(len(self._neurons), len(recording), np.int64)
+        lesioned = np.isin(self._neurons, recording.lesioned_neurons)
+        for one in self._lesions:
+            lesioned &= ~one.lesioned
+        for place in np.flatnonzero(lesioned).tolist():
+            active = np.flatnonzero(recording.activity[:, self._neurons[place]])
+            result[place] = active[-1] + 1 if len(active) else 0
+        return result
+
+    def parts(self, recording: Recording) -> Iterator[FloatArray]:
+        """The signals of all rows of a recording, some rows (rows, m) at a time."""
+        recorded = self.recorded(recording)
+        for first in range(0, max(len(recording), 1), _CHUNK):
+            rows = slice(first, first + _CHUNK)
+            sent = None if recorded is None else recorded.rows(rows)
+            yield self._of(recording.activity[rows], sent, weights_of(recording, rows)).value
+
+
+def weights_of(recording: Recording, rows: slice) -> FloatArray:
+    """All weights of these rows of a recording (rows, m); without rows one, with the changing ones 0."""
+    changing = recording.weights[rows]
+    weights = np.zeros((max(len(changing), 1), len(recording.sources)))
+    fixed = np.delete(np.arange(len(recording.sources)), recording.plastic)
+    weights[:, fixed] = recording.weights_static
+    if len(changing):
+        weights[:, recording.plastic] = changing
+    return weights
