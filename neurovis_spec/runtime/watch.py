@@ -71,7 +71,20 @@ class Watch:
         message = next(self._messages(state), None)
         if message is not None:
             self.warned = True
-            warnings.warn(f"{message}, in '{self._network.name}'", RuntimeWarning, stacklevel=callers_level())
+            message = f"{message}, in '{self._network.name}'{self._why(state)}"
+            warnings.warn(message, RuntimeWarning, stacklevel=callers_level())
+
+    def _why(self, state: State) -> str:
+        """That a step is too long for what is integrated, where that is so; "" else."""
+        if self._network.integration is None:
+            return ""
+        from neurovis_spec.runtime.stiffness import stiffest_of_run
+
+        worst = stiffest_of_run(self._network, state.k, state.conditions)
+        if worst is None:
+            return ""
+        message, hint = worst._replace(step=None).words(self._network)  # its step may be another in this run
+        return f" (stiff-step: {message}; {hint})"
 
     def _messages(self, state: State) -> Iterator[str]:
         """What is not finite: what shows it best comes first."""

@@ -11,12 +11,17 @@ import warnings
 from collections.abc import Collection
 from dataclasses import replace
 
+import numpy as np
+
+from neurovis_spec.arguments import CodedWarning, callers_level
 from neurovis_spec.body import BodyMissingError
 from neurovis_spec.compiler.drawing.drawing_settings import StatedGain
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.stiffness import stiffest_at_begin
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.recording import Recording
+from neurovis_spec.runtime.stiffness import stiffest_of_run
 from neurovis_spec.scene.collapse import gathered
 from neurovis_spec.scene.gains import Gains, choose_gains
 from neurovis_spec.scene.reached import nothing
@@ -61,7 +66,19 @@ def probe(network: Network, made: Recording | None = None) -> Gains:
                 made = record(network, course)
             except BodyMissingError:  # its pictures can be drawn all the same
                 made = record(replace(network, body=None), course)
+    _warn_of_stiffness(network, made.part(slice(steps)))
     return choose_gains(drawn.network, drawn.network.render, drawn.reached(made.part(slice(steps))))
+
+
+def _warn_of_stiffness(network: Network, made: Recording) -> None:
+    """Warn of a step that is too long for what is integrated, later than as a run begins. One that is no longer finite
+    for that warns itself."""
+    if network.integration is None or not np.isfinite(made.activity).all() or stiffest_at_begin(network) is not None:
+        return
+    worst = stiffest_of_run(network, len(made))
+    if worst is not None:
+        message, hint = worst.words(network)
+        warnings.warn(CodedWarning("stiff-step", f"{message}: {hint}"), stacklevel=callers_level())
 
 
 def gains_of(network: Network, recording: Recording) -> Gains:

@@ -6,29 +6,22 @@ could be made anew at each stage, at noise that is held, and at a step that is t
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
-from neurovis_spec.arrays import BoolArray, FloatArray, integers
+from neurovis_spec.arrays import BoolArray, integers
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.checks.neurons import unreached
-from neurovis_spec.compiler.flows import jacobian, plain_flow, ports_read_by, with_slope
+from neurovis_spec.compiler.flows import plain_flow, ports_read_by
 from neurovis_spec.compiler.levels import Cycle, Wired, held_at, made_anew, order_of
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.neurons.initial_states import beginning
-from neurovis_spec.compiler.program import Definition, Integrate, Population, Port
+from neurovis_spec.compiler.program import Definition
+from neurovis_spec.compiler.stiffness import stiffest_at_begin
 from neurovis_spec.diagnostics import Findings, Span
-from neurovis_spec.language.expressions.evaluate import Value
-from neurovis_spec.language.expressions.tree import ExpressionError
-from neurovis_spec.language.units import TIMES
 from neurovis_spec.language.words import Method
 
-#: How far into the negative a method stays stable: the least h·∂f/∂x. Others are not limited.
-_LIMITS: Final[Mapping[Method, float]] = {"euler": -2.0, "heun": -2.0, "rk4": -2.785}
 #: Methods of an order above 1.
 _HIGHER: Final = frozenset(("heun", "rk4"))
 
@@ -42,7 +35,7 @@ def check_flowing(compiled: Compiled, findings: Findings) -> None:
     if by.method in _HIGHER:
         _held_couplings(compiled, by.method, findings)
     _held_noise(compiled, findings)
-    _stiff(compiled, by, findings)
+    _stiff(compiled, findings)
 
 
 def _nothing_flows(compiled: Compiled, findings: Findings) -> None:
@@ -126,62 +119,12 @@ def _held_noise(compiled: Compiled, findings: Findings) -> None:
                 findings.warning("noise-held", formula.span, f"{message} becomes less with a shorter step", hint)
 
 
-class _Stiffest(NamedTuple):
-    """The state that decays fastest: the neuron, the state, and how fast, per second."""
-
-    neuron: str
-    state: str
-    slope: float
-
-
-def _stiff(compiled: Compiled, by: Integrate, findings: Findings) -> None:
+def _stiff(compiled: Compiled, findings: Findings) -> None:
     """A step that is too long for the state that decays fastest, as it begins."""
     network, time = compiled.network, compiled.spec.time
-    limit = _LIMITS.get(by.method)
-    if limit is None or time is None or time.dt is None:
+    if time is None or time.dt is None:
         return
-    worst = min(_slopes(network), key=lambda one: one.slope, default=None)
-    if worst is None or network.dt / by.substeps * worst.slope >= limit:
-        return
-    reached = network.dt / by.substeps * worst.slope
-    most = _shown(limit / worst.slope * by.substeps, network.dt_unit)
-    message = f"dt·∂{worst.state}'/∂{worst.state} is {reached:.3g} at '{worst.neuron}'; the limit of {by.method} is"
-    hint = f"take a dt of at most {most}, or integrate: exponential"
-    findings.warning("stiff-step", time.dt.span, f"{message} {limit:g}: the run will diverge", hint)
-
-
-def _slopes(network: Network) -> Iterator[_Stiffest]:
-    """For each flow state how its derivative changes with it where a run begins, at the neuron where that is least.
-    What arrives is taken for nothing but the bias."""
-    for population in network.populations:
-        model = population.model.definition
-        if not model.flows:
-            continue
-        try:
-            slopes, activation = jacobian(model), with_slope(population.activation.definition)
-        except ExpressionError:
-            continue  # it is too long to be told anything of
-        ports: dict[str, Value] = {port.name: _resting(network, population, port) for port in population.ports}
-        sloped = replace(population, activation=replace(population.activation, definition=activation))
-        begin = beginning(sloped, network.dt, network.neurons.starts, ports)
-        for name, tree in slopes.let:
-            begin.values[name] = begin.of(tree)
-        for state, tree in slopes.diagonal.items():
-            found = np.broadcast_to(begin.of(tree), population.members.shape)
-            if np.isfinite(found).any():
-                place = int(np.nanargmin(np.where(np.isfinite(found), found, np.nan)))
-                neuron = network.neurons.names[population.members[place]]
-                yield _Stiffest(neuron, state, float(found[place]) * model.per_second)
-
-
-def _resting(network: Network, population: Population, port: Port) -> FloatArray:
-    """What a port is where nothing arrives: its bias."""
-    bias = network.neurons.bias_at(port.name)[population.members]
-    return np.asarray(bias + (1.0 if port.combine == "product" else 0.0), dtype=np.float64)
-
-
-def _shown(seconds: float, unit: str) -> str:
-    """A time in this unit, rounded down to two digits."""
-    value = seconds / float(TIMES[unit])
-    power = 10.0 ** (math.floor(math.log10(value)) - 1)
-    return f"{math.floor(value / power) * power:.2g} {unit}"
+    worst = stiffest_at_begin(network)
+    if worst is not None:
+        message, hint = worst.words(network)
+        findings.warning("stiff-step", time.dt.span, f"{message}: the run will diverge", hint)
