@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from functools import cache
 
 from neurovis_spec.compiler.values.builtin import libraries
-from neurovis_spec.language.expressions.parser import parse
-from neurovis_spec.language.expressions.tree import Chain, ExpressionError, Name, Number
 from neurovis_spec.language.grammar import Kind
 from neurovis_spec.lsp.names import DEFINITIONS, SECTIONS
 from neurovis_spec.lsp.outline import Item, outline
@@ -140,33 +138,3 @@ def _equations(section: str, texts: Mapping[tuple[str, ...], str]) -> tuple[str,
             case ("weight", "each_episode"):
                 late.append(f"weight = {text} at an episode's end")
     return tuple(lines + late)
-
-
-def as_derivative(state: str, step: str) -> str | None:
-    """The derivative of which a formula for ``each_step`` is a step of the Euler method; None where it is no such step.
-
-    >>> as_derivative("v", "v + dt*(drive - v)/tau"), as_derivative("v", "(1 - leak)*v + leak*drive")
-    ('(drive - v)/tau', '(drive - v)*leak/dt')
-    """
-    try:
-        tree = parse(step, extra_functions={"f": 1})
-    except ExpressionError:
-        return None
-    match tree:
-        case Chain(
-            operators=("+",),
-            operands=(Name(name=own), Chain(operators=("*", *_), operands=(Name(name="dt"), *_)) as rest),
-        ) if own == state:
-            return step[rest.operands[0].end : rest.end].lstrip(" *")
-        case Chain(
-            operators=("+",),
-            operands=(
-                Chain(
-                    operators=("*",),
-                    operands=(Chain(operators=("-",), operands=(Number(value=1.0), Name(name=lost))), Name(name=own)),
-                ),
-                Chain(operators=("*",), operands=(Name(name=taken), _)) as rest,
-            ),
-        ) if (own, lost) == (state, taken):
-            return f"({step[rest.operands[0].end : rest.end].lstrip(' *')} - {state})*{taken}/dt"
-    return None

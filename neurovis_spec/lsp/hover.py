@@ -13,12 +13,13 @@ from pathlib import Path
 from typing import Literal
 
 from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.expressions.derivative import as_derivative
 from neurovis_spec.language.expressions.functions import GIVEN
 from neurovis_spec.language.grammar import Role
 from neurovis_spec.language.patterns import PATTERNS
 from neurovis_spec.language.places import key_at, role_of
 from neurovis_spec.language.templates import Hole, pieces
-from neurovis_spec.lsp.definitions import as_derivative, known
+from neurovis_spec.lsp.definitions import known
 from neurovis_spec.lsp.document import Document, described, ports_of
 from neurovis_spec.lsp.index import Found, Index
 from neurovis_spec.lsp.names import DEFINITIONS, Name

@@ -17,9 +17,11 @@ from neurovis_spec.compiler.checks.neurons import unreached
 from neurovis_spec.compiler.flows import plain_flow, ports_read_by
 from neurovis_spec.compiler.levels import Cycle, Wired, held_at, made_anew, order_of
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.neurons.groups import Built
 from neurovis_spec.compiler.program import Definition
 from neurovis_spec.compiler.stiffness import stiffest_at_begin
 from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.language.expressions.derivative import as_derivative
 from neurovis_spec.language.words import Method
 
 #: Methods of an order above 1.
@@ -35,6 +37,7 @@ def check_flowing(compiled: Compiled, findings: Findings) -> None:
     if by.method in _HIGHER:
         _held_couplings(compiled, by.method, findings)
     _held_noise(compiled, findings)
+    _steps_by_hand(compiled, by.method, findings)
     _stiff(compiled, findings)
 
 
@@ -117,6 +120,26 @@ def _held_noise(compiled: Compiled, findings: Findings) -> None:
                 message = f"this noise is held over each step, and a derivative of '{model.name}' reads it: its effect"
                 hint = "give the state a 'noise' of its own, which is scaled by the root of the step"
                 findings.warning("noise-held", formula.span, f"{message} becomes less with a shorter step", hint)
+
+
+def _steps_by_hand(compiled: Compiled, method: Method, findings: Findings) -> None:
+    """States that ``each_step`` takes by a step of the Euler method, in a network in which others are integrated. Where
+    nothing flows all is as it always was: nobody is told to write it in another way."""
+    groups: dict[str, list[Built]] = {}
+    for one in compiled.census.groups:
+        groups.setdefault(one.kind.model.definition.name, []).append(one)
+    for library in compiled.libraries:
+        for name, model in library.models.items():
+            for state, written in model.state.items() if name in groups else ():
+                step = written.each_step
+                if step is None or not isinstance(step.value, str) or written.derivative is not None:
+                    continue
+                if (flow := as_derivative(state, step.value)) is not None:
+                    message = f"this is a step of the Euler method by hand, beside what is integrated by {method}"
+                    hint = f"write derivative: {flow}"
+                    if any(one.model.initial is None for one in groups[name]):
+                        hint += "; it does nothing at step 0 then, where 'each_step' makes a step"
+                    findings.warning("step-by-hand", step.span, message, hint)
 
 
 def _stiff(compiled: Compiled, findings: Findings) -> None:

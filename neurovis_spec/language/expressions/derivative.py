@@ -12,13 +12,14 @@ from types import MappingProxyType
 
 from neurovis_spec.language.expressions.emit import simplify
 from neurovis_spec.language.expressions.functions import FUNCTIONS, OPERATORS, Operation
-from neurovis_spec.language.expressions.parser import formula
+from neurovis_spec.language.expressions.parser import formula, parse
 from neurovis_spec.language.expressions.tree import (
     Binary,
     Call,
     Chain,
     Conditional,
     Draw,
+    ExpressionError,
     Name,
     Number,
     Tree,
@@ -148,3 +149,40 @@ def _sum(a: Tree, b: Tree) -> Tree:
     if isinstance(a, Chain) and set(a.operators) <= {"+", "-"}:
         return Chain((*a.operators, "+"), (*a.operands, b))
     return Chain(("+",), (a, b))
+
+
+def as_derivative(state: str, step: str) -> str | None:
+    """The derivative of which a formula for ``each_step`` is a step of the Euler method; None where it is no such step.
+
+    >>> as_derivative("v", "v + dt*(drive - v)/tau"), as_derivative("v", "(1 - leak)*v + leak*drive")
+    ('(drive - v)/tau', '(drive - v)*leak/dt')
+    >>> as_derivative("v", "v + dt/tau*(drive - v)"), as_derivative("v", "v + 2*drive")
+    ('1/tau*(drive - v)', None)
+    """
+    try:
+        tree = parse(step, extra_functions={"f": 1})
+    except ExpressionError:
+        return None
+    match tree:
+        case Chain(
+            operators=("+",),
+            operands=(
+                Name(name=own),
+                Chain(operators=("*" | "/" as first, *_), operands=(Name(name="dt"), *_)) as rest,
+            ),
+        ) if own == state:
+            of_dt = step[rest.operands[0].end : rest.end].lstrip()
+            return of_dt.lstrip(" *") if first == "*" else f"1{of_dt}"
+        case Chain(
+            operators=("+",),
+            operands=(
+                Chain(
+                    operators=("*",),
+                    operands=(Chain(operators=("-",), operands=(Number(value=1.0), Name(name=lost))), Name(name=own)),
+                ),
+                Chain(operators=("*",), operands=(Name(name=taken), _)) as rest,
+            ),
+        ) if (own, lost) == (state, taken):
+            share = "" if taken == "dt" else f"*{taken}/dt"
+            return f"({step[rest.operands[0].end : rest.end].lstrip(' *')} - {state}){share}"
+    return None
