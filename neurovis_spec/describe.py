@@ -30,6 +30,7 @@ def describe(network: Network, engine: tuple[str, str]) -> dict[str, object]:
                 "name": entry.name,
                 "size": entry.size,
                 "source": "sensors" if index in sensed else _source(entry.expression, entry.table),
+                **({"hold": True} if entry.hold else {}),
             }
             for index, entry in enumerate(network.inputs)
         ],

@@ -92,6 +92,7 @@ def flowing_specs(draw: st.DrawFn, exact: bool = False) -> Spec:
         "parameters": {"level": 0.4, "w": 0.6},
         "inputs": {
             "wave": {"expression": "level*sin(3*t) if t >= 0.3 else 0"},
+            "held": {"expression": "level*sin(2*t) if k >= 2 else 0", "hold": True},
             "rows": {"values": [[0.1, -0.2, 0.3], [0.4, 0.1, 0]]},
         },
         "models": MODELS,
@@ -110,7 +111,7 @@ def flowing_specs(draw: st.DrawFn, exact: bool = False) -> Spec:
 
 def _without_functions(spec: Spec) -> Spec:
     """The same with sums and products alone."""
-    text = json.dumps(spec).replace("sin(3*t)", "t").replace("sin(0.01*t)", "t")
+    text = json.dumps(spec).replace("sin(3*t)", "t").replace("sin(2*t)", "t").replace("sin(0.01*t)", "t")
     for name in ("tanh", "sigmoid"):
         text = text.replace(f'"activation": "{name}"', '"activation": {"clip": {"low": -0.9, "high": 0.8}}')
     made: Spec = json.loads(text)
@@ -130,7 +131,7 @@ def _group(chooser: random.Random, kind: str, size: int) -> Plain:
         bias = chooser.choice(BIASES)
         group["bias"] = {port: bias} if chooser.random() < 0.5 else bias
     if chooser.random() < 0.5:
-        source = "rows" if size == 3 and chooser.random() < 0.5 else "wave"
+        source = "rows" if size == 3 and chooser.random() < 0.5 else chooser.choice(["wave", "wave", "held"])
         group["input"] = {port: source} if chooser.random() < 0.5 else source
     if chooser.random() < 0.3:
         group["noise"] = {port: "normal(0, 0.1)"} if chooser.random() < 0.5 else "normal(0, 0.1)"

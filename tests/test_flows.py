@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 
 import neurovis_spec as nv
+from neurovis_spec.cli.overview import overview
 from neurovis_spec.compiler.flows import (
     flows_by,
     jacobian,
@@ -337,3 +338,45 @@ def test_a_delay_that_an_edge_writes_is_no_default() -> None:
     assert [one.code for one in written] == ["held-coupling"]
     assert "default" not in written[0].message
     assert default == ()
+
+
+HELD = """inputs:
+  ramp: {expression: g*t}
+  kept: {expression: g*t, hold: true}
+  late: {expression: 1 if t >= 0.2 else 0, hold: true}
+parameters: {g: 2}
+models: {sum: {state: {v: {derivative: drive}}, activity: v}}
+neurons: {R: {model: sum, input: ramp}, H: {model: sum, input: kept}, L: {model: sum, input: late}}
+events: [{at: 6, set: {g: 3}}]
+"""
+
+
+@pytest.mark.parametrize("backend", ["reference", "numpy", pytest.param("c", marks=pytest.mark.compiler)])
+@pytest.mark.parametrize("method", ["rk4", "heun", "{method: euler, substeps: 3}"])
+def test_an_input_that_is_held_is_that_of_the_end_of_the_step(backend: str, method: str) -> None:
+    head = HEAD.replace("dt: 0.1", f"dt: 0.1, integrate: {method}")
+    made = nv.compile_text(head + HELD).run(10, backend=backend)
+    k = np.arange(1, 10)
+    seen = np.where(k >= 6, 3, 2) * (k * 0.1)
+    assert made["H"] == pytest.approx(np.append(0, np.cumsum(0.1 * seen)), rel=1e-12)
+    assert made["L"] == pytest.approx(np.append(0, np.cumsum(0.1 * (k * 0.1 >= 0.2))), rel=1e-12)
+    if method == "rk4":
+        assert made["R"][:6] == pytest.approx((np.arange(6) * 0.1) ** 2, rel=1e-4)
+
+
+def test_what_is_held_is_content_where_something_flows_and_does_not_flow() -> None:
+    plain, false, held = (
+        nv.compile_text(HEAD + HELD.replace(", hold: true", hold)).network
+        for hold in ("", ", hold: false", ", hold: true")
+    )
+    assert plain.hash == false.hash != held.hash
+    assert [plain.held_inputs.keys(), held.held_inputs.keys()] == [{"ramp", "kept", "late"}, {"ramp"}]
+    static = "inputs: {a: {expression: t%s}}\nneurons: {A: {input: a}}\n"
+    hashes = {nv.compile_text(HEAD + static % hold).network.hash for hold in ("", ", hold: true")}
+    assert len(hashes) == 1
+
+
+def test_inspect_says_what_is_held() -> None:
+    network = nv.compile_text(HEAD + HELD)
+    assert str(network.describe()["inputs"]).count("'hold': True") == 2
+    assert overview(network).count("expression, once a step") == 2

@@ -239,7 +239,7 @@ def _input(entry: Input, is_sensed: bool) -> tuple[str, str, str]:
     if is_sensed:
         source = "sensors"
     elif entry.expression is not None:
-        source = "expression"
+        source = "expression, once a step" if entry.hold else "expression"
     elif entry.table is not None:
         source = f"table of {count(len(entry.table), 'row')}"
     return entry.name, str(entry.size), source

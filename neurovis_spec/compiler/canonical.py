@@ -45,7 +45,7 @@ SCHEMA: Mapping[type, Content] = {
         "sources targets weights centres delays rules entry low high entries",
         "descriptions learns labels routes undelayed synapses twins lags",
     ),
-    Input: content("Input", "name start size expression table", "slots parts"),
+    Input: content("Input", "name start size expression table", "slots parts hold"),
     Output: content("Output", "name neurons scalar", "states"),
     Quantity: content("Quantity", "name initial each_step each_episode", "derivative noise unit"),
     Noise: content("Noise", "name members start expression parameters", "slots widths port state"),
@@ -92,6 +92,8 @@ def _flows(network: Network, places: IntArray) -> Iterator[tuple[object, ...]]:
     yield from (("noise", one.name, one.port, one.state) for one in network.noises if one.port != DRIVE)
     if (by := network.integration) is not None:
         yield "integrate", by.method, by.substeps
+        if held := sorted(one.name for one in network.inputs if one.hold):
+            yield "hold", *held
 
 
 def _arranged(inputs: Sequence[Input]) -> tuple[list[Input], IntArray]:

@@ -201,6 +201,13 @@ class Input:
     slots: Mapping[str, int] = field(default_factory=dict)
     #: what of the table follows parameters
     parts: tuple[Part, ...] = ()
+    #: whether an expression is taken once a step, at its end, and not at each stage of the integration
+    hold: bool = False
+
+    @property
+    def flows(self) -> bool:
+        """Whether it has a value at each stage of the integration."""
+        return self.expression is not None and not self.hold
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -364,7 +371,7 @@ class Network:
 
     @cached_property
     def held_inputs(self) -> Mapping[str, int]:
-        """Of each input that is a formula and reaches what flows, by its name: where it stands in the vector of a step
+        """Of each input that flows, and reaches what flows, by its name: where it stands in the vector of a step
         whether it is held over the step, as it is where a caller gives its value (1); else (0) its formula holds, at
         each stage."""
         by = self.integration
@@ -377,7 +384,7 @@ class Network:
         formulas = [
             entry.name
             for entry in self.inputs
-            if entry.expression is not None and not reached.isdisjoint(range(entry.start, entry.start + entry.size))
+            if entry.flows and not reached.isdisjoint(range(entry.start, entry.start + entry.size))
         ]
         return {name: self._drawn_end + place for place, name in enumerate(formulas)}
 

@@ -157,11 +157,15 @@ class InputModel(Model):
     size: Annotated[FormulaField | None, _one_source("expression", "file", "values")] = Field(
         None, description="How many numbers a step, for an input without a source."
     )
+    hold: Annotated[
+        BoolField | None,
+        Needs(("expression",), "'hold' is of an 'expression'; others are the same over a step", "remove 'hold'"),
+    ] = Field(None, description="Whether derivatives see it once a step, not as it is at each stage (default false).")
     description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
 
     @classmethod
     def _foreign(cls, name: str) -> tuple[str, str] | None:
-        return not_yet(name, "spikes", "poisson", "hold")
+        return not_yet(name, "spikes", "poisson")
 
     @classmethod
     def _instead(cls, node: Node) -> str | None:

@@ -34,7 +34,7 @@ def make_input(
     sources = {"expression": model.expression, "file": model.file, "values": model.values, "size": model.size}
     given = [key for key in _SOURCES if sources[key] is not None]
     made = [
-        None if model.expression is None else _by_expression(name, model.expression, start, constants),
+        None if model.expression is None else _by_expression(name, model, model.expression, start, constants),
         None if model.file is None else _by_file(name, model.file, start, files),
         None if model.values is None else _by_values(name, model.values, start, constants),
         None if given and model.size is None else _by_size(name, model, start, section, constants),
@@ -44,13 +44,12 @@ def make_input(
     return next(one for one in made if one is not None)
 
 
-def _by_expression(name: str, formula: Formula, start: int, constants: Constants) -> Input | Unknown:
+def _by_expression(name: str, model: InputModel, formula: Formula, start: int, constants: Constants) -> Input | Unknown:
     tree = _expression(formula, constants)
-    return (
-        UNKNOWN
-        if tree is UNKNOWN
-        else Input(name, start, 1, expression=tree, slots=slots_named(tree, constants.settable))
-    )
+    if tree is UNKNOWN:
+        return UNKNOWN
+    hold = model.hold is not None and model.hold.value
+    return Input(name, start, 1, expression=tree, slots=slots_named(tree, constants.settable), hold=hold)
 
 
 def _by_file(name: str, path: Located[str], start: int, files: Files) -> Input | Unknown:
