@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -115,6 +116,14 @@ def incoming_of(network: Network, port: Port, count: int, fusible: bool = True) 
     return Incoming(own, ends, degree, fused, full, lanes, factors, port.combine)
 
 
+class Sent(NamedTuple):
+    """An array of what connections without delay take, by its name, and where each of all connections (m,) finds it
+    there."""
+
+    array: str
+    places: Indices
+
+
 def taken(network: Network, code: Code, connections: Indices, place: Place) -> str:
     """What one of some connections takes: the activity of its source, or an outlet."""
     if network.sending is None:
@@ -149,8 +158,8 @@ def _alike(which: BoolArray) -> bool:
 class Arrivals:
     """What arrives at a port of the neurons of a population: their connections, in the order in which they are read:
     neuron by neuron, or as ``lanes`` says. What arrives at one neuron is put together in the order of its connections.
-    ``begins`` gives the code of what the sum of a neuron begins with, by its place, and ``sent`` that of what a
-    connection without delay takes; left out, they are nothing and the activity."""
+    ``begins`` gives the code of what the sum of a neuron begins with, by its place, and ``sent`` is what connections
+    without delay take; left out, they are nothing and the activities."""
 
     def __init__(
         self,
@@ -160,7 +169,7 @@ class Arrivals:
         form: Form,
         layout: SignalLayout,
         begins: Callable[[Place], Value] | None = None,
-        sent: Callable[[Indices, Place], str] | None = None,
+        sent: Sent | None = None,
     ) -> None:
         self.network, self.code, self.form = network, code, form
         self.combine, self.count = incoming.combine, len(incoming.ends) - 1
@@ -192,9 +201,15 @@ class Arrivals:
 
     def sent(self, column: slice, edge: Place) -> str:
         """What a connection without delay takes."""
-        if self._sent is not None:
-            return self._sent(self.connections[column], edge)
-        return taken(self.network, self.code, self.connections[column], edge)
+        if self._sent is None:
+            return taken(self.network, self.code, self.connections[column], edge)
+        return f"{self._sent.array}[{self.code.at(self.sent_places[column], edge)}]"
+
+    @cached_property
+    def sent_places(self) -> Indices:
+        """Where each connection finds what it takes, in the array of ``sent``."""
+        assert self._sent is not None
+        return self._sent.places[self.connections]
 
     @cached_property
     def offsets(self) -> Indices:

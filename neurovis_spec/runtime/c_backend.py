@@ -25,7 +25,7 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.expressions.emit_c import Emitter
 from neurovis_spec.language.expressions.functions import Library
-from neurovis_spec.runtime import c_flows, c_functions, c_library
+from neurovis_spec.runtime import c_flows, c_functions, c_library, c_plan
 from neurovis_spec.runtime.backend import Availability, BackendError, Capabilities
 from neurovis_spec.runtime.c_code import Code, Form, Table, Tables, function, state_name, words_of
 from neurovis_spec.runtime.c_step import StepCode, begins_otherwise, incoming_in
@@ -164,6 +164,8 @@ class Written:
     long_tables: tuple[Table, ...]
     #: how many weights are packed in whole runs
     packed: int
+    #: how many numbers an integration keeps
+    work: int
 
 
 _written: WeakKeyDictionary[Network, dict[bool, Written]] = WeakKeyDictionary()
@@ -196,23 +198,23 @@ class _Function(NamedTuple):
 
 
 def _write(network: Network, layout: SignalLayout) -> Written:
-    emitter, tables = Emitter(), Tables("double", LONGEST)
-    small = len(network.neurons) + len(network.connections) <= c_flows.written_out(network, SMALL)
+    emitter, tables, plan = Emitter(), Tables("double", LONGEST), c_plan.plan_of(network)
+    small = len(network.neurons) + len(network.connections) <= c_plan.written_out(plan, SMALL)
     bodies: list[str] = []
-    pointer_lines = _pointer_lines(network)
+    pointers = _pointer_lines(network, plan)
     watched = bool(network.projections) and not small
     # a network that is written out is in registers, and nothing is gained
     incoming = incoming_in(network)
-    whole = StepCode(network, Code(emitter, tables, network.dt, {}), Form(), incoming, layout)
+    whole = StepCode(network, Code(emitter, tables, network.dt, {}), Form(), incoming, layout, plan)
     fused = not small and bool(whole.fuses.any())
     for type_, name, form, write, parameters, of_fused in _functions(small, watched):
         code = Code(emitter, tables, network.dt, network.settable.variables)
         if fused or not of_fused:
-            write(StepCode(network, code, form, incoming, layout))
+            write(StepCode(network, code, form, incoming, layout, plan))
         if type_ == "double":
             code.line("return odd;" if form.watched and code.lines else "return 0.0;")
         head = f"static {type_} {name}(const nv_state *p{parameters})"
-        bodies += [*function(code, head, pointer_lines | tables.pointer_lines()), ""]
+        bodies += [*function(code, head, pointers | tables.pointer_lines()), ""]
     counts = {"NEURONS": len(network.neurons), "INPUTS": network.vector_size, "CHANGING": len(network.changing)}
     defined = [f"#define {name} {value}" for name, value in counts.items()]
     neurons, connections = _look(network)
@@ -221,15 +223,14 @@ def _write(network: Network, layout: SignalLayout) -> Written:
     used = words_of(bodies)
     parts = [
         _HEAD,
-        c_flows.declarations(network),
+        c_flows.declarations(plan),
         "\n".join(defined),
         emitter.helpers(used),
         tables.text(used),
         "\n".join(bodies),
     ]
-    return Written(
-        "\n\n".join(part for part in parts if part) + _TAIL, tuple(tables.passed_in), whole.count if fused else 0
-    )
+    text = "\n\n".join(part for part in parts if part) + _TAIL
+    return Written(text, tuple(tables.passed_in), whole.count if fused else 0, c_plan.work_size(plan))
 
 
 def _functions(small: bool, watched: bool) -> tuple[_Function, ...]:
@@ -248,7 +249,7 @@ def _functions(small: bool, watched: bool) -> tuple[_Function, ...]:
     )
 
 
-def _pointer_lines(network: Network) -> dict[str, str]:
+def _pointer_lines(network: Network, plan: c_plan.Plan | None) -> dict[str, str]:
     """For each array of the state, and for what is handed over, the line that gives it its name."""
     kinds = (
         ("double", ("activity", "weights", "signals", "history", "outlets", "packed")),
@@ -258,7 +259,7 @@ def _pointer_lines(network: Network) -> dict[str, str]:
     )
     lines = {name: f"{kind} *restrict const {name} = p->{name};" for kind, names in kinds for name in names}
     names = [state_name(use.owner, i) for _, use in network.uses for i in range(len(use.definition.kept))]
-    lines |= c_flows.pointer_lines(network, "double", "restrict", "p->work")
+    lines |= c_plan.pointer_lines(plan, "double", "restrict", "p->work")
     return lines | {name: f"double *restrict const {name} = p->cells[{at}];" for at, name in enumerate(names)}
 
 
@@ -313,7 +314,6 @@ class CStepper:
         self._reads = np.zeros(len(network.inputs), dtype=np.uint8)
         #: whether the first step of a run is another one
         self._initial = begins_otherwise(network)
-        self._work = np.zeros(c_flows.work_size(network))
         self._changing = np.ascontiguousarray(network.changing, dtype=np.int64)
         # whether the weights that are recorded lie next to each other
         count = len(self._changing)
@@ -325,7 +325,7 @@ class CStepper:
         self._struct = ctypes.c_void_p(self._address)
         self._k, self._form_there = 0, _PLAIN
         self._before = np.zeros(len(network.neurons))
-        self._pointers.before, self._pointers.work = self._before.ctypes.data, self._work.ctypes.data
+        self._pointers.before = self._before.ctypes.data
         self._take_code(own_signals=not signal_layout(network).shared)
         #: the state whose arrays the struct points to, these arrays, and the objects that say what holds in it: where
         #: each is still the same one, nothing has changed
@@ -346,9 +346,9 @@ class CStepper:
         self._step, self._run = library.nv_once, library.nv_run
         self._step.restype = ctypes.c_int64
         self._run.argtypes, self._run.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
-        self._long_tables, self._packed = made.long_tables, np.zeros(made.packed)
+        self._long_tables, self._packed, self._work = made.long_tables, np.zeros(made.packed), np.zeros(made.work)
         self._table_addresses = _addresses(self._long_tables)
-        self._pointers.packed = self._packed.ctypes.data
+        self._pointers.packed, self._pointers.work = self._packed.ctypes.data, self._work.ctypes.data
         self._pointers.given = ctypes.addressof(self._table_addresses)
 
     def read(self, computed: frozenset[str]) -> None:

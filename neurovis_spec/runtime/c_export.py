@@ -25,7 +25,7 @@ from neurovis_spec.compiler.run_checks import without_checks
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.language.expressions.emit_c import Emitter, Value
 from neurovis_spec.language.expressions.tree import Draw
-from neurovis_spec.runtime import c_flows
+from neurovis_spec.runtime import c_plan
 from neurovis_spec.runtime.c_backend import SMALL
 from neurovis_spec.runtime.c_code import Code, Form, Tables, function, state_name, words_of
 from neurovis_spec.runtime.c_draws import drawing
@@ -101,6 +101,7 @@ class Exported:
         #: whether any holds states of models, and how many numbers can be held
         self.fixing = any(order >= 0 for phase in self.phases for order in phase.order[n:])
         self.clampable = network.clampable if self.fixing else n
+        self.plan = c_plan.plan_of(self.network)
         self.members = self._members()
 
     # ---- what there is -----------------------------------------------------------------------------------------
@@ -160,7 +161,7 @@ class Exported:
             Member("parameters", state.conditions.parameters, "parameters of the spec and of its instances"),
             Member("variables", state.conditions.variables, "numbers that follow parameters"),
             Member("vector", np.zeros(network.vector_size), "the inputs and the noise of a step"),
-            Member("work", np.zeros(c_flows.work_size(network)), "what an integration keeps between stages"),
+            Member("work", np.zeros(c_plan.work_size(self.plan)), "what an integration keeps between stages"),
         ]
         if self.holding:
             about = "what neurons are held at" + (", then states" if self.fixing else "")
@@ -312,7 +313,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             name: f"{real} *{quick} const {name} = state->{name};"
             for name in ("activity", "weights", "signals", "history", "outlets")
         }
-        pointer_lines |= c_flows.pointer_lines(network, real, quick, "state->work")
+        pointer_lines |= c_plan.pointer_lines(self.plan, real, quick, "state->work")
         pointer_lines["lesioned"] = f"const unsigned char *{quick} const lesioned = state->lesioned;"
         pointer_lines["x"] = f"{real} *{quick} const x = state->variables;"
         pointer_lines["s"] = f"const {real} *{quick} const s = state->vector;"
@@ -354,7 +355,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
         network, code, pointer_lines = self.network, self._code(), self._pointer_lines()
         left_out = self._left_out()
         form = Form(
-            written_out=len(network.neurons) + len(network.connections) <= c_flows.written_out(network, SMALL),
+            written_out=len(network.neurons) + len(network.connections) <= c_plan.written_out(self.plan, SMALL),
             first=self.takes_initial,
             held=self.holding,
             fixed=self.fixing,
@@ -362,7 +363,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             still="still" in left_out,
             lost="lost" in left_out,
         )
-        StepCode(network, code, form, incoming_in(network), signal_layout(network, own=True)).write()
+        StepCode(network, code, form, incoming_in(network), signal_layout(network, own=True), self.plan).write()
         before: list[str] = []
         for name in sorted(left_out.keys() & words_of(code.lines)):  # what never learns asks for none that is still
             kind, phases = left_out[name]

@@ -1,14 +1,6 @@
 """Integration as C: flow states over a step, stage by stage, all populations together, and the noise behind it.
 
-In: a Network with an Integrate. Out: the lines of these operations, over an array ``work`` of the caller's, whose parts
-are
-
-    fx  the flow states at the beginning of a substep      fh  what is held at ports over the step
-    fy  those of a stage                                   fo  what connections take at a stage
-    fk  their derivatives there                            fv  the inputs and the noise of the step, inputs that are
-    fj  how much these change with their own states            expressions as they are at a stage
-    fs  sums of derivatives, over stages                   fg  what their noise is multiplied by
-
+In: a Network with an Integrate, and its Plan, which says what is kept in ``work``. Out: the lines of these operations.
 Of a leaky neuron with an input and Heun's method the text is
 
     fx[0] = cells0_0[0];
@@ -33,47 +25,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
-from itertools import chain, groupby
-from typing import NamedTuple
+from functools import partial
+from itertools import groupby
 
-import numpy as np
-
-from neurovis_spec.arrays import Indices, IntArray
-from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import MODEL, Diffuse, Integrate, Port, SendAhead, Use
+from neurovis_spec.arrays import IntArray
+from neurovis_spec.compiler.program import MODEL, Diffuse, Integrate, Port, SendAhead
 from neurovis_spec.language.expressions.emit_c import INEXACT, Made, Value
 from neurovis_spec.language.expressions.parser import formula
 from neurovis_spec.language.expressions.tree import Name
 from neurovis_spec.language.words import Method
-from neurovis_spec.runtime.c_arrivals import Arrivals, incoming_of
+from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, Sent
 from neurovis_spec.runtime.c_code import Place, plus, words_of
+from neurovis_spec.runtime.c_plan import BEGIN, MIDDLE, STAGES, FlowState, Plan
 from neurovis_spec.runtime.c_step import StepCode, write, write_input
-from neurovis_spec.runtime.stages import (
-    INSIDE,
-    Formulas,
-    Part,
-    Taken,
-    apart,
-    formulas_of,
-    given,
-    parts_of,
-    places_among_taken,
-    taken_by,
-    unfolded,
-)
+from neurovis_spec.runtime.stages import INSIDE, Formulas, Part, Taken, formulas_of, given
 
-#: Of a substep of the length 1, when the stages of a method are: just behind the beginning, in the middle, just before
-#: the end.
-_BEGIN, _MIDDLE, _END = range(3)
-STAGES: Mapping[Method, tuple[int, ...]] = {
-    "euler": (_BEGIN,),
-    "heun": (_BEGIN, _END),
-    "rk4": (_BEGIN, _MIDDLE, _MIDDLE, _END),
-    "exponential": (_BEGIN,),
-    "semi_implicit": (_BEGIN,),
-}
 #: What a state changes by in a substep of the length h, by its derivative f and j = ∂f/∂x.
 _CHANGES: Mapping[Method, str] = {
     "exponential": "(h*exprel(h*min(j, 0)))*f",
@@ -83,162 +49,24 @@ _CHANGES: Mapping[Method, str] = {
 _OF_TWO = ("atan2", "pow")
 
 
-class _State(NamedTuple):
-    """A flow state of a population: where its members stand among all flow states."""
-
-    part: Part
-    name: str
-    start: int
-
-    @property
-    def use(self) -> Use:
-        """The model that it is a state of."""
-        return self.part.population.model
-
-    @property
-    def size(self) -> int:
-        """How many numbers it is."""
-        return len(self.part.population.members)
-
-    @property
-    def varies(self) -> bool:
-        """Whether more than parameters says how much its derivative changes with it."""
-        let, diagonal = self.part.slopes.let, dict(self.part.slopes.trees)
-        if self.name not in diagonal:  # the method does not look at that
-            return False
-        return not unfolded(let, [diagonal[self.name]]).names <= {*self.use.parameters, *dict(let)}
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What an integration keeps in ``work``, and where."""
-
-    network: Network
-    operation: Integrate
-    #: whether noise is added behind it
-    diffuses: bool
-
-    @cached_property
-    def of_stage(self) -> tuple[Part, ...]:
-        """What is done at a stage, population by population."""
-        return parts_of(self.network, self.operation)
-
-    @cached_property
-    def states(self) -> tuple[_State, ...]:
-        """All flow states, population by population."""
-        found: list[_State] = []
-        start = 0
-        for part in self.of_stage:
-            for name in part.flows:
-                found.append(_State(part, name, start))
-                start += found[-1].size
-        return tuple(found)
-
-    @cached_property
-    def starts(self) -> Mapping[tuple[int, str], int]:
-        """Where the members of a flow state of a population stand."""
-        return {(one.part.number, one.name): one.start for one in self.states}
-
-    @cached_property
-    def held(self) -> Mapping[tuple[int, str], int]:
-        """Where what is held at the ports of populations stands."""
-        found: dict[tuple[int, str], int] = {}
-        start = 0
-        for part in self.of_stage:
-            formulas = (part.derivatives, part.spread, *(one.formulas for one in part.taken))
-            for port in dict.fromkeys(chain.from_iterable(one.ports for one in formulas)):
-                if len(apart(port)[0]):
-                    found[part.number, port.name] = start
-                    start += len(part.population.members)
-        return found
-
-    @cached_property
-    def places(self) -> IntArray:
-        """Where each activity and each outlet, as ``Network.sending`` has them, stands among what is taken at a stage;
-        −1 for none."""
-        return places_among_taken(self.network, self.of_stage)
-
-    def sent(self, connections: Indices) -> IntArray:
-        """Where what connections take stands among that."""
-        return np.asarray(self.places[taken_by(self.network)[connections]], dtype=np.int64)
-
-    @cached_property
-    def parts(self) -> Mapping[str, int]:
-        """Where the parts of ``work`` begin, by their names; those of no numbers are left out."""
-        several = len(STAGES[self.operation.method]) > 1
-        count = sum(one.size for one in self.states)
-        sizes = {
-            "fx": count,
-            "fy": count if several else 0,
-            "fk": count,
-            "fj": count if self.operation.method in _CHANGES else 0,
-            "fs": count if several else 0,
-            "fg": count if self.diffuses else 0,
-            "fh": sum(len(self.network.populations[number].members) for number, _ in self.held),
-            "fo": int(self.places.max(initial=-1)) + 1,
-            "fv": self.network.vector_size if self.network.held_inputs else 0,
-        }
-        starts, start = dict[str, int](), 0
-        for name, size in sizes.items():
-            if size:
-                starts[name] = start
-                start += size
-        return starts | {"": start}
-
-
-def plan_of(network: Network) -> Plan | None:
-    """The plan of a network; None where nothing flows."""
-    by = network.integration
-    if by is None:
-        return None
-    return Plan(network, by, any(isinstance(one, Diffuse) for one in network.program))
-
-
-def work_size(network: Network) -> int:
-    """How many numbers ``work`` has."""
-    plan = plan_of(network)
-    return 0 if plan is None else plan.parts[""]
-
-
-def written_out(network: Network, most: int) -> int:
-    """Up to how many neurons and connections a network is written out one by one, if it is up to ``most`` where nothing
-    flows: derivatives take more lines for each, which have to stay in the processor's cache from stage to stage."""
-    return most if plan_of(network) is None else most // 6
-
-
-def declarations(network: Network) -> str:
+def declarations(plan: Plan | None) -> str:
     """Where slopes of formulas are made, in which the functions of these come again: that a function gives the same for
     the same, so that a compiler calls it once."""
-    plan = plan_of(network)
     if plan is None or plan.operation.method not in _CHANGES:
         return ""
     return "\n".join(f"double {name}(double) __attribute__((__const__));" for name in INEXACT if name not in _OF_TWO)
 
 
-def pointer_lines(network: Network, real: str, quick: str, work: str) -> dict[str, str]:
-    """For each part of ``work``, the line that gives it its name; ``quick`` is how ``restrict`` is written."""
-    plan = plan_of(network)
-    if plan is None:
-        return {}
-    parts = {name: start for name, start in plan.parts.items() if name}
-    return {name: f"{real} *{quick} const {name} = {work} + {start};" for name, start in parts.items()}
-
-
-def _some(port: Port, positions: Indices) -> Port:
-    """The port with some of its signals alone."""
-    factors = None if port.factors is None else port.factors[positions]
-    return replace(port, incoming=port.incoming[positions], slots=port.slots[positions], factors=factors, staged=None)
-
-
 class _Integration:
     """Writes one integration."""
 
-    def __init__(self, step: StepCode, plan: Plan) -> None:
-        self.step, self.plan, self.code, self.network = step, plan, step.code, step.network
-        self.method, self.substeps = plan.operation.method, plan.operation.substeps
+    def __init__(self, step: StepCode) -> None:
+        assert step.plan is not None
+        self.step, self.plan, self.code, self.network = step, step.plan, step.code, step.network
+        self.method, self.substeps = self.plan.operation.method, self.plan.operation.substeps
         #: the flow states of a stage
-        self.now = "fy" if "fy" in plan.parts else "fx"
-        self.varying = {(one.part.number, one.name): one.varies for one in plan.states}
+        self.now = "fy" if "fy" in self.plan.parts else "fx"
+        self.varying = {(one.part.number, one.name): one.varies for one in self.plan.states}
 
     def write(self) -> None:
         """All of it."""
@@ -273,7 +101,7 @@ class _Integration:
         """A line for each flow state, which is ``cell`` in the State, ``now`` with what is held, and ``at`` here."""
         for one in self.plan.states:
 
-            def copied(place: Place, totals: Mapping[int, str], one: _State = one) -> None:
+            def copied(place: Place, totals: Mapping[int, str], one: FlowState = one) -> None:
                 now = cell = self.step.states(one.use, place)[one.name]
                 if held := self.step.held(one.part.number, one.name, place):
                     now = f"held[{held}] ? holding[{held}] : {cell}"
@@ -285,9 +113,9 @@ class _Integration:
 
     def hold(self, part: Part, port: Port) -> None:
         """What is held at a port over the step; a root is taken of all together, with the signals of a stage."""
-        start, (held, staged) = self.plan.held[part.number, port.name], apart(port)
-        arrivals = self.arrivals(part, _some(port, held))
-        arrivals.finished = not len(staged)
+        start, reaching = self.plan.held[part.number, port.name], self.plan.reaching[part.number, port.name]
+        arrivals = self.arrivals(reaching.held)
+        arrivals.finished = not len(reaching.anew.connections)
 
         def kept(place: Place, totals: Mapping[int, str]) -> None:
             total = totals.get(0, "") or self.code.text(arrivals.combined(place))
@@ -296,30 +124,21 @@ class _Integration:
         self.step.each(len(part.population.members), {0: arrivals}, kept)
 
     def arrivals(
-        self,
-        part: Part,
-        port: Port,
-        begins: Callable[[Place], Value] | None = None,
-        sent: Callable[[Indices, Place], str] | None = None,
+        self, incoming: Incoming, begins: Callable[[Place], Value] | None = None, sent: Sent | None = None
     ) -> Arrivals:
         """What arrives at a port of a population."""
-        step, network = self.step, self.network
-        incoming = incoming_of(network, port, len(part.population.members), fusible=False)
-        return Arrivals(network, incoming, self.code, step.form, step.layout, begins, sent)
+        return Arrivals(self.network, incoming, self.code, self.step.form, self.step.layout, begins, sent)
 
     def at_stage(self, part: Part, port: Port) -> Arrivals:
         """What arrives at a port at a stage: what is held, and on top of it what flows."""
         held, start = self.plan.held.get((part.number, port.name)), 1.0 if port.combine == "product" else 0.0
-        _, staged = apart(port)
+        anew = self.plan.reaching[part.number, port.name].anew
 
         def begins(place: Place) -> Value:
             return start if held is None else f"fh[{plus(held, place)}]"
 
-        def sent(connections: Indices, place: Place) -> str:
-            return f"fo[{self.code.at(self.plan.sent(connections), place)}]"
-
-        arrivals = self.arrivals(part, _some(port, staged), begins, sent)
-        arrivals.finished = held is None or len(staged) > 0  # else what is held is
+        arrivals = self.arrivals(anew, begins, Sent("fo", self.plan.takes))
+        arrivals.finished = held is None or len(anew.connections) > 0  # else what is held is
         return arrivals
 
     # ---- stages ------------------------------------------------------------------------------------------------
@@ -351,9 +170,9 @@ class _Integration:
     def time(self, when: int, h: float) -> str:
         """The time of a stage."""
         code, inside = self.code, self.code.text(INSIDE * h)
-        if when == _BEGIN:
+        if when == BEGIN:
             return f"since + {inside}"
-        return f"since + {code.text(h / 2.0)}" if when == _MIDDLE else f"since + {code.text(h)} - {inside}"
+        return f"since + {code.text(h / 2.0)}" if when == MIDDLE else f"since + {code.text(h)} - {inside}"
 
     def changes(self, formula_: str) -> None:
         """x + the change; of all neurons state by state, since a branch within exprel then goes the same way in all."""
@@ -517,10 +336,8 @@ def _clock(per_second: float) -> str:
 
 @write.register
 def _integrate(operation: Integrate, step: StepCode) -> None:
-    plan = plan_of(step.network)
-    assert plan is not None
     with step.unless_first():
-        _Integration(step, plan).write()
+        _Integration(step).write()
 
 
 @write.register
@@ -551,7 +368,7 @@ def _send_ahead(operation: SendAhead, step: StepCode) -> None:
 
 @write.register
 def _diffuse(operation: Diffuse, step: StepCode) -> None:
-    plan, code, network = plan_of(step.network), step.code, step.network
+    plan, code, network = step.plan, step.code, step.network
     assert plan is not None
     with step.unless_first():
         for one in plan.states:
@@ -563,7 +380,7 @@ def _diffuse(operation: Diffuse, step: StepCode) -> None:
             def disturb(
                 place: Place,
                 totals: Mapping[int, str],
-                one: _State = one,
+                one: FlowState = one,
                 drawn: IntArray = drawn,
                 root: str = root,
             ) -> None:

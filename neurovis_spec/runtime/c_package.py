@@ -17,8 +17,8 @@ from neurovis_spec.language.expressions.emit_c import INEXACT
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.expressions.tree import Call, Tree, walk
 from neurovis_spec.runtime.c_export import Exported
-from neurovis_spec.runtime.c_flows import STAGES
 from neurovis_spec.runtime.c_names import words
+from neurovis_spec.runtime.c_plan import STAGES
 from neurovis_spec.runtime.c_settable import ExportError
 from neurovis_spec.runtime.files import replacing
 from neurovis_spec.runtime.stages import Part, apart, parts_of

@@ -45,6 +45,7 @@ from neurovis_spec.language.expressions.emit_c import Made, Value
 from neurovis_spec.language.expressions.tree import Name, Tree, names
 from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, incoming_of, taken, taken_at
 from neurovis_spec.runtime.c_code import Code, Form, Place, plus, state_name
+from neurovis_spec.runtime.c_plan import Plan
 from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import SharedSlots, SignalLayout
 from neurovis_spec.runtime.stages import unfolded
@@ -58,13 +59,19 @@ _RULES_SIDE_BY_SIDE = 4
 
 
 class StepCode:
-    """Writes the body of a step; ``incoming`` is what arrives at each port of each population, and ``layout`` where
-    signals are under way, which all forms of a step share."""
+    """Writes the body of a step. ``incoming`` is what arrives at each port of each population, ``layout`` where signals
+    are under way, ``plan`` what is integrated: all forms of a step share them."""
 
     def __init__(
-        self, network: Network, code: Code, form: Form, incoming: Sequence[Sequence[Incoming]], layout: SignalLayout
+        self,
+        network: Network,
+        code: Code,
+        form: Form,
+        incoming: Sequence[Sequence[Incoming]],
+        layout: SignalLayout,
+        plan: Plan | None,
     ) -> None:
-        self.network, self.code, self.form, self.layout = network, code, form, layout
+        self.network, self.code, self.form, self.layout, self.plan = network, code, form, layout, plan
         self.depth = history_depth(network)
         #: what ports have beside what arrives, by their names
         self.own = {name: _own(network, name) for name in network.port_names}

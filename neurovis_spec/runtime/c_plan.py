@@ -1,0 +1,192 @@
+"""What an integration in C keeps, and where: made once for a network, read by all forms of its step.
+
+In: a Network. Out: its Plan, None where nothing flows: the parts of an array ``work`` of the caller's, what arrives at
+the ports that a stage reads, and what connections take there. The parts are
+
+    fx  the flow states at the beginning of a substep      fh  what is held at ports over the step
+    fy  those of a stage                                   fo  what connections take at a stage
+    fk  their derivatives there                            fv  the inputs and the noise of the step, inputs that are
+    fj  how much these change with their own states            expressions as they are at a stage
+    fs  sums of derivatives, over stages                   fg  what their noise is multiplied by
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import chain
+from typing import NamedTuple
+
+from neurovis_spec.arrays import Indices, IntArray, width
+from neurovis_spec.compiler.flows import BY_SLOPE
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Diffuse, Integrate, Port, Use
+from neurovis_spec.language.words import Method
+from neurovis_spec.runtime.c_arrivals import Incoming, incoming_of
+from neurovis_spec.runtime.stages import Part, apart, parts_of, places_among_taken, taken_by, unfolded
+
+#: Of a substep of the length 1, when the stages of a method are: just behind the beginning, in the middle, just before
+#: the end.
+BEGIN, MIDDLE, END = range(3)
+STAGES: Mapping[Method, tuple[int, ...]] = {
+    "euler": (BEGIN,),
+    "heun": (BEGIN, END),
+    "rk4": (BEGIN, MIDDLE, MIDDLE, END),
+    "exponential": (BEGIN,),
+    "semi_implicit": (BEGIN,),
+}
+
+
+class FlowState(NamedTuple):
+    """A flow state of a population: where its members stand among all flow states."""
+
+    part: Part
+    name: str
+    start: int
+
+    @property
+    def use(self) -> Use:
+        """The model that it is a state of."""
+        return self.part.population.model
+
+    @property
+    def size(self) -> int:
+        """How many numbers it is."""
+        return len(self.part.population.members)
+
+    @property
+    def varies(self) -> bool:
+        """Whether more than parameters says how much its derivative changes with it."""
+        let, diagonal = self.part.slopes.let, dict(self.part.slopes.trees)
+        if self.name not in diagonal:  # the method does not look at that
+            return False
+        return not unfolded(let, [diagonal[self.name]]).names <= {*self.use.parameters, *dict(let)}
+
+
+class Reaching(NamedTuple):
+    """What arrives at a port that a stage reads: what is held over the step, and what is made anew at each stage."""
+
+    held: Incoming
+    anew: Incoming
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What an integration keeps in ``work``, and where, and what it reads."""
+
+    network: Network
+    operation: Integrate
+    #: whether noise is added behind it
+    diffuses: bool
+
+    @cached_property
+    def of_stage(self) -> tuple[Part, ...]:
+        """What is done at a stage, population by population."""
+        return parts_of(self.network, self.operation)
+
+    @cached_property
+    def states(self) -> tuple[FlowState, ...]:
+        """All flow states, population by population."""
+        found: list[FlowState] = []
+        start = 0
+        for part in self.of_stage:
+            for name in part.flows:
+                found.append(FlowState(part, name, start))
+                start += found[-1].size
+        return tuple(found)
+
+    @cached_property
+    def starts(self) -> Mapping[tuple[int, str], int]:
+        """Where the members of a flow state of a population stand."""
+        return {(one.part.number, one.name): one.start for one in self.states}
+
+    @cached_property
+    def reaching(self) -> Mapping[tuple[int, str], Reaching]:
+        """What arrives at the ports of populations that a stage reads."""
+        return {
+            (part.number, port.name): Reaching(*(self._incoming(part, port, some) for some in apart(port)))
+            for part in self.of_stage
+            for port in part.ports
+        }
+
+    def _incoming(self, part: Part, port: Port, positions: IntArray) -> Incoming:
+        """Some of the signals of a port."""
+        factors = None if port.factors is None else port.factors[positions]
+        incoming, slots = port.incoming[positions], port.slots[positions]
+        some = replace(port, incoming=incoming, slots=slots, factors=factors, staged=None)
+        return incoming_of(self.network, some, len(part.population.members), fusible=False)
+
+    @cached_property
+    def held(self) -> Mapping[tuple[int, str], int]:
+        """Where what is held at the ports of populations stands."""
+        found: dict[tuple[int, str], int] = {}
+        start = 0
+        for part in self.of_stage:
+            formulas = (part.derivatives, part.spread, *(one.formulas for one in part.taken))
+            for port in dict.fromkeys(chain.from_iterable(one.ports for one in formulas)):
+                if len(apart(port)[0]):
+                    found[part.number, port.name] = start
+                    start += len(part.population.members)
+        return found
+
+    @cached_property
+    def places(self) -> IntArray:
+        """Where each activity and each outlet, as ``Network.sending`` has them, stands among what is taken at a stage;
+        −1 for none."""
+        return places_among_taken(self.network, self.of_stage)
+
+    @cached_property
+    def takes(self) -> Indices:
+        """Where what each connection takes (m,) stands among that; −1 for none."""
+        return self.places.astype(width(-1, len(self.places)))[taken_by(self.network)]
+
+    @cached_property
+    def parts(self) -> Mapping[str, int]:
+        """Where the parts of ``work`` begin, by their names; those of no numbers are left out."""
+        several = len(STAGES[self.operation.method]) > 1
+        count = sum(one.size for one in self.states)
+        sizes = {
+            "fx": count,
+            "fy": count if several else 0,
+            "fk": count,
+            "fj": count if self.operation.method in BY_SLOPE else 0,
+            "fs": count if several else 0,
+            "fg": count if self.diffuses else 0,
+            "fh": sum(len(self.network.populations[number].members) for number, _ in self.held),
+            "fo": int(self.places.max(initial=-1)) + 1,
+            "fv": self.network.vector_size if self.network.held_inputs else 0,
+        }
+        starts, start = dict[str, int](), 0
+        for name, size in sizes.items():
+            if size:
+                starts[name] = start
+                start += size
+        return starts | {"": start}
+
+
+def plan_of(network: Network) -> Plan | None:
+    """The plan of a network; None where nothing flows."""
+    by = network.integration
+    if by is None:
+        return None
+    return Plan(network, by, any(isinstance(one, Diffuse) for one in network.program))
+
+
+def work_size(plan: Plan | None) -> int:
+    """How many numbers ``work`` has."""
+    return 0 if plan is None else plan.parts[""]
+
+
+def written_out(plan: Plan | None, most: int) -> int:
+    """Up to how many neurons and connections a network is written out one by one, if it is up to ``most`` where nothing
+    flows: derivatives take more lines for each, which have to stay in the processor's cache from stage to stage."""
+    return most if plan is None else most // 6
+
+
+def pointer_lines(plan: Plan | None, real: str, quick: str, work: str) -> dict[str, str]:
+    """For each part of ``work``, the line that gives it its name; ``quick`` is how ``restrict`` is written."""
+    if plan is None:
+        return {}
+    parts = {name: start for name, start in plan.parts.items() if name}
+    return {name: f"{real} *{quick} const {name} = {work} + {start};" for name, start in parts.items()}
