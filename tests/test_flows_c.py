@@ -48,13 +48,13 @@ connections:
 
 
 def same_bits(network: nv.CompiledNetwork, steps: int) -> None:
-    """Activities, weights and states of the C backend are the reference's."""
-    made = [
-        record(network.network, Course(steps, backend=backend, keep=Keep(states=("all",))))
-        for backend in ("reference", "c")
-    ]
+    """Activities, weights and states of the C backend are the reference's, step by step and many steps by a call."""
+    states = Keep(states=("all",))
+    expected, found = (record(network.network, Course(steps, backend=one, keep=states)) for one in ("reference", "c"))
     for part in ("activity", "weights", "states"):
-        np.testing.assert_array_equal(getattr(made[1], part), getattr(made[0], part), part)
+        np.testing.assert_array_equal(getattr(found, part), getattr(expected, part), part)
+    together = record(network.network, Course(steps, backend="c", keep=Keep(weights=False)))
+    np.testing.assert_array_equal(together.activity, expected.activity)
 
 
 DISTANCES = """
@@ -136,3 +136,31 @@ events: [{{from: 2, clamp: {{A.v: -1}}}}]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         same_bits(nv.compile_text(text), 5)
+
+
+@FORMS
+@pytest.mark.parametrize(
+    "state",
+    ["derivative: -v + 0.3*drive", "derivative: drive - v, each_step: 0.9*v", "derivative: drive, each_episode: 0.1"],
+)
+@pytest.mark.parametrize("sent", ["tanh(v)", "v*cos(t)", "p*f(v)"])
+def test_what_is_there_from_the_step_before_is_what_a_stage_would_make(
+    small: int, state: str, sent: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also right behind a step in which a neuron was held, and a parameter was another."""
+    text = f"""
+neurovis: 1
+name: again
+time: {{dt: 0.1, episode: 4}}
+parameters: {{p: 0.7}}
+models:
+  m: {{parameters: {{p: 1}}, state: {{v: {{initial: 0.4, {state}}}}}, outputs: {{o: "{sent}"}}, activity: f(v)}}
+neurons: {{A: {{count: 3, model: {{m: {{p: p}}}}, bias: 0.2*i}}, B: {{model: m}}}}
+connections: [{{A -> A: {{weight: 0.3, pattern: all_to_all, send: o}}}}, {{A -> B: {{weight: 1, pattern: all_to_all}}}}]
+events: [{{from: 5, to: 7, clamp: {{A1: 0.9}}}}, {{at: 9, set: {{p: 0.2}}}}]
+"""
+    monkeypatch.setattr(c_backend, "SMALL", small)
+    network = nv.compile_text(text)
+    taken = c_backend.written(network.network).text.count("if (follows")
+    assert taken == ((sent != "v*cos(t)") + 1) * ("each_episode" not in state)
+    same_bits(network, 14)

@@ -85,7 +85,8 @@ typedef struct {
 
 #: ``nv_odd``: whether a number is not finite. Its exponent is all ones then; one more overflows into bit 63.
 #: ``nv_once`` makes a step, after which ``k`` is that of the next, and gives whether something is not finite. In
-#: ``nv_run`` ``wait`` is the number of steps until one is kept.
+#: ``nv_run`` ``wait`` is the number of steps until one is kept, and ``follows`` whether the step before was made there,
+#: in the form 0.
 _TAIL: Final = """
 static uint64_t nv_odd(const double *values, int64_t count)
 {
@@ -102,7 +103,7 @@ NV_PUBLIC int64_t nv_once(nv_state *p)
 {
     double odd = nv_read(p, p->k, p->s);
     if (p->form == 0)
-        odd += nv_plain(p, p->k, p->s);
+        odd += nv_plain(p, p->k, p->s, 0);
     else
         nv_general(p, p->k, p->s, p->form == 2);
     p->k++;
@@ -114,6 +115,7 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
     double *s = c->rows, *activity = c->activity, *weights = c->weights;
     const int fused = FUSED && c->then == 0 && c->steps > 3;
     int64_t made = 0;
+    int follows = 0;
     if (fused)
         nv_pack(p);
     int64_t wait = (c->every - c->k % c->every) % c->every;
@@ -134,9 +136,10 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
         if (form)
             nv_general(p, c->k + i, s, form == 2);
         else if (fused && i)
-            odd += nv_fused(p, c->k + i, s);
+            odd += nv_fused(p, c->k + i, s, follows);
         else
-            odd += nv_plain(p, c->k + i, s);
+            odd += nv_plain(p, c->k + i, s, follows);
+        follows = form == 0;
         if (fused)
             memcpy(p->before, p->activity, sizeof(double)*NEURONS);
         if (kept) {
@@ -236,14 +239,21 @@ def _write(network: Network, layout: SignalLayout) -> Written:
 def _functions(small: bool, watched: bool) -> tuple[_Function, ...]:
     """The functions that ``nv_once`` and ``nv_run`` call. Those of type double give ``odd``."""
     of_inputs, of_step = ", int64_t k, double *restrict s", ", int64_t k, const double *restrict s"
-    plain = Form(written_out=small, watched=watched)
+    plain = Form(written_out=small, follows=True, watched=watched)
     general = Form(first=True, held=True, fixed=True, gone=True, still=True, lost=True)
-    fused = Form(fused=True)
+    fused = Form(follows=True, fused=True)
     return (
         _Function("double", "nv_read", Form(watched=True), StepCode.read, of_inputs),
-        _Function("double", "nv_plain", plain, StepCode.write, of_step),
+        _Function("double", "nv_plain", plain, StepCode.write, f"{of_step}, int follows"),
         _Function("void", "nv_general", general, StepCode.write, f"{of_step}, int first"),
-        _Function("double", "nv_fused", replace(fused, watched=watched), StepCode.write, of_step, of_fused=True),
+        _Function(
+            "double",
+            "nv_fused",
+            replace(fused, watched=watched),
+            StepCode.write,
+            f"{of_step}, int follows",
+            of_fused=True,
+        ),
         _Function("void", "nv_pack", fused, StepCode.pack, of_fused=True),
         _Function("void", "nv_leave", fused, lambda step: step.leave(step.fuses), of_fused=True),
     )

@@ -115,6 +115,9 @@ class Form:
     written_out: bool = False
     #: neurons with ``initial`` take it at step 0, where the argument ``first`` is not 0
     first: bool = False
+    #: the step may follow one that was made in the same call and in a form like this, which the argument ``follows``
+    #: says: nothing has come between them
+    follows: bool = False
     #: neurons whose byte of ``held`` is set have the activity ``holding``
     held: bool = False
     #: so do states of models, whose bytes and numbers stand behind those of all neurons (``Network.state_places``)

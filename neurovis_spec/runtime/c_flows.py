@@ -34,7 +34,7 @@ from neurovis_spec.language.expressions.emit_c import INEXACT, Made, Value
 from neurovis_spec.language.expressions.parser import formula
 from neurovis_spec.language.expressions.tree import Name
 from neurovis_spec.language.words import Method
-from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, Sent
+from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, Sent, taken_at
 from neurovis_spec.runtime.c_code import Place, plus, words_of
 from neurovis_spec.runtime.c_plan import BEGIN, MIDDLE, STAGES, FlowState, Plan
 from neurovis_spec.runtime.c_step import StepCode, write, write_input
@@ -230,7 +230,8 @@ class _Integration:
         parts = self.plan.of_stage
         for part in parts:
             for one in part.taken:
-                self.neurons(part, one.formulas, partial(self.give, part, one))
+                with self.unless_there(part, one, first):
+                    self.neurons(part, one.formulas, partial(self.give, part, one))
         for part in parts:
             if part.flows:
                 self.neurons(part, part.derivatives, partial(self.slope, part))
@@ -239,6 +240,24 @@ class _Integration:
             with self.code.block(f"if ({first})"):
                 for part in noisy:
                     self.neurons(part, part.spread, partial(self.spread, part))
+
+    @contextmanager
+    def unless_there(self, part: Part, one: Taken, first: str) -> Iterator[None]:
+        """Lines that make what connections take, but where it is there from the end of the step before: then it is
+        taken from there at the first stage."""
+        code = self.code
+        if not (self.step.form.follows and self.plan.lasts(part, one)):
+            yield
+            return
+
+        def take(place: Place, totals: Mapping[int, str]) -> None:
+            there = taken_at(self.network, code, one.places, place)
+            code.line(f"fo[{code.at(self.plan.places[one.places], place)}] = {there};")
+
+        with code.block(f"if (follows && {first})"):
+            self.step.each(len(one.places), {}, take)
+        with code.block("else"):
+            yield
 
     def inputs(self) -> None:
         """Inputs that are formulas, at the time of a stage, but those that somebody has given for the step."""

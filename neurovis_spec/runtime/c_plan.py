@@ -24,7 +24,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Diffuse, Integrate, Port, Use
 from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.c_arrivals import Incoming, incoming_of
-from neurovis_spec.runtime.stages import Part, apart, parts_of, places_among_taken, taken_by, unfolded
+from neurovis_spec.runtime.stages import Part, Taken, apart, parts_of, places_among_taken, taken_by, unfolded
 
 #: Of a substep of the length 1, when the stages of a method are: just behind the beginning, in the middle, just before
 #: the end.
@@ -140,6 +140,15 @@ class Plan:
     def takes(self) -> Indices:
         """Where what each connection takes (m,) stands among that; −1 for none."""
         return self.places.astype(width(-1, len(self.places)))[taken_by(self.network)]
+
+    def lasts(self, part: Part, one: Taken) -> bool:
+        """Whether what connections take at the first stage of a step is what was made at the end of the step before, if
+        nothing has come between: it is made of states and parameters alone, and no episode's end changes these behind
+        it."""
+        ends = self.network.episode is not None and any(
+            state.each_episode is not None for state in part.population.model.definition.lasting
+        )
+        return not (ends or one.formulas.ports or {"k", "t"} & one.formulas.names)
 
     @cached_property
     def parts(self) -> Mapping[str, int]:

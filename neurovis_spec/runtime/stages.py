@@ -50,6 +50,8 @@ class Formulas(NamedTuple):
     trees: tuple[tuple[str, Tree], ...]
     let: Let
     ports: tuple[Port, ...]
+    #: all names that they read
+    names: frozenset[str]
 
 
 class Taken(NamedTuple):
@@ -133,7 +135,7 @@ def formulas_of(population: Population, trees: Iterable[tuple[str, Tree | None]]
     """Some formulas of the population's model, with ``more`` intermediate values behind its own."""
     kept = tuple((name, tree) for name, tree in trees if tree is not None)
     let, read = unfolded((*population.model.definition.let, *more), [tree for _, tree in kept])
-    return Formulas(kept, let, tuple(port for port in population.ports if port.name in read))
+    return Formulas(kept, let, tuple(port for port in population.ports if port.name in read), read)
 
 
 def apart(port: Port) -> tuple[IntArray, IntArray]:
