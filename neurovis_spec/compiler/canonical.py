@@ -90,6 +90,8 @@ def _flows(network: Network, places: IntArray) -> Iterator[tuple[object, ...]]:
     if neurons.port_input:
         yield "port_input", {port: np.append(places, -1)[given] for port, given in neurons.port_input.items()}
     yield from (("noise", one.name, one.port, one.state) for one in network.noises if one.port != DRIVE)
+    if network.connections.lags is not None:
+        yield "lags", network.connections.lags
     if (by := network.integration) is not None:
         yield "integrate", by.method, by.substeps
         if held := sorted(one.name for one in network.inputs if one.hold):

@@ -201,7 +201,8 @@ def _assemble(spec: Spec, sections: _Sections) -> Network:
     constants, census = declared.constants, declared.census
     name = known(spec.name.value, "")
     projections, rules = make_projections(connected.bundles)
-    connections = join(connected, rules)
+    stages = sections.order.stages
+    connections = join(connected, rules, None if stages is None else stages.lagging)
     populations = make_populations(census, connected.wired, sections.order)
     slots = tuple(constants.slots)
     network = Network(

@@ -52,12 +52,14 @@ class Cycle(NamedTuple):
 class Stages(NamedTuple):
     """The integration: its level; by ports which signals of their Line are made anew at each stage; for each neuron
     whether anything that is sent is. ``ahead``: by names of what is sent for each neuron whether others read it behind
-    the integration, before the neuron is updated."""
+    the integration, before the neuron is updated. ``lagging``: the connections (m,) whose delay is continuous, since
+    what they bring is read between steps; None without any."""
 
     level: int
     staged: Mapping[str, BoolArray]
     made: BoolArray
     ahead: Mapping[str, BoolArray] = MappingProxyType({})
+    lagging: BoolArray | None = None
 
 
 class Order(NamedTuple):
@@ -79,13 +81,14 @@ class Line(NamedTuple):
 @dataclass(frozen=True)
 class Wired:
     """The connections, as far as levels go by them: an entry has one of the ``routes``, and ``entry`` says of each
-    connection which entry it is of."""
+    connection which entry it is of; ``timed`` which have a delay above 0 in seconds, None where none has."""
 
     sources: IntColumn
     targets: IntColumn
     delays: IntColumn
     entry: IntColumn
     routes: Sequence[Route]
+    timed: BoolArray | None = None
 
     @cached_property
     def lines(self) -> Mapping[str, Line]:
@@ -120,8 +123,8 @@ def order_of(
     return level if isinstance(level, Cycle) else Order(level, np.zeros(len(model), dtype=np.int64))
 
 
-class _Undelayed(NamedTuple):
-    """The connections to the ports of a name: which of them have no delay, these, their sources and their targets."""
+class _Some(NamedTuple):
+    """Some of the connections to the ports of a name: which, these, their sources and their targets."""
 
     among: BoolArray
     connections: Indices
@@ -176,15 +179,24 @@ class _Coupled:
         return np.arange(len(self.sources), dtype=np.int64) if found is None else found
 
     @cached_property
-    def undelayed(self) -> dict[str, _Undelayed]:
+    def undelayed(self) -> dict[str, _Some]:
         """By ports the connections without delay."""
-        result = {}
-        for port in self.wired.lines:
-            arriving = self._arriving(port)
-            among = self.wired.undelayed[arriving]
-            found = arriving[among]
-            result[port] = _Undelayed(among, found, self.sources[found], self.targets[found])
-        return result
+        return {port: self._some(port, self.wired.undelayed) for port in self.wired.lines}
+
+    @cached_property
+    def fluent(self) -> dict[str, _Some]:
+        """By ports the connections that bring what flows as such: without delay, or with one in seconds."""
+        timed = self.wired.timed
+        if timed is None:
+            return self.undelayed
+        return {port: self._some(port, self.wired.undelayed | timed) for port in self.wired.lines}
+
+    def _some(self, port: str, which: BoolArray) -> _Some:
+        """Those of the connections to the ports of a name that are among these (m,)."""
+        arriving = self._arriving(port)
+        among = which[arriving]
+        found = arriving[among]
+        return _Some(among, found, self.sources[found], self.targets[found])
 
     def _of_neurons(self, port: str, reading: Sequence[Collection[str]]) -> BoolArray:
         """For each neuron whether what there is for its model has the name of a port in it."""
@@ -225,26 +237,26 @@ class _Coupled:
         mixed = {port: self.held.get(port, np.zeros(n, dtype=np.bool_)).copy() for port in self.wired.lines}
         for port, values in mixed.items():
             arriving = self._arriving(port)
-            values[self.targets[arriving[~self.undelayed[port].among]]] = True
+            values[self.targets[arriving[~self.fluent[port].among]]] = True
         flowing = self._of_sent(lambda number, sent: flows_by(self.models[number], sent) is not None)
         while True:
             for port, values in mixed.items():
                 flowing &= ~(self.through[port] & values[self.sources])
             before = sum(int(values.sum()) for values in mixed.values())
-            for port, (_, connections, _, targets) in self.undelayed.items():
+            for port, (_, connections, _, targets) in self.fluent.items():
                 mixed[port][targets[~flowing[connections]]] = True
             if sum(int(values.sum()) for values in mixed.values()) == before:
                 return flowing
 
     @cached_property
     def staged(self) -> dict[str, BoolArray]:
-        """By ports for each of its undelayed connections whether it is made anew at each stage: what it brings flows,
-        and a derivative reads that, or what another such connection takes."""
+        """By ports for each of its fluent connections whether it is made anew at each stage: what it brings flows, and a
+        derivative reads that, or what another such connection without delay takes."""
         result: dict[str, BoolArray] = {}
         making = np.zeros(len(self.sources), dtype=np.bool_)
         while True:
             before = int(making.sum())
-            for port, (_, connections, _, targets) in self.undelayed.items():
+            for port, (_, connections, _, targets) in self.fluent.items():
                 read = self.by_flow[port] | self._passed_on(port, making)
                 result[port] = self.flowing[connections] & read[targets]
                 making[connections[result[port]]] = True
@@ -252,16 +264,16 @@ class _Coupled:
                 return result
 
     def _passed_on(self, port: str, making: BoolArray) -> BoolArray:
-        """For each neuron whether any of some connections takes of it what reads a port."""
+        """For each neuron whether any of some connections without delay takes of it what reads a port."""
         reading = np.zeros(len(self.model), dtype=np.bool_)
-        reading[self.sources[making & self.through[port]]] = True
+        reading[self.sources[making & self.wired.undelayed & self.through[port]]] = True
         return reading
 
     @cached_property
     def making(self) -> BoolArray:
         """For each connection whether it brings to any port what is made anew at each stage."""
         result = np.zeros(len(self.sources), dtype=np.bool_)
-        for port, (_, connections, _, _) in self.undelayed.items():
+        for port, (_, connections, _, _) in self.fluent.items():
             result[connections[self.staged[port]]] = True
         return result
 
@@ -281,12 +293,14 @@ class _Coupled:
                 return level
             level, ahead = other, self._ahead(known)
         staged = {}
-        for port, (among, *_) in self.undelayed.items():
+        for port, (among, *_) in self.fluent.items():
             staged[port] = np.zeros(len(among), dtype=np.bool_)
             staged[port][among] = self.staged[port]
         made = np.zeros(n, dtype=np.bool_)
-        made[self.sources[self.making]] = True
-        return Order(level[:n], stage, Stages(int(level[n]), staged, made, ahead))
+        made[self.sources[self.making & self.wired.undelayed]] = True
+        lagging = None if self.wired.timed is None else self.making & self.wired.timed
+        lagging = lagging if lagging is not None and lagging.any() else None
+        return Order(level[:n], stage, Stages(int(level[n]), staged, made, ahead, lagging))
 
     def _ahead(self, known: BoolArray) -> dict[str, BoolArray]:
         """By names of what is sent for each neuron whether a neuron that does not wait for it reads it. ``known``: the
@@ -305,8 +319,9 @@ class _Coupled:
     def _stages(self) -> IntArray | Cycle:
         """For each neuron its level within a stage."""
         edges = []
-        for port, (_, connections, sources, targets) in self.undelayed.items():
+        for port, (_, connections, sources, targets) in self.fluent.items():
             waits = self.staged[port] & self._passed_on(port, self.making)[targets]
+            waits &= self.wired.undelayed[connections]
             edges.append((connections[waits], sources[waits], targets[waits]))
         level = levels_along(len(self.model), *_joined(edges))
         return level._replace(algebraic=True) if isinstance(level, Cycle) else level

@@ -17,8 +17,8 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from neurovis_spec.diagnostics import listed, shorten
 from neurovis_spec.language.grammar import (
+    DELAY,
     ENDS,
-    FORMULA,
     FORMULAS,
     GROUP,
     GROUP_DRAWN,
@@ -44,7 +44,6 @@ from neurovis_spec.language.library import not_yet
 from neurovis_spec.language.located import (
     IDENTIFIER,
     BoolField,
-    Formula,
     FormulaField,
     Leaf,
     Located,
@@ -54,9 +53,7 @@ from neurovis_spec.language.located import (
     TextField,
     TextsField,
     TimeField,
-    as_time,
     findings_of,
-    give_up,
     items_of,
     refuse,
     valid,
@@ -70,6 +67,7 @@ from neurovis_spec.language.values import (
     AtPort,
     BiasField,
     CentreField,
+    DelayField,
     DestinationsField,
     EdgesField,
     FileReference,
@@ -289,17 +287,8 @@ class ScaleModel(Model):
     )
 
 
-def _delay(node: Node, info: ValidationInfo) -> Formula:
-    """Steps, or a time with its unit."""
-    for entry in node.entries if isinstance(node, Mapping) else ():
-        if (later := not_yet(entry.name, "seconds", "matrix")) is not None:
-            findings_of(info).error("unknown-key", entry.key.span, later[0], "write a time, as 1.5 ms")
-            give_up()
-    return as_time(node, info)
-
-
-#: Rows of centres say which neurons are connected, as a matrix does.
-_CENTRE = AsTable("centre")
+#: Rows of centres say which neurons are connected, as a matrix does; those of delays have a cell for each pair.
+_CENTRE, _DELAY = AsTable("centre"), AsTable("delay")
 
 
 class ConnectionModel(Model):
@@ -338,10 +327,12 @@ class ConnectionModel(Model):
     ] = Field(None, description="Whether a neuron may connect to itself in a pattern (default false).")
     rows: Annotated[
         Annotated[Located[str], words("from", "to")] | None,
-        Needs(("matrix", _CENTRE), "'rows' says how a matrix is read; there is no matrix"),
+        Needs(("matrix", _CENTRE, _DELAY), "'rows' says how a matrix is read; there is no matrix"),
     ] = Field(None, description="Whether the rows of a matrix are sources (from) or targets (to) (default from).")
-    delay: Annotated[Formula, Leaf(_delay, FORMULA, True)] | None = Field(
-        None, description="Steps the signal travels, or a time such as 1.5 ms; 0 is within the same step (default 1)."
+    delay: Annotated[DelayField, DELAY] | None = Field(
+        None,
+        description="Steps the signal travels, or a time: 1.5 ms, {seconds: distance/3}, {matrix: …}; 0 is within the "
+        "same step (default 1).",
     )
     port: DestinationsField | None = Field(
         None, description="The port of the target, or several with factors: {ampa: 1, nmda: 0.3} (default drive)."

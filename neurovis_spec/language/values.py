@@ -39,7 +39,7 @@ from neurovis_spec.language.grammar import (
     declaring,
     words,
 )
-from neurovis_spec.language.keys import Keys, read_keys
+from neurovis_spec.language.keys import Keys, Words, read_keys
 from neurovis_spec.language.located import (
     NAME,
     Formula,
@@ -52,6 +52,7 @@ from neurovis_spec.language.located import (
     as_identifier,
     as_parts,
     as_text,
+    as_time,
     each,
     findings_of,
     give_up,
@@ -61,7 +62,7 @@ from neurovis_spec.language.located import (
     value_or,
 )
 from neurovis_spec.language.model import Model, NamedParameters, Short, opening
-from neurovis_spec.language.units import measured
+from neurovis_spec.language.units import Seconds, measured
 from neurovis_spec.language.words import Combine
 from neurovis_spec.language.yaml.source import AnyList, Entry, Mapping, Node, Scalar, Sequence, one_or_more
 
@@ -236,6 +237,52 @@ def as_centre(node: Node, info: ValidationInfo) -> Formula | Matrix:
 
 CentreField = Annotated[Formula | Matrix, Leaf(as_centre, Either((FORMULA, _ROWS, FILE)))]
 
+_DELAYS: Final = Map({"matrix": Key(Either((_ROWS, FILE)), "The delay of each pair, sources as rows.")}, one=True)
+_DELAY: Final = Map(
+    {
+        "seconds": Key(Either((FORMULA, _DELAYS)), "The delay in seconds, as an expression or {matrix: …}."),
+        "matrix": Key(Either((_ROWS, FILE)), "The delay of each pair in steps, sources as rows."),
+    },
+    one=True,
+)
+
+
+class Delay(NamedTuple):
+    """How long signals travel, of all connections or of each pair in a matrix: steps, or ``in_seconds``."""
+
+    value: Formula | Matrix
+    in_seconds: bool = False
+
+    @property
+    def span(self) -> Span:
+        """Where it stands."""
+        return self.value.span
+
+
+def as_delay(node: Node, info: ValidationInfo) -> Delay:
+    """Steps, a time with its unit, ``{seconds: …}`` or ``{matrix: …}``."""
+    if isinstance(node, AnyList):
+        refuse(info, node, "a delay", "rows of delays stand in a matrix: write {matrix: …}")
+    if not isinstance(node, Mapping):
+        time = as_time(node, info)
+        return Delay(time, isinstance(time.value, Seconds))
+    keys = read_keys(node, _DELAY.known, findings_of(info), Words(_no_delay)).mapping
+    entry = sole(keys, "kind of delay", "write {seconds: …} or {matrix: …}", info)
+    if entry.name == "matrix":
+        return Delay(as_matrix(entry.value, info))
+    if entry.name != "seconds":
+        give_up()
+    if not isinstance(entry.value, Mapping):
+        return Delay(as_time(entry.value, info), in_seconds=True)
+    keys = read_keys(entry.value, _DELAYS.known, findings_of(info), Words(_no_delay)).mapping
+    entry = sole(keys, "matrix", "write {matrix: …}", info)
+    return Delay(as_matrix(entry.value, info), in_seconds=True) if entry.name == "matrix" else give_up()
+
+
+def _no_delay(name: str) -> tuple[str, str] | None:
+    """What is said of a key of a delay that belongs into a matrix."""
+    return (f"a delay has no '{name}'", "write {matrix: {file: …}}") if name in ("file", "key") else None
+
 
 class FormulaList(NamedTuple):
     """A list of n values, one each."""
@@ -278,6 +325,9 @@ _STATES: Final = Map(
     least=1,
 )
 InitialField = Annotated[Initial, Leaf(as_initial, Either((FORMULA, ListOf(FORMULA), _STATES)))]
+
+
+DelayField = Annotated[Delay, Leaf(as_delay, Either((FORMULA, _DELAY)))]
 
 
 class AtPort(NamedTuple, Generic[T]):

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from neurovis_spec.compiler.checks.compiled import Compiled, WrittenEntry
+from neurovis_spec.compiler.connections.delays import warn_rounded
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.names.references import Section
@@ -101,6 +102,18 @@ def check_beyond_run(compiled: Compiled, findings: Findings) -> None:
             span = key.span if body.delay is None or body.edges is not None else body.delay.span
             message = f"after a delay of {plural(longest, 'step')} nothing arrives in a run of {steps} ('steps')"
             findings.warning("beyond-steps", span, message, hint.format(longest + 1))
+
+
+def check_rounded(compiled: Compiled, findings: Findings) -> None:
+    """Warn of delays in seconds that are rounded to steps: those between which nothing is read."""
+    connections, start = compiled.network.connections, 0
+    for bundle in compiled.bundles:
+        held = np.ones(len(bundle.sources), dtype=np.bool_)
+        if connections.lags is not None:
+            held = np.isnan(connections.lags[start : start + len(held)])
+        if bundle.timing is not None:
+            warn_rounded(bundle.timing, held, compiled.network.dt, findings)
+        start += len(held)
 
 
 def check_no_effect(compiled: Compiled, findings: Findings) -> None:

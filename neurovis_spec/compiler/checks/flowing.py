@@ -55,12 +55,14 @@ def _held_couplings(compiled: Compiled, method: Method, findings: Findings) -> N
     with delay 0."""
     network, census, made = compiled.network, compiled.census, compiled.network.connections
     delays = made.delays.whole()
-    if not (delays == 1).any():
+    lagging = None if made.lags is None else ~np.isnan(made.lags.whole())
+    of_one_step = delays == 1 if lagging is None else (delays == 1) & ~lagging
+    if not of_one_step.any():
         return
-    shorter = integers(np.where(delays == 1, 0, delays))
-    wired = Wired(made.sources, made.targets, shorter, made.entry, made.each_route)
+    shorter = integers(np.where(of_one_step, 0, delays))
+    wired = Wired(made.sources, made.targets, shorter, made.entry, made.each_route, lagging)
     held = held_at(network.neurons, network.inputs, network.noises)
-    would = (delays == 1) & made_anew(census.models.different, census.models.of, wired, held)
+    would = of_one_step & made_anew(census.models.different, census.models.of, wired, held)
     would &= _varying(network, wired)[wired.sources.compact()]
     if not would.any():
         return

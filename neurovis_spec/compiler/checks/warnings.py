@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 from neurovis_spec.compiler.checks.compiled import Compiled
-from neurovis_spec.compiler.checks.connections import check_beyond_run, check_doubled, check_no_effect
+from neurovis_spec.compiler.checks.connections import check_beyond_run, check_doubled, check_no_effect, check_rounded
 from neurovis_spec.compiler.checks.definitions import check_formulas, check_hidden, check_modules, check_unused
 from neurovis_spec.compiler.checks.lone_indices import check_lone_indices
 from neurovis_spec.compiler.checks.neurons import check_neurons
@@ -153,6 +153,7 @@ _CHECKS = (
     _Check(check_doubled, ("connections",)),
     _Check(check_beyond_run, ("time",)),
     _Check(check_no_effect, ("connections",)),
+    _Check(check_rounded, ("connections", "instances")),
     _Check(check_neurons, ("neurons",)),
     _Check(check_rules, ("connections",)),
     _Check(check_formulas, _DEFINITIONS),

@@ -11,7 +11,17 @@ from functools import cached_property
 
 import numpy as np
 
-from neurovis_spec.arrays import Column, Indices, IntArray, IntColumn, integers, narrow, reals
+from neurovis_spec.arrays import (
+    BoolArray,
+    Column,
+    FloatColumn,
+    Indices,
+    IntArray,
+    IntColumn,
+    integers,
+    narrow,
+    reals,
+)
 from neurovis_spec.compiler.connections.entries import Bundle, EntryBuilder, EntryContext
 from neurovis_spec.compiler.connections.plasticity import title_of
 from neurovis_spec.compiler.levels import Wired
@@ -47,6 +57,16 @@ class Connected:
     def delays(self) -> IntColumn:
         """The delay of every connection."""
         return integers(*(bundle.delays for bundle in self.bundles))
+
+    @cached_property
+    def exact(self) -> FloatColumn | None:
+        """How many steps the delay of every connection is, where it is in seconds, else NaN; None without any."""
+        exact = [None if bundle.timing is None else bundle.timing.exact for bundle in self.bundles]
+        if all(one is None for one in exact):
+            return None
+        sizes = self.sizes.tolist()
+        nothing = (np.broadcast_to(np.nan, (size,)) for size in sizes)
+        return reals(*(none if one is None else one for one, none in zip(exact, nothing, strict=True)))
 
     @cached_property
     def entry(self) -> IntColumn:
@@ -112,9 +132,13 @@ def _ends(
     return arrow.normal, sources, targets
 
 
-def join(made: Connected, rules: list[int]) -> Connections:
-    """All entries as one structure of columns; ``rules`` has for each entry the index of its Projection, or −1."""
+def join(made: Connected, rules: list[int], lagging: BoolArray | None = None) -> Connections:
+    """All entries as one structure of columns; ``rules`` has for each entry the index of its Projection, or −1, and
+    ``lagging`` says which connections have a continuous delay, if any."""
     bundles, sizes = made.bundles, made.sizes
+    lags = None
+    if lagging is not None and made.exact is not None:
+        lags = made.exact if lagging.all() else reals(np.where(lagging, made.exact.whole(), np.nan))
     return Connections(
         sources=made.sources,
         targets=made.targets,
@@ -131,4 +155,5 @@ def join(made: Connected, rules: list[int]) -> Connections:
         labels=tuple(bundle.label for bundle in bundles),
         routes=() if all(route == PLAIN_ROUTE for route in made.wired.routes) else tuple(made.wired.routes),
         undelayed=tuple(number for number, bundle in enumerate(bundles) if bundle.undelayed),
+        lags=lags,
     )

@@ -1,6 +1,6 @@
 """Edge lists: ``[from, to, weight, delay]`` rows, from the spec or from a file.
 
-In: rows as written or a file, the neurons of both ends. Out: positions within the ends, weights and delays (−1 where
+In: rows as written or a file, the neurons of both ends. Out: positions within the ends, weights and delays (none where
 an edge names none), in the order written. Long plain lists go from the reader's packed arrays straight into arrays.
 """
 
@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, Indices, IntArray, narrow
+from neurovis_spec.compiler.connections.delays import DelayReader, Delays, Timed, text_of
 from neurovis_spec.compiler.limits import LONGEST_DELAY, PATIENCE
 from neurovis_spec.compiler.names.references import Directory, few
 from neurovis_spec.compiler.values.cells import Cells, cells_of, seen_by_pairs, values_of
@@ -22,6 +23,7 @@ from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Span, shorten
 from neurovis_spec.language.located import time_of
+from neurovis_spec.language.units import Seconds
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
 from neurovis_spec.language.values import EdgeRows, FileReference
 from neurovis_spec.language.yaml.source import NULL, TEXT
@@ -31,12 +33,12 @@ _AN_EDGE = "an edge is [from, to], [from, to, weight] or [from, to, weight, dela
 
 
 class EdgeList(NamedTuple):
-    """Edges: positions within the ends, weights, delays (−1: the entry's)."""
+    """Edges: positions within the ends, weights, delays."""
 
     i: Indices
     j: Indices
     weights: FloatArray
-    delays: Indices
+    delays: Delays
 
 
 @dataclass(frozen=True)
@@ -84,8 +86,6 @@ class EdgeReader:
     stream: Stream
     #: how many connections may be made; None where that is not known
     most: int | None = None
-    #: whether a derivative of any target reads what they bring
-    into_flow: bool = False
 
     def read(self, edges: EdgeRows | FileReference) -> EdgeList | Unknown:
         """All edges; UNKNOWN where one is invalid."""
@@ -116,15 +116,13 @@ class EdgeReader:
             given_weights = self._given_weights(cells, first[weighted] + 2, ends)
         # the indices of a part count the edges that have a weight; from here on they count all edges
         self.constants.follow(part._replace(places=weighted[part.within(len(weighted))]) for part in parts)
-        given_delays = self._given_delays(cells, first[delayed] + 3)
-        if i is UNKNOWN or j is UNKNOWN or given_weights is UNKNOWN or given_delays is UNKNOWN:
+        delays = self._given_delays(cells, first[delayed] + 3, delayed)
+        if i is UNKNOWN or j is UNKNOWN or given_weights is UNKNOWN or delays is UNKNOWN:
             return UNKNOWN
         if len(wrong) or cells.failed:
             return UNKNOWN
         weights = np.ones(len(widths))
         weights[weighted] = given_weights
-        delays = np.full(len(widths), -1, dtype=np.int64)
-        delays[delayed] = given_delays
         return EdgeList(i, j, weights, delays)
 
     def _ends(self, cells: Cells, which: IntArray, end: End, what: str) -> Indices | Unknown:
@@ -161,17 +159,26 @@ class EdgeReader:
         values = values_of(cells, which, self.constants, *seen)
         return UNKNOWN if values is UNKNOWN else np.where(cells.kinds[which] == NULL, 1.0, values)
 
-    def _given_delays(self, cells: Cells, which: IntArray) -> IntArray | Unknown:
-        """The delays in these cells: few distinct ones, each evaluated once."""
-        found: dict[tuple[int, float], int | Unknown] = {}
-        result = np.zeros(len(which), dtype=np.int64)
+    def _given_delays(self, cells: Cells, which: IntArray, edges: IntArray) -> Delays | Unknown:
+        """The delays in these cells, each of an edge: few distinct ones, each evaluated once."""
+        reader, steps = DelayReader(self.constants), np.full(len(cells.widths), -1, dtype=np.int64)
+        places: dict[tuple[int, float], list[int]] = {}
         for place, cell in enumerate(which.tolist()):
             key = int(cells.kinds[cell]), float(cells.numbers[cell]) if cells.kinds[cell] != NULL else 0.0
-            if key not in found:
-                formula = time_of(cells.node(cell), self.constants.findings)
-                found[key] = UNKNOWN if formula is UNKNOWN else self.constants.delay(formula, self.into_flow)
-            result[place] = known(found[key], 0)
-        return UNKNOWN if UNKNOWN in found.values() else result
+            places.setdefault(key, []).append(place)
+        exact, timed, failed = np.full(len(steps), np.nan), list[Timed](), False
+        for alike in places.values():
+            formula = time_of(cells.node(int(which[alike[0]])), self.constants.findings)
+            in_seconds = formula is not UNKNOWN and isinstance(formula.value, Seconds)
+            found = UNKNOWN if formula is UNKNOWN else reader.single(formula, in_seconds)
+            if formula is UNKNOWN or found is UNKNOWN:
+                failed = True
+                continue
+            own = edges[alike]
+            steps[own], exact[own] = found
+            if in_seconds:
+                timed.append(Timed(formula.span, text_of(formula), own))
+        return UNKNOWN if failed else Delays(narrow(steps), exact if timed else None, tuple(timed))
 
     def _report_outside(self, name: str, end: End, what: str, span: Span, where: str) -> None:
         """Report a neuron that does not belong to an end, which is ``what``: a source or a target."""
@@ -203,6 +210,11 @@ class EdgeReader:
         for place in long[:PATIENCE]:
             message = f"row {table.row(place)} of the file: a delay must be at most {LONGEST_DELAY:,}"
             self.constants.findings.error("out-of-range", span, message, key=("delay", place))
-        if i is UNKNOWN or j is UNKNOWN or long or table.fault is not None:
+        given = Delays(delays)
+        if table.seconds is not None:
+            reader = DelayReader(self.constants)
+            timed = reader.each(table.seconds, span, True, False, lambda edge: f"row {table.row(edge)} of the file")
+            given = UNKNOWN if timed is UNKNOWN else timed.over(given)
+        if i is UNKNOWN or j is UNKNOWN or long or table.fault is not None or given is UNKNOWN:
             return UNKNOWN
-        return EdgeList(i, j, table.weights, delays)
+        return EdgeList(i, j, table.weights, given)

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray, narrow
+from neurovis_spec.compiler.connections.delays import DelayReader, Delays, Timed, check_below_step, text_of
 from neurovis_spec.compiler.connections.edges import EdgeReader, End
 from neurovis_spec.compiler.connections.ends import Ends, counted
 from neurovis_spec.compiler.connections.patterns import all_to_all, empty_reason, pairs_of
@@ -25,7 +26,6 @@ from neurovis_spec.compiler.connections.plasticity import ConnectionEnds, Learni
 from neurovis_spec.compiler.connections.routes import default_delays, route_of
 from neurovis_spec.compiler.connections.weight_scale import Scaled, check_scale, scaled
 from neurovis_spec.compiler.events.settable import Assembled, Distance, Part
-from neurovis_spec.compiler.flows import ports_read_by
 from neurovis_spec.compiler.limits import Limits, amount
 from neurovis_spec.compiler.names.references import Directory
 from neurovis_spec.compiler.names.scope import Scope
@@ -37,17 +37,17 @@ from neurovis_spec.compiler.values.constants import Constants, Randomness, Value
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.compiler.values.matrices import Grid, grid_of
 from neurovis_spec.diagnostics import Span
-from neurovis_spec.language.expressions.tree import names
+from neurovis_spec.language.expressions.tree import draws, names
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import ConnectionModel
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
-from neurovis_spec.language.values import FileReference, MatrixRows
+from neurovis_spec.language.values import Delay, FileReference, MatrixRows
 from neurovis_spec.language.yaml.source import Scalar
 
 #: Keys of a body that say which connections there are.
 _SHAPING = frozenset({"matrix", "edges", "pattern", "centre", "rows", "self"})
-_WEIGHT = formula_at(ConnectionModel, "weight")
+_WEIGHT, _DELAY = (formula_at(ConnectionModel, key) for key in ("weight", "delay"))
 
 
 class Bundle(NamedTuple):
@@ -76,6 +76,8 @@ class Bundle(NamedTuple):
     route: Route = PLAIN_ROUTE
     #: whether it names no delay, and connections have delay 0 for what flows through them
     undelayed: bool = False
+    #: its delays, where any is in seconds
+    timing: Delays | None = None
 
 
 class _Shape(NamedTuple):
@@ -86,7 +88,7 @@ class _Shape(NamedTuple):
     #: for each pair the position of its target among the targets of the entry
     j: Indices
     weights: FloatArray | None = None
-    delays: Indices | None = None
+    delays: Delays | None = None
     #: which of its weights follow parameters
     parts: tuple[Part, ...] = ()
 
@@ -126,16 +128,6 @@ class EntryBuilder:
         """What its connections take, and where they bring it."""
         return route_of(self.body, self.sources, self.targets, self.context.census, self.constants)
 
-    @cached_property
-    def into_flow(self) -> bool:
-        """Whether a derivative of any of its targets reads what it brings."""
-        census = self.context.census
-        if not census.models.flow or self.targets is UNKNOWN or self.route is UNKNOWN:
-            return False
-        ports = [name for name, _ in self.route.ports]
-        models = np.unique(census.models.of[self.targets]).tolist()
-        return any(not ports_read_by(census.models.different[one]).flow.isdisjoint(ports) for one in models)
-
     def _stream(self, purpose: str) -> Stream:
         return Stream(self.context.seed, purpose, self.context.scope.declares(self.name))
 
@@ -149,7 +141,6 @@ class EntryBuilder:
         errors_before_entry = findings.errors
         if body.label is not None:
             check_length(body.label, findings)
-        delay = 1 if body.delay is None else self.constants.delay(body.delay, self.into_flow)
         route = self.route
         errors_before_shape = findings.errors
         # what is collected here stands at cells of the matrix, what ``centre_parts`` collects at connections
@@ -160,6 +151,7 @@ class EntryBuilder:
             self._report_empty()
         if findings.errors > errors_before_shape or (shape is not UNKNOWN and not self._fits(len(shape.i))):
             shape = UNKNOWN
+        written = self._written_delays(shape)
         with self.constants.following() as weight_parts:
             weights = self._weights(shape)
         with self.constants.following() as centre_parts:
@@ -179,9 +171,10 @@ class EntryBuilder:
         ):
             return UNKNOWN
         sources, targets = self.sources[shape.i], self.targets[shape.j]
-        unsaid: int | Indices = known(delay, 1)
-        if body.delay is None:
-            unsaid = default_delays(sources, targets, route, self.context.census.models)
+        models = self.context.census.models
+        unsaid = default_delays(sources, targets, route, models)
+        delays = _delays(shape, written, unsaid)
+        check_below_step(delays, models.into_flow(targets, route), self.constants)
         learning = learning if len(shape.i) else None  # without connections there is nothing that a rule would change
         return Bundle(
             name=self.context.scope.called(self.name),
@@ -190,7 +183,7 @@ class EntryBuilder:
             targets=targets,
             weights=weights,
             centres=centres,
-            delays=_delays(shape, unsaid),  # an invalid one is 1: at 0 it could close a cycle
+            delays=delays.steps,
             low=bounds[0],
             high=bounds[1],
             learning=learning,
@@ -205,7 +198,8 @@ class EntryBuilder:
             label=None if body.label is None else body.label.value,
             empty=None if len(shape.i) else (self.sources, self.targets),
             route=route,
-            undelayed=body.delay is None and not np.all(unsaid),
+            undelayed=written is None and not np.all(unsaid),
+            timing=None if delays.exact is None else delays,
         )
 
     def _report_empty(self) -> None:
@@ -313,17 +307,60 @@ class EntryBuilder:
             End(neurons, self.context.directory, called, path) for neurons in (self.sources, self.targets)
         )
         reader = EdgeReader(
-            sources,
-            targets,
-            self.constants,
-            self.context.scope.files,
-            self._stream("weight"),
-            self.context.room,
-            self.into_flow,
+            sources, targets, self.constants, self.context.scope.files, self._stream("weight"), self.context.room
         )
         with self.constants.following() as parts:
             edges = reader.read(self.body.edges)
         return UNKNOWN if edges is UNKNOWN else _Shape(edges.i, edges.j, edges.weights, edges.delays, tuple(parts))
+
+    def _written_delays(self, shape: _Shape | Unknown) -> Delays | Unknown | None:
+        """What the entry says of its delays, of every pair; None where it says nothing. The structure depends on it."""
+        written = self.body.delay
+        if written is None:
+            return None
+        with self.constants.following() as parts:
+            found = self._pair_delays(written, shape)
+        self.constants.depend_on(parts)
+        return found
+
+    def _pair_delays(self, written: Delay, shape: _Shape | Unknown) -> Delays | Unknown:
+        """Delays in a matrix, by a formula of each pair, or all the same."""
+        reader, drawn = DelayReader(self.constants), False
+        if isinstance(written.value, Located):
+            tree = self.constants.tree(written.value, _DELAY)
+            if tree is UNKNOWN:
+                return UNKNOWN
+            drawn = bool(draws(tree))
+            if names(tree).isdisjoint(_DELAY.sees) and not drawn:
+                return self._same_delay(written.value, written.in_seconds, shape)
+            if "distance" in names(tree):
+                self._go_by_position()
+            values = self._values(written.value, shape, "delay")
+        else:
+            grid = self._grid(written.value, "delay")
+            values = UNKNOWN if grid is UNKNOWN or shape is UNKNOWN else grid.values[shape.i, shape.j]
+        if values is UNKNOWN or shape is UNKNOWN or self.sources is UNKNOWN or self.targets is UNKNOWN:
+            return UNKNOWN
+        ends, called = (self.sources[shape.i], self.targets[shape.j]), self.context.census.neurons.names
+        return reader.each(
+            values, written.span, written.in_seconds, drawn, lambda at: f"{called[ends[0][at]]} -> {called[ends[1][at]]}"
+        )
+
+    def _same_delay(self, formula: Formula, in_seconds: bool, shape: _Shape | Unknown) -> Delays | Unknown:
+        """A delay that all connections have."""
+        found = DelayReader(self.constants).single(formula, in_seconds)
+        if found is UNKNOWN or shape is UNKNOWN:
+            return UNKNOWN
+        steps, exact = (np.broadcast_to(np.asarray(one), shape.i.shape) for one in found)
+        if not in_seconds:
+            return Delays(steps)
+        return Delays(steps, exact, (Timed(formula.span, text_of(formula)),))
+
+    def _go_by_position(self) -> None:
+        """What places the neurons is structural, since something that is does depend on it."""
+        for end in (self.sources, self.targets):
+            if end is not UNKNOWN:
+                self.context.census.go_by_position(end.astype(np.int64))
 
     def _values(self, formula: Formula, shape: _Shape | Unknown, purpose: str) -> FloatArray | Unknown:
         """The values of a formula of i, j, n_from, n_to (and distance), one for every pair."""
@@ -468,11 +505,14 @@ class EntryBuilder:
         )
 
 
-def _delays(shape: _Shape, delay: int | Indices) -> Indices:
-    """The delay of each connection: that of its edge, where it has one, else that of the entry."""
-    if shape.delays is None or (shape.delays < 0).all():
-        return np.broadcast_to(np.asarray(delay, dtype=np.int64), shape.i.shape)
-    return narrow(np.where(shape.delays >= 0, shape.delays, delay))
+def _delays(shape: _Shape, written: Delays | Unknown | None, unsaid: int | Indices) -> Delays:
+    """The delay of each connection: that of its edge, where it has one, else that of the entry, else as it is where
+    nothing is said. An invalid one is 1: at 0 it could close a cycle."""
+    otherwise = 1 if written is UNKNOWN else unsaid
+    result = Delays(np.broadcast_to(np.asarray(otherwise, dtype=np.int64), shape.i.shape))
+    for given in (known(written, None), shape.delays):
+        result = result if given is None else given.over(result)
+    return result
 
 
 def _cells_of(present: BoolArray, values: FloatArray) -> _Shape:

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, Indices, IntArray, frozen, narrow
 from neurovis_spec.compiler.events.settable import Assembled
+from neurovis_spec.compiler.flows import ports_read_by
 from neurovis_spec.compiler.levels import default_delay
 from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.compiler.names.references import Directory, key_span
@@ -50,6 +51,12 @@ class Models:
             ports = [name for name, _ in route.ports]
             self._delays[key] = default_delay(self.different[source], route.sends, self.different[target], ports)
         return self._delays[key]
+
+    def into_flow(self, targets: Indices, route: Route) -> npt.NDArray[np.bool_]:
+        """For each connection to one of these whether a derivative there reads what arrives."""
+        ports = [name for name, _ in route.ports]
+        reading = [not ports_read_by(one).flow.isdisjoint(ports) for one in self.different]
+        return np.array(reading, dtype=np.bool_)[self.of[targets]]
 
     @property
     def flow(self) -> bool:

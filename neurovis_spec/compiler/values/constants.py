@@ -425,34 +425,11 @@ class Constants:
             formula = formula._replace(value=round(steps))
         return self.integer(formula, what, least, most)
 
-    def delay(self, formula: Formula, into_flow: bool) -> int | Unknown:
-        """A delay in steps. One that is written as a time is rounded, to one step at least if it is above 0; a warning
-        says so where that makes another delay of it. One below a step is an error where a derivative reads what arrives
-        (``into_flow``): held over a step it would be that of a step, and not held it would be none."""
-        if isinstance(formula.value, Seconds):
-            if not self.timed:
-                return UNKNOWN
-            if formula.value < 0:
-                message = f"a delay must be at least 0, this is {formula.value:.15g} s"
-                self.findings.error("out-of-range", formula.span, message)
-                return UNKNOWN
-            exact = formula.value / self.dt
-            steps = max(round(exact), min(1, math.ceil(exact)))
-            written, made = shorten(str(formula.node.value).strip()), plural(steps, "step")
-            if 0 < exact < 1 - NEAR_INTEGER:
-                message = f"'{written}' is less than a step, which is {self.dt:.12g} s long"
-                if into_flow:
-                    message += ", and a derivative reads what arrives"
-                    hint = "write delay: 0, so that it arrives within the step; delay: 1 holds it over one"
-                    self.findings.error("out-of-range", formula.span, message, f"{hint}; or shorten 'dt'")
-                    return UNKNOWN
-                message, hint = f"{message}: the delay is 1 step", "shorten 'dt', or write delay: 1"
-                self.findings.warning("delay-below-step", formula.span, message, hint)
-            elif abs(exact - steps) > NEAR_INTEGER:
-                message = f"'{written}' is {exact:.12g} steps: the delay is {made}, {steps * self.dt:.12g} s"
-                self.findings.warning("delay-rounded", formula.span, message, "write a whole number of steps")
-            formula = formula._replace(value=steps)
-        return self.integer(formula, "a delay", 0, LONGEST_DELAY)
+    def depend_on(self, parts: Iterable[Part]) -> None:
+        """Note that something of the structure depends on the parameters, of those that are declared here, that these
+        numbers follow."""
+        slots = frozenset[int]().union(*(part.formula.slots for part in parts))
+        self.depend([name for name, slot in self.settable.items() if slot in slots])
 
     def depend(self, used: Iterable[str]) -> None:
         """Note that something of the structure depends on these parameters, and so on those that they follow."""

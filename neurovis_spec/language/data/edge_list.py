@@ -36,9 +36,9 @@ from neurovis_spec.language.data.cells import (
 from neurovis_spec.language.data.table import CellError, Faults, Room, in_cell, in_row, quoted
 from neurovis_spec.likeness import nearest
 
-_COLUMNS: Final = ("from", "to", "weight", "delay")
+_COLUMNS: Final = ("from", "to", "weight", "delay", "delay_seconds")
 _LARGEST_DELAY: Final = 2**31 - 1
-#: cells of the first row; a header has four at most, and a few more may be a mistake to be named
+#: cells of the first row; a header has five at most, and a few more may be a mistake to be named
 _MOST_CELLS: Final = 100
 _NO_MARKS: Final = bytes(set(range(256)) - set(b",\n"))
 #: names are looked up by so many words of eight bytes, at one of so many places
@@ -51,14 +51,17 @@ _MASKS: Final = np.array([(1 << 8 * size) - 1 for size in range(9)], dtype=np.ui
 #: odd numbers that spread words over places (the golden ratio's, as in Knuth 6.4, and powers of it)
 _SPREAD: Final = [np.uint64(pow(0x9E3779B97F4A7C15, power, 1 << 64)) for power in range(1, _WORDS + 1)]
 _HINT: Final = "the first row is 'from,to', 'from,to,weight' or 'from,to,weight,delay'"
+#: the columns of numbers
+_NUMBERS: Final = _COLUMNS[2:]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EdgeTable:
     """A list of edges, one an index: from ``names[begins[i]]`` to ``names[ends[i]]``. A delay is −1 where the file
-    gives none; ``offsets`` is what has to be added to an edge's index for its row in the file. ``fault`` is the first
-    that is wrong with its rows, and holds the others: then edges are missing, and a weight or delay invalid is as if it
-    were not given."""
+    gives none in steps; ``seconds`` are those in seconds, NaN where it gives none, None without a column of them;
+    ``offsets`` is what has to be added to an edge's index for its row in the file. ``fault`` is the first that is wrong
+    with its rows, and holds the others: then edges are missing, and a weight or delay invalid is as if it were not
+    given."""
 
     names: tuple[str, ...]
     begins: Indices
@@ -67,6 +70,7 @@ class EdgeTable:
     delays: IntColumn
     offsets: IntColumn
     fault: CellError | None = None
+    seconds: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.begins)
@@ -115,7 +119,7 @@ def _columns(header: list[str]) -> dict[str, int]:
     for column, name in enumerate(names, 1):
         if name not in _COLUMNS:
             close = nearest(name, _COLUMNS, 1)
-            hint = f"did you mean '{close[0]}'?" if close else "the columns are from, to, weight and perhaps delay"
+            hint = f"did you mean '{close[0]}'?" if close else "the columns are from, to, weight and perhaps delay, or delay_seconds"
             if name.startswith("#"):
                 hint = NO_COMMENT
             elif separated(name):
@@ -215,6 +219,14 @@ def _in_brief(numbers: npt.NDArray[Any]) -> Indices:
     return np.broadcast_to(kept[0], kept.shape) if (kept == kept[0]).all() else kept
 
 
+def _are_delays(steps: FloatArray, seconds: FloatArray) -> bool:
+    """Whether these are delays, of each edge one at most; NaN where none is given."""
+    given = steps[~np.isnan(steps)]
+    if not np.array_equal(given, np.clip(np.floor(given), 0, _LARGEST_DELAY)):
+        return False
+    return not ((seconds < 0) | ~(np.isnan(steps) | np.isnan(seconds))).any()
+
+
 class _Reader:
     """Takes the rows after the header, and gives the table of all of them; what is wrong with them is reported."""
 
@@ -226,10 +238,11 @@ class _Reader:
         self._count = 0
         self._begins, self._ends = np.empty(most, dtype=np.int32), np.empty(most, dtype=np.int32)
         self._weights = np.empty(most)
+        self._seconds = np.empty(most) if "delay_seconds" in places else None
         #: those of some edges after the other
         self._delays: list[Indices] = []
         self._offsets: list[Indices] = []
-        #: edges that were taken one by one since: where they begin and end, weight, delay, row
+        #: edges that were taken one by one since: where they begin and end, weight, delay, that in seconds, row
         self._singles = array("d")
 
     def table(self) -> EdgeTable:
@@ -243,13 +256,16 @@ class _Reader:
             delays=integers(*self._delays),
             offsets=integers(*self._offsets),
             fault=self.faults.first(),
+            seconds=None if self._seconds is None else self._seconds[: self._count],
         )
 
     def _add(self, *columns: npt.NDArray[Any]) -> None:
-        """Add edges: where they begin and end, weights, delays, rows."""
-        begins, ends, weights, delays, rows = columns
+        """Add edges: where they begin and end, weights, delays, those in seconds, rows."""
+        begins, ends, weights, delays, seconds, rows = columns
         at = slice(self._count, self._count + len(rows))
         self._begins[at], self._ends[at], self._weights[at] = begins, ends, weights
+        if self._seconds is not None:
+            self._seconds[at] = seconds
         self._delays.append(_in_brief(delays))
         self._offsets.append(_in_brief(rows - np.arange(at.start, at.stop)))
         self._count = at.stop
@@ -257,7 +273,7 @@ class _Reader:
     def _add_singles(self) -> None:
         """Add what was taken one by one."""
         if self._singles:
-            self._add(*np.array(self._singles).reshape(-1, 5).T)
+            self._add(*np.array(self._singles).reshape(-1, 6).T)
             del self._singles[:]
 
     def take(self, lines: bytes, number: int) -> None:
@@ -278,21 +294,20 @@ class _Reader:
 
     def _quickly(self, columns: dict[str, _Cells], number: int, count: int) -> bool:
         """Take rows, column by column; False, and none is taken, where one of them is invalid or may be."""
-        weights, delays = (
-            numbers_of(columns[name].joined()) if name in columns else np.full(count, math.nan)
-            for name in ("weight", "delay")
-        )
-        if weights is None or delays is None:
-            return False
-        given = delays[~np.isnan(delays)]
-        if not np.array_equal(given, np.clip(np.floor(given), 0, _LARGEST_DELAY)):
+        found = [
+            numbers_of(columns[name].joined()) if name in columns else np.broadcast_to(np.nan, (count,))
+            for name in _NUMBERS
+        ]
+        numbers = [one for one in found if one is not None]
+        if len(numbers) < len(found) or not _are_delays(*numbers[1:]):
             return False
         begins, ends = self._names.of(columns["from"]), self._names.of(columns["to"])
         if min(begins.min(), ends.min()) < 0:
             return False
-        weights, delays = np.where(np.isnan(weights), 1.0, weights), np.where(np.isnan(delays), -1.0, delays)
+        weights, steps, seconds = numbers
+        weights, steps = np.where(np.isnan(weights), 1.0, weights), np.where(np.isnan(steps), -1.0, steps)
         self._add_singles()
-        self._add(begins, ends, weights, delays, np.arange(number, number + count))
+        self._add(begins, ends, weights, steps, seconds, np.arange(number, number + count))
         return True
 
     def _one(self, row: Row) -> None:
@@ -305,11 +320,14 @@ class _Reader:
         for column in sorted(self._places[end] for end in ("from", "to")):
             if not cells[column]:
                 self.faults.note(in_cell(number, column + 1, "the name of a neuron is wanted"))
-        weight, delay = (self._number(number, cells, name) for name in ("weight", "delay"))
+        weight, steps, seconds = (self._number(number, cells, name) for name in _NUMBERS)
+        if not (math.isnan(steps) or math.isnan(seconds)):
+            column = self._places["delay_seconds"] + 1
+            self.faults.note(in_cell(number, column, "a delay in steps stands in this row, too"))
         if all(ends):
             begin, end = (self._names[name] for name in ends)
-            weight, delay = 1.0 if math.isnan(weight) else weight, -1.0 if math.isnan(delay) else delay
-            self._singles.extend((begin, end, weight, delay, number))
+            weight, steps = 1.0 if math.isnan(weight) else weight, -1.0 if math.isnan(steps) else steps
+            self._singles.extend((begin, end, weight, steps, seconds, number))
 
     def _number(self, row: int, cells: list[str], name: str) -> float:
         """What a row has in the column of this name; NaN where that is nothing, or invalid, which is reported."""
@@ -320,6 +338,8 @@ class _Reader:
             value = number_of(cells[column], row, column + 1)
             if name == "delay" and not math.isnan(value) and not (value.is_integer() and 0 <= value <= _LARGEST_DELAY):
                 raise in_cell(row, column + 1, f"{quoted(cells[column])} is no delay (0, 1, 2, … steps)")
+            if name == "delay_seconds" and value < 0:
+                raise in_cell(row, column + 1, f"{quoted(cells[column])} is no delay: it is at least 0 seconds")
         except CellError as error:
             self.faults.note(error)
             return math.nan
