@@ -18,15 +18,21 @@ from neurovis_spec.manual.topics import Topic
 from neurovis_spec.manual.words import Word, functions, names
 
 _WIDTH: Final = 100
-_KINDS: Final = {"activation": "an activation", "model": "a neuron model", "rule": "a plasticity rule"}
+_KINDS: Final = {
+    "activation": "an activation",
+    "model": "a neuron model",
+    "rule": "a plasticity rule",
+    "synapse": "a synapse",
+}
 
 
 def text_of(found: Sequence[Topic]) -> str:
-    """One topic, or all that a name may mean; of a key that many sections have, a line each."""
-    same = [topic for topic in found if isinstance(topic, Key)]
+    """One topic, or all that a name may mean; of a key that many sections have, a line each, but for a section of that
+    name."""
+    same = [topic for topic in found if isinstance(topic, Key) and topic.path != topic.name]
     if len(same) <= 2:
         return "\n\n\n".join(map(explained, found))
-    others = [explained(topic) for topic in found if not isinstance(topic, Key)]
+    others = [explained(topic) for topic in found if topic not in same]
     rows = table([(key.path, key.about) for key in same])
     return "\n\n\n".join([*others, f"{same[0].name}, a key of several sections\n\n{rows}"])
 

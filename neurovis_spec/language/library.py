@@ -308,7 +308,7 @@ class CentreModel(ChangeModel):
     ONE_OF: ClassVar[OneOf | None] = _one_change("centre")
 
     each_step: Annotated[FormulaField, IN_CENTRE] | None = Field(
-        None, description="c[t+1], an expression of centre, pre, post, …."
+        None, description="The centre after a step, an expression of centre, pre, post, …."
     )
     each_episode: Annotated[FormulaField, IN_CENTRE] | None = Field(None, description="The centre after an episode.")
     derivative: Annotated[Annotated[FormulaField, IN_CENTRE] | None, _WITHOUT_STEPS] = Field(

@@ -1,7 +1,7 @@
 """Definitions that are most likely mistakes: unused, read by nothing, hidden by others, replacing what they should
 change.
 
-In: the activations, models, rules and modules of a spec and of the files that it includes. Out: warnings where they are
+In: the definitions and modules of a spec and of the files that it includes. Out: warnings where they are
 declared, or where they are named.
 """
 
@@ -19,7 +19,7 @@ from neurovis_spec.compiler.flows import jacobian, with_slope
 from neurovis_spec.compiler.names.references import key_of, key_span
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.groups import Built
-from neurovis_spec.compiler.program import ACTIVATION, MODEL, RULE, Kind
+from neurovis_spec.compiler.program import ACTIVATION, MODEL, RULE, SYNAPSE, Kind
 from neurovis_spec.compiler.values.builtin import installed
 from neurovis_spec.compiler.values.constants import value_of
 from neurovis_spec.compiler.values.definitions import Defined
@@ -37,7 +37,12 @@ from neurovis_spec.language.values import Choice
 from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
 
 #: What the result of definitions of a kind is, in the author's words.
-_RESULT_NOUN: AnyMapping[Kind, str] = {ACTIVATION: "the value", MODEL: "the activity", RULE: "the weight"}
+_RESULT_NOUN: AnyMapping[Kind, str] = {
+    ACTIVATION: "the value",
+    MODEL: "the activity",
+    RULE: "the weight",
+    SYNAPSE: "the signal",
+}
 _NOUNS = {"let": "intermediate value", "signals": "signal", "parameters": "parameter", "ports": "port"}
 
 
@@ -52,8 +57,9 @@ def check_formulas(compiled: Compiled, findings: Findings) -> None:
             for name, model in library.definitions[kind.section].items():
                 written = model.parts()
                 parts = _parts_of(model, written)
-                _check_parts(parts, written, result_noun, findings)
-                _check_flows(parts, written, shown, findings)
+                result = f"the {written.gives}" if written.gives else result_noun
+                _check_parts(parts, written, result, findings)
+                _check_flows(parts, written, shown if kind == MODEL else frozenset(), result, findings)
                 if kind.lasting:
                     _check_replaced(parts, written, compiled.library.definitions.of(kind).known()[name], findings)
 
@@ -64,12 +70,14 @@ class _Part(NamedTuple):
     section: str
     span: Span
     reads: frozenset[str]
+    #: of a state whether it has a derivative
+    flows: bool = False
 
 
 def _names_read(*formulas: Formula | None) -> frozenset[str]:
     """The names that formulas read."""
     texts = [formula.value for formula in formulas if formula is not None and isinstance(formula.value, str)]
-    return frozenset().union(*(names(parse(text, extra_functions={"f": 1})) for text in texts))
+    return frozenset().union(*(names(parse(text, extra_functions={"f": 1}, naming="ends")) for text in texts))
 
 
 def _parts_of(definition: DefinitionModel, written: Parts) -> dict[str, _Part]:
@@ -83,8 +91,9 @@ def _parts_of(definition: DefinitionModel, written: Parts) -> dict[str, _Part]:
         flow = state.flow
         read = _names_read(state.initial, state.each_step, state.each_episode, flow.derivative, flow.noise)
         reads["state", name] = read
+    flowing = {name for name, state in (written.state or {}).items() if state.flow.derivative is not None}
     found = {
-        name: _Part(section, key_of(definition.source, section, name).span, read)
+        name: _Part(section, key_of(definition.source, section, name).span, read, name in flowing)
         for (section, name), read in reads.items()
     }
     found |= {port.name.value: _Part("ports", port.name.span, frozenset()) for port in written.ports}
@@ -110,7 +119,7 @@ def _check_parts(parts: AnyMapping[str, _Part], written: Parts, result_noun: str
     states = [name for name, part in parts.items() if part.section == "state"]
     used = _reached([*_given(written), *states], parts)
     unused = {name: part for name, part in parts.items() if name not in used}
-    for name, (section, span, _) in unused.items():
+    for name, (section, span, _, _) in unused.items():
         if any(name in part.reads for other, part in unused.items() if other != name):
             continue
         message = f"{result_noun} does not depend on the {_NOUNS[section]} '{name}'"
@@ -121,22 +130,26 @@ def _check_parts(parts: AnyMapping[str, _Part], written: Parts, result_noun: str
 
 
 def _given(written: Parts) -> frozenset[str]:
-    """What the formulas read that say what a definition gives."""
-    return _names_read(written.each_step, written.each_episode, *(written.outputs or {}).values())
+    """What the formulas read that say what a definition gives, and how lines end."""
+    given = written.each_step, written.each_episode, written.derivative, written.sign
+    return _names_read(*given, *(written.outputs or {}).values())
 
 
 # Derivatives
 
 
 def _shown(network: Network) -> frozenset[str]:
-    """The names of states that somebody outside their model asks for: a connection, an output, a picture."""
-    found = {route.sends for route in network.connections.routes}
+    """The names of states that somebody outside their model asks for: a connection, a synapse or a rule, an output, a
+    picture."""
+    found = {route.sends for route in network.connections.routes} | {outlet.name for outlet in network.outlets}
     found |= {state.state for output in network.outputs for state in output.states}
     found |= {one.state for one in network.render.show}
     return frozenset(found.union(curve.state for panel in network.render.figure for curve in panel.shown or ()))
 
 
-def _check_flows(parts: AnyMapping[str, _Part], written: Parts, shown: Collection[str], findings: Findings) -> None:
+def _check_flows(
+    parts: AnyMapping[str, _Part], written: Parts, shown: Collection[str], result: str, findings: Findings
+) -> None:
     """Warn of each state with a derivative on which nothing depends: neither what the definition gives or sends, nor
     another state."""
     states = written.state or {}
@@ -147,7 +160,9 @@ def _check_flows(parts: AnyMapping[str, _Part], written: Parts, shown: Collectio
         others = frozenset().union(*(parts[other].reads for other in states if other != name))
         if name not in _reached(_given(written) | others, {key: parts[key] for key in parts if key not in states}):
             message = f"nothing depends on the state '{name}': it is integrated for nobody"
-            hint = "let the activity, an output or another state read it, send it, or remove it"
+            hint = f"let {result} or another state read it, or remove it"
+            if written.outputs is not None:
+                hint = f"let {result}, an output or another state read it, send it, or remove it"
             findings.warning("derivative-unread", parts[name].span, message, hint)
 
 
@@ -211,31 +226,35 @@ def _place_of(state: str, group: Built, libraries: Iterable[Library]) -> Span:
 def _check_replaced(parts: AnyMapping[str, _Part], written: Parts, rule: Defined, findings: Findings) -> None:
     """``weight: {each_step: 0.01 * pre * post}``: a formula that reads what is active but nothing that outlasts the
     step, neither the weight nor a state that builds up, and that is 0 where all activities are 0, as a change would be.
-    A weight that follows states, the time or a signal, or that has a value then, is not reported."""
-    weight = rule.definition.given
+    A weight that follows states, the time or a signal, or that has a value then, is not reported. The same of a
+    centre."""
+    given = rule.definition.given
     for formula, tree, when in (
-        (written.each_step, weight.each_step, "each step"),
-        (written.each_episode, weight.each_episode, "the end of each episode"),
+        (written.each_step, given.each_step, "each step"),
+        (written.each_episode, given.each_episode, "the end of each episode"),
     ):
         if formula is None or tree is None:
             continue
         read = _reached(_names_read(formula), parts)
-        reads_activity = not read.isdisjoint(ACTIVITIES)
-        if reads_activity and not _any_lasts(read, parts) and _in_silence(tree, rule) == 0:
-            message = f"this replaces the weight at {when}: it does not read 'weight'"
-            findings.warning("replaces-weight", formula.span, message, "for a change write weight + …")
+        if given.name in read or any(_lasts(name, parts) for name in read):
+            continue
+        reads_activity = any(name.partition(".")[0] in ACTIVITIES for name in read)
+        if reads_activity and _in_silence(tree, rule) == 0:
+            message = f"this replaces the {given.name} at {when}: it does not read '{given.name}'"
+            findings.warning("replaces-weight", formula.span, message, f"for a change write {given.name} + …")
 
 
-def _any_lasts(names: set[str], parts: AnyMapping[str, _Part]) -> bool:
-    """Whether there is among some names one whose value outlasts a step: the weight, or a state that reads itself."""
-    states = [name for name in names if name in parts and parts[name].section == "state"]
-    return "weight" in names or any(name in _reached(parts[name].reads, parts) for name in states)
+def _lasts(name: str, parts: AnyMapping[str, _Part]) -> bool:
+    """Whether a name is a state whose value outlasts a step, since it reads itself or flows."""
+    part = parts.get(name)
+    return part is not None and part.section == "state" and (part.flows or name in _reached(part.reads, parts))
 
 
 def _in_silence(tree: Tree, rule: Defined) -> Value:
     """What a formula gives where nothing is active, with the default parameters."""
     definition = rule.definition
-    values: dict[str, Value] = {**CONSTANTS, "dt": 1.0, "k": 1.0, "t": 1.0, "weight": 0.0}
+    values: dict[str, Value] = {**CONSTANTS, "dt": 1.0, "k": 1.0, "t": 1.0, definition.given.name: 0.0}
+    values |= dict.fromkeys((end.text for end in definition.end_names), 0.0)
     values |= dict.fromkeys((*ACTIVITIES, *definition.signals), 0.0)
     for default in rule.defaults:
         value = value_of(default.value, values)
@@ -251,13 +270,14 @@ def _in_silence(tree: Tree, rule: Defined) -> Value:
 
 
 def check_unused(compiled: Compiled, findings: Findings) -> None:
-    """Warn of activations, models and rules of the spec's own that are not used. What a module names counts as used,
-    even if it has no instance."""
+    """Warn of definitions of the spec's own that are not used. What a module names counts as used, even if it has no
+    instance."""
     network = compiled.network
     used = {
         ACTIVATION: {group.activation for group in network.neurons.groups},
         MODEL: {group.model for group in network.neurons.groups},
-        RULE: {projection.rule.definition.name for projection in network.projections},
+        RULE: {one.use.definition.name for one in network.projections if one.kind == RULE},
+        SYNAPSE: {choice.name.value for section, choice in _choices(compiled) if section == SYNAPSE.section},
     }
     modules = [library.source.get("modules") for library in compiled.libraries]
     named = {text for node in modules if node is not None for text in _texts_in(node)}
@@ -320,5 +340,7 @@ def _choices(compiled: Compiled) -> Iterator[tuple[str, Choice]]:
             if group.model is not None:
                 yield MODEL.section, group.model
         for _, body in section.connections:
+            if body.synapse is not None:
+                yield SYNAPSE.section, body.synapse
             if body.plasticity is not None:
                 yield RULE.section, body.plasticity
