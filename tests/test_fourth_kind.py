@@ -80,7 +80,7 @@ class Echo(Operation):
 def _perform(operation: Echo, by: reference.ReferenceStepper, state: State, inputs: FloatArray) -> None:
     projection = by.network.projections[operation.projection]
     for place, connection in enumerate(projection.members.tolist()):
-        seen = by.known(projection.uses[0], place, state) | by.seen(connection, state)
+        seen = by.known(projection.uses[0], place, state) | by.seen(projection, place, state)
         given = by.change(projection.uses[0], place, seen, state, {})
         state.activity[by.network.connections.targets[connection]] += given["echo"]
 

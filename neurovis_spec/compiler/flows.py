@@ -89,6 +89,37 @@ def known_behind_flow(definition: Definition, sent: str = "") -> bool:
     return changed.isdisjoint(read | {sent})
 
 
+class Slope(NamedTuple):
+    """A derivative of a formula, and further intermediate values that it reads, in order, behind those of the
+    definition."""
+
+    let: tuple[tuple[str, Tree], ...]
+    tree: Tree
+
+    @property
+    def vanishes(self) -> bool:
+        """Whether it is 0 wherever it is evaluated."""
+        return isinstance(self.tree, Number) and self.tree.value == 0
+
+
+def slope_by(definition: Definition, tree: Tree, name: str) -> Slope:
+    """The derivative of a formula of a definition by one of the names that it sees, by the chain rule through
+    intermediate values and the activation, whose derivative is the function SLOPE_F (``with_slope``); all other names
+    count as constant. Raises ExpressionError where it is more than an expression may be.
+    """
+    slopes: dict[str, Tree] = {name: Number(1.0)}
+    let: list[tuple[str, Tree]] = []
+    for between, formula in definition.let:
+        made = slope(formula, slopes, _SLOPES)
+        if not isinstance(made, Number):
+            let.append((f"d {between}/d {name}", made))
+            slopes[between] = Name(let[-1][0])
+        elif made.value != 0:
+            slopes[between] = made
+    found = slope(tree, slopes, _SLOPES)
+    return Slope(tuple(_needed(let, found)), found)
+
+
 class Jacobian(NamedTuple):
     """How much each derivative changes with its own state, all else but what depends on this being constant: a formula
     by each flow state, and further intermediate values that these read, in order, behind those of the definition."""
@@ -98,25 +129,17 @@ class Jacobian(NamedTuple):
 
 
 def jacobian(definition: Definition) -> Jacobian:
-    """The diagonal of the Jacobian of a model, by the chain rule through intermediate values and the activation, whose
-    derivative is the function SLOPE_F (``with_slope``). What arrives at ports counts as constant. Raises
-    ExpressionError where a derivative is more than an expression may be.
+    """The diagonal of the Jacobian of a definition. What arrives at ports counts as constant; how much of that a state
+    brings about through synapses, ``slope_by`` of the derivative and the port says, times that of the signal and
+    ``post.v``. Raises ExpressionError where a derivative is more than an expression may be.
     """
     let: list[tuple[str, Tree]] = []
     diagonal: dict[str, Tree] = {}
     for state in definition.flows:
         assert state.derivative is not None
-        slopes: dict[str, Tree] = {state.name: Number(1.0)}
-        own: list[tuple[str, Tree]] = []
-        for name, tree in definition.let:
-            made = slope(tree, slopes, _SLOPES)
-            if not isinstance(made, Number):
-                own.append((f"d {name}/d {state.name}", made))
-                slopes[name] = Name(own[-1][0])
-            elif made.value != 0:
-                slopes[name] = made
-        diagonal[state.name] = slope(state.derivative, slopes, _SLOPES)
-        let += _needed(own, diagonal[state.name])
+        made = slope_by(definition, state.derivative, state.name)
+        let += made.let
+        diagonal[state.name] = made.tree
     return Jacobian(tuple(let), diagonal)
 
 

@@ -23,6 +23,7 @@ from neurovis_spec.compiler.events.settable import Binding, ParameterFormula, Pa
 from neurovis_spec.compiler.names.state_references import StateOf
 from neurovis_spec.compiler.program import (
     DRIVE,
+    SYNAPSE,
     Check,
     Each,
     Holder,
@@ -339,6 +340,18 @@ class Network:
             numbers[holder.members] = number
             positions[holder.members] = np.arange(len(holder.members))
         return Located(holders, numbers, positions)
+
+    @cached_property
+    def synapses(self) -> Located:
+        """The projections, and for each connection which of them its synapse is (−1: it has none)."""
+        numbers, positions = (np.broadcast_to(np.int64(one), (len(self.connections),)) for one in (-1, 0))
+        joined = [number for number, projection in enumerate(self.projections) if projection.kind == SYNAPSE]
+        if joined:
+            numbers, positions = numbers.copy(), positions.copy()
+        for number in joined:
+            members = self.projections[number].members
+            numbers[members], positions[members] = number, np.arange(len(members))
+        return Located(self.projections, numbers, positions)
 
     @property
     def uses(self) -> Iterator[tuple[Holder, Use]]:

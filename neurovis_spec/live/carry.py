@@ -195,15 +195,16 @@ def _carry_signals(
     was: Network, old: State, network: Network, state: State, connections: tuple[IntArray, IntArray]
 ) -> None:
     delays = network.connections.delays[connections[1]]
-    same = was.connections.delays[connections[0]] == delays
-    one, other, delays = connections[0][same], connections[1][same], delays[same]
     before, after = signal_layout(was, old.own_signals), signal_layout(network, state.own_signals)
+    joined = (before.offsets[connections[0]] < 0) != (after.offsets[connections[1]] < 0)
+    same = (was.connections.delays[connections[0]] == delays) & ~joined
+    one, other, delays = connections[0][same], connections[1][same], delays[same]
     shares = after.shares[other]
     if not _as_they_left(old, before, state, after, one[shares], other[shares]):
         have_own_signals(network, state)
         after = signal_layout(network, own=True)
         shares = after.shares[other]
-    own = (delays > 0) & ~shares
+    own = (after.offsets[other] >= 0) & ~shares
     parts = [(shares, before.offsets, old.signals)]
     if own.any():
         parts.append((own, signal_layout(was, own=True).offsets, signals_of_each(was, old)))

@@ -29,9 +29,9 @@ def lose(network: Network, state: State, connections: IntArray) -> None:
         return
     layout, delays = signal_layout(network, state.own_signals), network.connections.delays.whole()
     for connection in connections[~layout.shares[connections]].tolist():
-        if delays[connection]:
+        if layout.offsets[connection] >= 0:
             state.signals[layout.offsets[connection] : layout.offsets[connection] + delays[connection]] = 0.0
-    # those that read past activities on arrival, or whose rules do
+    # those that read past activities on arrival, or whose synapses or rules do
     read_later = connections[(layout.shares | remembering(network))[connections]]
     if len(read_later):
         lost = state.conditions.structure.lost.copy()

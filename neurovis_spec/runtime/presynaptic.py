@@ -1,4 +1,5 @@
-"""What rules read of the past: ``pre``, the activity of a source when that left which now reaches the synapse.
+"""What synapses and rules read of the past: ``pre`` and ``pre.v``, as they were at the source when that left which now
+reaches the synapse.
 
 In: a Network. Out: how far back its activities are kept, and which connections look there.
 """
@@ -10,10 +11,11 @@ import numpy.typing as npt
 
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Projection
+from neurovis_spec.runtime.stages import ends_of
 
 
 def history_depth(network: Network) -> int:
-    """Rows of the history: a[t−d] … a[t] for the largest d of a rule that reads ``pre``; 0 where none is delayed."""
+    """Rows of the history: a[t−d] … a[t] for the largest d of whatever reads ``pre``; 0 where none is delayed."""
     deepest = max(
         (int(network.connections.delays[reader.members].max(initial=0)) for reader in _readers_of_pre(network)),
         default=0,
@@ -22,7 +24,7 @@ def history_depth(network: Network) -> int:
 
 
 def remembering(network: Network) -> npt.NDArray[np.bool_]:
-    """The connections (m,) whose rule reads an activity of the past: delayed ones whose rule reads ``pre``."""
+    """The connections (m,) whose synapse or rule reads the past: delayed ones of which one reads ``pre``."""
     reading = np.zeros(len(network.connections), dtype=np.bool_)
     for reader in _readers_of_pre(network):
         reading[reader.members] = True
@@ -30,4 +32,5 @@ def remembering(network: Network) -> npt.NDArray[np.bool_]:
 
 
 def _readers_of_pre(network: Network) -> list[Projection]:
-    return [projection for projection in network.projections if "pre" in projection.read]
+    """Those whose definitions read it."""
+    return [one for one in network.projections if any(end.past for end in ends_of(network, one).values())]

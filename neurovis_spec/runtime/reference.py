@@ -25,6 +25,7 @@ from neurovis_spec.compiler.program import (
     Operation,
     Population,
     ReadInputs,
+    Receive,
     Send,
     SendAhead,
     Update,
@@ -36,7 +37,7 @@ from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.backend import Availability, Capabilities
 from neurovis_spec.runtime.reference_flows import Flow
 from neurovis_spec.runtime.reference_seen import NO_FUNCTIONS, Functions, NetworkArray, Seen, is_first, with_let
-from neurovis_spec.runtime.stages import formulas_of, given
+from neurovis_spec.runtime.stages import formulas_of, given, target_of
 from neurovis_spec.runtime.state import State
 
 
@@ -85,6 +86,7 @@ class ReferenceStepper(Seen):
 
     def gather(self, population: Population, state: State, inputs: FloatArray) -> dict[str, list[float]]:
         """What each member is given at each port: what arrives, combined, + bias + input + noise."""
+        self.hold_states(population, state)
         return {
             port.name: self.given(
                 population, port, self.signals(port, range(len(port.incoming)), state), state, inputs.tolist()
@@ -185,16 +187,27 @@ class ReferenceStepper(Seen):
         return found
 
     def send(self, state: State) -> None:
-        """w[t]·a[t] of every delayed connection leaves, or a[t] where it is shared; a[t] is remembered."""
+        """w[t]·a[t] of every delayed connection without a synapse leaves, or a[t] where it is shared; a[t] is
+        remembered."""
         sent, layout = np.concatenate((state.activity, state.outlets)), self.layouts[state.own_signals]
         for connection, delay in enumerate(self.delays.tolist()):
-            if delay > 0:
+            if layout.offsets[connection] >= 0:
                 leaving = float(sent[self.sending[connection]])
                 if not layout.shares[connection]:
                     leaving = float(state.weights[connection]) * leaving
                 state.signals[layout.offsets[connection] + state.k % delay] = leaving
         if len(state.history):
             state.history[state.k % len(state.history)] = sent
+
+    def receive(self, number: int, state: State) -> None:
+        """The states of synapses from old values; at an episode's end, once more from what these gave."""
+        projection = self.network.projections[number]
+        self.hold_states(self.network.populations[target_of(self.network, projection)], state)
+        for position, connection in enumerate(projection.members.tolist()):
+            if not state.conditions.structure.gone[connection]:
+                seen = self.known(projection.use, position, state) | self.before_update(projection, position, state)
+                seen["weight"] = float(state.weights[connection])
+                self.change(projection.use, position, seen, state, {})
 
     def learn(self, number: int, state: State, inputs: FloatArray) -> None:
         """w[t+1] and the states of a rule from old values; at an episode's end, once more from what these gave."""
@@ -207,22 +220,11 @@ class ReferenceStepper(Seen):
         """The weight and the states of one connection."""
         projection = self.network.projections[number]
         low, high = self.low.at(connection, state), self.high.at(connection, state)
-        seen = self.known(projection.rule, position, state) | self.seen(connection, state)
+        seen = self.known(projection.rule, position, state) | self.seen(projection, position, state)
         signals = (*state.activity.tolist(), *inputs.tolist())  # as ``Projection.signals`` numbers them
         seen |= {signal: signals[indices[position]] for signal, indices in projection.signals.items()}
         weight = Bounded(float(state.weights[connection]), low, high)
         state.weights[connection] = self.change(projection.rule, position, seen, state, {"weight": weight})["weight"]
-
-    def seen(self, connection: int, state: State) -> dict[str, float]:
-        """``pre``, what is sent at t−d, 0 where that is lost, ``sent``, what is at t, and ``post`` = a_i[t] of a
-        connection from j to i; a_j is sent, unless the connection takes something else."""
-        delay, sent = int(self.delays[connection]), self.sent(connection, state)
-        pre = sent
-        if delay > 0 and len(state.history):
-            lost = state.k - delay < state.conditions.structure.lost[connection]
-            row = state.history[(state.k - delay) % len(state.history)]
-            pre = 0.0 if lost else float(row[self.sending[connection]])
-        return {"pre": pre, "sent": sent, "post": float(state.activity[self.targets[connection]])}
 
     def ends_episode(self, state: State) -> bool:
         """Whether (t + 1) mod m = 0."""
@@ -260,6 +262,11 @@ def _read(operation: ReadInputs, by: ReferenceStepper, state: State, inputs: Flo
 @perform.register
 def _gather(operation: Gather, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
     by.ports[operation.population] = by.gather(by.network.populations[operation.population], state, inputs)
+
+
+@perform.register
+def _receive(operation: Receive, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
+    by.receive(operation.projection, state)
 
 
 @perform.register

@@ -2,7 +2,8 @@
 
 In: a Network, a State before the step's updates, the vector of all inputs. Out: the flow states behind the step. A
 *stage* is one evaluation of all derivatives: first what connections take within it, then the ports that derivatives
-read, then the derivatives. In a port what is held over the step comes first, then what is made anew at the stage.
+read, with the signals that synapses form there, then the derivatives, of neurons and of connections. In a port what is
+held over the step comes first, then what is made anew at the stage.
 """
 
 from __future__ import annotations
@@ -12,25 +13,40 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple, TypeAlias
 
+import numpy as np
+
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.compiler.program import Integrate, Port
+from neurovis_spec.compiler.program import Integrate, Owner, Port
 from neurovis_spec.language.expressions.functions import FUNCTIONS, divide, minimum
 from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.inputs import at_stage
 from neurovis_spec.runtime.reference_seen import Seen, is_first
-from neurovis_spec.runtime.stages import Formulas, Part, Times, apart, parts_of, times
+from neurovis_spec.runtime.stages import (
+    Contacts,
+    Formulas,
+    Part,
+    Through,
+    Times,
+    apart,
+    contacts_of,
+    flowing,
+    parts_of,
+    times,
+)
 from neurovis_spec.runtime.state import State
 
 
 class Place(NamedTuple):
-    """The number of a population, and the name of one of its flow states."""
+    """Whose flow state it is, a model's, a synapse's or a rule's, and its name."""
 
-    population: int
+    owner: Owner
     name: str
 
 
 #: Numbers of flow states, of each one a member.
 Numbers: TypeAlias = Mapping[Place, Sequence[float]]
+#: What flow states are held at over a step, by the positions of the members that are.
+Still: TypeAlias = Mapping[Place, Mapping[int, float]]
 
 
 @dataclass
@@ -39,6 +55,7 @@ class Stage:
     ``sent``, all activities and then the outlets, and the ports, by population and name."""
 
     state: State
+    still: Still
     x: Numbers
     t: float
     inputs: Sequence[float]
@@ -51,11 +68,17 @@ Look: TypeAlias = Callable[[Numbers, float], Stage]
 
 
 class Flow:
-    """The integration of some populations of a network."""
+    """The integration of the states of some populations and projections of a network."""
 
     def __init__(self, seen: Seen, operation: Integrate) -> None:
         self.seen, self.network, self.operation = seen, seen.network, operation
         self.parts = parts_of(seen.network, operation)
+        self.contacts = {one.number: one for one in contacts_of(seen.network, operation)}
+        #: of activities and outlets whether they are, where connections read them now, those of a stage
+        self.flowing = flowing(seen.network).tolist() if self.contacts else []
+        #: whose states flow
+        self.uses = {part.population.model.owner: part.population.model for part in self.parts}
+        self.uses |= {one.projection.use.owner: one.projection.use for one in self.contacts.values()}
         #: what the noise of each state is multiplied by, as it was at the beginning of the step
         self.spread: Numbers = {}
 
@@ -63,15 +86,26 @@ class Flow:
         """From what the flow states were after the step before to what they are now; they stay at the first step."""
         if is_first(state):
             return
-        cells = {Place(part.number, name): self._cells(part, name, state) for part in self.parts for name in part.flows}
-        x = self.fix({place: values.tolist() for place, values in cells.items()}, state)
+        cells = {
+            Place(owner, one.name): state.cells[owner][one.name]
+            for owner, use in self.uses.items()
+            for one in use.definition.flows
+        }
+        still = self.still(cells, state)
+        x = fix({place: values.tolist() for place, values in cells.items()}, still)
         start, h = (state.k - 1) * self.network.dt, self.network.dt / self.operation.substeps
-        stage = self.stage(state, x, times(start, h).first, inputs)
-        self.spread = self.all_values(stage, lambda part: part.spread)
+
+        def look(x: Numbers, t: float) -> Stage:
+            return self.stage(state, still, x, t, inputs)
+
+        stage = look(x, times(start, h).first)
+        self.spread = {
+            Place(part.population.model.owner, name): values
+            for part in self.parts
+            for name, values in self.values(part, part.spread, stage).items()
+        }
         for substep in range(self.operation.substeps):
-            at = times(start + substep * h, h)
-            x = METHODS[self.operation.method](self, x, at, lambda x, t: self.stage(state, x, t, inputs))
-            x = self.fix(x, state)
+            x = fix(METHODS[self.operation.method](self, x, times(start + substep * h, h), look), still)
         for place, values in cells.items():
             values[:] = x[place]
 
@@ -80,34 +114,31 @@ class Flow:
         if is_first(state):
             return
         for part in self.parts:
-            root = math.sqrt(self.network.dt * part.population.model.definition.per_second)
+            use = part.population.model
+            root = math.sqrt(self.network.dt * use.definition.per_second)
             for name, _ in part.spread.trees:
                 drawn = self.network.noise_of(state=name)[part.population.members]
-                values, spread = self._cells(part, name, state), self.spread[Place(part.number, name)]
-                fixed = state.conditions.fixed_in(part.population.model.owner, name)
+                values, spread = state.cells[use.owner][name], self.spread[Place(use.owner, name)]
+                fixed = state.conditions.fixed_in(use.owner, name)
                 for position, g in enumerate(spread):
                     if position not in fixed:
                         values[position] += (g * root) * float(inputs[drawn[position]])
 
-    def fix(self, x: Numbers, state: State, at: float | None = None) -> Numbers:
-        """The same, but for states that are held: what these are held at, or what all of them have ``at``."""
-        result: dict[Place, list[float]] = {}
-        for place, values in x.items():
-            owner = self.network.populations[place.population].model.owner
-            fixed = state.conditions.fixed_in(owner, place.name)
-            result[place] = [
-                value if position not in fixed else fixed[position] if at is None else at
-                for position, value in enumerate(values)
-            ]
-        return result
+    def still(self, cells: Mapping[Place, FloatArray], state: State) -> Still:
+        """The states of neurons that are held, and those of connections whose synapse or rule does nothing, which stay
+        what they are."""
+        found = {place: state.conditions.fixed_in(place.owner, place.name) for place in cells}
+        for one in self.contacts.values():
+            idle = state.conditions.structure.idle(one.projection)
+            for name in one.flows:
+                place = Place(one.projection.use.owner, name)
+                found[place] = {position: float(cells[place][position]) for position in np.flatnonzero(idle).tolist()}
+        return found
 
-    def _cells(self, part: Part, name: str, state: State) -> FloatArray:
-        return state.cells[part.population.model.owner][name]
-
-    def stage(self, state: State, x: Numbers, t: float, inputs: FloatArray) -> Stage:
+    def stage(self, state: State, still: Still, x: Numbers, t: float, inputs: FloatArray) -> Stage:
         """What is taken at a stage, population by population."""
         sent = [*state.activity.tolist(), *state.outlets.tolist()]
-        stage = Stage(state, x, t, at_stage(self.network, inputs, state, t), sent)
+        stage = Stage(state, still, x, t, at_stage(self.network, inputs, state, t), sent)
         for part in self.parts:
             for taken in part.taken:
                 (values,) = self.values(part, taken.formulas, stage).values()
@@ -119,37 +150,85 @@ class Flow:
 
     def derivatives(self, stage: Stage) -> Numbers:
         """All derivatives at a stage; 0 of states that are held."""
-        return self.fix(self.all_values(stage, lambda part: part.derivatives), stage.state, 0.0)
+        return fix(self.all_values(stage, lambda one: one.derivatives), stage.still, 0.0)
 
     def slopes(self, stage: Stage) -> Numbers:
-        """How much each derivative changes with its own state at a stage."""
-        return self.all_values(stage, lambda part: part.slopes)
+        """How much each derivative changes with its own state at a stage, through synapses, too."""
+        made = dict(self.all_values(stage, lambda one: one.slopes))
+        for part in self.parts:
+            for through in part.through:
+                place = Place(part.population.model.owner, through.state)
+                ((_, by_port),) = self.values(part, through.slope, stage).items()
+                back = self.back(part, through, stage)
+                made[place] = [j + by * sum_ for j, by, sum_ in zip(made[place], by_port, back, strict=True)]
+        return made
 
-    def all_values(self, stage: Stage, formulas: Callable[[Part], Formulas]) -> Numbers:
-        """The values of formulas of all parts."""
-        return {
-            Place(part.number, name): values
-            for part in self.parts
-            for name, values in self.values(part, formulas(part), stage).items()
-        }
+    def back(self, part: Part, through: Through, stage: Stage) -> list[float]:
+        """How much what synapses bring to a port of each member changes with one of its states."""
+        totals = [0.0 for _ in part.population.members]
+        port, synapses = through.port, self.seen.synapses
+        for place in apart(port)[1].tolist():
+            connection = int(port.incoming[place])
+            contacts = self.contacts.get(int(synapses.numbers[connection]))
+            if contacts is None or stage.state.conditions.structure.gone[connection]:
+                continue
+            values = self.joined(contacts, int(synapses.positions[connection]), contacts.back, stage)
+            if through.state in values:
+                factor = 1.0 if port.factors is None else float(port.factors[place])
+                totals[port.slots[place]] += values[through.state] * factor
+        return totals
+
+    def all_values(self, stage: Stage, formulas: Callable[[Part | Contacts], Formulas]) -> Numbers:
+        """The values of formulas of all populations, and of all projections."""
+        found: dict[Place, list[float]] = {}
+        for part in self.parts:
+            for name, values in self.values(part, formulas(part), stage).items():
+                found[Place(part.population.model.owner, name)] = values
+        for one in self.contacts.values():
+            made = [self.joined(one, place, formulas(one), stage) for place in range(len(one.projection.members))]
+            for name, _ in formulas(one).trees:
+                found[Place(one.projection.use.owner, name)] = [values[name] for values in made]
+        return found
 
     def values(self, part: Part, formulas: Formulas, stage: Stage) -> dict[str, list[float]]:
         """The values of formulas at a stage by their names, of each one a member."""
         if not formulas.trees:
             return {}
-        own = {name: values.tolist() for name, values in stage.state.cells[part.population.model.owner].items()}
-        own |= {name: stage.x[Place(part.number, name)] for name in part.flows}
+        owner = part.population.model.owner
+        own = {name: values.tolist() for name, values in stage.state.cells[owner].items()}
+        own |= {name: stage.x[Place(owner, name)] for name in part.flows}
         own |= {port.name: self.port(part, port, stage) for port in formulas.ports}
         return self.seen.values(part.population, formulas, own, stage.state, stage.t)
+
+    def joined(self, contacts: Contacts, position: int, formulas: Formulas, stage: Stage) -> dict[str, float]:
+        """The values of formulas of a synapse or a rule at a stage by their names, for one of its connections."""
+        if not formulas.trees:
+            return {}
+        state, projection = stage.state, contacts.projection
+        owner = projection.use.owner
+
+        def now(index: int) -> float:
+            return stage.sent[index] if self.flowing[index] else self.seen.at(index, state)
+
+        own = {name: float(values[position]) for name, values in state.cells[owner].items()}
+        own |= {name: stage.x[Place(owner, name)][position] for name in contacts.flows}
+        own |= self.seen.seen(projection, position, state, now)
+        return self.seen.values_at(projection, position, formulas, own, state, stage.t)
 
     def port(self, part: Part, port: Port, stage: Stage) -> list[float]:
         """What each member is given at a port at a stage."""
         made = stage.ports.get((part.number, port.name))
         if made is None:
+
+            def formed(number: int, position: int) -> float:
+                contacts = self.contacts[number]
+                (value,) = self.joined(contacts, position, contacts.signal, stage).values()
+                return value
+
             held, staged = apart(port)
             signals = [
                 *self.seen.signals(port, held, stage.state),
-                *self.seen.signals(port, staged, stage.state, stage.sent),
+                *self.seen.signals(port, staged, stage.state, stage.sent, formed),
             ]
             made = self.seen.given(part.population, port, signals, stage.state, stage.inputs)
             stage.ports[part.number, port.name] = made
@@ -160,10 +239,20 @@ class Flow:
         in each of these numbers."""
         result: dict[Place, list[float]] = {}
         for place in numbers[0]:
-            definition = self.network.populations[place.population].model.definition
-            h = self.network.dt * definition.per_second / self.operation.substeps
+            h = self.network.dt * self.uses[place.owner].definition.per_second / self.operation.substeps
             result[place] = [made(h, *values) for values in zip(*(one[place] for one in numbers), strict=True)]
         return result
+
+
+def fix(x: Numbers, still: Still, at: float | None = None) -> Numbers:
+    """The same, but for states that are held: what these are held at, or what all of them have ``at``."""
+    return {
+        place: [
+            value if position not in still[place] else still[place][position] if at is None else at
+            for position, value in enumerate(values)
+        ]
+        for place, values in x.items()
+    }
 
 
 def _euler(flow: Flow, x: Numbers, at: Times, look: Look) -> Numbers:

@@ -7,19 +7,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from types import MappingProxyType
 from typing import NamedTuple, TypeAlias
+
+import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.events.settable import CENTRES, Variable, bias_of
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Definition, Key, Population, Port, Use
+from neurovis_spec.compiler.program import Definition, Key, Population, Port, Projection, Use
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.signals import signal_layout
-from neurovis_spec.runtime.stages import Formulas, taken_by
+from neurovis_spec.runtime.stages import Formulas, behind_flow, ends_of, signal_of, taken_by, target_of
 from neurovis_spec.runtime.state import State, constants
 
+#: What is now of activities and outlets, by the index among these.
+Now: TypeAlias = Callable[[int], float]
+#: The signal of a synapse, by the number of its projection and which of the members it is.
+Forming: TypeAlias = Callable[[int, int], float]
 #: What formulas may call, by name.
 Functions: TypeAlias = Mapping[str, Callable[..., float]]
 NO_FUNCTIONS: Functions = MappingProxyType({})
@@ -70,21 +77,32 @@ class Seen:
         names, neurons = network.port_names, network.neurons
         self.bias = {name: NetworkArray(neurons.bias_at(name), variables.get(bias_of(name))) for name in names}
         self.fed = {name: (neurons.input_at(name), network.noise_of(name)) for name in names}
+        #: what connections read of their ends, by projections
+        self.ends = [ends_of(network, one) for one in network.projections]
+        self.synapses = network.synapses
         self.centres = NetworkArray(connections.centres.whole(), variables.get(CENTRES))
 
     def signals(
-        self, port: Port, places: Iterable[int], state: State, sent: Sequence[float] | None = None
+        self,
+        port: Port,
+        places: Iterable[int],
+        state: State,
+        sent: Sequence[float] | None = None,
+        formed: Forming | None = None,
     ) -> Iterator[Signal]:
         """What some of the connections bring to a port, ``places`` of its ``incoming``: of what is ``sent`` now where
-        that is given, else by their delays."""
+        that is given, else by their delays; of synapses what is ``formed``, by default before the update."""
+        formed = formed or partial(self.formed, state)
         for place in places:
             connection = int(port.incoming[place])
             if not state.conditions.structure.gone[connection]:
-                value = (
-                    self.arriving(connection, state)
-                    if sent is None
-                    else float(state.weights[connection]) * sent[self.sending[connection]]
-                )
+                synapse = int(self.synapses.numbers[connection])
+                if synapse >= 0:
+                    value = formed(synapse, int(self.synapses.positions[connection]))
+                elif sent is None:
+                    value = self.arriving(connection, state)
+                else:
+                    value = float(state.weights[connection]) * sent[self.sending[connection]]
                 if port.factors is not None:
                     value *= float(port.factors[place])
                 yield Signal(int(port.slots[place]), value, self.centres.at(connection, state))
@@ -141,6 +159,59 @@ class Seen:
                 result[name].append(evaluate(tree, known, functions))
         return result
 
+    def formed(self, state: State, number: int, position: int) -> float:
+        """The signal of a synapse before its target is updated."""
+        projection = self.network.projections[number]
+        own = {name: float(values[position]) for name, values in state.cells[projection.use.owner].items()}
+        own |= self.before_update(projection, position, state)
+        (value,) = self.values_at(projection, position, signal_of(projection), own, state).values()
+        return value
+
+    def values_at(
+        self,
+        projection: Projection,
+        position: int,
+        formulas: Formulas,
+        own: Mapping[str, float],
+        state: State,
+        t: float | None = None,
+    ) -> dict[str, float]:
+        """The values of formulas by their names for one of the connections; ``own`` are what they see of states and of
+        both ends, ``t`` the seconds of a stage."""
+        known = {**self.known(projection.use, position, state, t), **own}
+        known["weight"] = float(state.weights[projection.members[position]])
+        with_let(known, formulas.let)
+        return {name: evaluate(tree, known) for name, tree in formulas.trees}
+
+    def before_update(self, projection: Projection, position: int, state: State) -> dict[str, float]:
+        """What a synapse sees of its ends before its target is updated: of the states of that which flow, as they are
+        behind the integration."""
+        target = self.network.populations[target_of(self.network, projection)]
+        states, cells = behind_flow(self.network, projection), state.cells[target.model.owner]
+        member = int(np.searchsorted(target.members, self.targets[projection.members[position]]))
+        known = {name: float(cells[own][member]) for name, own in states.items()}
+        return self.seen(projection, position, state) | known
+
+    def seen(self, projection: Projection, position: int, state: State, now: Now | None = None) -> dict[str, float]:
+        """What one of the connections reads of its ends: ``pre``, what is sent at t−d, 0 where that is lost, ``sent``,
+        what is at t, ``post`` = a_i[t] of a connection from j to i, and of what else is there the same. ``now`` says
+        what is now, by default what was left there last."""
+        connection, found = int(projection.members[position]), dict[str, float]()
+        for name, end in self.ends[projection.use.owner.number].items():
+            index = int(end.places[position])
+            if end.past and self.delays[connection] > 0:
+                found[name] = self.past(connection, index, state)
+            else:
+                found[name] = self.at(index, state) if now is None else now(index)
+        return found
+
+    def past(self, connection: int, index: int, state: State) -> float:
+        """An activity or an outlet of d steps ago, 0 where that is lost."""
+        sent_at = state.k - int(self.delays[connection])
+        if sent_at < state.conditions.structure.lost[connection]:
+            return 0.0
+        return float(state.history[sent_at % len(state.history)][index])
+
     def arriving(self, connection: int, state: State) -> float:
         """w[t−d]·a[t−d]: of this step for d = 0, else what was sent d steps ago; 0 where that is lost."""
         delay, layout = int(self.delays[connection]), self.layouts[state.own_signals]
@@ -153,8 +224,12 @@ class Seen:
         return 0.0 if lost else float(state.weights[connection]) * left
 
     def sent(self, connection: int, state: State) -> float:
-        """What a connection takes now: an activity or an outlet."""
-        index, neurons = self.sending[connection], len(state.activity)
+        """What a connection takes now."""
+        return self.at(int(self.sending[connection]), state)
+
+    def at(self, index: int, state: State) -> float:
+        """An activity or an outlet as it is now."""
+        neurons = len(state.activity)
         return float(state.activity[index] if index < neurons else state.outlets[index - neurons])
 
     def clock(self, state: State, definition: Definition, t: float | None = None) -> dict[str, float]:

@@ -192,7 +192,8 @@ def _send(
     """Send what was sent at a step before 0, as far as it is known, and has not arrived by then: −1 was the last step
     before the run."""
     connections, taken = network.connections, taken_by(network)
-    under_way = np.flatnonzero((connections.delays.whole() >= -step) & np.broadcast_to(known, sent.shape)[taken])
+    arriving = (connections.delays.whole() >= -step) & (layout.offsets >= 0)
+    under_way = np.flatnonzero(arriving & np.broadcast_to(known, sent.shape)[taken])
     factors = np.where(layout.shares[under_way], 1.0, weights[under_way])
     with np.errstate(all="ignore"):
         signals = factors * sent[taken[under_way]]

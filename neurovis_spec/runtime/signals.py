@@ -7,6 +7,7 @@ Connections of the same delay into the same population lie next to each other, s
 slice. Where nothing changes a weight in a run, w[t−d] is w[t]: the slots hold what is sent, the activity of a source or
 an outlet, which all such connections of a delay that take it share. Each has it times its weight on arrival, which
 gives the same bits. Where few numbers are saved each has its own all the same: to multiply all at once costs less.
+On connections with a synapse nothing is under way: their signals are made where they arrive.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 
 from neurovis_spec.arrays import BoolArray, Indices, pieces, width
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import SYNAPSE
 from neurovis_spec.runtime.stages import taken_by
 
 #: the slots that connections of a delay must save by sharing. It stays: a checkpoint holds what is under way as it lies
@@ -57,8 +59,8 @@ class SharedSlots:
 
 @dataclass(frozen=True, slots=True)
 class SignalLayout:
-    """``offsets`` (m,): the first slot of each connection, −1 with delay 0; ``size``: slots in all; ``shares`` (m,):
-    the connections whose slots hold what is sent, not signals of their own."""
+    """``offsets`` (m,): the first slot of each connection, −1 with delay 0 or a synapse; ``size``: slots in all;
+    ``shares`` (m,): the connections whose slots hold what is sent, not signals of their own."""
 
     offsets: Indices
     size: int
@@ -75,7 +77,7 @@ def signal_layout(network: Network, own: bool = False) -> SignalLayout:
     for number, population in enumerate(network.populations):
         population_of[population.members] = number
     populations = population_of[connections.targets.compact()]
-    delays, index_type = connections.delays.compact(), width(0, len(connections))
+    delays, index_type = _delayed(network), width(0, len(connections))
     offsets = np.full(len(connections), -1, dtype=width(-1, slots_of_each(network)))
     shares = np.zeros(len(connections), dtype=np.bool_) if own else _sharing(network)
     classes: list[DelayClass] = []
@@ -101,14 +103,14 @@ def signal_layout(network: Network, own: bool = False) -> SignalLayout:
 
 def slots_of_each(network: Network) -> int:
     """How many slots there are where no connection shares any."""
-    return sum(int(piece.sum()) for piece in pieces(network.connections.delays.compact()))
+    return sum(int(piece.sum()) for piece in pieces(_delayed(network)))
 
 
 def _sharing(network: Network) -> BoolArray:
     """The delayed connections (m,) whose weight nothing changes in a run, of each delay where it is worth it. Not where
     signals are multiplied: before the first one has arrived, a weight below 0 would make −0 of 0, which a sum does not
     show, but a product."""
-    delays = network.connections.delays.compact()
+    delays = _delayed(network)
     shares = (delays > 0) & (network.connections.rules.compact() < 0)
     for binding in network.settable.bindings:
         if binding.weights:
@@ -130,6 +132,14 @@ def _sends(network: Network, connections: Indices) -> tuple[BoolArray, Indices]:
     sends = np.zeros(len(network.neurons) + network.outlet_count, dtype=np.bool_)
     sends[taken] = True
     return sends, taken
+
+
+def _delayed(network: Network) -> Indices:
+    """The delays (m,), 0 of connections with a synapse."""
+    delays = network.connections.delays.compact()
+    if not any(one.kind == SYNAPSE for one in network.projections):
+        return delays
+    return np.where(network.synapses.numbers < 0, delays, delays.dtype.type(0))
 
 
 def _delays(network: Network) -> list[int]:

@@ -1,29 +1,43 @@
 """What a stage of the integration is made of: which outputs are taken at it, what is derived, what these read.
 
-In: a Network, and its operation Integrate. Out: a Part for each population, in the order in which a stage makes them;
-when stages are. All backends ask here, so that they do the same in the same order.
+In: a Network, and its operation Integrate. Out: a Part for each population, in the order in which a stage makes them,
+and Contacts for each projection whose signals or states a stage makes; when stages are. All backends ask here, so that
+they do the same in the same order.
+
+At a stage the signal of a synapse, and what derivatives of its states and of rules read, are made of what is *now*: of
+what flows, as it is taken at the stage, else as it was left (this step's where it was updated before, else the last
+step's); and of what was sent d ≥ 1 steps ago, which the history has.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-from neurovis_spec.arrays import Indices, IntArray
-from neurovis_spec.compiler.flows import BY_SLOPE, Jacobian, jacobian, with_slope
+from neurovis_spec.arrays import BoolArray, Indices, IntArray
+from neurovis_spec.compiler.flows import BY_SLOPE, Jacobian, flows_by, jacobian, reads, slope_by, with_slope
+from neurovis_spec.compiler.levels import held_at
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Definition, Integrate, Population, Port
+from neurovis_spec.compiler.program import (
+    MODEL,
+    SYNAPSE,
+    Definition,
+    EndName,
+    Integrate,
+    Population,
+    Port,
+    Projection,
+)
+from neurovis_spec.compiler.values.definitions import sorted_by_need
 from neurovis_spec.language.expressions.tree import Name, Tree, names
 
 Let: TypeAlias = tuple[tuple[str, Tree], ...]
 
 #: how far inside a step its ends are seen from, of its length: what jumps on the grid jumps between two steps
 INSIDE: Final = 2.0**-20
-#: what every model gives
-_ACTIVITY: Final = "activity"
 
 
 class Unfolded(NamedTuple):
@@ -45,13 +59,17 @@ def unfolded(let: Let, trees: Iterable[Tree | None]) -> Unfolded:
 
 
 class Formulas(NamedTuple):
-    """Formulas of a model that are evaluated together, by names, with the intermediate values and ports they read."""
+    """Formulas of a definition that are evaluated together, by names, with the intermediate values and, of a model, the
+    ports that they read."""
 
-    trees: tuple[tuple[str, Tree], ...]
-    let: Let
-    ports: tuple[Port, ...]
-    #: all names that they read
-    names: frozenset[str]
+    trees: tuple[tuple[str, Tree], ...] = ()
+    let: Let = ()
+    ports: tuple[Port, ...] = ()
+
+    @property
+    def read(self) -> frozenset[str]:
+        """All names that they read."""
+        return frozenset().union(*(names(tree) for _, tree in (*self.trees, *self.let)))
 
 
 class Taken(NamedTuple):
@@ -61,6 +79,16 @@ class Taken(NamedTuple):
     formulas: Formulas
     places: IntArray
     is_activity: bool
+
+
+class Through(NamedTuple):
+    """That a derivative changes with its own ``state`` by what synapses bring to a port: by how much for each unit at
+    the port (one formula), times what the signals there change by (``Contacts.back``), which are added up in the order
+    of the connections."""
+
+    state: str
+    port: Port
+    slope: Formulas
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,6 +103,8 @@ class Part:
     slopes: Formulas
     #: by states with noise, what their random numbers are multiplied by: at the first stage of a step
     spread: Formulas
+    #: what is added to the slopes, in this order
+    through: tuple[Through, ...] = ()
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -86,6 +116,46 @@ class Part:
     def flows(self) -> tuple[str, ...]:
         """The names of its flow states."""
         return tuple(name for name, _ in self.derivatives.trees)
+
+
+class End(NamedTuple):
+    """What connections read of an end: where each of them finds it, an index into the activities of all neurons
+    followed by the outlets; and whether it is what was sent by their delays ago, rather than what is now."""
+
+    places: IntArray
+    past: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contacts:
+    """A projection at a stage: its signals, where its definition is a synapse and a port of a stage reads them, and the
+    derivatives of its states."""
+
+    number: int
+    projection: Projection
+    #: by its name what they bring to ports, without the factors of these
+    signal: Formulas
+    derivatives: Formulas
+    #: how much each derivative changes with its own state, where the method looks at that
+    slopes: Formulas
+    #: by states of their targets' models how much the signal changes with these, where it does
+    back: Formulas
+    #: what they read of their ends, by its names
+    ends: Mapping[str, End]
+
+    @property
+    def flows(self) -> tuple[str, ...]:
+        """The names of its flow states."""
+        return tuple(name for name, _ in self.derivatives.trees)
+
+
+class Formed(NamedTuple):
+    """Those of some connections that have a synapse of the same projection: the number of that, where they are among
+    the connections, and which of its members."""
+
+    number: int
+    places: IntArray
+    members: IntArray
 
 
 class Times(NamedTuple):
@@ -104,7 +174,8 @@ def times(start: float, h: float) -> Times:
 
 def parts_of(network: Network, operation: Integrate) -> tuple[Part, ...]:
     """What is done at a stage, population by population."""
-    taken = _taken(network, operation)
+    contacts = {one.number: one for one in contacts_of(network, operation)}
+    taken = _taken(network, operation, contacts.values())
     parts = []
     for number in operation.populations:
         population, slopes = network.populations[number], Jacobian((), {})
@@ -114,28 +185,166 @@ def parts_of(network: Network, operation: Integrate) -> tuple[Part, ...]:
             if model.reads_activation:
                 activation = replace(activation, definition=with_slope(activation.definition))
                 population = replace(population, activation=activation)
-        own = [(name, places) for (owner, name), places in taken.items() if owner == number]
+        own = {name: places for (owner, name), places in taken.items() if owner == number}
         parts.append(
             Part(
                 number,
                 population,
                 tuple(
-                    Taken(formulas_of(population, [(name, given(model, name))]), places, name == _ACTIVITY)
-                    for name, places in own
+                    Taken(formulas_of(population, [(name, given(model, name))]), own[name], name == MODEL.gives)
+                    for name in _in_order(network, population, own, contacts)
                 ),
                 formulas_of(population, [(one.name, one.derivative) for one in model.flows]),
                 formulas_of(population, slopes.diagonal.items(), slopes.let),
                 formulas_of(population, [(one.name, one.noise) for one in model.flows]),
+                tuple(_through(network, population, contacts)) if operation.method in BY_SLOPE else (),
             )
         )
     return tuple(parts)
 
 
+def contacts_of(network: Network, operation: Integrate) -> tuple[Contacts, ...]:
+    """What is done at a stage, projection by projection: those whose signals it makes, and those whose states flow."""
+    staged = [_staged(port) for number in operation.populations for port in network.populations[number].ports]
+    formed = frozenset(one.number for incoming in staged for one in formed_at(network, incoming))
+    return tuple(
+        _contacts(network, operation, number, number in formed)
+        for number in sorted(formed | frozenset(operation.projections))
+    )
+
+
+def _contacts(network: Network, operation: Integrate, number: int, formed: bool) -> Contacts:
+    projection = network.projections[number]
+    definition = projection.use.definition
+    signal, flows = definition.given.each_step, definition.flows if number in operation.projections else ()
+    slopes, back = Jacobian((), {}), dict[str, Tree]()
+    between: Let = ()
+    if operation.method in BY_SLOPE:
+        slopes = jacobian(replace(definition, state=flows))
+        if formed and signal is not None:
+            target = network.populations[target_of(network, projection)].model.definition
+            made = {one.name: slope_by(definition, signal, EndName("post", one.name).text) for one in target.flows}
+            back = {name: slope.tree for name, slope in made.items() if not slope.vanishes}
+            between = tuple(one for name in back for one in made[name].let)
+    return Contacts(
+        number,
+        projection,
+        signal_of(projection) if formed else Formulas(),
+        _formulas(definition, [(one.name, one.derivative) for one in flows]),
+        _formulas(definition, slopes.diagonal.items(), slopes.let),
+        _formulas(definition, back.items(), between),
+        ends_of(network, projection),
+    )
+
+
+def _staged(port: Port) -> Indices:
+    """The connections to a port whose signals are made anew at each stage."""
+    return port.incoming[:0] if port.staged is None else port.incoming[port.staged]
+
+
+def _through(network: Network, population: Population, contacts: Mapping[int, Contacts]) -> Iterator[Through]:
+    """How derivatives of a population change with their own states by what synapses bring."""
+    model = population.model.definition
+    for state in model.flows:
+        assert state.derivative is not None
+        for port in population.ports:
+            joined = (contacts[one.number].back.trees for one in formed_at(network, _staged(port)))
+            if port.combine != "sum" or all(state.name not in dict(trees) for trees in joined):
+                continue
+            made = slope_by(model, state.derivative, port.name)
+            if not made.vanishes:
+                name = f"d {state.name}'/d {port.name}"
+                yield Through(state.name, port, formulas_of(population, [(name, made.tree)], made.let))
+
+
 def formulas_of(population: Population, trees: Iterable[tuple[str, Tree | None]], more: Let = ()) -> Formulas:
     """Some formulas of the population's model, with ``more`` intermediate values behind its own."""
+    made = _formulas(population.model.definition, trees, more)
+    read = made.read
+    return made._replace(ports=tuple(port for port in population.ports if port.name in read))
+
+
+def _formulas(definition: Definition, trees: Iterable[tuple[str, Tree | None]], more: Let = ()) -> Formulas:
     kept = tuple((name, tree) for name, tree in trees if tree is not None)
-    let, read = unfolded((*population.model.definition.let, *more), [tree for _, tree in kept])
-    return Formulas(kept, let, tuple(port for port in population.ports if port.name in read), read)
+    return Formulas(kept, unfolded((*definition.let, *more), [tree for _, tree in kept]).let)
+
+
+def ends_of(network: Network, projection: Projection) -> dict[str, End]:
+    """What a projection reads of the ends of its connections, by names: ``pre``, ``sent`` and ``post``, and those of
+    ``Projection.ends``."""
+    members, read = projection.members, projection.read
+    sent = np.asarray(taken_by(network)[members], dtype=np.int64)
+    found = {"pre": End(sent, True), "sent": End(sent, False), "post": End(network.connections.targets[members], False)}
+    found |= {name: End(places, name.startswith("pre.")) for name, places in projection.ends.items()}
+    return {name: end for name, end in found.items() if name in read}
+
+
+def formed_at(network: Network, connections: Indices) -> list[Formed]:
+    """Those of some connections that have a synapse, together by their projections."""
+    numbers, members = (array[connections] for array in network.synapses[1:])
+    return [
+        Formed(number, places := np.flatnonzero(numbers == number), members[places])
+        for number in np.unique(numbers[numbers >= 0]).tolist()
+    ]
+
+
+def signal_of(projection: Projection) -> Formulas:
+    """The signal of a synapse, by its name."""
+    definition = projection.use.definition
+    return _formulas(definition, [(definition.given.name, definition.given.each_step)])
+
+
+def target_of(network: Network, projection: Projection) -> int:
+    """The number of the population that a synapse's connections lead to."""
+    return int(network.located("neuron").numbers[network.connections.targets[projection.members[:1]][0]])
+
+
+def behind_flow(network: Network, projection: Projection) -> dict[str, str]:
+    """What of a synapse's targets its formulas read as it is behind the integration, before the targets are updated:
+    their flow states, by what these are called in the formulas."""
+    model = network.populations[target_of(network, projection)].model.definition
+    found = {EndName("post", one.name).text: one.name for one in model.flows}
+    return {name: state for name, state in found.items() if name in projection.ends}
+
+
+def flowing(network: Network) -> BoolArray:
+    """For the activities of all neurons and the outlets behind them whether they flow (``compiler/flows.py``). What
+    reads something that is held is held, too, and so on until nothing more is found."""
+    held = held_at(network.neurons, network.inputs, network.noises)
+    mixed = {name: held.get(name, np.zeros(len(network.neurons), dtype=np.bool_)).copy() for name in network.port_names}
+    made = [
+        (population.members, places, flows_by(population.model.definition, name))
+        for number, population in enumerate(network.populations)
+        for name, places in _names_of(network, number)
+    ]
+    result = np.ones(len(network.neurons) + network.outlet_count, dtype=np.bool_)
+    while True:
+        before, brings = result.copy(), _bringing(network, result)
+        for population in network.populations:
+            for port in population.ports:
+                mixed[port.name][population.members[port.slots[~brings[port.incoming]]]] = True
+        for members, places, ports in made:
+            if ports is None:
+                result[places] = False
+            for port_name in ports or ():
+                result[places[mixed[port_name][members]]] = False
+        if np.array_equal(result, before):
+            return result
+
+
+def _bringing(network: Network, flows: BoolArray) -> BoolArray:
+    """For each connection whether what it brings flows, as far as what it takes does."""
+    delays = network.connections.delays.whole()
+    result = np.asarray((delays == 0) & flows[taken_by(network)])
+    for projection in network.projections:
+        definition = projection.use.definition
+        if definition.kind == SYNAPSE:
+            held = {"k", *(one.name for one in definition.state if one.derivative is None)}
+            result[projection.members] = held.isdisjoint(projection.read)
+            for end in ends_of(network, projection).values():
+                now = (delays[projection.members] == 0) | (not end.past)
+                result[projection.members] &= now & flows[end.places]
+    return result
 
 
 def apart(port: Port) -> tuple[IntArray, IntArray]:
@@ -169,20 +378,47 @@ def places_among_taken(network: Network, parts: Iterable[Part]) -> IntArray:
     return result
 
 
-def _taken(network: Network, operation: Integrate) -> dict[tuple[int, str], IntArray]:
+def _names_of(network: Network, number: int) -> Iterator[tuple[str, IntArray]]:
+    """What of a population can be taken, and the places of that: its activity, and its outlets."""
+    members, n = network.populations[number].members, len(network.neurons)
+    yield MODEL.gives, members
+    for one in network.outlets:
+        if one.population == number:
+            yield one.name, n + one.start + np.arange(len(members))
+
+
+def _taken(network: Network, operation: Integrate, contacts: Iterable[Contacts]) -> dict[tuple[int, str], IntArray]:
     """By population and name what is taken at a stage, and its places."""
-    n, sending = len(network.neurons), taken_by(network)
-    asked = np.zeros(n + network.outlet_count, dtype=np.bool_)
+    sending, flows = taken_by(network), None
+    asked = np.zeros(len(network.neurons) + network.outlet_count, dtype=np.bool_)
     for number in operation.populations:
         for port in network.populations[number].ports:
-            if port.staged is not None:
-                asked[sending[port.incoming[port.staged]]] = True
-    found: dict[tuple[int, str], IntArray] = {}
-    for number in operation.populations:
-        members = network.populations[number].members
-        beside = [one for one in network.outlets if one.population == number]
-        outlets = [(one.name, n + one.start + np.arange(len(members))) for one in beside]
-        for name, places in ((_ACTIVITY, members), *outlets):
-            if asked[places].any():
-                found[number, name] = places
-    return found
+            plain = _staged(port)
+            asked[sending[plain[network.synapses.numbers[plain] < 0]]] = True
+    for one in contacts:
+        flows = flowing(network) if flows is None else flows
+        undelayed = network.connections.delays[one.projection.members] == 0
+        for end in one.ends.values():
+            now = end.places[undelayed] if end.past else end.places
+            asked[now[flows[now]]] = True
+    return {
+        (number, name): places
+        for number in operation.populations
+        for name, places in _names_of(network, number)
+        if asked[places].any()
+    }
+
+
+def _in_order(
+    network: Network, population: Population, own: Mapping[str, IntArray], contacts: Mapping[int, Contacts]
+) -> list[str]:
+    """The names of what is taken of a population, each behind what synapses at the ports that it reads take of it."""
+    model = population.model.definition
+    needs: dict[str, set[str]] = {}
+    for name in own:
+        read = reads(model, [given(model, name)])
+        ports = [_staged(port) for port in population.ports if port.name in read]
+        joined = [contacts[one.number].ends for incoming in ports for one in formed_at(network, incoming)]
+        taken = [end.places for ends in joined for text, end in ends.items() if text.partition(".")[0] == "post"]
+        needs[name] = {other for other, places in own.items() if any(np.isin(places, one).any() for one in taken)}
+    return sorted_by_need(needs)[0]

@@ -18,7 +18,7 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.changes import Held
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.initial_states import initial_states
-from neurovis_spec.compiler.program import Key, Owner
+from neurovis_spec.compiler.program import SYNAPSE, Key, Owner, Projection
 from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import signal_layout
 
@@ -47,14 +47,19 @@ class Structure:
     since: IntArray
     #: (m,) those whose rule is not carried out
     still: Mask
-    #: (m,) what a connection has sent before this step never arrives, so that its rule reads 0 as ``pre``; NEVER_LOST
-    #: where nothing is lost, or nobody would read it: no rule, and signals of its own are 0
+    #: (m,) what a connection has sent before this step never arrives, so that its synapse and its rules read 0 as
+    #: ``pre``; NEVER_LOST where nothing is lost, or nobody would read it: none of these, and signals of its own are 0
     lost: IntArray
 
     @property
     def whole(self) -> bool:
         """Whether no connection is left out or still."""
         return not (self.gone.any() or self.still.any())
+
+    def idle(self, projection: Projection) -> Mask:
+        """Which connections of a projection do nothing, so that their states stay: those that are gone, and of rules
+        those that are still."""
+        return np.asarray((self.gone if projection.kind == SYNAPSE else self.still)[projection.members])
 
     @property
     def has_lost(self) -> bool:
