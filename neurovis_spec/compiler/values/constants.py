@@ -162,6 +162,8 @@ def _unknown(name: str, known: Collection[str], functions: Mapping[str, int], wh
     if usage is not None:
         return f"'{name}' is a function, not a value", f"write {usage}"
     message = f"unknown name '{shorten(name)}'"
+    if "." in name:
+        return message, "what is at the ends of a connection is known in a run, in formulas of what becomes of it there"
     if name in GIVEN:
         return message, f"'{name}' is known elsewhere: {meaning(name)}"
     close = suggest(name, known, what)

@@ -41,6 +41,7 @@ from neurovis_spec.language.expressions.tree import (
     check_extent,
     names,
     substitute,
+    walk,
     with_products,
 )
 from neurovis_spec.language.grammar import IN_SIGN, Role
@@ -108,13 +109,14 @@ class Definitions:
 
 class Reading(NamedTuple):
     """How definitions of a kind are read: what their formulas see (``role``), whether intermediate values are put into
-    what is given (``inlined``), and whether x^3 and x^4 are products in all of them (``products``), not only where
-    something is integrated."""
+    what is given (``inlined``), whether x^3 and x^4 are products in all of them (``products``), not only where
+    something is integrated, and which names are to mean something in a later version (``later``)."""
 
     kind: Kind
     role: Role
     inlined: bool = False
     products: bool = False
+    later: tuple[str, ...] = ()
 
 
 #: The built-in definitions that came when specs may have had one of their own of this name, which replaces it.
@@ -128,7 +130,7 @@ _READINGS = (
     Reading(ACTIVATION, formula_at(ActivationModel, "value"), inlined=True),
     Reading(MODEL, formula_at(ModelModel, "activity")),
     Reading(RULE, formula_at(RuleModel, "weight", "each_step")),
-    Reading(SYNAPSE, formula_at(SynapseModel, "signal"), products=True),
+    Reading(SYNAPSE, formula_at(SynapseModel, "signal"), products=True, later=("spike",)),
 )
 
 #: Keys of a definition that declare what is named where it is used, and those that declare names for its formulas.
@@ -142,6 +144,15 @@ _PER_SECOND: Final[Mapping[TimeUnit, float]] = {"s": 1.0, "ms": 1000.0}
 #: Names that no output has: what is sent and shown by these is something else.
 _NO_OUTPUTS = (MODEL.gives, "spike")
 
+
+#: What nobody reads of the ends of a connection, with the message, behind the name, and the hint.
+_NOT_OF_ENDS: Final[Mapping[str, tuple[str, str]]] = {
+    DRIVE: (
+        "is a port, where what connections bring is only being put together",
+        "read a state or an output: outputs: {rate: f(drive)} in the model there is post.rate",
+    ),
+    "spike": ("is not there yet", "a later version of the language has it"),
+}
 
 #: What to do where a definition reads a parameter of the spec.
 _OUTSIDE = "a definition sees its own parameters alone: declare '{0}' among them, and set it where it is used"
@@ -185,6 +196,7 @@ class _Checker:
         self.naming: Naming = "ends" if reading.role.ends else ""
         for key in (entry.key for entry in model.source.entries if entry.name in _LATER):
             self.known.declared[str(key.value)] = key.span
+        self.later = reading.later
         #: whether x^3 and x^4 are products
         self.products = (
             reading.products
@@ -198,6 +210,9 @@ class _Checker:
 
     def declare_at(self, span: Span, name: str) -> None:
         """The same of one that is declared at a place."""
+        if name in self.later:
+            message = f"'{name}' is to mean something here in a later version of the language"
+            self.findings.error("reserved-name", span, message, f"choose another name, such as '{name}_0'")
         if name in self.known.declared:
             such = "" if isinstance(self.known[name], Span) else f", such as '{name}_0'"
             self.findings.error("duplicate-name", span, self.taken(name), f"choose another name{such}")
@@ -250,7 +265,7 @@ class _Checker:
     def read(self, formula: Formula, sight: Sight, functions: Mapping[str, int] = _NO_FUNCTIONS) -> Tree | Unknown:
         """The tree of a formula; UNKNOWN where it is invalid, which is reported."""
         tree = parse_formula(formula, sight, self.findings, functions=functions, naming=self.naming)
-        if tree is UNKNOWN or not self.products:
+        if tree is UNKNOWN or not self._has_ends(tree, formula) or not self.products:
             return tree
         try:
             made = with_products(tree)
@@ -260,6 +275,18 @@ class _Checker:
             place = formula.node.at(error.start, error.end)
             self.findings.error(error.code, place, f"with x^3 as x*x*x, {error.message}", error.hint)
             return UNKNOWN
+
+    def _has_ends(self, tree: Tree, formula: Formula) -> bool:
+        """Whether all that is read of the ends may be there: a finding for what no model has, whichever it is."""
+        before = self.findings.errors
+        for node in walk(tree) if self.naming else ():
+            end, _, name = node.name.partition(".") if isinstance(node, Name) else ("", "", "")
+            if name not in _NOT_OF_ENDS:
+                continue
+            place = formula.node.at(node.start, node.end)
+            message, hint = _NOT_OF_ENDS[name]
+            self.findings.error("no-such-end-state", place, f"'{end}.{name}' {message}", hint)
+        return self.findings.errors == before
 
     def parameters(self, parameters: Mapping[str, ParameterModel]) -> Defaults:
         """Declare the parameters; a default sees those before it."""

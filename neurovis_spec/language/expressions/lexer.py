@@ -116,7 +116,7 @@ def tokens(text: str, naming: Naming = "") -> tuple[Token, ...]:
         if blank := _BLANK.match(text, at):
             at = blank.end()
             continue
-        token = _special(text, at, naming, found) or _token(text, at, after=found[-1] if found else None)
+        token = _special(text, at, naming, found) or _token(text, at, naming, after=found[-1] if found else None)
         found.append(token)
         at = token.end
     found.append(Token("end", "", len(text), len(text)))
@@ -173,7 +173,7 @@ def _subscripted(text: str, at: int) -> Token | None:
     return Token("name", f"{name[1]}[{int(name[2])}]", at, name.end())
 
 
-def _token(text: str, at: int, after: Token | None) -> Token:
+def _token(text: str, at: int, naming: Naming, after: Token | None) -> Token:
     if number := _NUMBER.match(text, at):
         return _number(text, number)
     if name := _NAME.match(text, at):
@@ -186,7 +186,7 @@ def _token(text: str, at: int, after: Token | None) -> Token:
     if foreign:
         message = f"'{foreign.group()}' is no operator here"
         raise ExpressionError("foreign-operator", message, at, foreign.end(), _FOREIGN[foreign.group()])
-    raise _no_token(text, at, after)
+    raise _no_token(text, at, naming, after)
 
 
 def _number(text: str, number: re.Match[str]) -> Token:
@@ -254,7 +254,7 @@ def _unit_at(text: str, at: int) -> str:
     return "" if match is None else match[0]
 
 
-def _no_token(text: str, at: int, after: Token | None) -> ExpressionError:
+def _no_token(text: str, at: int, naming: Naming, after: Token | None) -> ExpressionError:
     character = text[at]
     if quoted := _QUOTED.match(text, at):
         message, inside = "an expression holds no texts, only numbers", quoted.group().strip("'\"`“”‘’").strip()
@@ -265,6 +265,10 @@ def _no_token(text: str, at: int, after: Token | None) -> ExpressionError:
     if character == ".":
         end = at + 1 + len(name.group() if (name := _NAME.match(text, at + 1)) else "")
         hint = "refer to a value by its name alone"
+        if naming == "ends":
+            hint = (
+                "what is at the ends of a connection is written pre.X and post.X, without blanks; all else has no point"
+            )
         return ExpressionError("no-attributes", "there are no attributes in an expression", at, end, hint)
     if character in "[{" and re.search(r"\bfor\b", text[at:]):
         message = "there are no comprehensions in an expression"

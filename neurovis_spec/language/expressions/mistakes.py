@@ -34,7 +34,9 @@ INSTEAD: Mapping[str, str] = {
     "square": "write 'x^2'",
     "cbrt": "write 'sign(x) * abs(x)^(1/3)'",
     "f": "f(x), the neuron's activation, is known in the 'activity' of a model, its outputs, 'let' and states, but not "
-    "in 'initial', 'each_episode' and 'noise'",
+    "in 'initial', 'each_episode' and 'noise'; rules and synapses read what a model gives of it, as pre.rate of "
+    "outputs: {rate: f(v)}",
+    "spike": "a later version of the language has it",
     "relu": "write 'max(x, 0)'",
     "where": "write 'a if condition else b'",
     "sum": "write the terms one by one",
