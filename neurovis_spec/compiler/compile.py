@@ -200,10 +200,10 @@ def _assemble(spec: Spec, sections: _Sections) -> Network:
     declared, connected = sections.declared, sections.connected
     constants, census = declared.constants, declared.census
     name = known(spec.name.value, "")
-    projections, rules = make_projections(connected.bundles)
-    stages = sections.order.stages
-    connections = join(connected, rules, None if stages is None else stages.lagging)
     populations = make_populations(census, connected.wired, sections.order)
+    projected = make_projections(connected, populations)
+    stages = sections.order.stages
+    connections = join(connected, projected.rules, None if stages is None else stages.lagging)
     slots = tuple(constants.slots)
     network = Network(
         name=name,
@@ -222,8 +222,8 @@ def _assemble(spec: Spec, sections: _Sections) -> Network:
         inputs=declared.expansion.inputs,
         outputs=sections.outputs,
         populations=populations,
-        projections=projections,
-        program=make_program(populations, projections, sections.order, declared.integration),
+        projections=projected.projections,
+        program=make_program(populations, projected, sections.order, declared.integration),
         layout=sections.layout,
         render=sections.render,
         hash="",  # of all the rest

@@ -120,6 +120,13 @@ def slope_by(definition: Definition, tree: Tree, name: str) -> Slope:
     return Slope(tuple(_needed(let, found)), found)
 
 
+def signal_flows(synapse: Definition) -> bool:
+    """Whether the signal of a synapse flows where all does that it reads of its ends: all of its states have a
+    derivative, and it does not read the step."""
+    held = {one.name for one in synapse.state if one.derivative is None}
+    return reads(synapse, [synapse.given.each_step]).isdisjoint({"k", *held})
+
+
 class Jacobian(NamedTuple):
     """How much each derivative changes with its own state, all else but what depends on this being constant: a formula
     by each flow state, and further intermediate values that these read, in order, behind those of the definition."""

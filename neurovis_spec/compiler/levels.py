@@ -8,27 +8,44 @@ graph: behind what does not flow and reaches a derivative without delay, and bef
 *flows* is a function of states with a derivative, parameters, the time, and ports at which only what flows arrives; it
 reaches derivatives at each stage, so that such connections may form cycles, unless an output closes them. What is made
 of such states alone is known behind the integration: where neurons would wait for each other, nobody waits for that.
+
+A synapse takes of its source all that it reads there, and of its target what that is by then: a neuron waits for no
+neuron of which a synapse at its own end alone reads something.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray, IntColumn, frozen, narrow
-from neurovis_spec.compiler.flows import PortsRead, flows_by, known_behind_flow, plain_flow, ports_read_by, sent_by
-from neurovis_spec.compiler.network import PLAIN_ROUTE, Input, Neurons, Noise, Route
+from neurovis_spec.arrays import BoolArray, Indices, IntArray
+from neurovis_spec.compiler.flows import (
+    PortsRead,
+    flows_by,
+    known_behind_flow,
+    plain_flow,
+    ports_read_by,
+    sent_by,
+    signal_flows,
+)
+from neurovis_spec.compiler.network import Input, Neurons, Noise
 from neurovis_spec.compiler.program import DRIVE, Definition
+from neurovis_spec.compiler.taken import Taken, Wired, is_kept, read_at
 
 
-def default_delay(source: Definition, sends: str, target: Definition, ports: Sequence[str]) -> int:
+def default_delay(
+    source: Definition, sends: str, target: Definition, ports: Sequence[str], synapse: Definition | None = None
+) -> int:
     """The delay of a connection that names none, by the models of its ends: 0 where the source has a derivative, what
-    is sent is made of what flows there alone, and a derivative of the target reads what arrives; else 1."""
+    is sent is made of what flows there alone, and a derivative of the target reads what arrives; with a synapse where
+    all that this reads of the source is made so; else 1."""
+    if synapse is not None:
+        return 0 if all(plain_flow(source, name) for name in read_at("pre", synapse, sends)) else 1
     if not source.flows or ports_read_by(target).flow.isdisjoint(ports):
         return 1
     return 0 if plain_flow(source, sends) else 1
@@ -51,9 +68,9 @@ class Cycle(NamedTuple):
 
 class Stages(NamedTuple):
     """The integration: its level; by ports which signals of their Line are made anew at each stage; for each neuron
-    whether anything that is sent is. ``ahead``: by names of what is sent for each neuron whether others read it behind
-    the integration, before the neuron is updated. ``lagging``: the connections (m,) whose delay is continuous, since
-    what they bring is read between steps; None without any."""
+    whether anything that is taken of it is. ``ahead``: by names of what is taken for each neuron whether it is read
+    behind the integration, before the neuron is updated. ``lagging``: the connections (m,) whose delay is continuous,
+    since what they bring is read between steps; None without any."""
 
     level: int
     staged: Mapping[str, BoolArray]
@@ -70,61 +87,27 @@ class Order(NamedTuple):
     stages: Stages | None = None
 
 
-class Line(NamedTuple):
-    """What arrives at the ports of a name: the connections, ascending (None: all), and what each signal is multiplied
-    by, None where that is 1."""
-
-    connections: Indices | None = None
-    factors: FloatArray | None = None
-
-
-@dataclass(frozen=True)
-class Wired:
-    """The connections, as far as levels go by them: an entry has one of the ``routes``, and ``entry`` says of each
-    connection which entry it is of; ``timed`` which have a delay above 0 in seconds, None where none has."""
-
-    sources: IntColumn
-    targets: IntColumn
-    delays: IntColumn
-    entry: IntColumn
-    routes: Sequence[Route]
-    timed: BoolArray | None = None
-
-    @cached_property
-    def lines(self) -> Mapping[str, Line]:
-        """By ports what arrives there."""
-        if all(route == PLAIN_ROUTE for route in self.routes):
-            return {DRIVE: Line()}
-        entry, result = self.entry.compact(), {DRIVE: Line(np.zeros(0, dtype=np.int64))}
-        for port in dict.fromkeys(name for route in self.routes for name, _ in route.ports):
-            factor = np.array([dict(route.ports).get(port, np.nan) for route in self.routes])
-            there = np.flatnonzero(~np.isnan(factor)[entry])
-            factors = factor[entry[there]]
-            result[port] = Line(frozen(narrow(there)), None if (factors == 1).all() else frozen(factors))
-        return result
-
-    @cached_property
-    def undelayed(self) -> BoolArray:
-        """For each connection whether it brings what is sent in the same step."""
-        return np.asarray(self.delays.compact() == 0)
-
-
 def order_of(
     models: Sequence[Definition], model: Indices, wired: Wired, held: Mapping[str, BoolArray]
 ) -> Order | Cycle:
     """The levels of all neurons. ``models`` are those that there are, ``model`` the number of that of each neuron;
     ``held`` says by ports where something is added that does not flow: tables, supplied inputs, noise."""
-    if any(one.flows for one in models):
+    if wired.flow or any(one.flows for one in models):
         return _Coupled(models, model, wired, held).order
     level: IntArray | Cycle = np.zeros(len(model), dtype=np.int64)
     if (wired.delays.kept == 0).any():
-        undelayed = np.flatnonzero(wired.undelayed)
+        waited_for = wired.undelayed
+        if wired.synapses:
+            waited_for = waited_for & Taken(models, model, wired).waited_for
+        undelayed = np.flatnonzero(waited_for)
         level = levels_along(len(model), undelayed, wired.sources.some(undelayed), wired.targets.some(undelayed))
     return level if isinstance(level, Cycle) else Order(level, np.zeros(len(model), dtype=np.int64))
 
 
-class _Some(NamedTuple):
-    """Some of the connections to the ports of a name: which, these, their sources and their targets."""
+class _Open(NamedTuple):
+    """The connections to the ports of a name whose signals may be made anew within a step: which of them these are,
+    that is, those without delay, or with one in seconds, and those with a synapse; these, their sources and their
+    targets."""
 
     among: BoolArray
     connections: Indices
@@ -133,15 +116,16 @@ class _Some(NamedTuple):
 
 
 def made_anew(models: Sequence[Definition], model: Indices, wired: Wired, held: Mapping[str, BoolArray]) -> BoolArray:
-    """For each connection whether what it brings is made anew at each stage. The arguments are those of
+    """For each connection whether what it brings flows and is made anew at each stage. The arguments are those of
     ``order_of``."""
-    return _Coupled(models, model, wired, held).making
+    made = _Coupled(models, model, wired, held)
+    return made.making & made.flowing
 
 
 def held_at(neurons: Neurons, inputs: Sequence[Input], noises: Sequence[Noise]) -> Mapping[str, BoolArray]:
     """By ports for each neuron whether a number is added there that is the same over a step: a table's, one that is
-    supplied, or held, noise."""
-    flows = np.array([*(one.flows for one in inputs for _ in range(one.size)), True])
+    supplied, noise."""
+    flows = np.array([*(one.expression is not None for one in inputs for _ in range(one.size)), True])
     result = {port: ~flows[given] for port, given in ((DRIVE, neurons.input), *neurons.port_input.items())}
     for noise in noises:
         if not noise.state:
@@ -159,44 +143,50 @@ class _Coupled:
     held: Mapping[str, BoolArray]
 
     @cached_property
+    def taken(self) -> Taken:
+        """What connections take at their ends."""
+        return Taken(self.models, self.model, self.wired)
+
+    @cached_property
     def reads(self) -> tuple[PortsRead, ...]:
         """Which ports each model reads."""
         return tuple(map(ports_read_by, self.models))
 
-    @cached_property
-    def sources(self) -> Indices:
-        """The source of each connection."""
-        return self.wired.sources.compact()
-
-    @cached_property
+    @property
     def targets(self) -> Indices:
         """The target of each connection."""
-        return self.wired.targets.compact()
+        return self.taken.ends["post"]
+
+    @cached_property
+    def synapse(self) -> BoolArray:
+        """For each connection whether it has a synapse."""
+        return self.taken.of_entries(lambda synapse: True)
+
+    @cached_property
+    def receiving(self) -> BoolArray:
+        """For each connection whether its synapse has states that are made once a step."""
+        return self.taken.of_entries(lambda one: any(s.each_step or s.each_episode for s in one.state))
+
+    @cached_property
+    def integrated(self) -> BoolArray:
+        """For each connection whether its synapse has states that flow."""
+        return self.taken.of_entries(lambda synapse: bool(synapse.flows))
 
     def _arriving(self, port: str) -> Indices:
         """The connections to the ports of a name."""
         found = self.wired.lines[port].connections
-        return np.arange(len(self.sources), dtype=np.int64) if found is None else found
+        return np.arange(len(self.targets), dtype=np.int64) if found is None else found
 
     @cached_property
-    def undelayed(self) -> dict[str, _Some]:
-        """By ports the connections without delay."""
-        return {port: self._some(port, self.wired.undelayed) for port in self.wired.lines}
-
-    @cached_property
-    def fluent(self) -> dict[str, _Some]:
-        """By ports the connections that bring what flows as such: without delay, or with one in seconds."""
-        timed = self.wired.timed
-        if timed is None:
-            return self.undelayed
-        return {port: self._some(port, self.wired.undelayed | timed) for port in self.wired.lines}
-
-    def _some(self, port: str, which: BoolArray) -> _Some:
-        """Those of the connections to the ports of a name that are among these (m,)."""
-        arriving = self._arriving(port)
-        among = which[arriving]
-        found = arriving[among]
-        return _Some(among, found, self.sources[found], self.targets[found])
+    def open(self) -> dict[str, _Open]:
+        """By ports the connections whose signals may be made anew within a step."""
+        result = {}
+        for port in self.wired.lines:
+            arriving = self._arriving(port)
+            among = (self.wired.fluent | self.synapse)[arriving]
+            found = arriving[among]
+            result[port] = _Open(among, found, self.taken.ends["pre"][found], self.targets[found])
+        return result
 
     def _of_neurons(self, port: str, reading: Sequence[Collection[str]]) -> BoolArray:
         """For each neuron whether what there is for its model has the name of a port in it."""
@@ -212,68 +202,74 @@ class _Coupled:
         """By ports for each neuron whether what is made once a step reads it."""
         return {port: self._of_neurons(port, [one.update for one in self.reads]) for port in self.wired.lines}
 
-    def _of_sent(self, holds: Callable[[int, str], bool]) -> BoolArray:
-        """For each connection what holds of the number of its source's model and of what it takes."""
-        sends = {name: number for number, name in enumerate(dict.fromkeys(one.sends for one in self.wired.routes))}
-        table = [[holds(number, sent_by(model, one)) for one in sends] for number, model in enumerate(self.models)]
-        of_both = np.array(table, dtype=np.bool_).reshape(len(self.models), len(sends))
-        of_entry = np.array([sends[one.sends] for one in self.wired.routes], dtype=np.int64)
-        return np.asarray(of_both[self.model[self.sources], of_entry[self.wired.entry.compact()]])
-
     @cached_property
     def through(self) -> dict[str, BoolArray]:
-        """By ports for each connection whether what it takes reads that port of its source."""
-        return {port: self._reading(port) for port in self.wired.lines}
+        """By ports (names, n) whether what is taken of a neuron by a name reads that port of it."""
+        outputs = {id(model): read.outputs for model, read in zip(self.models, self.reads, strict=True)}
 
-    def _reading(self, port: str) -> BoolArray:
-        """The same for one port."""
-        return self._of_sent(lambda number, sent: port in self.reads[number].outputs.get(sent, ()))
+        def reading(port: str) -> BoolArray:
+            return self.taken.of_models(lambda model, name: port in outputs[id(model)].get(sent_by(model, name), ()))
+
+        return {port: reading(port) for port in self.wired.lines}
 
     @cached_property
-    def flowing(self) -> BoolArray:
-        """For each connection whether what it brings flows. What reads something that is held is held, too, and so on
-        until nothing more is found."""
-        n = len(self.model)
+    def _flowing(self) -> tuple[BoolArray, BoolArray]:
+        """Whether what is taken of a neuron by a name flows (names, n), and what a connection brings (m,). What reads
+        something that is held is held, too, and so on until nothing more is found."""
+        n, taken = len(self.model), self.taken
         mixed = {port: self.held.get(port, np.zeros(n, dtype=np.bool_)).copy() for port in self.wired.lines}
-        for port, values in mixed.items():
-            arriving = self._arriving(port)
-            values[self.targets[arriving[~self.fluent[port].among]]] = True
-        flowing = self._of_sent(lambda number, sent: flows_by(self.models[number], sent) is not None)
+        flowing = taken.of_models(lambda model, name: flows_by(model, name) is not None)
+        delayed = ~self.wired.fluent & taken.any("pre", np.ones_like(flowing))
+        bringing = ~delayed & (~self.synapse | taken.of_entries(signal_flows))
         while True:
             for port, values in mixed.items():
-                flowing &= ~(self.through[port] & values[self.sources])
+                flowing &= ~(self.through[port] & values)
+            bringing &= taken.all("pre", flowing) & taken.all("post", flowing)
             before = sum(int(values.sum()) for values in mixed.values())
-            for port, (_, connections, _, targets) in self.fluent.items():
-                mixed[port][targets[~flowing[connections]]] = True
+            for port, values in mixed.items():
+                arriving = self._arriving(port)
+                values[self.targets[arriving[~bringing[arriving]]]] = True
             if sum(int(values.sum()) for values in mixed.values()) == before:
-                return flowing
+                return flowing, bringing
+
+    @property
+    def flowing(self) -> BoolArray:
+        """For each connection whether what it brings flows."""
+        return self._flowing[1]
+
+    @cached_property
+    def made(self) -> BoolArray:
+        """(names, n): whether what is taken of a neuron by a name flows and is no parameter: whoever takes it at a
+        stage takes it anew."""
+        return self._flowing[0] & self.taken.real
 
     @cached_property
     def staged(self) -> dict[str, BoolArray]:
-        """By ports for each of its fluent connections whether it is made anew at each stage: what it brings flows, and a
-        derivative reads that, or what another such connection without delay takes."""
+        """By ports for each of its open connections whether it is made anew at each stage: what it brings flows, or it
+        has a synapse, and a derivative reads that, or what another such connection takes."""
         result: dict[str, BoolArray] = {}
-        making = np.zeros(len(self.sources), dtype=np.bool_)
+        making = self.integrated.copy()
         while True:
             before = int(making.sum())
-            for port, (_, connections, _, targets) in self.fluent.items():
+            for port, (_, connections, _, targets) in self.open.items():
                 read = self.by_flow[port] | self._passed_on(port, making)
-                result[port] = self.flowing[connections] & read[targets]
+                result[port] = (self.flowing | self.synapse)[connections] & read[targets]
                 making[connections[result[port]]] = True
             if int(making.sum()) == before:
                 return result
 
     def _passed_on(self, port: str, making: BoolArray) -> BoolArray:
-        """For each neuron whether any of some connections without delay takes of it what reads a port."""
-        reading = np.zeros(len(self.model), dtype=np.bool_)
-        reading[self.sources[making & self.wired.undelayed & self.through[port]]] = True
-        return reading
+        """For each neuron whether any of some connections takes of it, at a stage, what reads a port."""
+        reading = self.through[port] & self.made
+        before = self.taken.neurons("pre", making & self.wired.undelayed, reading)
+        return before | self.taken.neurons("post", making, reading)
 
     @cached_property
     def making(self) -> BoolArray:
-        """For each connection whether it brings to any port what is made anew at each stage."""
-        result = np.zeros(len(self.sources), dtype=np.bool_)
-        for port, (_, connections, _, _) in self.fluent.items():
+        """For each connection whether what it takes is taken at each stage: for what it brings to a port, or for the
+        states of its synapse."""
+        result = self.integrated.copy()
+        for port, (_, connections, _, _) in self.open.items():
             result[connections[self.staged[port]]] = True
         return result
 
@@ -284,68 +280,130 @@ class _Coupled:
         stage = self._stages()
         if isinstance(stage, Cycle):
             return stage
-        ahead: Mapping[str, BoolArray] = {}
-        level = levels_along(n + 1, *self._waits(np.zeros(len(self.sources), dtype=np.bool_)))
+        known = np.zeros(len(self.targets), dtype=np.bool_)
+        level = levels_along(n + 1, *self._waits(known))
         if isinstance(level, Cycle):  # perhaps not where nobody waits for what is known behind the integration
-            known = self._of_sent(lambda number, sent: known_behind_flow(self.models[number], sent))
+            known = self.taken.all("pre", self.taken.of_models(known_behind_flow))
             other = levels_along(n + 1, *self._waits(known))
             if isinstance(other, Cycle):
                 return level
-            level, ahead = other, self._ahead(known)
+            level = other
         staged = {}
-        for port, (among, *_) in self.fluent.items():
+        for port, (among, *_) in self.open.items():
             staged[port] = np.zeros(len(among), dtype=np.bool_)
             staged[port][among] = self.staged[port]
-        made = np.zeros(n, dtype=np.bool_)
-        made[self.sources[self.making & self.wired.undelayed]] = True
-        lagging = None if self.wired.timed is None else self.making & self.wired.timed
-        lagging = lagging if lagging is not None and lagging.any() else None
-        return Order(level[:n], stage, Stages(int(level[n]), staged, made, ahead, lagging))
+        made, ahead = self._taken_at_stages(), self._ahead(known)
+        return Order(level[:n], stage, Stages(int(level[n]), staged, made, ahead, self._lagging()))
+
+    def _lagging(self) -> BoolArray | None:
+        """The connections (m,) with a delay in seconds that bring anew at each stage what flows; None without any."""
+        if self.wired.timed is None:
+            return None
+        result = self.making & self.wired.timed & self.taken.all("pre", self._flowing[0])
+        return result if result.any() else None
+
+    def _taken_at_stages(self) -> BoolArray:
+        """For each neuron whether anything of it is taken at each stage, by connections, synapses or rules."""
+        taken = self.taken
+        sources = taken.neurons("pre", self.making & (self.wired.undelayed | taken.of_entries(_reads_sent)), self.made)
+        return sources | taken.neurons("post", self.making, self.made) | self._by_rules
+
+    @cached_property
+    def _by_rules(self) -> BoolArray:
+        """For each neuron whether a rule, whose states flow, may take anything of it at each stage."""
+        result = np.zeros(len(self.model), dtype=np.bool_)
+        for number, rules in self.wired.rules.items():
+            members = self.taken.in_entries([number])
+            for rule in (one for one in rules if one.flows):
+                for side, ends in self.taken.ends.items():
+                    names = read_at(side, rule, self.wired.routes[number].sends)
+                    flowing = [any(_flows(model, name) for name in names) for model in self.models]
+                    taken = ends[members]
+                    result[taken[np.array(flowing, dtype=np.bool_)[self.model[taken]]]] = True
+        return result
 
     def _ahead(self, known: BoolArray) -> dict[str, BoolArray]:
-        """By names of what is sent for each neuron whether a neuron that does not wait for it reads it. ``known``: the
-        connections (m,) whose signal is known behind the integration."""
-        waiting = np.zeros(len(self.sources), dtype=np.bool_)
-        for port, (_, connections, _, targets) in self.undelayed.items():
-            waiting[connections[self.by_update[port][targets]]] = True
+        """By names of what is taken for each neuron whether it is read between the integration and the neuron's own
+        update: by a neuron that does not wait for it, or as a state of the target by a synapse. ``known``: the
+        connections (m,) of which all that they take of the source is known behind the integration."""
+        taken, waiting = self.taken, self._once_a_step
         result: dict[str, BoolArray] = {}
-        for name in dict.fromkeys(sent_by(model, one.sends) for model in self.models for one in self.wired.routes):
-            taking = self._of_sent(partial(_is, name)) & waiting & known
-            if taking.any():
-                result[name] = np.zeros(len(self.model), dtype=np.bool_)
-                result[name][self.sources[taking]] = True
+        for number, name in enumerate(taken.names):
+            if name is None:
+                continue
+            this = np.zeros_like(taken.real)
+            this[number] = taken.real[number]
+            read = taken.neurons("pre", waiting & known & self.wired.undelayed, this)
+            this &= taken.of_models(_is_flow_state)
+            read |= taken.neurons("post", waiting & self.synapse, this)
+            for sent, neurons in self._by_model(name, read):
+                result[sent] = result.get(sent, np.zeros_like(read)) | neurons
+        return result
+
+    def _by_model(self, name: str, neurons: BoolArray) -> Iterator[tuple[str, BoolArray]]:
+        """What some neurons send that are told to send this, by its own name, and those that do."""
+        for number in np.flatnonzero(np.bincount(self.model[neurons], minlength=len(self.models))).tolist():
+            yield sent_by(self.models[number], name), neurons & (self.model == number)
+
+    @cached_property
+    def _once_a_step(self) -> BoolArray:
+        """For each connection whether what it takes is needed once a step: for a port of the target that is read then,
+        or for states of its synapse."""
+        result = self.receiving.copy()
+        for port, (_, connections, _, targets) in self.open.items():
+            result[connections[self.by_update[port][targets]]] = True
         return result
 
     def _stages(self) -> IntArray | Cycle:
-        """For each neuron its level within a stage."""
-        edges = []
-        for port, (_, connections, sources, targets) in self.fluent.items():
+        """For each neuron its level within a stage. Without a synapse a neuron waits for whatever it takes, else for
+        what reads ports there; a synapse that reads such an output of its target makes it wait for itself."""
+        edges, taken = [], self.taken
+        closing = self.made & np.logical_or.reduce([*self.through.values()])
+        before = (taken.any("pre", closing) | ~self.synapse) & self.wired.undelayed
+        behind = taken.any("post", closing)
+        for port, (_, connections, sources, targets) in self.open.items():
             waits = self.staged[port] & self._passed_on(port, self.making)[targets]
-            waits &= self.wired.undelayed[connections]
-            edges.append((connections[waits], sources[waits], targets[waits]))
+            for begins, of in ((sources, waits & before[connections]), (targets, waits & behind[connections])):
+                edges.append((connections[of], begins[of], targets[of]))
         level = levels_along(len(self.model), *_joined(edges))
         return level._replace(algebraic=True) if isinstance(level, Cycle) else level
 
     def _waits(self, known: BoolArray) -> tuple[Indices, Indices, Indices]:
         """Who waits for whom within a step: the connection (−1 for none), the first, and the one that waits. ``known``:
-        the connections (m,) whose signal is known behind the integration, so that nobody waits for their source."""
-        integration = len(self.model)
+        the connections (m,) of which all that they take is known behind the integration, so that nobody waits for
+        their source."""
+        integration, taken = len(self.model), self.taken
         flows = np.flatnonzero(np.array([bool(one.flows) for one in self.models], dtype=np.bool_)[self.model])
         edges: list[tuple[Indices, Indices, Indices]] = [
             (np.full(len(flows), -1), np.full(len(flows), integration), flows)
         ]
-        for port, (_, connections, sources, targets) in self.undelayed.items():
-            updated = self.by_update[port][targets]
+        waited_for, held = self.wired.undelayed & taken.waited_for, ~taken.all("pre", self._flowing[0])
+        for port, (_, connections, sources, targets) in self.open.items():
+            updated = self.by_update[port][targets] | self.receiving[connections]
+            now = updated & waited_for[connections]
             begins = np.where(known[connections], integration, sources)
-            edges.append((connections[updated], begins[updated], targets[updated]))
-            before = self.by_flow[port][targets] & ~self.flowing[connections]
+            edges.append((connections[now], begins[now], targets[now]))
+            of_integration = self.by_flow[port][targets] | self.integrated[connections]
+            before = of_integration & (waited_for & held)[connections]
             edges.append((connections[before], sources[before], np.full(int(before.sum()), integration)))
+            own = updated & self.integrated[connections]
+            edges.append((connections[own], np.full(int(own.sum()), integration), targets[own]))
         return _joined(edges)
 
 
-def _is(name: str, number: int, sent: str) -> bool:
-    """Whether this is sent, of whatever model."""
-    return sent == name
+def _flows(model: Definition, name: str) -> bool:
+    """Whether a model has something of a name that may flow."""
+    return is_kept(model, sent_by(model, name)) and flows_by(model, name) is not None
+
+
+def _reads_sent(synapse: Definition) -> bool:
+    """Whether a synapse reads what its source sends now, whatever the delay."""
+    return "sent" in synapse.read
+
+
+def _is_flow_state(model: Definition, name: str) -> bool:
+    """Whether that is a state with a derivative."""
+    return any(one.name == sent_by(model, name) for one in model.flows)
 
 
 def _joined(edges: list[tuple[Indices, Indices, Indices]]) -> tuple[Indices, Indices, Indices]:

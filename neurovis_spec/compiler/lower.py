@@ -6,21 +6,26 @@ Projections (connections that learn by one rule) and the program, an ordered lis
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain, pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, Indices, IntArray, frozen, narrow, sorting, starts_of, width
+from neurovis_spec.compiler.connections.connect import Connected
 from neurovis_spec.compiler.connections.entries import Bundle
-from neurovis_spec.compiler.connections.plasticity import Learning
-from neurovis_spec.compiler.levels import Order, Stages, Wired
+from neurovis_spec.compiler.connections.in_use import InUse, Piece
+from neurovis_spec.compiler.levels import Order, Stages
+from neurovis_spec.compiler.network import Outlet, outlets_of, taken_at
 from neurovis_spec.compiler.neurons.groups import Built
 from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.program import (
     DRIVE,
+    RULE,
+    SYNAPSE,
     Diffuse,
+    EndName,
     Gather,
     Integrate,
     Learn,
@@ -31,11 +36,13 @@ from neurovis_spec.compiler.program import (
     PortOf,
     Projection,
     ReadInputs,
+    Receive,
     Send,
     SendAhead,
     Update,
     Use,
 )
+from neurovis_spec.compiler.taken import Wired
 from neurovis_spec.language.words import Method
 
 
@@ -47,7 +54,7 @@ class Integration(NamedTuple):
 
 
 def make_program(
-    populations: tuple[Population, ...], projections: tuple[Projection, ...], order: Order, by: Integration
+    populations: tuple[Population, ...], projected: Projected, order: Order, by: Integration
 ) -> tuple[Operation, ...]:
     """What a step does, in order: inputs, neurons along delay 0, signals that leave, rules. Where states flow they are
     integrated behind the neurons that reach a derivative without delay and do not flow themselves."""
@@ -55,20 +62,28 @@ def make_program(
     integration: tuple[Operation, ...] = ()
     if order.stages is not None:
         before = sum(population.level < order.stages.level for population in populations)
-        integration = _integration(populations, order.stages, by)
+        integration = _integration(populations, projected.projections, order.stages, by)
     updates: list[list[Operation]] = [[Gather(number), Update(number)] for number in range(len(populations))]
-    learning = (Learn(number) for number in range(len(projections)))
+    for number, target in projected.targets.items():
+        state = projected.projections[number].use.definition.state
+        if any(one.each_step is not None or one.each_episode is not None for one in state):
+            updates[target].insert(-2, Receive(number))
+    learning = (Learn(number) for number, one in enumerate(projected.projections) if one.kind == RULE)
     return ReadInputs(), *chain(*updates[:before]), *integration, *chain(*updates[before:]), Send(), *learning
 
 
-def _integration(populations: tuple[Population, ...], stages: Stages, by: Integration) -> tuple[Operation, ...]:
+def _integration(
+    populations: tuple[Population, ...], projections: tuple[Projection, ...], stages: Stages, by: Integration
+) -> tuple[Operation, ...]:
     """The integration of all states that flow, and what noise adds to them."""
     flowing = [number for number, one in enumerate(populations) if one.model.definition.flows]
     made = [number for number, one in enumerate(populations) if stages.made[one.members].any()]
     numbers = sorted({*flowing, *made}, key=lambda number: (populations[number].stage, number))
+    at_connections = tuple(number for number, one in enumerate(projections) if one.use.definition.flows)
     noisy = tuple(n for n in flowing if any(one.noise is not None for one in populations[n].model.definition.flows))
     diffuse = (Diffuse(noisy),) if noisy else ()
-    return Integrate(tuple(numbers), by.method, by.substeps), *diffuse, *_sends_ahead(populations, stages)
+    integrate = Integrate(tuple(numbers), by.method, by.substeps, at_connections)
+    return integrate, *diffuse, *_sends_ahead(populations, stages)
 
 
 def _sends_ahead(populations: tuple[Population, ...], stages: Stages) -> Iterator[Operation]:
@@ -194,35 +209,117 @@ def _use(population: int, members: IntArray, group_of: IntArray, groups: Sequenc
     return Use(owner, definition, parameters)
 
 
-def make_projections(bundles: tuple[Bundle, ...]) -> tuple[tuple[Projection, ...], list[int]]:
-    """One Projection a rule, whichever entries learn by it, and for each entry the index of its Projection, or −1: what
-    is learned by the same rule is computed together."""
-    number_of_rule: dict[str, int] = {}
-    entries: list[list[tuple[Learning, IntArray]]] = []
-    rules: list[int] = []
+class Projected(NamedTuple):
+    """The projections; for each entry the number of that of the first rule of each of its connections, or −1; and of
+    those of synapses the population of the targets."""
+
+    projections: tuple[Projection, ...]
+    rules: tuple[Indices, ...]
+    targets: Mapping[int, int]
+
+
+class _Alike(NamedTuple):
+    """What the connections of a projection have in common: the definition, what of its names of the ends are
+    parameters there; of a rule its place among theirs; of a synapse the population of the targets."""
+
+    kind: str
+    name: str
+    parameters: tuple[str, ...]
+    place: int
+    population: int = -1
+
+
+class _Some(NamedTuple):
+    """Connections of an entry that are members of one projection: their indices in the network, and in the piece."""
+
+    use: InUse
+    piece: Piece
+    members: IntArray
+    inside: IntArray
+
+
+def make_projections(made: Connected, populations: tuple[Population, ...]) -> Projected:
+    """One Projection a rule, at a place among those of its connections, and one a synapse and population of targets,
+    whichever entries they are of: what is computed alike is computed together. Rules come first."""
+    found: dict[str, dict[_Alike, list[_Some]]] = {RULE.name: {}, SYNAPSE.name: {}}
+    population_of = np.zeros(sum(len(one.members) for one in populations), dtype=np.int64)
+    for number, population in enumerate(populations):
+        population_of[population.members] = number
     start = 0
-    for bundle in bundles:
-        count, learning = len(bundle.sources), bundle.learning
-        projection = -1
-        if learning is not None:
-            projection = number_of_rule.setdefault(learning.rule.name, len(entries))
-            if projection == len(entries):
-                entries.append([])
-            entries[projection].append((learning, np.arange(start, start + count, dtype=np.int64)))
-        rules.append(projection)
-        start += count
-    return tuple(_projection(projection, of_projection) for projection, of_projection in enumerate(entries)), rules
+    for bundle in made.bundles:
+        for use in bundle.uses:
+            for piece in use.pieces:
+                of_kind = found[piece.definition.kind.name]
+                for key, inside in _alike(use, piece, population_of[bundle.targets[piece.places]]):
+                    some = _Some(use, piece, start + piece.places[inside], inside)
+                    of_kind.setdefault(key, []).append(some)
+        start += len(bundle.sources)
+    alike = {**found[RULE.name], **found[SYNAPSE.name]}
+    outlets = outlets_of(populations, _asked(made.bundles))
+    ends = _Ends(made, populations, outlets, len(population_of))
+    projections = tuple(_projection(number, *one, ends) for number, one in enumerate(alike.items()))
+    targets = {number: key.population for number, key in enumerate(alike) if key.population >= 0}
+    return Projected(projections, tuple(_first_rules(made, projections)), targets)
 
 
-def _projection(projection: int, entries: list[tuple[Learning, IntArray]]) -> Projection:
-    """The connections of several entries that learn by one rule; of each entry what it learns by, and the indices of
-    its connections."""
-    first = entries[0][0]
-    members = np.concatenate([members for _, members in entries])
+def _alike(use: InUse, piece: Piece, targets: IntArray) -> Iterator[tuple[_Alike, IntArray]]:
+    """The connections of a piece by what projections they are members of. ``targets``: the populations of theirs."""
+    definition = piece.definition
+    read = {name.text for name in definition.end_names}
+    names = definition.kind.name, definition.name, tuple(one for one in definition.parameters if one in read)
+    if definition.kind == RULE:
+        yield _Alike(*names, use.place), np.arange(len(targets), dtype=np.int64)
+        return
+    for population in np.flatnonzero(np.bincount(targets)).tolist():
+        yield _Alike(*names, use.place, population), np.flatnonzero(targets == population)
+
+
+def _asked(bundles: Sequence[Bundle]) -> set[str]:
+    """The names of what is taken of neurons beside their activities."""
+    read = {name.name for one in bundles for use in one.uses for piece in use.pieces for name in piece.read}
+    return read.union(one.route.sends for one in bundles)
+
+
+def _first_rules(made: Connected, projections: tuple[Projection, ...]) -> Iterator[Indices]:
+    """For each entry the projection of the first rule of each of its connections, −1 without."""
+    first = np.full(int(made.sizes.sum()), -1, dtype=np.int64)
+    for number, one in enumerate(projections):
+        if one.kind == RULE and one.place == 0:
+            first[one.members] = number
+    start = 0
+    for size in made.sizes.tolist():
+        some = first[start : start + size]
+        yield np.broadcast_to(some[:1], some.shape) if size and (some == some[0]).all() else some
+        start += size
+
+
+class _Ends(NamedTuple):
+    """What can be read of the ends of connections."""
+
+    made: Connected
+    populations: tuple[Population, ...]
+    outlets: tuple[Outlet, ...]
+    neurons: int
+
+    def read(self, name: EndName, members: IntArray) -> IntArray:
+        """Where what has this name stands at the ends of some connections, among activities and outlets."""
+        ends = self.made.sources if name.side == "pre" else self.made.targets
+        return np.asarray(taken_at(self.populations, self.outlets, self.neurons, name.name)[ends.some(members)])
+
+
+def _projection(number: int, key: _Alike, some: list[_Some], ends: _Ends) -> Projection:
+    """The connections that have one rule or synapse in common."""
+    first = some[0]
+    definition = first.piece.definition
+    members = frozen(np.concatenate([one.members for one in some]))
     parameters = {
-        name: np.concatenate([learning.parameters[name] for learning, _ in entries]) for name in first.parameters
+        name: frozen(np.concatenate([one.piece.parameters[name][one.inside] for one in some]))
+        for name in definition.parameters
     }
-    signals = {name: np.concatenate([learning.signals[name] for learning, _ in entries]) for name in first.signals}
-    for array in (members, *parameters.values(), *signals.values()):
-        frozen(array)
-    return Projection(members, (Use(Owner(first.rule.kind.name, projection), first.rule, parameters),), signals)
+    signals = {
+        name: frozen(np.concatenate([one.use.signals[name][one.piece.places[one.inside]] for one in some]))
+        for name in first.use.signals
+    }
+    read = {name.text: frozen(ends.read(name, members)) for name in first.piece.read}
+    use = Use(Owner(definition.kind.name, number), definition, parameters)
+    return Projection(members, (use,), signals, read, key.place)

@@ -8,14 +8,14 @@ carried out.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, FloatColumn, IntArray, IntColumn, frozen, pieces
+from neurovis_spec.arrays import BoolArray, FloatArray, FloatColumn, IntArray, IntColumn, frozen, pieces
 from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
 from neurovis_spec.compiler.events.changes import Change
@@ -25,6 +25,7 @@ from neurovis_spec.compiler.program import (
     DRIVE,
     SYNAPSE,
     Check,
+    Definition,
     Each,
     Holder,
     Integrate,
@@ -242,6 +243,31 @@ class Outlet(NamedTuple):
     start: int
 
 
+def outlets_of(populations: Sequence[Population], asked: Collection[str]) -> tuple[Outlet, ...]:
+    """What is taken beside activities, in the order of the populations and of what these keep: whatever has one of the
+    names that are ``asked`` for, and what a model sends in place of its activity."""
+    found: list[Outlet] = []
+    start = 0
+    for number, population in enumerate(populations):
+        model = population.model.definition
+        for one in model.kept if asked or model.send else ():
+            if one.name in asked or one.name == model.send:
+                found.append(Outlet(number, one.name, start))
+                start += len(population.members)
+    return tuple(found)
+
+
+def taken_at(populations: Sequence[Population], outlets: Sequence[Outlet], n: int, name: str) -> IntArray:
+    """What is taken of each of n neurons by this name, "" for what the neuron's model sends: an index into the
+    activities of all neurons followed by the outlets, the activity where nothing else has that name; (n,)."""
+    result = np.arange(n, dtype=np.int64)
+    for outlet in outlets:
+        population = populations[outlet.population]
+        if outlet.name == (name or population.model.definition.send):
+            result[population.members] = n + outlet.start + np.arange(len(population.members))
+    return result
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Output:
     """A name for what leaves the network: the activities of ``neurons``, or, where there are ``states``, these, and
@@ -331,14 +357,16 @@ class Network:
         """Whatever has definitions in use, in the order in which their states are kept."""
         return *self.populations, *self.projections
 
-    def located(self, each: Each) -> Located:
-        """The populations and all neurons, or the projections and all connections."""
+    def located(self, each: Each, having: Callable[[Definition], bool] = lambda definition: True) -> Located:
+        """The populations and all neurons, or the projections and all connections; of those only that have such a
+        definition, of which a connection may have one alone."""
         holders: Sequence[Holder] = self.populations if each == "neuron" else self.projections
         count = len(self.neurons if each == "neuron" else self.connections)
         numbers, positions = np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=np.int64)
         for number, holder in enumerate(holders):
-            numbers[holder.members] = number
-            positions[holder.members] = np.arange(len(holder.members))
+            if any(having(use.definition) for use in holder.uses):
+                numbers[holder.members] = number
+                positions[holder.members] = np.arange(len(holder.members))
         return Located(holders, numbers, positions)
 
     @cached_property
@@ -423,17 +451,9 @@ class Network:
 
     @cached_property
     def outlets(self) -> tuple[Outlet, ...]:
-        """What connections can take beside activities, in the order of the populations and of what these keep."""
+        """What connections, synapses and rules can take beside activities."""
         asked = {route.sends for route in self.connections.routes}
-        found: list[Outlet] = []
-        start = 0
-        for number, population in enumerate(self.populations):
-            model = population.model.definition
-            for one in model.kept if asked or model.send else ():
-                if one.name in asked or one.name == model.send:
-                    found.append(Outlet(number, one.name, start))
-                    start += len(population.members)
-        return tuple(found)
+        return outlets_of(self.populations, asked.union(*(one.asks for one in self.projections)))
 
     @cached_property
     def outlet_count(self) -> int:
@@ -451,7 +471,8 @@ class Network:
         routes = connections.each_route
         for name in dict.fromkeys(route.sends for route in routes):
             taking = np.isin(entry, [number for number, route in enumerate(routes) if route.sends == name])
-            result[taking] = self._taken(name)[result[taking]]
+            of_each = taken_at(self.populations, self.outlets, len(self.neurons), name)
+            result[taking] = of_each[result[taking]]
         return frozen(result)
 
     @cached_property
@@ -472,15 +493,6 @@ class Network:
             places = self.taken[(self.taken >= outlet.start) & (self.taken < outlet.start + len(members))]
             found.append(StateOf.of("neuron", outlet.name, members[places - outlet.start]))
         return tuple(one for one in found if one.size)
-
-    def _taken(self, name: str) -> IntArray:
-        """What of each neuron (n,) is taken by a connection that sends this, "" for what the neuron's model sends."""
-        result = np.arange(len(self.neurons), dtype=np.int64)
-        for outlet in self.outlets:
-            population = self.populations[outlet.population]
-            if outlet.name == (name or population.model.definition.send):
-                result[population.members] = len(result) + outlet.start + np.arange(len(population.members))
-        return result
 
     @cached_property
     def state_places(self) -> Mapping[tuple[int, str], int]:

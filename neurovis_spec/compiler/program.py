@@ -294,6 +294,13 @@ class Projection:
     ends: Mapping[str, IntArray] = field(default_factory=dict)
     #: of a rule its place among those of its connections
     place: int = 0
+    #: the names of the states and outputs that are among its signals
+    signal_names: frozenset[str] = frozenset()
+
+    @property
+    def asks(self) -> frozenset[str]:
+        """The names of the states and outputs of neurons that it reads."""
+        return self.signal_names.union(text.partition(".")[2] for text in self.ends)
 
     @property
     def read(self) -> frozenset[str]:

@@ -150,11 +150,12 @@ def probe_of(network: Network, states: Iterable[StateOf]) -> Probe:
 def _probe(network: Network, wanted: list[tuple[str, Each, int]]) -> Probe:
     """A probe of single states: the name, what has it ("neuron", "connection"), and the index of that."""
     places: dict[tuple[Owner, str], tuple[list[int], list[int]]] = {}
-    located: dict[Each, Located] = {}
+    located: dict[tuple[str, Each], Located] = {}
     for column, (state, what, index) in enumerate(wanted):
-        if what not in located:
-            located[what] = network.located(what)
-        holders, numbers, positions = located[what]
+        key = state, what
+        if key not in located:
+            located[key] = network.located(what, lambda one, state=state: any(own.name == state for own in one.kept))
+        holders, numbers, positions = located[key]
         uses = holders[int(numbers[index])].uses
         owner = next(use.owner for use in uses if any(one.name == state for one in use.definition.kept))
         members, columns = places.setdefault((owner, state), ([], []))

@@ -15,7 +15,7 @@ from neurovis_spec.arrays import BoolArray, integers
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.checks.neurons import unreached
 from neurovis_spec.compiler.flows import plain_flow, ports_read_by
-from neurovis_spec.compiler.levels import Cycle, Wired, held_at, made_anew, order_of
+from neurovis_spec.compiler.levels import Cycle, held_at, made_anew, order_of
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.groups import Built
 from neurovis_spec.compiler.program import Definition

@@ -6,6 +6,7 @@ matrix or pattern row by row), and for each plastic entry what it learns by.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -23,13 +24,13 @@ from neurovis_spec.arrays import (
     reals,
 )
 from neurovis_spec.compiler.connections.entries import Bundle, EntryBuilder, EntryContext
-from neurovis_spec.compiler.connections.plasticity import title_of
-from neurovis_spec.compiler.levels import Wired
+from neurovis_spec.compiler.connections.plasticity import called, title_of
 from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.compiler.names.references import Directory, arrow_of, resolve_sum
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import PLAIN_ROUTE, Connections
 from neurovis_spec.compiler.neurons.populate import Census
+from neurovis_spec.compiler.taken import Wired
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.sections import written
@@ -85,8 +86,17 @@ class Connected:
     @cached_property
     def wired(self) -> Wired:
         """The connections as levels go by them."""
-        routes = tuple(bundle.route for bundle in self.bundles)
-        return Wired(self.sources, self.targets, self.delays, self.entry, routes)
+        bundles, exact = self.bundles, self.exact
+        return Wired(
+            self.sources,
+            self.targets,
+            self.delays,
+            self.entry,
+            routes=tuple(one.route for one in bundles),
+            timed=None if exact is None else np.asarray(exact.whole() > 0),
+            synapses={number: one.synapse.definition for number, one in enumerate(bundles) if one.synapse is not None},
+            rules={number: (one.learning.rule,) for number, one in enumerate(bundles) if one.learning is not None},
+        )
 
 
 def connect(scopes: tuple[Scope, ...], census: Census, limits: Limits, seed: int) -> Connected:
@@ -132,10 +142,11 @@ def _ends(
     return arrow.normal, sources, targets
 
 
-def join(made: Connected, rules: list[int], lagging: BoolArray | None = None) -> Connections:
-    """All entries as one structure of columns; ``rules`` has for each entry the index of its Projection, or −1, and
-    ``lagging`` says which connections have a continuous delay, if any."""
+def join(made: Connected, rules: Sequence[Indices], lagging: BoolArray | None = None) -> Connections:
+    """All entries as one structure of columns; ``rules`` has for each entry the Projection of each connection, or −1,
+    and ``lagging`` says which connections have a continuous delay, if any."""
     bundles, sizes = made.bundles, made.sizes
+    synapses = tuple(None if one.synapse is None else called(one.synapse) for one in bundles)
     lags = None
     if lagging is not None and made.exact is not None:
         lags = made.exact if lagging.all() else reals(np.where(lagging, made.exact.whole(), np.nan))
@@ -145,7 +156,7 @@ def join(made: Connected, rules: list[int], lagging: BoolArray | None = None) ->
         weights=reals(*(bundle.weights for bundle in bundles)),
         centres=reals(*(bundle.centres for bundle in bundles)),
         delays=made.delays,
-        rules=Column.repeated(np.array(rules, dtype=np.int64), sizes, np.int64),
+        rules=integers(*rules),
         entry=made.entry,
         low=Column.repeated(np.array([bundle.low for bundle in bundles]), sizes, np.float64),
         high=Column.repeated(np.array([bundle.high for bundle in bundles]), sizes, np.float64),
@@ -156,4 +167,5 @@ def join(made: Connected, rules: list[int], lagging: BoolArray | None = None) ->
         routes=() if all(route == PLAIN_ROUTE for route in made.wired.routes) else tuple(made.wired.routes),
         undelayed=tuple(number for number, bundle in enumerate(bundles) if bundle.undelayed),
         lags=lags,
+        synapses=synapses if any(synapses) else (),
     )

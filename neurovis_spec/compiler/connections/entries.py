@@ -21,6 +21,7 @@ from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray, narro
 from neurovis_spec.compiler.connections.delays import DelayReader, Delays, Timed, check_below_step, text_of
 from neurovis_spec.compiler.connections.edges import EdgeReader, End
 from neurovis_spec.compiler.connections.ends import Ends, counted
+from neurovis_spec.compiler.connections.in_use import InUse, Joined, in_use
 from neurovis_spec.compiler.connections.patterns import all_to_all, empty_reason, pairs_of
 from neurovis_spec.compiler.connections.plasticity import ConnectionEnds, Learning, learning_of
 from neurovis_spec.compiler.connections.routes import default_delays, route_of
@@ -32,7 +33,8 @@ from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import PLAIN_ROUTE, Route
 from neurovis_spec.compiler.neurons.labels import check_length
 from neurovis_spec.compiler.neurons.populate import Census
-from neurovis_spec.compiler.program import DRIVE
+from neurovis_spec.compiler.program import DRIVE, SYNAPSE
+from neurovis_spec.compiler.values.arguments import Each, Settled, check_initials, settled_of
 from neurovis_spec.compiler.values.constants import Constants, Randomness, Value
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.compiler.values.matrices import Grid, grid_of
@@ -78,6 +80,9 @@ class Bundle(NamedTuple):
     undelayed: bool = False
     #: its delays, where any is in seconds
     timing: Delays | None = None
+    synapse: Settled | None = None
+    #: the rule and the synapse, with what they read of both ends
+    uses: tuple[InUse, ...] = ()
 
 
 class _Shape(NamedTuple):
@@ -159,8 +164,10 @@ class EntryBuilder:
             self.constants.follow(self._parts_per_connection(centre, centre_cell_parts, shape))
         with self.constants.following() as bound_parts:  # ``_bounds`` sets the field of each
             bounds = self._bounds(weights)
-        learning = self._learning(shape)
-        if shape is UNKNOWN or weights is UNKNOWN or centres is UNKNOWN or bounds is UNKNOWN or learning is UNKNOWN:
+        learning, synapse = self._learning(shape), self._synapse(shape)
+        if shape is UNKNOWN or weights is UNKNOWN or centres is UNKNOWN or bounds is UNKNOWN:
+            return UNKNOWN
+        if learning is UNKNOWN or synapse is UNKNOWN:
             return UNKNOWN
         if (
             self.sources is UNKNOWN
@@ -172,10 +179,16 @@ class EntryBuilder:
             return UNKNOWN
         sources, targets = self.sources[shape.i], self.targets[shape.j]
         models = self.context.census.models
-        unsaid = default_delays(sources, targets, route, models)
+        made = None if synapse is None else synapse.definition
+        unsaid = default_delays(sources, targets, route, models, made)
         delays = _delays(shape, written, unsaid)
-        check_below_step(delays, models.into_flow(targets, route), self.constants)
-        learning = learning if len(shape.i) else None  # without connections there is nothing that a rule would change
+        into_flow = models.into_flow(targets, route) | (made is not None and bool(made.flows))
+        check_below_step(delays, into_flow, self.constants)
+        if not len(shape.i):  # without connections there is nothing that they would do
+            learning = synapse = None
+        uses = self._uses(learning, synapse, Joined(sources, targets, self.context.census))
+        if uses is UNKNOWN:
+            return UNKNOWN
         return Bundle(
             name=self.context.scope.called(self.name),
             key=self.key.span,
@@ -193,13 +206,15 @@ class EntryBuilder:
                 *(part._replace(field="weights" if learning is None else "initial_weights") for part in weight_parts),
                 *(part._replace(field="centres") for part in centre_parts),
                 *bound_parts,
-                *(() if learning is None else learning.settled.parts),
+                *(part for use in uses for part in use.parts),
             ),
             label=None if body.label is None else body.label.value,
             empty=None if len(shape.i) else (self.sources, self.targets),
             route=route,
             undelayed=written is None and not np.all(unsaid),
             timing=None if delays.exact is None else delays,
+            synapse=synapse,
+            uses=uses,
         )
 
     def _report_empty(self) -> None:
@@ -448,11 +463,11 @@ class EntryBuilder:
             return UNKNOWN
         return np.ascontiguousarray(grid.values[shape.i, shape.j])
 
-    def _measures_distance(self) -> bool:
-        """Whether any of the targets combines what arrives by distance, or may, where what it says of that is
-        invalid."""
+    def _measures_distance(self, unknown: bool = True) -> bool:
+        """Whether any of the targets combines what arrives by distance, or may (``unknown``), where what it says of
+        that is invalid."""
         if self.targets is UNKNOWN or self.route is UNKNOWN:
-            return True
+            return unknown
         census, ports = self.context.census, [name for name, _ in self.route.ports]
         if DRIVE in ports and census.by_distance[self.targets].any():
             return True
@@ -491,18 +506,56 @@ class EntryBuilder:
         """What the entry learns by; None without a rule."""
         if self.body.plasticity is None:
             return None
-        ends: ConnectionEnds | Unknown = UNKNOWN
-        if shape is not UNKNOWN and self.sources is not UNKNOWN and self.targets is not UNKNOWN:
-            i, j = shape.i.astype(np.int64), shape.j.astype(np.int64)  # formulas compute with them
-            ends = ConnectionEnds(i, j, len(self.sources), len(self.targets))
         return learning_of(
             self.body.plasticity,
-            ends,
+            self._connection_ends(shape),
             target_count=UNKNOWN if self.targets is UNKNOWN else len(self.targets),
             scope=self.context.scope,
             directory=self.context.directory,
             neurons=len(self.context.census.neurons),
         )
+
+    def _connection_ends(self, shape: _Shape | Unknown) -> ConnectionEnds | Unknown:
+        """Which of both ends the connections join, for the settings of rules and synapses."""
+        if shape is UNKNOWN or self.sources is UNKNOWN or self.targets is UNKNOWN:
+            return UNKNOWN
+        i, j = shape.i.astype(np.int64), shape.j.astype(np.int64)  # formulas compute with them
+        return ConnectionEnds(i, j, len(self.sources), len(self.targets))
+
+    def _synapse(self, shape: _Shape | Unknown) -> Settled | Unknown | None:
+        """What the connections bring in place of the weight times what is sent; None without a synapse."""
+        choice = self.body.synapse
+        if choice is None:
+            return None
+        if self._measures_distance(unknown=False):
+            message = "a synapse brings a signal, and there is nothing that a distance would be measured from"
+            hint = "leave the synapse out, or let the targets combine by sum or product"
+            self.constants.findings.error("synapse-at-distance", choice.name.span, message, hint)
+        ends = self._connection_ends(shape)
+        each = Each("connection", dict.fromkeys(_SETTING.sees, UNKNOWN) if ends is UNKNOWN else ends._asdict())
+        count = UNKNOWN if ends is UNKNOWN else len(ends.i)
+        settled = settled_of(choice, SYNAPSE, self.context.scope.definitions, self.constants, each, count)
+        if settled is UNKNOWN or not settled.sound or not check_initials(settled, choice, self.constants):
+            return UNKNOWN
+        return settled
+
+    def _uses(self, learning: Learning | None, synapse: Settled | None, at: Joined) -> tuple[InUse, ...] | Unknown:
+        """The rule and the synapse, with what they read of both ends."""
+        findings = self.constants.findings
+        found: list[InUse | Unknown] = []
+        if learning is not None and self.body.plasticity is not None:
+            rule = in_use(learning.settled, self.body.plasticity.name.span, at, findings)
+            found.append(rule if rule is UNKNOWN else rule._replace(signals=learning.signals))
+        if synapse is not None and self.body.synapse is not None:
+            span = self.body.synapse.name.span
+            found.append(in_use(synapse, span, at, findings))
+            taken = {} if learning is None else {one.name: learning.rule.name for one in learning.rule.state}
+            for state in (one.name for one in synapse.definition.state if one.name in taken):
+                message = f"the synapse and the rule '{taken[state]}' both have a state '{state}'"
+                hint = "states of a connection have different names: rename it in one of them"
+                findings.error("duplicate-name", span, message, hint)
+        known = tuple(one for one in found if one is not UNKNOWN)
+        return known if len(known) == len(found) else UNKNOWN
 
 
 def _delays(shape: _Shape, written: Delays | Unknown | None, unsaid: int | Indices) -> Delays:

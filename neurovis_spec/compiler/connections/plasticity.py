@@ -6,7 +6,7 @@ and for each signal where it comes from.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -177,11 +177,16 @@ def _text(node: Node) -> str:
 
 
 def title_of(learning: Learning) -> str:
-    """A rule in use for display: ``delta(rate=0.01, target=T)``; a parameter that has several values is ``…``."""
+    """A rule in use for display: ``delta(rate=0.01, target=T)``."""
+    texts = (f"{signal}={learning.texts[signal]}" for signal in learning.rule.signals)
+    return called(learning.settled, texts)
+
+
+def called(used: Settled, further: Iterable[str] = ()) -> str:
+    """A rule or a synapse in use for display: ``phase(lag=0.5)``; a parameter that has several values is ``…``."""
     parts = [
         f"{name}={array[0]:g}" if len(array) and (array == array[0]).all() else f"{name}=…"
-        for name, array in learning.parameters.items()
+        for name, array in used.parameters.items()
     ]
-    rule = learning.rule
-    parts += [f"{signal}={learning.texts[signal]}" for signal in rule.signals]
-    return f"{rule.name}({', '.join(parts)})" if parts else rule.name
+    parts += further
+    return f"{used.definition.name}({', '.join(parts)})" if parts else used.definition.name

@@ -18,7 +18,7 @@ from neurovis_spec.compiler.names.state_references import no_port
 from neurovis_spec.compiler.network import PLAIN_ROUTE, Route
 from neurovis_spec.compiler.neurons.groups import Built, is_written
 from neurovis_spec.compiler.neurons.populate import Census, Models
-from neurovis_spec.compiler.program import MODEL
+from neurovis_spec.compiler.program import MODEL, Definition
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, Home, Undeclared, shorten
 from neurovis_spec.language.located import Formula, Located
@@ -77,14 +77,16 @@ def _sends(name: Located[str], groups: Sequence[Built], findings: Findings) -> s
     return "" if own else name.value
 
 
-def default_delays(sources: Indices, targets: Indices, route: Route, models: Models) -> int | Indices:
+def default_delays(
+    sources: Indices, targets: Indices, route: Route, models: Models, synapse: Definition | None = None
+) -> int | Indices:
     """The delays of connections that name none: one for all, or one for each."""
-    if not models.flow:
+    if not models.flow and synapse is None:
         return 1
     starts, ends = models.of[sources], models.of[targets]
     table = np.ones((len(models.different), len(models.different)), dtype=np.int64)
     for start in np.unique(starts).tolist():
         for end in np.unique(ends).tolist():
-            table[start, end] = models.delay(start, end, route)
+            table[start, end] = models.delay(start, end, route, synapse)
     found = table[starts, ends]
     return int(found[0]) if len(found) and (found == found[0]).all() else found

@@ -6,7 +6,7 @@ which numbers of a group follow a formula, a Binding which numbers of an array o
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -50,15 +50,23 @@ class LocatedPart(NamedTuple):
 
 def found_in(network: Network, census: Census, bundles: tuple[Bundle, ...]) -> Iterator[LocatedPart]:
     """The parts of all of a network: of neurons, connections, and tables of inputs."""
-    neurons, connections = network.located("neuron"), network.located("connection")
+    neurons, connections = network.located("neuron"), dict[tuple[str, str], Located]()
+
+    def at_connections(part: Part) -> Located:
+        """Where the definition is in use that a part is of: the parts of some connections may be of several."""
+        key = part.field, part.of
+        if key not in connections:
+            connections[key] = network.located("connection", lambda one: (one.kind.name, one.name) == key)
+        return connections[key]
+
     for one in census.groups:
         for part in one.parts:
-            yield from _found(part, one.group.start + part.within(one.group.count), neurons)
+            yield from _found(part, one.group.start + part.within(one.group.count), lambda part: neurons)
     start = 0
     for bundle in bundles:
         count = len(bundle.sources)
         for part in bundle.parts if count else ():
-            yield from _found(part, start + part.within(count), connections)
+            yield from _found(part, start + part.within(count), at_connections)
         start += count
     for number, entry in enumerate(network.inputs):
         for part in entry.parts:
@@ -66,12 +74,13 @@ def found_in(network: Network, census: Census, bundles: tuple[Bundle, ...]) -> I
             yield LocatedPart(table_of(number), part.within(entry.table.size), part)
 
 
-def _found(part: Part, members: IntArray, located: Located) -> Iterator[LocatedPart]:
+def _found(part: Part, members: IntArray, locate: Callable[[Part], Located]) -> Iterator[LocatedPart]:
     """A part of some neurons or connections: of a definition, which may be in use at several populations, or of what
-    the network has one of."""
+    the network has one of. ``locate`` says where a definition is in use."""
     if part.field == BIAS.name:
         yield LocatedPart(bias_of(part.name), members, part)
     elif part.name:
+        located = locate(part)
         numbers = located.numbers[members]
         owners = np.flatnonzero(np.bincount(numbers)).tolist()  # np.unique would import numpy.ma
         for number in owners:

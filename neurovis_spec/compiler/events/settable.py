@@ -106,6 +106,8 @@ class Part(NamedTuple):
     field: str = ""
     #: for a setting of a definition the parameter that is set
     name: str = ""
+    #: and what that definition is called
+    of: str = ""
     #: the bounds within which they must lie
     low: Dependent | None = None
     high: Dependent | None = None

@@ -42,14 +42,14 @@ class Models:
 
     different: tuple[Definition, ...]
     of: Indices
-    _delays: dict[tuple[int, int, Route], int] = field(default_factory=dict)
+    _delays: dict[tuple[int, int, Route, str], int] = field(default_factory=dict)
 
-    def delay(self, source: int, target: int, route: Route) -> int:
+    def delay(self, source: int, target: int, route: Route, synapse: Definition | None = None) -> int:
         """The delay of a connection that names none, from a neuron of one of these models to one of another."""
-        key = source, target, route
+        key = source, target, route, "" if synapse is None else synapse.name
         if key not in self._delays:
-            ports = [name for name, _ in route.ports]
-            self._delays[key] = default_delay(self.different[source], route.sends, self.different[target], ports)
+            ports, models = [name for name, _ in route.ports], (self.different[source], self.different[target])
+            self._delays[key] = default_delay(models[0], route.sends, models[1], ports, synapse)
         return self._delays[key]
 
     def into_flow(self, targets: Indices, route: Route) -> npt.NDArray[np.bool_]:
@@ -62,6 +62,13 @@ class Models:
     def flow(self) -> bool:
         """Whether any has a state with a derivative."""
         return any(one.flows for one in self.different)
+
+
+class Inside(NamedTuple):
+    """A group, and where neurons of it stand among others."""
+
+    group: Built
+    places: IntArray
 
 
 @dataclass(frozen=True)
@@ -110,6 +117,12 @@ class Census:
         """The groups that these neurons belong to."""
         starts = [one.group.start for one in self.groups]
         return [self.groups[number] for number in np.unique(np.searchsorted(starts, neurons, side="right") - 1)]
+
+    def groups_at(self, neurons: Indices) -> list[Inside]:
+        """The groups of some neurons, each with the places among these where its own stand."""
+        starts = [one.group.start for one in self.groups]
+        numbers = np.searchsorted(starts, neurons, side="right") - 1
+        return [Inside(self.groups[number], np.flatnonzero(numbers == number)) for number in np.unique(numbers)]
 
     def _each(self, values: list[bool]) -> npt.NDArray[np.bool_]:
         """For each neuron what holds of its group."""
