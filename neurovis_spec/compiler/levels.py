@@ -15,7 +15,7 @@ neuron of which a synapse at its own end alone reads something.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
@@ -323,27 +323,20 @@ class _Coupled:
         return result
 
     def _ahead(self, known: BoolArray) -> dict[str, BoolArray]:
-        """By names of what is taken for each neuron whether it is read between the integration and the neuron's own
-        update: by a neuron that does not wait for it, or as a state of the target by a synapse. ``known``: the
+        """By names of what is taken for each neuron whether a neuron that does not wait for it reads it. ``known``: the
         connections (m,) of which all that they take of the source is known behind the integration."""
-        taken, waiting = self.taken, self._once_a_step
         result: dict[str, BoolArray] = {}
-        for number, name in enumerate(taken.names):
-            if name is None:
-                continue
-            this = np.zeros_like(taken.real)
-            this[number] = taken.real[number]
-            read = taken.neurons("pre", waiting & known & self.wired.undelayed, this)
-            this &= taken.of_models(_is_flow_state)
-            read |= taken.neurons("post", waiting & self.synapse, this)
-            for sent, neurons in self._by_model(name, read):
-                result[sent] = result.get(sent, np.zeros_like(read)) | neurons
+        reading = self._once_a_step & known & self.wired.undelayed
+        for number, name in enumerate(self.taken.names) if reading.any() else ():
+            this = np.zeros_like(self.taken.real)
+            this[number] = self.taken.real[number]
+            neurons = self.taken.neurons("pre", reading, this)
+            for place, model in enumerate(self.models) if name is not None and neurons.any() else ():
+                having = neurons & (self.model == place)
+                if having.any():
+                    sent = sent_by(model, name)
+                    result[sent] = result.get(sent, np.zeros_like(having)) | having
         return result
-
-    def _by_model(self, name: str, neurons: BoolArray) -> Iterator[tuple[str, BoolArray]]:
-        """What some neurons send that are told to send this, by its own name, and those that do."""
-        for number in np.flatnonzero(np.bincount(self.model[neurons], minlength=len(self.models))).tolist():
-            yield sent_by(self.models[number], name), neurons & (self.model == number)
 
     @cached_property
     def _once_a_step(self) -> BoolArray:
@@ -399,11 +392,6 @@ def _flows(model: Definition, name: str) -> bool:
 def _reads_sent(synapse: Definition) -> bool:
     """Whether a synapse reads what its source sends now, whatever the delay."""
     return "sent" in synapse.read
-
-
-def _is_flow_state(model: Definition, name: str) -> bool:
-    """Whether that is a state with a derivative."""
-    return any(one.name == sent_by(model, name) for one in model.flows)
 
 
 def _joined(edges: list[tuple[Indices, Indices, Indices]]) -> tuple[Indices, Indices, Indices]:

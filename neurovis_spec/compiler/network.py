@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import BoolArray, FloatArray, FloatColumn, IntArray, IntColumn, frozen, pieces
+from neurovis_spec.arrays import FloatArray, FloatColumn, IntArray, IntColumn, frozen, pieces
 from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
 from neurovis_spec.compiler.events.changes import Change

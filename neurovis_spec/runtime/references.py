@@ -17,7 +17,7 @@ from neurovis_spec.compiler.names.state_references import (
     model_state,
 )
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import MODEL, RULE, Check, Kind
+from neurovis_spec.compiler.program import MODEL, RULE, SYNAPSE, Check, Kind
 from neurovis_spec.language.references import Arrow, Part, Sum, parse, parse_sum, state_of
 from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.likeness import suggest
@@ -128,7 +128,8 @@ def _holders_of(network: Network, kind: Kind) -> tuple[Holder, ...]:
 
 
 def _wiring_of(network: Network) -> Wiring:
-    """All connections, with the states of their rules."""
-    rules = _holders_of(network, RULE)
+    """All connections, with the states of their rules and synapses."""
+    rules, synapses = (_holders_of(network, kind) for kind in (RULE, SYNAPSE))
     connections = network.connections
-    return Wiring(connections.sources.whole(), connections.targets.whole(), connections.entries, rules)
+    ends = connections.sources.whole(), connections.targets.whole()
+    return Wiring(*ends, connections.entries, rules, synapses=synapses)

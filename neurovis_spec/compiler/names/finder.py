@@ -139,15 +139,19 @@ class Finder:
 
 def finder_of(census: Census, made: Connected, findings: Findings) -> Finder:
     """The Finder of the neurons, connections and states of a spec."""
-    rules, start = [], 0
+    rules, synapses, start = [], [], 0
     for bundle in made.bundles:
         first, start = start, start + len(bundle.sources)
         if bundle.learning is not None:
             rule, members = bundle.learning.rule, np.arange(first, start)
             rules.append(_holder(members, rule.name, rule.state))
+        if bundle.synapse is not None:
+            synapse = bundle.synapse.definition
+            synapses.append(_holder(np.arange(first, start), synapse.name, synapse.state))
     names = tuple(bundle.name for bundle in made.bundles)
     empty = tuple(bundle.empty for bundle in made.bundles if bundle.empty is not None)
-    wiring = Wiring(made.sources.compact(), made.targets.compact(), names, tuple(rules), made.complete, empty)
+    ends = made.sources.compact(), made.targets.compact()
+    wiring = Wiring(*ends, names, tuple(rules), made.complete, empty, tuple(synapses))
     models = _models(census)
     kept = tuple(_holder(members, model.name, model.state, model.outputs) for model, members in models)
     lasting = tuple(_holder(members, model.name, model.state) for model, members in models)

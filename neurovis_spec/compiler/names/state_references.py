@@ -1,4 +1,4 @@
-"""States by reference: ``K.v`` is the state v of the model of K's neurons, ``(K -> O).eligibility`` that of a rule.
+"""States by reference: ``K.v`` is the state v of the model of K's neurons, ``(K -> O).g`` that of a rule or a synapse.
 
 In: the name of a state, the neurons or connections that are to have it, who has which states. Out: StateOf, or what is
 wrong with it. A name that is a neuron's is never a state's.
@@ -24,7 +24,7 @@ _NONE: IntArray = np.zeros(0, dtype=np.int64)
 
 
 class StateOf(NamedTuple):
-    """A state of the models of neurons, or of the rules of connections: one of the two is empty."""
+    """A state of the models of neurons, or of the rules and synapses of connections: one of the two is empty."""
 
     state: str
     neurons: IntArray
@@ -58,8 +58,8 @@ class Refusal(NamedTuple):
 
 
 class Holder(NamedTuple):
-    """Members (neurons, or connections) whose model or rule is ``kind`` and has these states, and these outputs beside
-    them, where outputs are asked for, too."""
+    """Members (neurons, or connections) whose model, rule or synapse is ``kind`` and has these states, and these
+    outputs beside them, where outputs are asked for, too."""
 
     members: IntArray
     kind: str
@@ -68,8 +68,8 @@ class Holder(NamedTuple):
 
 
 class Wiring(NamedTuple):
-    """The ends of all connections, what the entries are called, and the states of the rules. ``complete``: there are no
-    others. ``empty`` are the ends of the entries that make no connection."""
+    """The ends of all connections, what the entries are called, and the states of the rules and the synapses.
+    ``complete``: there are no others. ``empty`` are the ends of the entries that make no connection."""
 
     sources: Indices
     targets: Indices
@@ -77,6 +77,7 @@ class Wiring(NamedTuple):
     rules: tuple[Holder, ...]
     complete: bool = True
     empty: tuple[tuple[Indices, Indices], ...] = ()
+    synapses: tuple[Holder, ...] = ()
 
     def nothing_between(self, sources: Sequence[int], targets: Sequence[int]) -> bool:
         """Whether an entry from any of some neurons to any of others makes no connection."""
@@ -103,9 +104,13 @@ def model_state(name: StateName, neurons: Sequence[int], models: Iterable[Holder
 
 
 def connections_state(name: StateName, connections: IntArray, wiring: Wiring) -> StateOf | Refusal | Unknown:
-    """A state of those of these connections whose rule has it; UNKNOWN where the connection that has it may be one
-    that is invalid."""
-    holders = [holder for holder in wiring.rules if np.isin(connections, holder.members).any()]
+    """A state of those of these connections whose rule or synapse has it; UNKNOWN where the connection that has it may
+    be one that is invalid."""
+    rules, synapses = (
+        [holder for holder in some if np.isin(connections, holder.members).any()]
+        for some in (wiring.rules, wiring.synapses)
+    )
+    holders = (*rules, *synapses)
     having = [holder.members for holder in holders if name.state in holder.states]
     if having:
         return StateOf.of("connection", name.state, connections[np.isin(connections, np.concatenate(having))])
@@ -115,13 +120,14 @@ def connections_state(name: StateName, connections: IntArray, wiring: Wiring) ->
         return Refusal(f"there is no connection '{shorten(name.owner.text)}'")
     if not holders:
         return Refusal(f"no rule changes '{shorten(name.owner.text)}', so it has no states")
-    return no_state("rule", holders[0].kind, f"of '{shorten(name.owner.text)}'", name.state, holders[0].states)
+    what, one = ("rule", rules[0]) if rules and not (synapses and synapses[0].states) else ("synapse", synapses[0])
+    return no_state(what, one.kind, f"of '{shorten(name.owner.text)}'", name.state, one.states)
 
 
 def no_state(
-    what: Literal["model", "rule"], name: str, of: str, state: str, states: Names, outputs: Names = ()
+    what: Literal["model", "rule", "synapse"], name: str, of: str, state: str, states: Names, outputs: Names = ()
 ) -> Refusal:
-    """That a model or a rule, ``of`` somebody, has not this state, but ``states``, and not this output, but
+    """That a model, a rule or a synapse, ``of`` somebody, has not this state, but ``states``, and not this output, but
     ``outputs``."""
     owner = f"the {what} '{name}' {of}"
     if not states and not outputs:
