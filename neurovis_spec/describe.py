@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from neurovis_spec.body import BodyError, Port, open_body
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import RULE
 
 
 def describe(network: Network, engine: tuple[str, str]) -> dict[str, object]:
@@ -64,9 +65,6 @@ def _neurons(network: Network) -> list[dict[str, object]]:
 
 def _connections(network: Network) -> list[dict[str, object]]:
     names, connections = network.neurons.names, network.connections
-    rules = [
-        None if rule < 0 else network.projections[rule].rule.definition.name for rule in connections.rules.tolist()
-    ]
     routes = _routes(network)
     return [
         {"from": names[source], "to": names[target], "weight": weight, "delay": delay, "rule": rule}
@@ -76,11 +74,22 @@ def _connections(network: Network) -> list[dict[str, object]]:
             connections.targets.tolist(),
             connections.weights.tolist(),
             connections.delays.tolist(),
-            rules,
+            _rules(network),
             connections.entry.tolist(),
             strict=True,
         )
     ]
+
+
+def _rules(network: Network) -> list[str | None]:
+    """The rule of each connection by its name, or several in their order; None for one that does not learn."""
+    result: list[str | None] = [None] * len(network.connections)
+    rules = [one for one in network.projections if one.kind == RULE]
+    for one in sorted(rules, key=lambda one: one.place):
+        for connection in one.members.tolist():
+            before, name = result[connection], one.use.definition.name
+            result[connection] = name if before is None else f"{before} + {name}"
+    return result
 
 
 def _routes(network: Network) -> list[dict[str, object]]:

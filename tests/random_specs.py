@@ -14,6 +14,7 @@ Spec: TypeAlias = dict[str, Plain]
 _ACTIVATIONS: list[Plain] = ["tanh", "sigmoid", "sin", {"clip": {"low": -0.8, "high": 0.9}}, {"gaussian": {"sigma": 2}}]
 _MODELS: list[Plain] = ["static", {"leaky_integrator": {"leak": 0.3}}]
 _RULES: list[Plain] = [None, None, {"oja": {"rate": 0.01}}, {"decay": {"rate": 0.05}}, {"hebbian": {"rate": 0.002}}]
+_RULES += [[{"oja": {"rate": 0.01}}, {"decay": {"rate": 0.05}}], ["decay", {"bcm": {"rate": 0.001}}, {"oja": {}}]]
 
 
 def section(spec: Spec, name: str) -> dict[str, Plain]:

@@ -131,7 +131,7 @@ def _projection(one: Projection, moved: IntArray) -> Record:
     signals = {name: moved[indices] for name, indices in one.signals.items()}
     rule, parameters = _definition(one.rule.definition), one.rule.parameters
     fields = {"rule": rule, "members": one.members, "parameters": parameters, "signals": signals}
-    return Record("Plasticity", fields)
+    return Record("Plasticity", fields | ({"place": one.place} if one.place else {}))
 
 
 def _definition(made: Definition) -> Record:

@@ -22,6 +22,7 @@ from neurovis_spec.compiler.neurons.groups import Built
 from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.program import (
     DRIVE,
+    PHASES,
     RULE,
     SYNAPSE,
     Diffuse,
@@ -68,8 +69,21 @@ def make_program(
         state = projected.projections[number].use.definition.state
         if any(one.each_step is not None or one.each_episode is not None for one in state):
             updates[target].insert(-2, Receive(number))
-    learning = (Learn(number) for number, one in enumerate(projected.projections) if one.kind == RULE)
+    learning = _learning(projected.projections)
     return ReadInputs(), *chain(*updates[:before]), *integration, *chain(*updates[before:]), Send(), *learning
+
+
+def _learning(projections: tuple[Projection, ...]) -> Iterator[Operation]:
+    """The rules of all connections. Where some have several, a phase of all comes before the next, in the order in
+    which connections have them."""
+    rules = [number for number, one in enumerate(projections) if one.kind == RULE]
+    if not any(projections[number].place for number in rules):
+        yield from map(Learn, rules)
+        return
+    for phase in PHASES:
+        for number in sorted(rules, key=lambda number: projections[number].place):
+            if any(getattr(one, phase) is not None for one in projections[number].use.definition.lasting):
+                yield Learn(number, (phase,))
 
 
 def _integration(

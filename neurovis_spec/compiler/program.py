@@ -6,15 +6,18 @@ projections say for which neurons and connections which are in use; operations a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Literal, NamedTuple, TypeAlias
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Final, Literal, NamedTuple, TypeAlias
 
 from neurovis_spec.arrays import FloatArray, Indices, IntArray
 from neurovis_spec.language.expressions.tree import Call, Number, Tree, names, walk
 from neurovis_spec.language.words import Combine, Method
 
 _ZERO = Number(0.0)
+#: What of a rule is carried out together: what each step changes, derivatives among it, and an episode's end.
+Phase: TypeAlias = Literal["each_step", "each_episode"]
+PHASES: Final[tuple[Phase, ...]] = ("each_step", "each_episode")
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +37,11 @@ class Quantity:
     noise: Tree | None = None
     #: as it is written, to be shown
     unit: str = ""
+
+    def during(self, phases: Collection[Phase]) -> Quantity:
+        """The same with what becomes of it in these phases."""
+        one = self if "each_step" in phases else replace(self, each_step=None, derivative=None)
+        return one if "each_episode" in phases else replace(one, each_episode=None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -307,6 +315,14 @@ class Projection:
         """All names that its definitions read in a run."""
         return frozenset().union(*(use.definition.read for use in self.uses))
 
+    def during(self, phases: Collection[Phase]) -> Projection:
+        """The same with what of its definition is carried out in these phases."""
+        if set(phases) == set(PHASES):
+            return self
+        made = self.use.definition
+        gives, state = (tuple(one.during(phases) for one in some) for some in (made.gives, made.state))
+        return replace(self, uses=(replace(self.use, definition=replace(made, gives=gives, state=state)),))
+
     @property
     def use(self) -> Use:
         """The definition that is in use."""
@@ -397,14 +413,10 @@ class Receive(Operation):
     projection: int
 
 
-#: What of a rule is carried out together: what each step changes, derivatives among it, and an episode's end.
-Phase: TypeAlias = Literal["each_step", "each_episode"]
-
-
 @dataclass(frozen=True, slots=True)
 class Learn(Operation):
     """The rule of a projection, step and (where it has them) episode: w[t+1] and its states, from old values. Where
     connections have several rules, one phase of all of them comes before the next."""
 
     projection: int
-    phases: tuple[Phase, ...] = ("each_step", "each_episode")
+    phases: tuple[Phase, ...] = PHASES

@@ -76,7 +76,7 @@ from neurovis_spec.language.values import (
     ModelField,
     NoiseField,
     Pair,
-    RuleField,
+    RulesField,
     SynapseField,
     as_file,
     at_ports,
@@ -343,7 +343,9 @@ class ConnectionModel(Model):
     synapse: SynapseField | None = Field(
         None, description="What it brings to its port, in place of weight times what is sent: name, or {name: {…}}."
     )
-    plasticity: RuleField | None = Field(None, description="A rule: name, or {name: {parameter: value, signal: …}}.")
+    plasticity: RulesField = Field(
+        default=(), description="A rule: name, or {name: {parameter: value, signal: …}}; or several, in their order."
+    )
     bounds: Annotated[
         Annotated[Pair, pair("bounds [low, high]")] | None,
         Needs(("plasticity",), "'bounds' hold plastic weights; there is no 'plasticity'"),

@@ -131,8 +131,20 @@ def _choice(kind: Kind, value: Role) -> Either:
 
 ActivationField = Annotated[Choice, Leaf(as_choice, _choice("activation", GROUP)), Role("choice", "activation")]
 ModelField = Annotated[Choice, Leaf(as_choice, _choice("model", GROUP)), Role("choice", "model")]
-RuleField = Annotated[Choice, Leaf(as_choice, _choice("rule", RULE_SETTING)), Role("choice", "rule")]
 SynapseField = Annotated[Choice, Leaf(as_choice, _choice("synapse", SYNAPSE_SETTING)), Role("choice", "synapse")]
+
+
+def as_choices(node: Node, info: ValidationInfo) -> tuple[Choice, ...]:
+    """A choice, or a list of several."""
+    if isinstance(node, AnyList) and not len(node):
+        refuse(info, node, "a rule, or a list of rules", "leave the key out where nothing learns")
+    return tuple(as_choice(item, info) for item in one_or_more(node))
+
+
+_RULE: Final = _choice("rule", RULE_SETTING)
+RulesField = Annotated[
+    tuple[Choice, ...], Leaf(as_choices, Either((_RULE, ListOf(_RULE, least=1)))), Role("choice", "rule")
+]
 
 
 class FileReference(NamedTuple):

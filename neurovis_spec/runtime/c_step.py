@@ -28,6 +28,7 @@ from neurovis_spec.arrays import FloatArray, Indices, IntArray
 from neurovis_spec.compiler.events.settable import HIGH, LOW, bias_of
 from neurovis_spec.compiler.network import Input, Network, Outlet
 from neurovis_spec.compiler.program import (
+    PHASES,
     Definition,
     Gather,
     Key,
@@ -85,10 +86,10 @@ class StepCode:
         #: how many weights are packed
         self.count = 0
         #: projections whose connections send while they learn, in one pass over their weights: those of one delay
-        learn = (one.projection for one in network.program if isinstance(one, Learn) and not form.written_out)
+        learn = (one for one in network.program if isinstance(one, Learn) and not form.written_out)
         self.sent_with = frozenset(
             number
-            for number in learn
+            for number in (one.projection for one in learn if one.phases == PHASES)
             if _common_delay(network.connections.delays[network.projections[number].members]) > 0
         )
         for arrivals in chain(*self.arrivals):
@@ -467,38 +468,39 @@ class StepCode:
 
     # ---- connections -------------------------------------------------------------------------------------------
 
-    def learn(self, number: int) -> None:
+    def learn(self, operation: Learn) -> None:
         """The rule of a projection: in a loop several connections side by side, then one by one those that are left.
         The sums ``o`` are put together behind the loop, so that no addition waits for the one before."""
-        code, count = self.code, len(self.network.projections[number].members)
+        code, projection = self.code, self.network.projections[operation.projection].during(operation.phases)
+        count = len(projection.members)
         if self.form.written_out:
             for place in range(count):
                 with code.block(""):
-                    self.connections(number, [place])
+                    self.connections(projection, [place])
             return
         lanes = 1 if self.form.still else _RULES_SIDE_BY_SIDE
         in_lanes = count - count % lanes
         if lanes > 1 and in_lanes:
             sums = [code.variable("o", 0.0) for _ in range(lanes)] if self.form.watched else []
             with code.block(code.loop("q", in_lanes, step=lanes)):
-                self.connections(number, ["q", *(f"(q + {lane})" for lane in range(1, lanes))], sums)
+                self.connections(projection, ["q", *(f"(q + {lane})" for lane in range(1, lanes))], sums)
             if sums:
                 code.line(f"odd += {' + '.join(sums)};")
         if in_lanes < count or lanes == 1:
             with code.block(code.loop("q", count, 0 if lanes == 1 else in_lanes)):
-                self.connections(number, ["q"], ["odd"] if self.form.watched else [])
+                self.connections(projection, ["q"], ["odd"] if self.form.watched else [])
 
-    def connections(self, number: int, places: Sequence[Place], sums: Sequence[str] = ()) -> None:
+    def connections(self, projection: Projection, places: Sequence[Place], sums: Sequence[str] = ()) -> None:
         """The rule at some connections: all is read before anything is stored. To each of ``sums``, one a connection,
         what is stored adds 0, or NaN where it is not finite."""
         code, leaving = self.code, []
-        if number in self.sent_with:
-            leaving = [self.leaving(self.network.projections[number].members, place) for place in places]
+        if projection.use.owner.number in self.sent_with:
+            leaving = [self.leaving(projection.members, place) for place in places]
             # what leaves is read before its weight learns
             leaving = [(slot, code.let("s", signal)) for slot, signal in leaving]
         if self.form.still:
             self.store(leaving)
-        stores = [self.connection(number, place) for place in places]
+        stores = [self.connection(projection, place) for place in places]
         for name, made in zip(sums, stores, strict=False):
             for _, value in made:
                 if not isinstance(value, float):  # x − x is 0, or NaN where x is not finite
@@ -524,11 +526,10 @@ class StepCode:
         for cell, value in made:
             self.code.line(f"{cell} = {self.code.text(value)};")
 
-    def connection(self, number: int, place: Place) -> list[tuple[str, Value]]:
+    def connection(self, projection: Projection, place: Place) -> list[tuple[str, Value]]:
         """The weight and the states of one connection, at a step and, where it has one, at an episode's end: where
         each is stored, and what."""
-        code, projection = self.code, self.network.projections[number]
-        connection = code.at(projection.members, place)
+        code, connection = self.code, self.code.at(projection.members, place)
         if self.form.still:
             if isinstance(place, int):
                 code.line(f"if (!still[{connection}]) {{")
@@ -680,4 +681,4 @@ def _send(operation: Send, step: StepCode) -> None:
 
 @write.register
 def _learn(operation: Learn, step: StepCode) -> None:
-    step.learn(operation.projection)
+    step.learn(operation)

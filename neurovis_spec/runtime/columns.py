@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -16,7 +17,7 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.body import Skeleton
 from neurovis_spec.compiler.names.state_references import StateOf, singles
 from neurovis_spec.compiler.network import Located, Network
-from neurovis_spec.compiler.program import Each, Owner
+from neurovis_spec.compiler.program import Definition, Each, Owner
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.references import find_neurons, find_states
@@ -154,7 +155,7 @@ def _probe(network: Network, wanted: list[tuple[str, Each, int]]) -> Probe:
     for column, (state, what, index) in enumerate(wanted):
         key = state, what
         if key not in located:
-            located[key] = network.located(what, lambda one, state=state: any(own.name == state for own in one.kept))
+            located[key] = network.located(what, partial(_keeps, state))
         holders, numbers, positions = located[key]
         uses = holders[int(numbers[index])].uses
         owner = next(use.owner for use in uses if any(one.name == state for one in use.definition.kept))
@@ -169,6 +170,10 @@ def _probe(network: Network, wanted: list[tuple[str, Each, int]]) -> Probe:
     for state, what, index in wanted:
         names += network.state_names([StateOf.of(what, state, np.array([index], dtype=np.int64))])
     return Probe(tuple(names), reads)
+
+
+def _keeps(state: str, definition: Definition) -> bool:
+    return any(one.name == state for one in definition.kept)
 
 
 @dataclass(frozen=True, eq=False)

@@ -183,7 +183,8 @@ def _learn(operation: Learn, step: Step) -> None:
     """The rule of a projection at a step and, where it has one, at an episode's end; not of connections that are
     ``still`` in this structure."""
     code, network = step.code, step.network
-    projection, learning = network.projections[operation.projection], None  # None: all of its connections learn
+    projection = network.projections[operation.projection].during(operation.phases)
+    learning: IntArray | None = None  # all of its connections
     still = step.structure.still[projection.members]
     if still.any():
         learning = np.flatnonzero(~still)

@@ -24,6 +24,7 @@ from neurovis_spec.compiler.program import (
     Learn,
     Operation,
     Population,
+    Projection,
     ReadInputs,
     Receive,
     Send,
@@ -209,16 +210,17 @@ class ReferenceStepper(Seen):
                 seen["weight"] = float(state.weights[connection])
                 self.change(projection.use, position, seen, state, {})
 
-    def learn(self, number: int, state: State, inputs: FloatArray) -> None:
+    def learn(self, operation: Learn, state: State, inputs: FloatArray) -> None:
         """w[t+1] and the states of a rule from old values; at an episode's end, once more from what these gave."""
-        projection = self.network.projections[number]
+        projection = self.network.projections[operation.projection].during(operation.phases)
         for position, connection in enumerate(projection.members.tolist()):
             if not state.conditions.structure.still[connection]:
-                self.learn_one(number, position, connection, state, inputs)
+                self.learn_one(projection, position, connection, state, inputs)
 
-    def learn_one(self, number: int, position: int, connection: int, state: State, inputs: FloatArray) -> None:
+    def learn_one(
+        self, projection: Projection, position: int, connection: int, state: State, inputs: FloatArray
+    ) -> None:
         """The weight and the states of one connection."""
-        projection = self.network.projections[number]
         low, high = self.low.at(connection, state), self.high.at(connection, state)
         seen = self.known(projection.rule, position, state) | self.seen(projection, position, state)
         signals = (*state.activity.tolist(), *inputs.tolist())  # as ``Projection.signals`` numbers them
@@ -298,4 +300,4 @@ def _send(operation: Send, by: ReferenceStepper, state: State, inputs: FloatArra
 
 @perform.register
 def _learn(operation: Learn, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
-    by.learn(operation.projection, state, inputs)
+    by.learn(operation, state, inputs)

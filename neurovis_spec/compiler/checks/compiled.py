@@ -23,6 +23,7 @@ from neurovis_spec.language.library import Library as Definitions
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.sections import ConnectionModel, GroupModel
 from neurovis_spec.language.spec import Spec
+from neurovis_spec.language.values import Choice
 
 
 class WrittenEntry(NamedTuple):
@@ -33,9 +34,10 @@ class WrittenEntry(NamedTuple):
     bundles: list[Bundle]
 
     @property
-    def learning(self) -> Learning | None:
-        """What it learns by, in the first scope that has connections."""
-        return next((bundle.learning for bundle in self.bundles if bundle.learning is not None), None)
+    def rules(self) -> tuple[tuple[Choice, Learning], ...]:
+        """What it learns by, in the first scope that has connections, beside what is written."""
+        made = next((bundle.rules for bundle in self.bundles if bundle.rules), ())
+        return tuple(zip(self.body.plasticity, made, strict=False))
 
 
 @dataclass(frozen=True)

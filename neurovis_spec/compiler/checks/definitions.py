@@ -342,5 +342,4 @@ def _choices(compiled: Compiled) -> Iterator[tuple[str, Choice]]:
         for _, body in section.connections:
             if body.synapse is not None:
                 yield SYNAPSE.section, body.synapse
-            if body.plasticity is not None:
-                yield RULE.section, body.plasticity
+            yield from ((RULE.section, choice) for choice in body.plasticity)

@@ -37,9 +37,9 @@ def check_lone_indices(compiled: Compiled, findings: Findings) -> None:
         for key, body in section.connections:
             if next(formulas_of(body, _PAIR), None) is None:  # as in most
                 continue
-            alone, learning = _alone(key, compiled, place), compiled.entries[key.span].learning
-            if alone:
-                _connection(body, alone, () if learning is None else learning.rule.signals, findings)
+            if alone := _alone(key, compiled, place):
+                rules = [learning.rule for _, learning in compiled.entries[key.span].rules]
+                _connection(body, alone, [(rule.name, signal) for rule in rules for signal in rule.signals], findings)
 
 
 def _instances(section: Section, findings: Findings) -> None:
@@ -56,10 +56,12 @@ def _group(name: str, group: GroupModel, findings: Findings) -> None:
         _warn(place, index, f"'{name}' is one neuron", hint, findings)
 
 
-def _connection(body: ConnectionModel, alone: dict[str, str], signals: Collection[str], findings: Findings) -> None:
-    """``i`` and ``j`` in an entry; ``alone`` has those that stand for one neuron, with what that is called. A rule's
-    signals are names."""
-    formulas = (one for one in formulas_of(body, alone) if one.path[0] != "plasticity" or one.path[-1] not in signals)
+def _connection(
+    body: ConnectionModel, alone: dict[str, str], signals: Collection[tuple[str, ...]], findings: Findings
+) -> None:
+    """``i`` and ``j`` in an entry; ``alone`` has those that stand for one neuron, with what that is called. Rules'
+    ``signals``, each by the rule and its own name, are names."""
+    formulas = (one for one in formulas_of(body, alone) if one.path[0] != "plasticity" or one.path[1:3] not in signals)
     for place, index in _occurrences(formulas, alone):
         hint = "'i' counts the sources and 'j' the targets, both from 0"
         if len(alone) == 1:

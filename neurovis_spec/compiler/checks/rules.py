@@ -8,19 +8,22 @@ is told of: there the signal is always ``post``, and with any other it would lea
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from typing import NamedTuple
 
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.checks.compiled import Compiled, WrittenEntry
 from neurovis_spec.compiler.connections.entries import Bundle
+from neurovis_spec.compiler.connections.plasticity import Learning
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Definition
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.grammar import ACTIVITIES
+from neurovis_spec.language.values import Choice
 from neurovis_spec.language.yaml.source import Scalar
 
 _POINTS = 16
@@ -31,20 +34,39 @@ def check_rules(compiled: Compiled, findings: Findings) -> None:
     """Warn of every entry whose rule changes no weight, or has each target for its own signal."""
     watched = _watched(compiled.network)
     for entry in compiled.entries.values():
-        learning, choice = entry.learning, entry.body.plasticity
-        if learning is None or choice is None:
-            continue
-        for signal in learning.rule.signals:
-            if all(_is_own(bundle, signal) for bundle in entry.bundles):
-                _check_signal(entry, signal, compiled.network, findings)
-        if watched.isdisjoint(bundle.name for bundle in entry.bundles):  # else it is there for its states
-            _check_rate(entry, findings)
+        is_watched = not watched.isdisjoint(bundle.name for bundle in entry.bundles)  # it is there for its states
+        for used in (_Used(entry, place, *rule) for place, rule in enumerate(entry.rules)):
+            _check_rule(used, compiled.network, findings)
+            if not is_watched:
+                _check_rate(used, findings)
+        if entry.rules and not is_watched:
             _check_bounds(entry, findings)
-        if compiled.network.episode is None and learning.rule.given.each_step is None:
-            name = learning.rule.name
-            message = f"'{name}' changes weights at the end of an episode, and there are none: no weight will change"
-            hint = "say how many steps an episode has, as in time: {episode: 100}"
-            findings.warning("no-effect", choice.name.span, message, hint)
+
+
+class _Used(NamedTuple):
+    """A rule of an entry: its place among those, how it is written, and what was made of it in the first scope."""
+
+    entry: WrittenEntry
+    place: int
+    choice: Choice
+    learning: Learning
+
+    @property
+    def everywhere(self) -> Iterator[Learning]:
+        """What was made of it in all scopes."""
+        return (bundle.rules[self.place] for bundle in self.entry.bundles if bundle.rules)
+
+
+def _check_rule(used: _Used, network: Network, findings: Findings) -> None:
+    """Warn of a rule of which a signal is each target, or that changes weights where no episode ends."""
+    rule = used.learning.rule
+    for signal in rule.signals:
+        if all(_is_own(bundle, used.place, signal) for bundle in used.entry.bundles):
+            _check_signal(used, signal, network, findings)
+    if network.episode is None and rule.given.each_step is None:
+        message = f"'{rule.name}' changes weights at the end of an episode, and there are none: no weight will change"
+        hint = "say how many steps an episode has, as in time: {episode: 100}"
+        findings.warning("no-effect", used.choice.name.span, message, hint)
 
 
 def changes(rule: Definition, parameters: Mapping[str, FloatArray], own: Collection[str] = ()) -> bool:
@@ -81,22 +103,19 @@ def _watched(network: Network) -> set[str]:
     return {connections.entries[number] for own in states for number in set(connections.entry[own].tolist())}
 
 
-def _is_own(bundle: Bundle, signal: str) -> bool:
-    """Whether a signal is, for every connection, the activity of its own target."""
-    return bundle.learning is not None and np.array_equal(bundle.learning.signals[signal], bundle.targets)
+def _is_own(bundle: Bundle, place: int, signal: str) -> bool:
+    """Whether a signal of a rule is, for every connection, the activity of its own target."""
+    return bool(bundle.rules) and np.array_equal(bundle.rules[place].signals[signal], bundle.targets)
 
 
-def _check_signal(entry: WrittenEntry, signal: str, network: Network, findings: Findings) -> None:
+def _check_signal(used: _Used, signal: str, network: Network, findings: Findings) -> None:
     """Warn of a signal that is each connection's own target, where the rule changes nothing then, or where other
     neurons may be meant."""
-    learning, choice = entry.learning, entry.body.plasticity
-    assert learning is not None
-    assert choice is not None
-    rule = learning.rule
-    span = next(setting.value.span for setting in choice.settings.entries if setting.name == signal)
+    learning, rule = used.learning, used.learning.rule
+    span = next(setting.value.span for setting in used.choice.settings.entries if setting.name == signal)
     if changes(rule, learning.parameters, (signal,)) or not changes(rule, learning.parameters):
-        if any(_is_of_others(bundle) for bundle in entry.bundles):
-            _tell_own(entry, signal, span, network, findings)
+        if any(_is_of_others(bundle) for bundle in used.entry.bundles):
+            _tell_own(used, signal, span, network, findings)
         return
     message = (
         f"'{shorten(learning.texts[signal])}' is this connection's own end: '{signal}' is then always 'post', and "
@@ -113,12 +132,10 @@ def _is_of_others(bundle: Bundle) -> bool:
     return len(targets) > 1 and bool((counts > 1).any() or among.any())
 
 
-def _tell_own(entry: WrittenEntry, signal: str, span: Span, network: Network, findings: Findings) -> None:
+def _tell_own(used: _Used, signal: str, span: Span, network: Network, findings: Findings) -> None:
     """Of a group that drives itself the source is probably meant, of another one all of its neurons together."""
-    learning = entry.learning
-    assert learning is not None
-    called, names = shorten(learning.texts[signal]), network.neurons.names
-    first = next(bundle for bundle in entry.bundles if _is_of_others(bundle))
+    called, names = shorten(used.learning.texts[signal]), network.neurons.names
+    first = next(bundle for bundle in used.entry.bundles if _is_of_others(bundle))
     one = names[int(first.targets[0])]
     message = f"'{called}' gives each connection its own target as '{signal}', which is 'post' already"
     if np.isin(first.sources, first.targets).any():
@@ -138,15 +155,14 @@ def _check_bounds(entry: WrittenEntry, findings: Findings) -> None:
         findings.warning("no-effect", bounds.span, message, "leave the plasticity out, or give the weight room")
 
 
-def _check_rate(entry: WrittenEntry, findings: Findings) -> None:
+def _check_rate(used: _Used, findings: Findings) -> None:
     """A rate of 0, which changes no weight. One that names a parameter can be set later."""
-    choice = entry.body.plasticity
-    assert choice is not None
+    choice = used.choice
     written = next((setting.value for setting in choice.settings.entries if setting.name == "rate"), None)
     if isinstance(written, Scalar) and isinstance(written.value, str):
         return
-    for learning in (bundle.learning for bundle in entry.bundles):
-        if learning is None or "rate" not in learning.parameters or learning.parameters["rate"].any():
+    for learning in used.everywhere:
+        if "rate" not in learning.parameters or learning.parameters["rate"].any():
             continue
         if not changes(learning.rule, learning.parameters):
             message = f"the rate of '{learning.rule.name}' is 0: no weight will change"

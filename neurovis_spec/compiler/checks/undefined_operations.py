@@ -39,10 +39,11 @@ def check_undefined(compiled: Compiled, findings: Findings) -> None:
             if hidden:
                 _tell(choice, used, hidden, compiled.network.dt, findings)
     for _, body, bundles in compiled.entries.values():
-        for learning in (bundle.learning for bundle in bundles if bundle.learning is not None):
-            made = [hazards(tree, Hidden.ALL) for tree in _at_steps(learning.rule)]
-            hidden = through_let(made, learning.rule.let).found
-            _tell(body.plasticity, learning.settled, hidden, compiled.network.dt, findings)
+        for bundle in bundles:
+            for choice, learning in zip(body.plasticity, bundle.rules, strict=False):  # no rules without connections
+                made = [hazards(tree, Hidden.ALL) for tree in _at_steps(learning.rule)]
+                hidden = through_let(made, learning.rule.let).found
+                _tell(choice, learning.settled, hidden, compiled.network.dt, findings)
 
 
 def _at_steps(definition: Definition) -> Iterator[Tree]:

@@ -86,16 +86,15 @@ class Connected:
     @cached_property
     def wired(self) -> Wired:
         """The connections as levels go by them."""
-        bundles, exact = self.bundles, self.exact
+        bundles = self.bundles
         return Wired(
             self.sources,
             self.targets,
             self.delays,
             self.entry,
             routes=tuple(one.route for one in bundles),
-            timed=None if exact is None else np.asarray(exact.whole() > 0),
             synapses={number: one.synapse.definition for number, one in enumerate(bundles) if one.synapse is not None},
-            rules={number: (one.learning.rule,) for number, one in enumerate(bundles) if one.learning is not None},
+            rules={number: [own.rule for own in one.rules] for number, one in enumerate(bundles) if one.rules},
         )
 
 
@@ -162,7 +161,7 @@ def join(made: Connected, rules: Sequence[Indices], lagging: BoolArray | None = 
         high=Column.repeated(np.array([bundle.high for bundle in bundles]), sizes, np.float64),
         entries=tuple(bundle.name for bundle in bundles),
         descriptions=tuple(bundle.description for bundle in bundles),
-        learns=tuple(None if bundle.learning is None else title_of(bundle.learning) for bundle in bundles),
+        learns=tuple(title_of(bundle.rules) or None for bundle in bundles),
         labels=tuple(bundle.label for bundle in bundles),
         routes=() if all(route == PLAIN_ROUTE for route in made.wired.routes) else tuple(made.wired.routes),
         undelayed=tuple(number for number, bundle in enumerate(bundles) if bundle.undelayed),

@@ -23,7 +23,7 @@ from neurovis_spec.compiler.connections.edges import EdgeReader, End
 from neurovis_spec.compiler.connections.ends import Ends, counted
 from neurovis_spec.compiler.connections.in_use import InUse, Joined, in_use
 from neurovis_spec.compiler.connections.patterns import all_to_all, empty_reason, pairs_of
-from neurovis_spec.compiler.connections.plasticity import ConnectionEnds, Learning, learning_of
+from neurovis_spec.compiler.connections.plasticity import ConnectionEnds, Learning, Place, rules_of
 from neurovis_spec.compiler.connections.routes import default_delays, route_of
 from neurovis_spec.compiler.connections.weight_scale import Scaled, check_scale, scaled
 from neurovis_spec.compiler.events.settable import Assembled, Distance, Part
@@ -53,7 +53,7 @@ _WEIGHT, _DELAY = (formula_at(ConnectionModel, key) for key in ("weight", "delay
 
 
 class Bundle(NamedTuple):
-    """The connections of one entry: neuron indices and values, one a connection, and the rule, if any."""
+    """The connections of one entry: neuron indices and values, one a connection, and the rules, if any."""
 
     name: str
     #: where the entry is named
@@ -65,7 +65,7 @@ class Bundle(NamedTuple):
     delays: Indices
     low: float
     high: float
-    learning: Learning | None
+    rules: tuple[Learning, ...]
     description: str | None
     #: whether the entry has a ``self``, and no neuron is in both of its ends
     ends_disjoint: bool
@@ -81,7 +81,7 @@ class Bundle(NamedTuple):
     #: its delays, where any is in seconds
     timing: Delays | None = None
     synapse: Settled | None = None
-    #: the rule and the synapse, with what they read of both ends
+    #: the rules and the synapse, with what they read of both ends
     uses: tuple[InUse, ...] = ()
 
 
@@ -111,7 +111,7 @@ class EntryContext(NamedTuple):
 
 @dataclass(frozen=True)
 class EntryBuilder:
-    """Builds one entry, step by step: its shape, its weights, its rule. An end that is invalid is UNKNOWN.
+    """Builds one entry, step by step: its shape, its weights, its rules. An end that is invalid is UNKNOWN.
 
     ``name`` is what it is called in its scope.
     """
@@ -164,10 +164,10 @@ class EntryBuilder:
             self.constants.follow(self._parts_per_connection(centre, centre_cell_parts, shape))
         with self.constants.following() as bound_parts:  # ``_bounds`` sets the field of each
             bounds = self._bounds(weights)
-        learning, synapse = self._learning(shape), self._synapse(shape)
+        rules, synapse = self._rules(shape), self._synapse(shape)
         if shape is UNKNOWN or weights is UNKNOWN or centres is UNKNOWN or bounds is UNKNOWN:
             return UNKNOWN
-        if learning is UNKNOWN or synapse is UNKNOWN:
+        if rules is UNKNOWN or synapse is UNKNOWN:
             return UNKNOWN
         if (
             self.sources is UNKNOWN
@@ -185,8 +185,8 @@ class EntryBuilder:
         into_flow = models.into_flow(targets, route) | (made is not None and bool(made.flows))
         check_below_step(delays, into_flow, self.constants)
         if not len(shape.i):  # without connections there is nothing that they would do
-            learning = synapse = None
-        uses = self._uses(learning, synapse, Joined(sources, targets, self.context.census))
+            rules, synapse = (), None
+        uses = self._uses(rules, synapse, Joined(sources, targets, self.context.census))
         if uses is UNKNOWN:
             return UNKNOWN
         return Bundle(
@@ -199,11 +199,11 @@ class EntryBuilder:
             delays=delays.steps,
             low=bounds[0],
             high=bounds[1],
-            learning=learning,
+            rules=rules,
             description=None if body.description is None else body.description.value,
             ends_disjoint=body.self is not None and not np.isin(self.sources, self.targets).any(),
             parts=(
-                *(part._replace(field="weights" if learning is None else "initial_weights") for part in weight_parts),
+                *(part._replace(field="initial_weights" if rules else "weights") for part in weight_parts),
                 *(part._replace(field="centres") for part in centre_parts),
                 *bound_parts,
                 *(part for use in uses for part in use.parts),
@@ -502,18 +502,18 @@ class EntryBuilder:
             return UNKNOWN
         return (low, high)
 
-    def _learning(self, shape: _Shape | Unknown) -> Learning | Unknown | None:
-        """What the entry learns by; None without a rule."""
-        if self.body.plasticity is None:
-            return None
-        return learning_of(
-            self.body.plasticity,
+    def _rules(self, shape: _Shape | Unknown) -> tuple[Learning, ...] | Unknown:
+        """What the entry learns by, rule by rule."""
+        if not self.body.plasticity:
+            return ()
+        place = Place(
             self._connection_ends(shape),
             target_count=UNKNOWN if self.targets is UNKNOWN else len(self.targets),
             scope=self.context.scope,
             directory=self.context.directory,
             neurons=len(self.context.census.neurons),
         )
+        return rules_of(self.body.plasticity, place)
 
     def _connection_ends(self, shape: _Shape | Unknown) -> ConnectionEnds | Unknown:
         """Which of both ends the connections join, for the settings of rules and synapses."""
@@ -539,17 +539,17 @@ class EntryBuilder:
             return UNKNOWN
         return settled
 
-    def _uses(self, learning: Learning | None, synapse: Settled | None, at: Joined) -> tuple[InUse, ...] | Unknown:
-        """The rule and the synapse, with what they read of both ends."""
+    def _uses(self, rules: tuple[Learning, ...], synapse: Settled | None, at: Joined) -> tuple[InUse, ...] | Unknown:
+        """The rules and the synapse, with what they read of both ends."""
         findings = self.constants.findings
         found: list[InUse | Unknown] = []
-        if learning is not None and self.body.plasticity is not None:
-            rule = in_use(learning.settled, self.body.plasticity.name.span, at, findings)
-            found.append(rule if rule is UNKNOWN else rule._replace(signals=learning.signals))
+        for place, (choice, learning) in enumerate(zip(self.body.plasticity, rules, strict=False)):
+            rule = in_use(learning.settled, choice.name.span, at, findings)
+            found.append(rule if rule is UNKNOWN else rule._replace(signals=learning.signals, place=place))
         if synapse is not None and self.body.synapse is not None:
             span = self.body.synapse.name.span
             found.append(in_use(synapse, span, at, findings))
-            taken = {} if learning is None else {one.name: learning.rule.name for one in learning.rule.state}
+            taken = {one.name: learning.rule.name for learning in rules for one in learning.rule.state}
             for state in (one.name for one in synapse.definition.state if one.name in taken):
                 message = f"the synapse and the rule '{taken[state]}' both have a state '{state}'"
                 hint = "states of a connection have different names: rename it in one of them"

@@ -1,7 +1,7 @@
 """Learning: what an entry of ``connections`` says of its plasticity.
 
-In: a Choice (a rule with settings and signals). Out: a Learning: the rule, its parameters (one value a connection),
-and for each signal where it comes from.
+In: Choices (rules with settings and signals). Out: for each a Learning: the rule, its parameters (one value a
+connection), and for each signal where it comes from.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import Input
 from neurovis_spec.compiler.program import RULE, Definition
 from neurovis_spec.compiler.values.arguments import Each, Settled, check_initials, settled_of
-from neurovis_spec.diagnostics import shorten
+from neurovis_spec.diagnostics import Findings, shorten
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import ConnectionModel
@@ -58,24 +58,51 @@ class ConnectionEnds(NamedTuple):
     n_to: int
 
 
+class Place(NamedTuple):
+    """Of which connections the rules are, UNKNOWN where those are not known: the entry is invalid, and its rules are
+    checked only. ``directory`` says what the names of the scope mean, ``neurons`` is how many the network has."""
+
+    ends: ConnectionEnds | Unknown
+    target_count: int | Unknown
+    scope: Scope
+    directory: Directory
+    neurons: int
+
+
 _SETTING = formula_at(ConnectionModel, "plasticity", "RULE", "SETTING")
 #: Signals of a list that are named where a rule is shown.
 _SHOWN = 3
 
 
-def learning_of(
-    choice: Choice,
-    ends: ConnectionEnds | Unknown,
-    target_count: int | Unknown,
-    scope: Scope,
-    directory: Directory,
-    neurons: int,
-) -> Learning | Unknown:
-    """The rule of an entry with these connections; UNKNOWN where they are not known: the entry is invalid, and its rule
-    is checked only.
+def rules_of(choices: tuple[Choice, ...], at: Place) -> tuple[Learning, ...] | Unknown:
+    """The rules of an entry, in their order; UNKNOWN where one is invalid, or they have something in common."""
+    found = [_learning_of(choice, at) for choice in choices]
+    known = [one for one in found if one is not UNKNOWN]
+    apart = _are_apart(choices, found, at.scope.constants.findings)
+    return tuple(known) if apart and len(known) == len(choices) else UNKNOWN
 
-    ``directory`` says what the names of the scope mean, ``neurons`` is how many the network has.
-    """
+
+def _are_apart(choices: tuple[Choice, ...], found: list[Learning | Unknown], findings: Findings) -> bool:
+    """Whether no two rules of a connection are the same, or have states of the same name; a finding where two do."""
+    before, owners = findings.errors, dict[str, str]()
+    for number, (choice, learning) in enumerate(zip(choices, found, strict=True)):
+        name = choice.name.value
+        if name in (other.name.value for other in choices[:number]):
+            message = f"the rule '{shorten(name)}' is here already: a connection has a rule once"
+            findings.error("duplicate-name", choice.name.span, message, "leave it out here")
+            continue
+        for state in () if learning is UNKNOWN else learning.rule.state:
+            other = owners.setdefault(state.name, name)
+            if other != name:
+                message = f"the rules '{shorten(other)}' and '{shorten(name)}' both have a state '{state.name}'"
+                hint = "states of a connection have different names: rename it in one of them"
+                findings.error("duplicate-name", choice.name.span, message, hint)
+    return findings.errors == before
+
+
+def _learning_of(choice: Choice, at: Place) -> Learning | Unknown:
+    """A rule of an entry; UNKNOWN where it is invalid."""
+    ends, target_count, scope, directory, neurons = at
     constants, targets = scope.constants, UNKNOWN if ends is UNKNOWN else ends.j
     each = Each("connection", dict.fromkeys(_SETTING.sees, UNKNOWN) if ends is UNKNOWN else ends._asdict())
     count = UNKNOWN if targets is UNKNOWN else len(targets)
@@ -176,10 +203,11 @@ def _text(node: Node) -> str:
     return str(node.value).strip() if isinstance(node, Scalar) else "…"
 
 
-def title_of(learning: Learning) -> str:
-    """A rule in use for display: ``delta(rate=0.01, target=T)``."""
-    texts = (f"{signal}={learning.texts[signal]}" for signal in learning.rule.signals)
-    return called(learning.settled, texts)
+def title_of(rules: Iterable[Learning]) -> str:
+    """Rules in use for display, in their order: ``delta(rate=0.01, target=T) + decay(rate=0.1)``."""
+    return " + ".join(
+        called(one.settled, (f"{signal}={one.texts[signal]}" for signal in one.rule.signals)) for one in rules
+    )
 
 
 def called(used: Settled, further: Iterable[str] = ()) -> str:

@@ -142,12 +142,11 @@ def finder_of(census: Census, made: Connected, findings: Findings) -> Finder:
     rules, synapses, start = [], [], 0
     for bundle in made.bundles:
         first, start = start, start + len(bundle.sources)
-        if bundle.learning is not None:
-            rule, members = bundle.learning.rule, np.arange(first, start)
-            rules.append(_holder(members, rule.name, rule.state))
+        members = np.arange(first, start)
+        rules += [_holder(members, learning.rule.name, learning.rule.state) for learning in bundle.rules]
         if bundle.synapse is not None:
             synapse = bundle.synapse.definition
-            synapses.append(_holder(np.arange(first, start), synapse.name, synapse.state))
+            synapses.append(_holder(members, synapse.name, synapse.state))
     names = tuple(bundle.name for bundle in made.bundles)
     empty = tuple(bundle.empty for bundle in made.bundles if bundle.empty is not None)
     ends = made.sources.compact(), made.targets.compact()

@@ -98,9 +98,8 @@ def settled_of(
         values = _parameters(choice, defined, n, constants, entries, each)
     if values is UNKNOWN:
         return Settled(definition, {}, (), entries, sound=False)
-    return Settled(
-        definition, values, tuple(part._replace(field=kind.name, of=definition.name) for part in parts), entries
-    )
+    named = tuple(part._replace(field=kind.name, of=definition.name) for part in parts)
+    return Settled(definition, values, named, entries)
 
 
 def _named_definition(choice: Choice, known: Names[Defined], kind: Kind, findings: Findings) -> Defined | Unknown:
