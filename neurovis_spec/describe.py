@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from neurovis_spec.body import BodyError, Port, open_body
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import RULE
+from neurovis_spec.compiler.program import RULE, SYNAPSE
 
 
 def describe(network: Network, engine: tuple[str, str]) -> dict[str, object]:
@@ -65,10 +65,11 @@ def _neurons(network: Network) -> list[dict[str, object]]:
 
 def _connections(network: Network) -> list[dict[str, object]]:
     names, connections = network.neurons.names, network.connections
-    routes = _routes(network)
+    routes, synapses = _routes(network), _synapses(network)
     return [
         {"from": names[source], "to": names[target], "weight": weight, "delay": delay, "rule": rule}
         | (routes[entry] if routes else {})
+        | ({"synapse": synapses[entry]} if synapses else {})
         for source, target, weight, delay, rule, entry in zip(
             connections.sources.tolist(),
             connections.targets.tolist(),
@@ -95,6 +96,15 @@ def _rules(network: Network) -> list[str | None]:
 def _routes(network: Network) -> list[dict[str, object]]:
     """By entries what connections take and where they bring it, where any does as no other says."""
     return [{"sends": route.sends or None, "ports": dict(route.ports)} for route in network.connections.routes]
+
+
+def _synapses(network: Network) -> list[str | None]:
+    """By entries the synapses of connections by name, where any has one."""
+    result: list[str | None] = [None] * len(network.connections.entries)
+    for one in network.projections:
+        for entry in set(network.connections.entry[one.members].tolist()) if one.kind == SYNAPSE else ():
+            result[entry] = one.use.definition.name
+    return result if any(result) else []
 
 
 def _integration(network: Network) -> dict[str, object]:

@@ -15,7 +15,16 @@ from neurovis_spec.cli.files import count
 from neurovis_spec.cli.tables import number, spread, table
 from neurovis_spec.compiler.flows import ports_read_by
 from neurovis_spec.compiler.network import PLAIN_ROUTE
-from neurovis_spec.compiler.program import Diffuse, Integrate, SendAhead, Update
+from neurovis_spec.compiler.program import (
+    Check,
+    Definition,
+    Diffuse,
+    Integrate,
+    Operation,
+    Receive,
+    SendAhead,
+    Update,
+)
 from neurovis_spec.describe import wired
 from neurovis_spec.diagnostics import printable
 
@@ -28,7 +37,7 @@ if TYPE_CHECKING:
 #: The largest network whose connection matrix is shown, in neurons.
 _MATRIX = 24
 _OF_GROUPS = ("group", "neurons", "size", "activation", "model", "combine", "bias", "input", "box")
-_OF_ENTRIES = ("entry", "number", "weight", "delay", "port", "sends", "rule", "bounds")
+_OF_ENTRIES = ("entry", "number", "weight", "delay", "port", "sends", "synapse", "rule", "bounds")
 
 
 def overview(compiled: CompiledNetwork) -> str:
@@ -148,7 +157,7 @@ def _entries(network: Network) -> list[tuple[str, ...]]:
 def _entry(connections: Connections, index: int, route: Route, members: IntArray) -> tuple[str, ...]:
     name = connections.entries[index]
     if not len(members):
-        return name, "0", "", "", "", "", "", ""
+        return name, "0", "", "", "", "", "", "", ""
     return (
         name,
         f"{len(members):,}",
@@ -156,6 +165,7 @@ def _entry(connections: Connections, index: int, route: Route, members: IntArray
         _delays(connections.delays[members]),
         "" if route.ports == PLAIN_ROUTE.ports else ", ".join(map(_port, route.ports)),
         route.sends,
+        (connections.synapses[index] if connections.synapses else None) or "",
         connections.learns[index] or "",
         _bounds(float(connections.low[members[0]]), float(connections.high[members[0]])),
     )
@@ -172,34 +182,52 @@ def _port(of_route: tuple[str, float]) -> str:
 
 
 def _program(network: Network) -> str:
-    """The order of a step where states flow: what is integrated together, and what of it is held."""
-    if network.integration is None:
+    """The order of a step where states flow, or synapses have states: what is integrated together, and what of it is
+    held."""
+    if network.integration is None and not any(isinstance(one, Receive) for one in network.program):
         return ""
-    rows: list[tuple[str, str, str]] = []
-    anew: set[str] = set()
-    held: set[str] = set()
-    for operation in network.program:
-        match operation:
-            case Update(population=one):
-                rows.append(("update", _members(network, one), ""))
-            case Integrate(populations=several, method=method, substeps=substeps):
-                how = method + (f", {count(substeps, 'substep')} a step" if substeps > 1 else "")
-                rows += [("integrate", _members(network, one), _flows(network, one, how)) for one in several]
-                for one in several:
-                    for name, staged in _into_derivatives(network, one):
-                        (anew if staged else held).add(name)
-            case SendAhead(population=one, names=names):
-                rows.append(("send ahead", _members(network, one), ", ".join(names)))
-            case Diffuse(populations=several):
-                noisy = [(one, network.populations[one].model.definition) for one in several]
-                rows += [
-                    ("noise", _members(network, one), ", ".join(state.name for state in model.flows if state.noise))
-                    for one, model in noisy
-                ]
-    by_default = {network.connections.entries[entry] for entry in network.connections.undelayed}
-    notes = [("made anew at each stage", anew), ("held over a step", held), ("delay 0 by default", by_default)]
-    told = [(what, ", ".join(name for name in network.connections.entries if name in of)) for what, of in notes if of]
+    rows = [row for operation in network.program for row in _rows(network, operation)]
+    reached: dict[str, set[str]] = {}
+    for one in () if network.integration is None else network.integration.populations:
+        for name, how in _into_derivatives(network, one):
+            reached.setdefault(how, set()).add(name)
+    reached["delay 0 by default"] = {network.connections.entries[entry] for entry in network.connections.undelayed}
+    told = [
+        (how, ", ".join(name for name in network.connections.entries if name in reached[how]))
+        for how in (_ANEW, _FORMED, _HELD, "delay 0 by default")
+        if reached.get(how)
+    ]
     return "\n".join(["program", table(rows), *([table(told)] if told else [])])
+
+
+def _rows(network: Network, operation: Operation) -> Iterator[tuple[str, str, str]]:
+    """What an operation does, to whom, and how."""
+    match operation:
+        case Update(population=one):
+            yield "update", _members(network, one), ""
+        case Integrate(populations=several, method=method, substeps=substeps, projections=connected):
+            how = method + (f", {count(substeps, 'substep')} a step" if substeps > 1 else "")
+            for one in several:
+                yield "integrate", _members(network, one), _flows(network.populations[one].model.definition, how)
+            for one in connected:
+                yield "integrate", _connected(network, one), _flows(network.projections[one].use.definition, how)
+        case Receive(projection=one):
+            states = network.projections[one].use.definition.state
+            once = [one.name for one in states if (one.each_step or one.each_episode) and not isinstance(one, Check)]
+            if once:
+                yield "receive", _connected(network, one), ", ".join(once)
+        case SendAhead(population=one, names=names):
+            yield "send ahead", _members(network, one), ", ".join(names)
+        case Diffuse(populations=several):
+            for one in several:
+                flows = network.populations[one].model.definition.flows
+                yield "noise", _members(network, one), ", ".join(state.name for state in flows if state.noise)
+
+
+def _connected(network: Network, projection: int) -> str:
+    """The entries whose connections are of a projection."""
+    found = set(network.connections.entry[network.projections[projection].members].tolist())
+    return ", ".join(name for number, name in enumerate(network.connections.entries) if number in found)
 
 
 def _members(network: Network, population: int) -> str:
@@ -212,22 +240,28 @@ def _members(network: Network, population: int) -> str:
     return _few(named)
 
 
-def _flows(network: Network, population: int, how: str) -> str:
-    """What is integrated of a population; of one without such states what it sends is made at each stage."""
-    states = [state.name for state in network.populations[population].model.definition.flows]
+def _flows(definition: Definition, how: str) -> str:
+    """What is integrated by a definition; where it has no such states what it sends is made at each stage."""
+    states = [state.name for state in definition.flows]
     return f"{', '.join(states)} ({how})" if states else "what it sends, at each stage"
 
 
-def _into_derivatives(network: Network, population: int) -> Iterator[tuple[str, bool]]:
-    """The entries that reach derivatives of a population, and whether what they bring is made anew at each stage."""
+#: What becomes of what connections bring to derivatives.
+_ANEW, _FORMED, _HELD = "made anew at each stage", "formed at each stage, of what was sent before", "held over a step"
+
+
+def _into_derivatives(network: Network, population: int) -> Iterator[tuple[str, str]]:
+    """The entries that reach derivatives of a population, and what becomes of what they bring: a synapse forms its
+    signal at each stage, and what it reads of its source is held where it has a delay."""
     one, connections = network.populations[population], network.connections
     read = ports_read_by(one.model.definition).flow
-    for port in one.ports:
+    for port in (port for port in one.ports if port.name in read):
         anew = np.zeros(len(port.incoming), dtype=np.bool_)
         anew[[] if port.staged is None else port.staged] = True
-        for staged in (True, False) if port.name in read else ():
-            for entry in np.unique(connections.entry[port.incoming[anew == staged]]).tolist():
-                yield connections.entries[entry], staged
+        delayed = connections.delays[port.incoming] > 0
+        for how, some in ((_ANEW, anew & ~delayed), (_FORMED, anew & delayed), (_HELD, ~anew)):
+            for entry in np.unique(connections.entry[port.incoming[some]]).tolist():
+                yield connections.entries[entry], how
 
 
 def _bounds(low: float, high: float) -> str:

@@ -165,7 +165,7 @@ class _Coupled:
     @cached_property
     def receiving(self) -> BoolArray:
         """For each connection whether its synapse has states that are made once a step."""
-        return self.taken.of_entries(lambda one: any(s.each_step or s.each_episode for s in one.state))
+        return self.taken.of_entries(lambda synapse: synapse.received)
 
     @cached_property
     def integrated(self) -> BoolArray:

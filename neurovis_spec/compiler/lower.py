@@ -66,8 +66,7 @@ def make_program(
         integration = _integration(populations, projected.projections, order.stages, by)
     updates: list[list[Operation]] = [[Gather(number), Update(number)] for number in range(len(populations))]
     for number, target in projected.targets.items():
-        state = projected.projections[number].use.definition.state
-        if any(one.each_step is not None or one.each_episode is not None for one in state):
+        if projected.projections[number].use.definition.received:
             updates[target].insert(-2, Receive(number))
     learning = _learning(projected.projections)
     return ReadInputs(), *chain(*updates[:before]), *integration, *chain(*updates[before:]), Send(), *learning

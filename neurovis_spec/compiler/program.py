@@ -157,6 +157,11 @@ class Definition:
         return tuple(one for one in self.state if one.derivative is not None)
 
     @property
+    def received(self) -> bool:
+        """Of a synapse whether states of it are made once a step, or at an episode's end."""
+        return any(one.each_step is not None or one.each_episode is not None for one in self.state)
+
+    @property
     def given(self) -> Quantity:
         """What its kind gives."""
         return self.gives[0]

@@ -21,6 +21,7 @@ import math
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
+from itertools import chain
 from types import MappingProxyType
 
 import numpy as np
@@ -28,13 +29,17 @@ import numpy as np
 from neurovis_spec.compiler.events.settable import HIGH, LOW
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import (
+    SYNAPSE,
     UNDEFINED_F,
     Check,
     Definition,
+    Gather,
     Key,
+    Operation,
     Population,
     Projection,
     Quantity,
+    Receive,
     Use,
 )
 from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
@@ -68,14 +73,27 @@ def with_checks(network: Network) -> Network:
     projections = tuple(map(checks.checked_projection, network.projections))
     if all(new is old for new, old in zip((*populations, *projections), network.holders, strict=True)):
         return network
-    return replace(network, populations=populations, projections=projections)
+    return replace(network, populations=populations, projections=projections, program=_receiving(network, projections))
+
+
+def _receiving(network: Network, projections: tuple[Projection, ...]) -> tuple[Operation, ...]:
+    """The program, in which synapses of which a state is made once a step receive before their targets are."""
+    numbers = network.located("neuron").numbers
+    receiving: dict[int, list[Operation]] = {}
+    for number, one in enumerate(projections):
+        if one.kind == SYNAPSE and one.use.definition.received:
+            target = int(numbers[network.connections.targets[one.members[:1]][0]])
+            receiving.setdefault(target, []).append(Receive(number))
+    others = (operation for operation in network.program if not isinstance(operation, Receive))
+    found = [[*(receiving.get(one.population, ()) if isinstance(one, Gather) else ()), one] for one in others]
+    return tuple(chain.from_iterable(found))
 
 
 def without_checks(network: Network) -> Network:
     """The network without them, for one that nobody watches."""
     populations = tuple(replace(population, model=_unchecked(population.model)) for population in network.populations)
     projections = tuple(replace(one, uses=tuple(map(_unchecked, one.uses))) for one in network.projections)
-    return replace(network, populations=populations, projections=projections)
+    return replace(network, populations=populations, projections=projections, program=_receiving(network, projections))
 
 
 def _unchecked(use: Use) -> Use:
@@ -126,6 +144,7 @@ class _Checks:
             self.is_set(array) or bool(np.isfinite(values[members]).any())
             for array, values in ((LOW, connections.low), (HIGH, connections.high))
         )
+        bounded &= projection.kind != SYNAPSE  # which gives a signal
         hidden = Hidden.INFINITY if bounded else Hidden.NOTHING  # bounds make a number of an infinite weight
         checks = [self.of_use(use, hidden)[0] for use in projection.uses]
         if not any(checks):

@@ -14,12 +14,14 @@ import numpy as np
 from neurovis_spec.arrays import BoolArray, integers
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.checks.neurons import unreached
+from neurovis_spec.compiler.connections.connect import Connected
 from neurovis_spec.compiler.flows import plain_flow, ports_read_by
 from neurovis_spec.compiler.levels import Cycle, held_at, made_anew, order_of
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.groups import Built
-from neurovis_spec.compiler.program import Definition
+from neurovis_spec.compiler.program import Definition, EndName
 from neurovis_spec.compiler.stiffness import stiffest_at_begin
+from neurovis_spec.compiler.taken import Wired, read_at
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.derivative import as_derivative
 from neurovis_spec.language.words import Method
@@ -60,7 +62,7 @@ def _held_couplings(compiled: Compiled, method: Method, findings: Findings) -> N
     if not of_one_step.any():
         return
     shorter = integers(np.where(of_one_step, 0, delays))
-    wired = Wired(made.sources, made.targets, shorter, made.entry, made.each_route, lagging)
+    wired = replace(Connected(compiled.bundles, complete=True).wired, delays=shorter, timed=lagging)
     held = held_at(network.neurons, network.inputs, network.noises)
     would = of_one_step & made_anew(census.models.different, census.models.of, wired, held)
     would &= _varying(network, wired)[wired.sources.compact()]
@@ -81,16 +83,21 @@ def _held_couplings(compiled: Compiled, method: Method, findings: Findings) -> N
         first = np.flatnonzero(would & (entry == number))[0]
         start, end = (int(census.models.of[ends.compact()[first]]) for ends in (wired.sources, wired.targets))
         message = f"'{bundle.name}' has a delay of one step, over which {method} holds its signal: its order is 1 then"
-        if body.delay is None and census.models.delay(start, end, bundle.route) == 1:
+        synapse = None if bundle.synapse is None else bundle.synapse.definition
+        if body.delay is None and census.models.delay(start, end, bundle.route, synapse) == 1:
             source, target = (census.models.different[model] for model in (start, end))
-            message += f". That is the default, since {_why_held(source, bundle.route.sends, target)}"
+            message += f". That is the default, since {_why_held(source, bundle.route.sends, target, synapse)}"
         findings.warning("held-coupling", span, message, hint)
 
 
-def _why_held(source: Definition, sends: str, target: Definition) -> str:
+def _why_held(source: Definition, sends: str, target: Definition, synapse: Definition | None) -> str:
     """Why a connection has a delay of one step by default."""
     if not source.flows:
         return f"the model '{source.name}' of its source has no derivative"
+    if synapse is not None:
+        read = next(name for name in read_at("pre", synapse, sends) if not plain_flow(source, name))
+        text = "pre" if read == sends and "pre" in synapse.read else EndName("pre", read).text
+        return f"its synapse reads {text}, which in the model '{source.name}' of its source does not flow by itself"
     if plain_flow(source, sends):
         return f"no derivative of the model '{target.name}' of its target reads it"
     return f"the model '{source.name}' of its source sends what reads a port"

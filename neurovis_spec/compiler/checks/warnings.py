@@ -32,7 +32,7 @@ def warn(compiled: Compiled, findings: Findings) -> None:
 def _flows(compiled: Compiled, findings: Findings) -> None:
     """How states are integrated. Most specs have none with a derivative: nothing is imported then."""
     time = compiled.spec.time
-    if compiled.census.models.flow or (time is not None and time.integrate is not None):
+    if compiled.network.integration is not None or (time is not None and time.integrate is not None):
         from neurovis_spec.compiler.checks.flowing import check_flowing
 
         check_flowing(compiled, findings)

@@ -50,6 +50,7 @@ from neurovis_spec.language.yaml.source import Scalar
 #: Keys of a body that say which connections there are.
 _SHAPING = frozenset({"matrix", "edges", "pattern", "centre", "rows", "self"})
 _WEIGHT, _DELAY = (formula_at(ConnectionModel, key) for key in ("weight", "delay"))
+_SETTING = formula_at(ConnectionModel, "synapse", "SYNAPSE", "SETTING")
 
 
 class Bundle(NamedTuple):
