@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from neurovis_spec.compiler.canonical import content_hash
 from neurovis_spec.compiler.checks.compiled import Compiled
-from neurovis_spec.compiler.checks.definitions import check_dt, check_slopes
+from neurovis_spec.compiler.checks.definitions import check_dt, check_slopes, integrated
 from neurovis_spec.compiler.checks.warnings import warn
 from neurovis_spec.compiler.connections.connect import Connected, connect, join
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
 from neurovis_spec.compiler.drawing.sections import layout_settings, render_settings
 from neurovis_spec.compiler.events.bound import found_in, make_settable, own_weights
-from neurovis_spec.compiler.flows import BY_SLOPE, sent_by
+from neurovis_spec.compiler.flows import BY_SLOPE, plain_flow, sent_by
 from neurovis_spec.compiler.levels import Cycle, Order, held_at, order_of
 from neurovis_spec.compiler.limits import MOST_SIGNALS, MOST_SUBSTEPS, Limits, amount
 from neurovis_spec.compiler.lower import Integration, make_populations, make_program, make_projections
@@ -36,6 +36,7 @@ from neurovis_spec.compiler.neurons.noise import make_noises
 from neurovis_spec.compiler.neurons.populate import Census, populate, without_neurons
 from neurovis_spec.compiler.ros_settings import RosSettings
 from neurovis_spec.compiler.run_checks import with_checks
+from neurovis_spec.compiler.taken import Side, read_at
 from neurovis_spec.compiler.values.constants import Constants, Sight, parse_formula
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.parameters import make_parameters
@@ -130,6 +131,10 @@ def _compile_sections(spec: Spec, request: Request, findings: Findings) -> _Sect
     scopes, inputs = declared.expansion.scopes, declared.expansion.inputs
     layout = layout_settings(spec.layout, scopes, census, findings)
     connected = connect(scopes, census, request.limits, declared.seed)
+    files, used = [file.model for file in request.includes.files], integrated(census.groups, connected.bundles)
+    check_dt(spec, files, used, findings)
+    if declared.integration.method in BY_SLOPE:
+        check_slopes(spec, files, used, findings)
     finder = finder_of(census, connected, findings)
     render = render_settings(spec.render, finder, constants)
     outputs = make_outputs(spec, finder)
@@ -174,10 +179,6 @@ def _declare(spec: Spec, request: Request, findings: Findings) -> _Declared:
     expander = Expander(library, request.root, findings, constants.dt, files={**request.files}, limits=request.limits)
     expansion = expander.expand(spec, constants, request.base)
     census = populate(expansion.scopes, request.limits, seed)
-    files = [file.model for file in request.includes.files]
-    check_dt(spec, files, census.groups, findings)
-    if integration.method in BY_SLOPE:
-        check_slopes(spec, files, census.groups, findings)
     _check_modules_without_instance(expander, request.limits, seed)
     if not len(census.neurons):
         _report_no_neurons(spec, census, findings)
@@ -365,11 +366,16 @@ def _order(
 
 
 def _outputs_of(cycle: Cycle, connected: Connected, census: Census) -> tuple[str, ...]:
-    """What all neurons are called, those of a cycle with what they send along it: ``K1.rate``."""
+    """What all neurons are called, those of a cycle with what is taken of them along it: ``K1.rate``."""
     names = [*census.neurons.names]
-    for neuron, connection in zip(cycle.neurons, cycle.connections, strict=False):
-        model = census.models.different[census.models.of[neuron]]
-        names[neuron] = f"{names[neuron]}.{sent_by(model, connected.bundle_of(connection).route.sends)}"
+    for neuron, target, connection in zip(cycle.neurons, cycle.neurons[1:], cycle.connections, strict=False):
+        model, bundle = census.models.different[census.models.of[neuron]], connected.bundle_of(connection)
+        taken = [sent_by(model, bundle.route.sends)]
+        if bundle.synapse is not None:
+            sides: tuple[Side, ...] = ("post", "pre") if neuron == target else ("pre",)
+            read = [read_at(side, bundle.synapse.definition, bundle.route.sends) for side in sides]
+            taken = [name for names_read in read for name in names_read if not plain_flow(model, name)]
+        names[neuron] = f"{names[neuron]}.{sent_by(model, taken[0])}"
     return tuple(names)
 
 

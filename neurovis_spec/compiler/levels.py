@@ -327,11 +327,13 @@ class _Coupled:
         connections (m,) of which all that they take of the source is known behind the integration."""
         result: dict[str, BoolArray] = {}
         reading = self._once_a_step & known & self.wired.undelayed
-        for number, name in enumerate(self.taken.names) if reading.any() else ():
+        for number, name in enumerate(self.taken.names):
+            if name is None or not reading.any():
+                continue
             this = np.zeros_like(self.taken.real)
             this[number] = self.taken.real[number]
             neurons = self.taken.neurons("pre", reading, this)
-            for place, model in enumerate(self.models) if name is not None and neurons.any() else ():
+            for place, model in enumerate(self.models):
                 having = neurons & (self.model == place)
                 if having.any():
                     sent = sent_by(model, name)

@@ -15,11 +15,12 @@ from typing import NamedTuple
 import numpy as np
 
 from neurovis_spec.compiler.checks.compiled import Compiled
+from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.flows import jacobian, with_slope
 from neurovis_spec.compiler.names.references import key_of, key_span
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.groups import Built
-from neurovis_spec.compiler.program import ACTIVATION, MODEL, RULE, SYNAPSE, Kind
+from neurovis_spec.compiler.program import ACTIVATION, MODEL, RULE, SYNAPSE, Definition, Kind
 from neurovis_spec.compiler.values.builtin import installed
 from neurovis_spec.compiler.values.constants import value_of
 from neurovis_spec.compiler.values.definitions import Defined
@@ -166,58 +167,77 @@ def _check_flows(
             findings.warning("derivative-unread", parts[name].span, message, hint)
 
 
-def check_dt(spec: Spec, included: Iterable[Library], groups: Iterable[Built], findings: Findings) -> None:
+class Integrated(NamedTuple):
+    """A definition in use that has derivatives, and where it is named; with a model the activation."""
+
+    definition: Definition
+    named: Span
+    activation: Definition | None = None
+
+    def place_of(self, derivative: str, libraries: Iterable[Library]) -> Span:
+        """Where the derivative of a state, or of what is given, stands, or where the definition is named, if it is a
+        built-in."""
+        kind, name = self.definition.kind, self.definition.name
+        own = next((made[name] for one in libraries if name in (made := one.definitions[kind.section])), None)
+        if own is None:
+            return self.named
+        parts = own.parts()
+        state = (parts.state or {}).get(derivative)
+        formula = parts.derivative if state is None else state.flow.derivative
+        return self.named if formula is None else formula.span
+
+
+def integrated(groups: Iterable[Built], bundles: Iterable[Bundle]) -> list[Integrated]:
+    """All definitions in use with derivatives, with a model each activation: of neurons, then of connections."""
+    found: dict[tuple[Kind, str, str], Integrated] = {}
+    for group in groups:
+        (activation, model), choice = (one.definition for one in group.kind), group.model.model
+        if model.flows:
+            named = group.model.source.span if choice is None else choice.name.span
+            found.setdefault((MODEL, model.name, activation.name), Integrated(model, named, activation))
+    for bundle in bundles:
+        for made in (piece.definition for use in bundle.uses for piece in use.pieces):
+            if made.flows or made.given.derivative is not None:
+                found.setdefault((made.kind, made.name, ""), Integrated(made, bundle.key))
+    return list(found.values())
+
+
+def check_dt(spec: Spec, included: Iterable[Library], needing: Iterable[Integrated], findings: Findings) -> None:
     """Report a derivative in use where nothing says how long a step is."""
     if "time" in spec.unknown or (spec.time is not None and (spec.time.dt or "dt" in spec.time.unknown)):
         return
-    needing: dict[str, Built] = {}
-    for one in groups:
-        if one.kind.model.definition.flows:
-            needing.setdefault(one.kind.model.definition.name, one)
-    if not needing:
+    first_of: dict[tuple[Kind, str], Integrated] = {}
+    for used in needing:
+        first_of.setdefault((used.definition.kind, used.definition.name), used)
+    if not first_of:
         return
-    group, *others = needing.values()
-    model = group.kind.model.definition
-    first = model.flows[0].name
-    unit = "second" if model.per_second == 1 else "millisecond"
+    one, *others = first_of.values()
+    first = next((state.name for state in one.definition.flows), one.definition.given.name)
+    unit = "second" if one.definition.per_second == 1 else "millisecond"
     message = f"the derivative of '{first}' is per {unit}, and no 'dt' says how long a step is"
     if others:
-        names = listed([f"'{one.kind.model.definition.name}'" for one in others])
+        names = listed([f"'{other.definition.name}'" for other in others])
         message += f". Others that need it: {names}"
     hint = "say it at the top, as in time: {dt: 0.1 ms}"
-    findings.error("dt-needed", _place_of(first, group, (spec, *included)), message, hint)
+    findings.error("dt-needed", one.place_of(first, (spec, *included)), message, hint)
 
 
-def check_slopes(spec: Spec, included: Iterable[Library], groups: Iterable[Built], findings: Findings) -> None:
+def check_slopes(spec: Spec, included: Iterable[Library], used: Iterable[Integrated], findings: Findings) -> None:
     """Report a derivative in use whose own derivative by its state, which the integration needs, is longer than an
     expression may be."""
-    told: set[tuple[str, str]] = set()
-    for group in groups:
-        model, activation = group.kind.model.definition, group.kind.activation.definition
-        states = () if (model.name, activation.name) in told else model.flows
-        told.add((model.name, activation.name))
-        for state in states:
+    for one in used:
+        for state in one.definition.flows:
             try:
-                jacobian(replace(model, state=(state,)))
-                if model.reads_activation:
-                    with_slope(activation)
+                jacobian(replace(one.definition, state=(state,)))
+                if one.activation is not None and one.definition.reads_activation:
+                    with_slope(one.activation)
             except ExpressionError as error:
                 message = (
                     f"how the derivative of '{state.name}' changes with it is too long to be told: {error.message}"
                 )
                 hint = f"{error.hint} (let), or take another method of time.integrate, such as rk4"
-                findings.error(error.code, _place_of(state.name, group, (spec, *included)), message, hint)
+                findings.error(error.code, one.place_of(state.name, (spec, *included)), message, hint)
                 break
-
-
-def _place_of(state: str, group: Built, libraries: Iterable[Library]) -> Span:
-    """Where the derivative of a state of a group's model stands, or where the model is named, if it is a built-in."""
-    name, choice = group.kind.model.definition.name, group.model.model
-    own = next((one.models[name] for one in libraries if name in one.models), None)
-    derivative = None if own is None else own.state[state].derivative
-    if derivative is not None:
-        return derivative.span
-    return group.model.source.span if choice is None else choice.name.span
 
 
 # Weights that are replaced where a change is meant

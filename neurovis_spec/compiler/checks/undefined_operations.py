@@ -40,10 +40,13 @@ def check_undefined(compiled: Compiled, findings: Findings) -> None:
                 _tell(choice, used, hidden, compiled.network.dt, findings)
     for _, body, bundles in compiled.entries.values():
         for bundle in bundles:
-            for choice, learning in zip(body.plasticity, bundle.rules, strict=False):  # no rules without connections
-                made = [hazards(tree, Hidden.ALL) for tree in _at_steps(learning.rule)]
-                hidden = through_let(made, learning.rule.let).found
-                _tell(choice, learning.settled, hidden, compiled.network.dt, findings)
+            rules = [learning.settled for learning in bundle.rules]  # none without connections
+            choices = (*zip(body.plasticity, rules, strict=False), (body.synapse, bundle.synapse))
+            for choice, used in choices:
+                if used is not None:
+                    made = [hazards(tree, Hidden.ALL) for tree in _at_steps(used.definition)]
+                    hidden = through_let(made, used.definition.let).found
+                    _tell(choice, used, hidden, compiled.network.dt, findings)
 
 
 def _at_steps(definition: Definition) -> Iterator[Tree]:

@@ -120,8 +120,10 @@ def connections_state(name: StateName, connections: IntArray, wiring: Wiring) ->
         return Refusal(f"there is no connection '{shorten(name.owner.text)}'")
     if not holders:
         return Refusal(f"no rule changes '{shorten(name.owner.text)}', so it has no states")
-    what, one = ("rule", rules[0]) if rules and not (synapses and synapses[0].states) else ("synapse", synapses[0])
-    return no_state(what, one.kind, f"of '{shorten(name.owner.text)}'", name.state, one.states)
+    of = f"of '{shorten(name.owner.text)}'"
+    if rules and not any(one.states for one in synapses):
+        return no_state("rule", rules[0].kind, of, name.state, rules[0].states)
+    return no_state("synapse", synapses[0].kind, of, name.state, synapses[0].states)
 
 
 def no_state(
