@@ -41,18 +41,23 @@ def check_undefined(compiled: Compiled, findings: Findings) -> None:
     for _, body, bundles in compiled.entries.values():
         for bundle in bundles:
             rules = [learning.settled for learning in bundle.rules]  # none without connections
-            choices = (*zip(body.plasticity, rules, strict=False), (body.synapse, bundle.synapse))
-            for choice, used in choices:
-                if used is not None:
-                    made = [hazards(tree, Hidden.ALL) for tree in _at_steps(used.definition)]
-                    hidden = through_let(made, used.definition.let).found
-                    _tell(choice, used, hidden, compiled.network.dt, findings)
+            for choice, rule in zip(body.plasticity, rules, strict=False):
+                _tell(choice, rule, _of_connections(rule.definition), compiled.network.dt, findings)
+            if bundle.synapse is not None:
+                hidden = _of_connections(bundle.synapse.definition)
+                _tell(body.synapse, bundle.synapse, hidden, compiled.network.dt, findings)
 
 
 def _at_steps(definition: Definition) -> Iterator[Tree]:
     """What a definition computes at each step."""
     for one in (*definition.gives, *definition.state):
         yield from (tree for tree in (one.each_step, one.derivative, one.noise) if tree is not None)
+
+
+def _of_connections(definition: Definition) -> list[Hazard]:
+    """What may be undefined in the formulas of a rule or a synapse."""
+    made = [hazards(tree, Hidden.ALL) for tree in _at_steps(definition)]
+    return through_let(made, definition.let).found
 
 
 def _of_kind(model: Definition, activation: Definition) -> tuple[list[Hazard], list[Hazard]]:
