@@ -2,22 +2,25 @@
 
 In: a Step in the making. Out: code, or identifiers of what it gives. Sums are made by ``bincount``, which adds in the
 order of the connections from 0.0 on, and products by ``multiply.reduceat``, which multiplies from left to right. What
-is made of some connections first (``held``) comes before those of the others.
+is made of some connections first (``held``) comes before those of the others. The signals of all connections of a
+projection that have a synapse are one expression of arrays.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from neurovis_spec.arrays import Indices, IntArray
 from neurovis_spec.compiler.events.settable import CENTRES, bias_of
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Population, Port
+from neurovis_spec.compiler.program import Population, Port, Projection
 from neurovis_spec.runtime.numpy_code import Code, any_given
 from neurovis_spec.runtime.signals import SharedSlots, SignalLayout
-from neurovis_spec.runtime.stages import taken_by
+from neurovis_spec.runtime.stages import End, Formed, behind_flow, ends_of, formed_at, signal_of, taken_by, target_of
 from neurovis_spec.runtime.state import NEVER_LOST, Structure
 
 
@@ -26,6 +29,7 @@ class Step:
     """A step in the making."""
 
     code: Code
+    whole: Network
     #: without the connections that the structure leaves out
     network: Network
     structure: Structure
@@ -36,7 +40,33 @@ class Step:
     #: by populations and names of ports the identifiers of what was gathered there
     ports: dict[int, dict[str, str]]
     #: by populations and states, those of what their noise is multiplied by
-    spread: dict[tuple[int, str], str]
+    spread: dict[tuple[int, str], str] = field(default_factory=dict)
+    #: by projections, those of the signals of synapses before their targets are updated
+    formed: dict[int, str] = field(default_factory=dict)
+
+    def working(self, number: int) -> Working:
+        """The connections of a projection that do something."""
+        projection = self.network.projections[number]
+        idle = self.structure.idle(projection)
+        if not idle.any():
+            return Working(projection, None)
+        some = np.flatnonzero(~idle)
+        signals, ends = (
+            {name: indices[some] for name, indices in one.items()} for one in (projection.signals, projection.ends)
+        )
+        return Working(replace(projection, members=projection.members[some], signals=signals, ends=ends), some)
+
+
+class Working(NamedTuple):
+    """The connections of a projection that do something: it without the others, and which of its members they are,
+    None where all do."""
+
+    projection: Projection
+    some: IntArray | None
+
+    def among(self, members: IntArray) -> IntArray:
+        """Where some of the members of the whole projection are among them."""
+        return members if self.some is None else np.searchsorted(self.some, members)
 
 
 def gathered(step: Step, number: int, port: Port) -> str:
@@ -92,6 +122,9 @@ def signals_at(step: Step, number: int, port: Port, places: Indices) -> str:
     delays, shares = connections.delays[incoming], step.layout.shares[incoming]
     #: what arrives, and where in the order
     parts: list[tuple[str, IntArray]] = []
+    for one in formed_at(step.network, incoming):
+        parts.append((some_of(step, one, before_update(step, one.number)), one.places))
+        delays = np.where(np.isin(np.arange(len(delays)), one.places), -1, delays)  # nothing is under way there
     undelayed = np.flatnonzero(delays == 0)
     if len(undelayed):
         weights = code.select("weights", incoming[undelayed], len(connections))
@@ -111,13 +144,110 @@ def signals_at(step: Step, number: int, port: Port, places: Indices) -> str:
             if not arriving.all():
                 own = code.select(code.let("g", own), np.flatnonzero(arriving), len(arriving))
             parts.append((own, np.flatnonzero(~shares & (delays == delay_class.delay))))
+    return with_factors(code, port, places, put_together(code, parts, len(delays)))
+
+
+def put_together(code: Code, parts: list[tuple[str, IntArray]], count: int, prefix: str = "g") -> str:
+    """Values one of which stands at each of so many places: those of each part, and where they stand."""
     if len(parts) == 1:
-        signals = code.let("g", parts[0][0])
+        return code.let(prefix, parts[0][0])
+    made = code.let(prefix, f"np.empty({count})")
+    for values, there in parts:
+        code.line(f"{made}{code.position(there, count)} = {values}")
+    return made
+
+
+def some_of(step: Step, formed: Formed, signals: str) -> str:
+    """Of the signals of a projection those of some of its members."""
+    working = step.working(formed.number)
+    return step.code.select(signals, working.among(formed.members), len(working.projection.members))
+
+
+def before_update(step: Step, number: int) -> str:
+    """The signals of synapses before their targets are updated."""
+    if number not in step.formed:
+        code, (projection, some) = step.code, step.working(number)
+        known = code.parameters(projection.use, some) | seen_before_update(step, projection)
+        for one in projection.use.definition.state:
+            known[one.name] = cell_of(code, projection, one.name, some)
+        formulas = signal_of(projection)
+        for name, tree in formulas.let:
+            known[name] = code.let("m", code.expression(tree, known))
+        ((_, tree),) = formulas.trees
+        step.formed[number] = each(step, projection, formulas.names, code.expression(tree, known))
+    return step.formed[number]
+
+
+def cell_of(code: Code, projection: Projection, state: str, some: IntArray | None) -> str:
+    """A state of a projection, of some of its members or all."""
+    cell = code.state(projection.use, state)
+    return cell if some is None else f"{cell}[{code.constant(some)}]"
+
+
+def seen_before_update(step: Step, projection: Projection) -> dict[str, str]:
+    """What synapses see before their targets are updated: weights, and both ends, of these the states that flow as they
+    are behind the integration."""
+    code, network = step.code, step.network
+    number, states = target_of(network, projection), behind_flow(network, projection)
+    target = network.populations[number]
+    if states:
+        code.line(f"if fixed: hold_cells(fixed, {code.constant(target.model.owner)}, cells)")
+    at = np.searchsorted(target.members, network.connections.targets[projection.members])
+    seen = {
+        name: code.let("a", code.select(code.state(target.model, state), at, len(target.members), broadcast=True))
+        for name, state in states.items()
+    }
+    seen["weight"] = code.select("weights", projection.members, len(network.connections))
+    return seen | ends_at(step, projection, seen)
+
+
+def ends_at(step: Step, projection: Projection, known: Collection[str] = ()) -> dict[str, str]:
+    """What the definition of a projection reads of both ends of its connections, but for what is known."""
+    return {
+        name: step.code.let("a", end_at(step, projection.members, end))
+        for name, end in ends_of(step.network, projection).items()
+        if name not in known
+    }
+
+
+def end_at(step: Step, members: IntArray, end: End) -> str:
+    """Something that connections read of an end: as it is now, or what was sent by their delays ago."""
+    delays = step.network.connections.delays[members]
+    past = np.asarray(end.past & (delays > 0))
+    if past.all():
+        return _past(step, members, end.places)
+    if not past.any():
+        return sent_at(step, end.places, broadcast=True)
+    parts = [
+        (_past(step, members[past], end.places[past]), np.flatnonzero(past)),
+        (sent_at(step, end.places[~past]), np.flatnonzero(~past)),
+    ]
+    return put_together(step.code, parts, len(members), "a")
+
+
+def _past(step: Step, members: IntArray, places: IntArray) -> str:
+    """Activities or outlets of d ≥ 1 steps ago, 0 where that is lost."""
+    code, depth = step.code, step.depth
+    delays, lost = step.network.connections.delays[members], step.structure.lost[members]
+    if (delays == delays[0]).all():
+        count = len(step.network.neurons) + step.network.outlet_count
+        past = code.select(f"history[(k - {delays[0]}) % {depth}]", places, count, broadcast=True)
     else:
-        signals = code.let("g", f"np.empty({len(delays)})")
-        for values, there in parts:
-            code.line(f"{signals}{code.position(there, len(delays))} = {values}")
-    return with_factors(code, port, places, signals)
+        rows = f"(k - {code.constant(delays)}) % {depth}"
+        past = f"history[{rows}, {code.constant(np.ascontiguousarray(places, dtype=np.intp))}]"
+    if not (lost > NEVER_LOST).any():
+        return past
+    return f"np.where(k < {code.constant(lost + delays)}, 0.0, {past})"
+
+
+def each(step: Step, projection: Projection, read: frozenset[str], value: str) -> str:
+    """Numbers made of what is ``read``, one for each connection of a projection, though all may be one."""
+    members, ends = projection.members, ends_of(step.network, projection)
+    own = {"weight", *(one.name for one in projection.use.definition.state)}
+    own |= {name for name, end in ends.items() if (end.places != end.places[0]).any()}
+    if own.isdisjoint(read):
+        value = f"np.broadcast_to({value}, ({len(members)},))"
+    return step.code.let("g", value)
 
 
 def _shared(step: Step, slots: SharedSlots, members: Indices) -> str:

@@ -82,11 +82,12 @@ class NumpyBackend:
 def step_code(network: Network, structure: Structure, own_signals: bool = False) -> Code:
     """The code of one step, operation by operation, without what the structure leaves out."""
     layout = signal_layout(network, own_signals)  # where all has its place, what is left out too
+    whole = network
     if structure.gone.any():
         populations = tuple(_without(population, structure.gone) for population in network.populations)
         network = replace(network, populations=populations)
     code = Code(network.dt, network.settable.variables)
-    step = Step(code, network, structure, layout, history_depth(network), {}, {})
+    step = Step(code, whole, network, structure, layout, history_depth(network), {})
     for operation in network.program:
         emit(operation, step)
     return code

@@ -26,29 +26,52 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
-from neurovis_spec.arrays import IntArray
-from neurovis_spec.compiler.program import Diffuse, Integrate, Key, Port
+from neurovis_spec.arrays import Indices, IntArray
+from neurovis_spec.compiler.program import Diffuse, Integrate, Key, Port, Projection, Use
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.numpy_arrivals import (
     Step,
     accumulated,
+    cell_of,
+    each,
+    end_at,
     finished,
+    put_together,
     signals_at,
+    some_of,
     with_bias,
     with_factors,
     with_step_values,
 )
 from neurovis_spec.runtime.numpy_code import FIRST, shared
-from neurovis_spec.runtime.stages import Formulas, Part, apart, parts_of, places_among_taken, taken_by, times
+from neurovis_spec.runtime.stages import (
+    Contacts,
+    Formulas,
+    Part,
+    Through,
+    apart,
+    contacts_of,
+    ends_of,
+    flowing,
+    formed_at,
+    parts_of,
+    places_among_taken,
+    taken_by,
+    times,
+)
 
 #: fewer signals are added one by one, however they lie
 _DENSE = 4096
+#: a name that no author can write
+_FORMED = "the signal"
 
 
 def integrate(operation: Integrate, step: Step) -> None:
@@ -81,21 +104,47 @@ def _unless_first(step: Step) -> Iterator[None]:
     step.code.indent -= 1
 
 
+@dataclass
+class _Joined:
+    """The connections of a projection that take part in a stage: all that there is of it there, it with these alone,
+    and which of its members they are, None for all."""
+
+    at: Contacts
+    projection: Projection
+    some: IntArray | None
+    #: identifiers of what they read that stays over the stages
+    held: dict[str, str] = field(default_factory=dict)
+    #: what of each of them, by its name, is read anew at each stage: of which connections, and where that is taken
+    anew: dict[str, tuple[IntArray, IntArray]] = field(default_factory=dict)
+
+    @property
+    def use(self) -> Use:
+        """The synapse or the rule."""
+        return self.projection.use
+
+
 class _Flow:
-    """The integration of some populations in the making."""
+    """The integration of some populations and projections in the making."""
 
     def __init__(self, step: Step, operation: Integrate) -> None:
         self.step, self.code, self.network, self.operation = step, step.code, step.network, operation
-        self.parts = parts_of(step.network, operation)
-        #: where each flow state, by its population and name, lies among all of them
-        self.places: dict[tuple[int, str], slice] = {}
+        working = [_Joined(one, *step.working(one.number)) for one in contacts_of(step.network, operation)]
+        self.contacts = {one.at.number: one for one in working if len(one.projection.members)}
+        #: of activities and outlets whether they are, where connections read them now, those of a stage
+        self.flowing = flowing(step.whole) if self.contacts else np.zeros(0, dtype=np.bool_)
+        self.parts = parts_of(step.network, operation, self.flowing)
         #: where in what is taken at a stage each activity and each outlet lies, −1 for the others
         self.taken = places_among_taken(self.network, self.parts)
-        self.size, self.taken_count = 0, int(self.taken.max(initial=-1)) + 1
-        for part in self.parts:
-            for name in part.flows:
-                begin, self.size = self.size, self.size + len(part.population.members)
-                self.places[part.number, name] = slice(begin, self.size)
+        #: the flow states, whose they are and by how many, and where each of them lies among all
+        self.states = [
+            (part.population.model, name, len(part.population.members)) for part in self.parts for name in part.flows
+        ] + [(one.use, name, len(one.projection.members)) for one in self.contacts.values() for name in one.at.flows]
+        ends = np.cumsum([0, *(count for _, _, count in self.states)]).tolist()
+        self.places = {
+            Key(use.owner, name): slice(begin, end)
+            for (use, name, _), (begin, end) in zip(self.states, pairwise(ends), strict=True)
+        }
+        self.size, self.taken_count = ends[-1], int(self.taken.max(initial=-1)) + 1
         #: the states at the beginning of the step, those where a stage looks, the derivatives there, their slopes
         self.x, self.y, self.k = self.temporary(), self.temporary(), self.temporary()
         self.j = self.temporary() if any(part.slopes.trees for part in self.parts) else ""
@@ -117,10 +166,9 @@ class _Flow:
     def numbers(self, value: Callable[[float], float]) -> str:
         """What a method makes of the length of its steps, for each number in the time of its definition."""
         made = np.empty(self.size)
-        for part in self.parts:
-            h = self.network.dt * part.population.model.definition.per_second / self.operation.substeps
-            for name in part.flows:
-                made[self.places[part.number, name]] = value(h)
+        for use, name, _ in self.states:
+            h = self.network.dt * use.definition.per_second / self.operation.substeps
+            made[self.places[Key(use.owner, name)]] = value(h)
         return self.code.constant(shared(made))
 
     def emit(self) -> None:
@@ -128,14 +176,15 @@ class _Flow:
         code, substeps, h = self.code, self.operation.substeps, self.network.dt / self.operation.substeps
         stage = code.name("stage")
         with _unless_first(self.step):
-            cells = {
-                (part.number, name): code.state(part.population.model, name)
-                for part in self.parts
-                for name in part.flows
+            some = {
+                one.use.owner: f"[{code.constant(one.some)}]" for one in self.contacts.values() if one.some is not None
             }
-            for key, place in self.places.items():
-                code.line(f"{self.x}[{_text(place)}] = {cells[key]}")
+            cells = [code.state(use, name) + some.get(use.owner, "") for use, name, _ in self.states]
+            for cell, place in zip(cells, self.places.values(), strict=True):
+                code.line(f"{self.x}[{_text(place)}] = {cell}")
             self.emit_fixed()
+            for one in self.contacts.values():
+                self.hold_ends(one)
             for part in self.parts:
                 for port in part.ports:
                     self.hold(part, port)
@@ -161,15 +210,12 @@ class _Flow:
                 code.line(line)
             code.line(f"if fixed: {self.x}[held] = values")
             code.indent -= substeps > 1
-            for key, place in self.places.items():
-                code.line(f"{cells[key]}[:] = {self.x}[{_text(place)}]")
+            for cell, place in zip(cells, self.places.values(), strict=True):
+                code.line(f"{cell if cell[-1] == ']' else f'{cell}[:]'} = {self.x}[{_text(place)}]")
 
     def emit_fixed(self) -> None:
         """Which of the flow states are held, and at what."""
-        starts = {
-            Key(self.network.populations[number].model.owner, name): place.start
-            for (number, name), place in self.places.items()
-        }
+        starts = {key: place.start for key, place in self.places.items()}
         self.code.line("if fixed:")
         self.code.line(f"    held, values = held_among(fixed, {self.code.constant(starts)})")
         self.code.line(f"    {self.x}[held] = values")
@@ -195,6 +241,28 @@ class _Flow:
         else:
             self.whole[key] = self.given(part, port, arriving)
 
+    def hold_ends(self, joined: _Joined) -> None:
+        """What connections read that stays over the stages: weights, and of both ends what was sent, and what does not
+        flow."""
+        code, connections = self.code, self.network.connections
+        members, contacts = joined.projection.members, joined.at
+        every = (contacts.signal, contacts.derivatives, contacts.slopes, contacts.back)
+        read = frozenset().union(*(one.names for one in every))
+        if "weight" in read:
+            joined.held["weight"] = code.let("w", code.select("weights", members, len(connections)))
+        for name, end in ends_of(self.network, joined.projection).items():
+            past = end.past & (connections.delays[members] > 0)
+            anew = np.asarray(~past & self.flowing[end.places] & (self.taken[end.places] >= 0))
+            if name not in read:
+                continue
+            if anew.any():
+                joined.anew[name] = np.flatnonzero(anew), self.taken[end.places[anew]]
+            if not anew.all():
+                held = end_at(self.step, members, end)
+                if anew.any():  # of each connection: it is filled in at each stage
+                    held = f"np.array(np.broadcast_to({held}, ({len(members)},)))"
+                joined.held[name] = code.let("a", held)
+
     def given(self, part: Part, port: Port, arriving: str, vector: str = "s") -> str:
         """All that is at a port, of what arrives there, "" for nothing."""
         if arriving:
@@ -217,8 +285,10 @@ class _Stage:
         #: the names that formulas of a population see, and the functions, as far as they are known
         self.known: dict[int, dict[str, str]] = {}
         self.functions = {part.number: self.code.functions(part.population.activation) for part in flow.parts}
+        #: the same of projections
+        self.joined: dict[int, dict[str, str]] = {}
         self.vector = self.emit_inputs()
-        self.sent = False
+        self.sent = self.taking = False
 
     def emit(self) -> None:
         """The derivatives of all flow states, and how much they change with these, where the method looks at that; at
@@ -226,7 +296,17 @@ class _Stage:
         for part in self.flow.parts:
             for array, formulas in ((self.flow.k, part.derivatives), (self.flow.j, part.slopes)):
                 for name, value in self.values(part, formulas).items():
-                    self.code.line(f"{array}[{_text(self.flow.places[part.number, name])}] = {value}")
+                    self.code.line(f"{self.place(array, part.population.model, name)} = {value}")
+            for through in part.through:
+                ((_, value),) = self.values(part, through.slope).items()
+                back, j = self.back(part, through), self.place(self.flow.j, part.population.model, through.state)
+                self.code.line(f"{j} += ({value}) * {back}")
+        for joined in self.flow.contacts.values():
+            if joined.at.flows:
+                self.emit_taken()
+            for array, formulas in ((self.flow.k, joined.at.derivatives), (self.flow.j, joined.at.slopes)):
+                for name, value in self.values_of(joined, formulas).items():
+                    self.code.line(f"{self.place(array, joined.use, name)} = {value}")
         self.code.line(f"if fixed: {self.flow.k}[held] = 0.0")
         if not self.step.spread:
             return
@@ -257,7 +337,8 @@ class _Stage:
         """What connections take at the stage, population by population, once."""
         if self.sent:
             return
-        self.sent, count = True, 0
+        self.sent = self.taking = True
+        count = 0
         for part in self.flow.parts:
             for taken in part.taken:
                 place = f"{self.flow.sent}[{count}:{count + len(taken.places)}]"
@@ -268,6 +349,7 @@ class _Stage:
                     positions = self.code.constant(self.flow.taken)
                     self.code.line(f"if holds and {held}: {self.flow.sent}[{positions}[{held}[0]]] = {held}[1]")
                 count += len(taken.places)
+        self.taking = False
 
     def values(self, part: Part, formulas: Formulas) -> dict[str, str]:
         """The code of formulas by their names; the intermediate values and ports that they need are written once."""
@@ -288,10 +370,71 @@ class _Stage:
             unit = model.definition.per_second
             known["t"] = "t" if unit == 1.0 else f"(t * {unit!r})"
             for one in model.definition.state:
-                key = part.number, one.name
+                key = Key(model.owner, one.name)
                 known[one.name] = self.flow.now[key] if key in self.flow.now else self.code.state(model, one.name)
             self.known[part.number] = known
         return self.known[part.number]
+
+    def place(self, array: str, use: Use, name: str) -> str:
+        """The part of an array that is a flow state's."""
+        return f"{array}[{_text(self.flow.places[Key(use.owner, name)])}]"
+
+    def values_of(self, joined: _Joined, formulas: Formulas) -> dict[str, str]:
+        """The code of formulas of a projection by their names. What it reads of ends is complete when all is taken;
+        before, it is read anew each time."""
+        known: dict[str, str] = {} if self.taking else self.joined.setdefault(joined.at.number, {})
+        if not formulas.trees:
+            return {}
+        if not known:
+            known |= self.code.parameters(joined.use, joined.some)
+            unit = joined.use.definition.per_second
+            known["t"] = "t" if unit == 1.0 else f"(t * {unit!r})"
+            known |= {name: held for name, held in joined.held.items() if name not in joined.anew}
+            for one in joined.use.definition.state:
+                now = self.flow.now.get(Key(joined.use.owner, one.name))
+                known[one.name] = now or cell_of(self.code, joined.projection, one.name, joined.some)
+        for name in joined.anew.keys() & formulas.names - known.keys():
+            known[name] = self.read_anew(joined, name)
+        for name, tree in formulas.let:
+            if name not in known:
+                known[name] = self.code.let("m", self.code.expression(tree, known))
+        return {name: self.code.expression(tree, known) for name, tree in formulas.trees}
+
+    def read_anew(self, joined: _Joined, name: str) -> str:
+        """What connections read of an end, of which something is taken at the stage."""
+        (some, taken), count = joined.anew[name], len(joined.projection.members)
+        values = self.code.select(self.flow.sent, taken, self.flow.taken_count)
+        if name not in joined.held:
+            return self.code.let("a", values)
+        made = self.code.let("a", f"{joined.held[name]}.copy()")
+        self.code.line(f"{made}{self.code.position(some, count)} = {values}")
+        return made
+
+    def formed(self, number: int) -> str:
+        """The signals of the synapses of a projection."""
+        joined = self.flow.contacts[number]
+        known = {} if self.taking else self.joined.setdefault(number, {})
+        if _FORMED not in known:
+            (value,) = self.values_of(joined, joined.at.signal).values()
+            known[_FORMED] = each(self.step, joined.projection, joined.at.signal.names, value)
+        return known[_FORMED]
+
+    def back(self, part: Part, through: Through) -> str:
+        """How much what synapses bring to a port of each member changes with one of its states."""
+        _, staged = apart(through.port)
+        connections = through.port.incoming[staged]
+        parts = []
+        for one in formed_at(self.network, connections):
+            joined = self.flow.contacts[one.number]
+            value = self.values_of(joined, joined.at.back).get(through.state)
+            if value is not None:
+                value = each(self.step, joined.projection, joined.at.back.names, value)
+                parts.append((some_of(self.step, one, value), one.places))
+        places = np.sort(np.concatenate([places for _, places in parts]))
+        parts = [(values, np.searchsorted(places, own)) for values, own in parts]
+        signals = put_together(self.code, parts, len(places))
+        signals = with_factors(self.code, through.port, staged[places], signals)
+        return self.code.let("h", accumulated(self.step, part.population, through.port, staged[places], signals))
 
     def port(self, part: Part, port: Port) -> str:
         """What is at a port."""
@@ -302,15 +445,35 @@ class _Stage:
         if len(staged):
             self.emit_taken()
             connections = port.incoming[staged]
-            weights = self.code.select("weights", connections, len(self.network.connections))
-            taken = flow.taken[taken_by(self.network)[connections]]
-            signals = f"{weights} * {self.code.select(flow.sent, taken, flow.taken_count)}"
+            if (self.network.synapses.numbers[connections] >= 0).any():
+                signals = with_factors(self.code, port, staged, self.mixed(connections))
+                arriving = accumulated(self.step, part.population, port, staged, signals, arriving)
+                return flow.given(part, port, arriving, self.vector)
+            weights, taken, signals = self.plain(connections)
             if port.combine == "sum" and port.factors is None and not arriving and len(staged) >= _DENSE:
                 arriving = self.product(part, port, taken, weights, signals)
             else:
                 signals = with_factors(self.code, port, staged, self.code.let("g", signals))
                 arriving = accumulated(self.step, part.population, port, staged, signals, arriving)
         return flow.given(part, port, arriving, self.vector)
+
+    def plain(self, connections: Indices) -> tuple[str, IntArray, str]:
+        """Of connections without a synapse weights, where what they take is among all that is, and their signals."""
+        weights = self.code.select("weights", connections, len(self.network.connections))
+        taken = self.flow.taken[taken_by(self.network)[connections]]
+        return weights, taken, f"{weights} * {self.code.select(self.flow.sent, taken, self.flow.taken_count)}"
+
+    def mixed(self, connections: Indices) -> str:
+        """The signals of connections of which some have a synapse."""
+        parts = [
+            (some_of(self.step, one, self.formed(one.number)), one.places)
+            for one in formed_at(self.network, connections)
+        ]
+        plain = np.flatnonzero(self.network.synapses.numbers[connections] < 0)
+        if len(plain):
+            *_, signals = self.plain(connections[plain])
+            parts.append((signals, plain))
+        return put_together(self.code, parts, len(connections))
 
     def product(self, part: Part, port: Port, taken: IntArray, weights: str, signals: str) -> str:
         """The sums of a port all of whose signals are made anew. Where most neurons are connected, they are a product

@@ -20,7 +20,6 @@ Every identifier is new: its letter says what it is, its number sets it apart. c
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import singledispatch
 
@@ -40,15 +39,23 @@ from neurovis_spec.compiler.program import (
     Operation,
     Projection,
     ReadInputs,
+    Receive,
     Send,
     SendAhead,
     Update,
 )
-from neurovis_spec.runtime.numpy_arrivals import Step, gathered, sent_at, sent_by, slots_of
+from neurovis_spec.runtime.numpy_arrivals import (
+    Step,
+    ends_at,
+    gathered,
+    seen_before_update,
+    sent_at,
+    sent_by,
+    slots_of,
+)
 from neurovis_spec.runtime.numpy_code import FIRST, Cell, Code, emit_change
 from neurovis_spec.runtime.numpy_flows import diffuse, integrate
-from neurovis_spec.runtime.stages import formulas_of, given, taken_by
-from neurovis_spec.runtime.state import NEVER_LOST
+from neurovis_spec.runtime.stages import formulas_of, given
 
 
 @singledispatch
@@ -80,6 +87,23 @@ def _integrate(operation: Integrate, step: Step) -> None:
 @emit.register
 def _diffuse(operation: Diffuse, step: Step) -> None:
     diffuse(operation, step)
+
+
+@emit.register
+def _receive(operation: Receive, step: Step) -> None:
+    """The states of synapses at a step and, where they have one, at an episode's end."""
+    code, (projection, some) = step.code, step.working(operation.projection)
+    definition = replace(projection.use.definition, gives=())  # signals are formed at ports
+    if not len(projection.members) or not any(one.each_step or one.each_episode for one in definition.state):
+        return
+    seen = code.parameters(projection.use, some) | seen_before_update(step, projection)
+    place = "" if some is None else f"[{code.constant(some)}]"
+    cells = {
+        one.name: Cell(f"{cell}{place}", f"{cell}{place or '[:]'}")
+        for one in definition.state
+        for cell in [code.state(projection.use, one.name)]
+    }
+    emit_change(code, definition, seen, cells, step.network.episode)
 
 
 @emit.register
@@ -183,15 +207,10 @@ def _learn(operation: Learn, step: Step) -> None:
     """The rule of a projection at a step and, where it has one, at an episode's end; not of connections that are
     ``still`` in this structure."""
     code, network = step.code, step.network
-    projection = network.projections[operation.projection].during(operation.phases)
-    learning: IntArray | None = None  # all of its connections
-    still = step.structure.still[projection.members]
-    if still.any():
-        learning = np.flatnonzero(~still)
-        if not len(learning):
-            return
-        signals = {name: indices[learning] for name, indices in projection.signals.items()}
-        projection = replace(projection, members=projection.members[learning], signals=signals)
+    whole, learning = step.working(operation.projection)
+    projection = whole.during(operation.phases)
+    if not len(projection.members):
+        return
     rule, place = projection.rule, "" if learning is None else f"[{code.constant(learning)}]"
     seen = code.parameters(rule, learning) | seen_at(step, projection)
     states = {one.name: code.state(rule, one.name) for one in rule.definition.state}
@@ -219,41 +238,11 @@ def _bounded(code: Code, network: Network, projection: Projection, weight: str) 
 def seen_at(step: Step, projection: Projection) -> dict[str, str]:
     """Arrays for pre, sent, post and the signals; only what the definitions read is gathered."""
     code, network = step.code, step.network
-    read, members = projection.read, projection.members
-    connections, n = network.connections, len(network.neurons)
-    targets, delays, lost = connections.targets[members], connections.delays[members], step.structure.lost[members]
-    emitters: dict[str, Callable[[], str]] = {
-        "sent": lambda: sent_by(step, members, broadcast=True),
-        "post": lambda: code.select("activity", targets, n, broadcast=True),
-        "pre": lambda: _pre_without_lost(step, members, delays, lost),
-    }
-    seen = {name: code.let("a", make()) for name, make in emitters.items() if name in read}
+    seen = ends_at(step, projection)
     for signal, indices in projection.signals.items():
-        if signal in read:
-            seen[signal] = code.let("a", _signal(code, indices, n, network.vector_size))
+        if signal in projection.read:
+            seen[signal] = code.let("a", _signal(code, indices, len(network.neurons), network.vector_size))
     return seen
-
-
-def _pre_without_lost(step: Step, members: IntArray, delays: IntArray, lost: IntArray) -> str:
-    """What each connection took d steps ago, 0 where that is lost."""
-    pre = _pre(step, members, delays)
-    if not (lost > NEVER_LOST).any():
-        return pre
-    return f"np.where(k < {step.code.constant(lost + delays)}, 0.0, {pre})"
-
-
-def _pre(step: Step, members: IntArray, delays: IntArray) -> str:
-    """What each connection took d steps ago: a_j[t−d], or an outlet of then."""
-    code, network, depth = step.code, step.network, step.depth
-    if not delays.any():
-        return sent_by(step, members, broadcast=True)
-    taken = taken_by(network)[members]
-    first = int(delays[0])
-    if (delays == first).all():
-        count = len(network.neurons) + network.outlet_count
-        return code.select(f"history[(k - {first}) % {depth}]", taken, count, broadcast=True)
-    rows = f"(k - {code.constant(delays.copy())}) % {depth}"
-    return f"history[{rows}, {code.constant(np.ascontiguousarray(taken, dtype=np.intp))}]"
 
 
 def _signal(code: Code, indices: IntArray, n: int, inputs: int) -> str:

@@ -38,7 +38,7 @@ from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.backend import Availability, Capabilities
 from neurovis_spec.runtime.reference_flows import Flow
 from neurovis_spec.runtime.reference_seen import NO_FUNCTIONS, Functions, NetworkArray, Seen, is_first, with_let
-from neurovis_spec.runtime.stages import formulas_of, given, target_of
+from neurovis_spec.runtime.stages import formulas_of, given
 from neurovis_spec.runtime.state import State
 
 
@@ -203,7 +203,7 @@ class ReferenceStepper(Seen):
     def receive(self, number: int, state: State) -> None:
         """The states of synapses from old values; at an episode's end, once more from what these gave."""
         projection = self.network.projections[number]
-        self.hold_states(self.network.populations[target_of(self.network, projection)], state)
+        self.hold_states(self.behind[number][0], state)
         for position, connection in enumerate(projection.members.tolist()):
             if not state.conditions.structure.gone[connection]:
                 seen = self.known(projection.use, position, state) | self.before_update(projection, position, state)

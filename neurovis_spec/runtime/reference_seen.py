@@ -16,7 +16,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.events.settable import CENTRES, Variable, bias_of
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Definition, Key, Population, Port, Projection, Use
+from neurovis_spec.compiler.program import SYNAPSE, Definition, Key, Population, Port, Projection, Use
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.signals import signal_layout
@@ -80,6 +80,12 @@ class Seen:
         #: what connections read of their ends, by projections
         self.ends = [ends_of(network, one) for one in network.projections]
         self.synapses = network.synapses
+        #: of synapses the targets, and which of their states are seen as they are behind the integration
+        self.behind = {
+            number: (network.populations[target_of(network, one)], behind_flow(network, one))
+            for number, one in enumerate(network.projections)
+            if one.kind == SYNAPSE
+        }
         self.centres = NetworkArray(connections.centres.whole(), variables.get(CENTRES))
 
     def signals(
@@ -186,8 +192,8 @@ class Seen:
     def before_update(self, projection: Projection, position: int, state: State) -> dict[str, float]:
         """What a synapse sees of its ends before its target is updated: of the states of that which flow, as they are
         behind the integration."""
-        target = self.network.populations[target_of(self.network, projection)]
-        states, cells = behind_flow(self.network, projection), state.cells[target.model.owner]
+        target, states = self.behind[projection.use.owner.number]
+        cells = state.cells[target.model.owner]
         member = int(np.searchsorted(target.members, self.targets[projection.members[position]]))
         known = {name: float(cells[own][member]) for name, own in states.items()}
         return self.seen(projection, position, state) | known

@@ -172,10 +172,11 @@ def times(start: float, h: float) -> Times:
     return Times(start + inside, start + h / 2.0, start + h - inside)
 
 
-def parts_of(network: Network, operation: Integrate) -> tuple[Part, ...]:
-    """What is done at a stage, population by population."""
+def parts_of(network: Network, operation: Integrate, flows: BoolArray | None = None) -> tuple[Part, ...]:
+    """What is done at a stage, population by population. ``flows`` is what is ``flowing`` in the network before a
+    lesion, which changes nothing of that."""
     contacts = {one.number: one for one in contacts_of(network, operation)}
-    taken = _taken(network, operation, contacts.values())
+    taken = _taken(network, operation, contacts.values(), flowing(network) if contacts and flows is None else flows)
     parts = []
     for number in operation.populations:
         population, slopes = network.populations[number], Jacobian((), {})
@@ -387,16 +388,18 @@ def _names_of(network: Network, number: int) -> Iterator[tuple[str, IntArray]]:
             yield one.name, n + one.start + np.arange(len(members))
 
 
-def _taken(network: Network, operation: Integrate, contacts: Iterable[Contacts]) -> dict[tuple[int, str], IntArray]:
+def _taken(
+    network: Network, operation: Integrate, contacts: Iterable[Contacts], flows: BoolArray | None
+) -> dict[tuple[int, str], IntArray]:
     """By population and name what is taken at a stage, and its places."""
-    sending, flows = taken_by(network), None
+    sending = taken_by(network)
     asked = np.zeros(len(network.neurons) + network.outlet_count, dtype=np.bool_)
     for number in operation.populations:
         for port in network.populations[number].ports:
             plain = _staged(port)
             asked[sending[plain[network.synapses.numbers[plain] < 0]]] = True
     for one in contacts:
-        flows = flowing(network) if flows is None else flows
+        assert flows is not None
         undelayed = network.connections.delays[one.projection.members] == 0
         for end in one.ends.values():
             now = end.places[undelayed] if end.past else end.places
