@@ -17,6 +17,7 @@ from neurovis_spec.arguments import callers_level
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import RULE, SYNAPSE
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.state import State
@@ -43,6 +44,8 @@ class Capabilities:
     episodes: bool = True
     #: derivatives; ports, outputs and what is sent beside those that every model has
     flows: bool = False
+    #: synapses, their states and signals, and all that definitions of connections read of both ends
+    synapses: bool = False
     #: clamps of states of models (``Conditions.fixed``)
     clamped_states: bool = False
     #: the most neurons and connections together, None without a bound
@@ -330,7 +333,8 @@ def lacking(network: Network, capabilities: Capabilities) -> tuple[str, ...]:
             not capabilities.delays and bool((network.connections.delays.kept > 1).any()),
             "no delays of more than a step",
         ),
-        (not capabilities.plasticity and bool(network.projections), "no plasticity"),
+        (not capabilities.plasticity and any(one.kind == RULE for one in network.projections), "no plasticity"),
+        (not capabilities.synapses and any(one.kind == SYNAPSE for one in network.projections), "no synapses"),
         (not capabilities.noise and bool(network.noises), "no noise"),
         (not capabilities.episodes and network.episode is not None, "no episodes"),
         *((not capabilities.flows and has, f"no {what}") for what, has in _beyond(network)),
