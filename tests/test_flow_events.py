@@ -7,11 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from small_specs import compiled
 
 import neurovis_spec as nv
 from neurovis_spec.arguments import CodedWarning
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.diagnostics import SpecError
 from neurovis_spec.live.carry import carried
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.turns import Hold, Release, Set, Turn
@@ -24,7 +26,7 @@ from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.numpy_backend import NumpyBackend
 from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.recording import Recording
-from neurovis_spec.runtime.simulation import Simulation
+from neurovis_spec.runtime.simulation import ParameterError, Simulation
 from neurovis_spec.runtime.state import initial_state
 
 BOTH = ["reference", "numpy", pytest.param("c", marks=pytest.mark.compiler)]
@@ -268,3 +270,23 @@ def test_the_live_view_goes_back_and_on_and_into_an_edited_network() -> None:
     np.testing.assert_allclose(other.seen().snapshot.activity, seen[79], atol=0.03)  # its last step made by the edited
     other.advance()
     np.testing.assert_allclose(other.seen().snapshot.activity, seen[80], atol=0.06)
+
+
+def test_what_a_factor_of_a_port_reads_is_structural() -> None:
+    """Set in a run it would have to reach the factor: it is refused by name, in events and by hand, and what it follows
+    is, too."""
+    text = """time: {dt: 0.1}
+parameters: {g: 2, h: g/2}
+models: {m: {ports: [a, b], state: {v: {derivative: a - 2*b - v}}, activity: v}}
+neurons: {A: {bias: 1}, B: {model: m}}
+connections: {A -> B: {port: {a: 1, b: h}}}
+"""
+    network = compiled(text)
+    assert network.network.structural == {"g", "h"}
+    for name in ("g", "h"):
+        with pytest.raises(ParameterError, match=f"'{name}' cannot be set in a run: the structure"):
+            network.simulator("numpy").set({name: 3})
+    with pytest.raises(SpecError, match="'g' cannot be set in a run"):
+        compiled(text + "events: [{at: 2, set: {g: 3}}]\n")
+    other = compiled(text.replace("g: 2", "g: 5"))
+    assert other.network.populations[1].ports[2].factors == pytest.approx([2.5])
