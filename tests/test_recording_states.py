@@ -12,6 +12,7 @@ import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.turns import Set
+from neurovis_spec.runtime.c_backend import CStepper
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.recording import Recording
 
@@ -322,3 +323,31 @@ def test_a_slider_reaches_parameters_within_derivatives_at_once(backend: str) ->
     source.go(8)
     np.testing.assert_array_equal(source.seen().snapshot.activity, by_event.activity[8])
     assert (by_event.activity[6, :2] > flow.run(12, backend=backend).activity[6, :2]).all()
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("every", [1, 3])
+@pytest.mark.parametrize("until", [None, "O > 0.4"])
+def test_a_run_in_c_keeps_states_as_one_step_by_step_does(every: int, until: str | None) -> None:
+    """Many steps a call, with events between them, a measure that ends it, and from a recording on."""
+    events = "events:\n  - {at: 7, set: {g: 2}}\n  - {from: 12, to: 20, clamp: {A2: 0.3}}\n  - {at: 16, lesion: A3}\n"
+    spec = SPEC.replace("bias: 1 + i, act", "bias: g + i, act") + "parameters: {g: 1}\n" + events
+    network = nv.compile_text(spec)
+    wanted = network.run(states=WANTED, backend="reference", every=every, until=until)
+    made = network.run(states=WANTED, backend="c", every=every, until=until)
+    assert made.state_names == wanted.state_names
+    assert made.step.tolist() == wanted.step.tolist()
+    assert (len(made) < len(network.run(every=every))) == (until is not None)
+    for of in ("activity", "weights", "states"):
+        assert getattr(made, of).tobytes() == getattr(wanted, of).tobytes(), of
+    further = [network.run(9, states=WANTED, backend=backend, start=made) for backend in ("reference", "c")]
+    assert further[0].states.tobytes() == further[1].states.tobytes()
+
+
+@pytest.mark.compiler
+def test_a_run_in_c_makes_many_steps_a_call_where_states_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(CStepper, "step", refuse)
+    assert len(nv.compile_text(SPEC).run(states=WANTED, backend="c")) == 30

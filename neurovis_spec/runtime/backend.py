@@ -10,7 +10,7 @@ import os
 import warnings
 from dataclasses import InitVar, dataclass
 from functools import cache
-from typing import Final, Literal, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Final, Literal, Protocol, runtime_checkable
 
 from neurovis_spec import plugins
 from neurovis_spec.arguments import callers_level
@@ -21,6 +21,9 @@ from neurovis_spec.compiler.program import RULE, SYNAPSE
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.state import State
+
+if TYPE_CHECKING:
+    from neurovis_spec.runtime.columns import Probe
 
 #: It may name the backend that is taken where nobody names one.
 ENVIRONMENT_VARIABLE: Final = "NEUROVIS_BACKEND"
@@ -101,6 +104,16 @@ class Runner(Protocol):
         """Make a step for each row of ``vectors``, at least one; keep those that ``every`` divides: a[t] in the first
         rows of ``activity``, the w[t] that change in those of ``weights``. With ``look``, end behind the first step
         after which something is not finite. Gives the number of steps made."""
+        ...
+
+
+@runtime_checkable
+class Probing(Protocol):
+    """A Runner that can keep states of models and rules, too."""
+
+    def probe(self, probe: Probe, states: FloatArray) -> None:
+        """In the next run put what a probe reads behind each step that is kept into the first rows of ``states``
+        (rows, columns)."""
         ...
 
 

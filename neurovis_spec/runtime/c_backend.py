@@ -15,7 +15,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -31,6 +31,9 @@ from neurovis_spec.runtime.c_code import Code, Form, Table, Tables, function, st
 from neurovis_spec.runtime.c_step import StepCode, begins_otherwise, incoming_in
 from neurovis_spec.runtime.signals import SignalLayout, signal_layout
 from neurovis_spec.runtime.state import Conditions, Mask, State, Structure
+
+if TYPE_CHECKING:
+    from neurovis_spec.runtime.columns import Probe
 
 #: neurons and connections up to which a network is written out one by one
 SMALL = 600
@@ -52,8 +55,9 @@ _NEVER: Final = 1 << 62
 #:
 #: ``nv_course``: ``steps`` steps from ``k`` on, the first in ``form``, the others in the form ``then``; the inputs of
 #: each are a row of ``rows``, but for those that the step computes, which it puts there. Steps that ``every`` divides
-#: are kept: a row of ``activity``, and one of ``weights`` with those that are ``changing``, which lie next to each
-#: other if ``beside``. With ``look`` it ends behind the first step after which something is not finite.
+#: are kept: a row of ``activity``; one of ``weights`` with those that are ``changing``, which lie next to each other if
+#: ``beside``; and one of ``states``, with the ``columns`` numbers that ``probed`` points to. With ``look`` it ends
+#: behind the first step after which something is not finite.
 _HEAD: Final = """#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -77,9 +81,10 @@ typedef struct {
 } nv_state;
 
 typedef struct {
-    int64_t k, steps, every, form, then, look, beside;
-    double *rows, *activity, *weights;
+    int64_t k, steps, every, form, then, look, beside, columns;
+    double *rows, *activity, *weights, *states;
     const int64_t *changing;
+    const double *const *probed;
 } nv_course;
 """
 
@@ -112,7 +117,7 @@ NV_PUBLIC int64_t nv_once(nv_state *p)
 
 NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
 {
-    double *s = c->rows, *activity = c->activity, *weights = c->weights;
+    double *s = c->rows, *activity = c->activity, *weights = c->weights, *states = c->states;
     const int fused = FUSED && c->then == 0 && c->steps > 3;
     int64_t made = 0;
     int follows = 0;
@@ -145,6 +150,8 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
         if (kept) {
             memcpy(activity, p->activity, sizeof(double)*NEURONS);
             activity += NEURONS;
+            for (int64_t j = 0; j < c->columns; j++)
+                *states++ = *c->probed[j];
         }
         made = i + 1;
         // what no step looked at is checked here; what no step changes, once
@@ -303,8 +310,8 @@ class _Course(ctypes.Structure):
     """``nv_course``: the steps of a call."""
 
     _fields_ = [
-        *((name, ctypes.c_int64) for name in ("k", "steps", "every", "form", "then", "look", "beside")),
-        *((name, ctypes.c_void_p) for name in ("rows", "activity", "weights", "changing")),
+        *((name, ctypes.c_int64) for name in ("k", "steps", "every", "form", "then", "look", "beside", "columns")),
+        *((name, ctypes.c_void_p) for name in ("rows", "activity", "weights", "states", "changing", "probed")),
     ]
 
 
@@ -345,6 +352,8 @@ class CStepper:
         self._holds: object = None
         self._fixed: object = None
         self._structure: Structure | None = None
+        #: what the next run reads of states, and where it puts that
+        self._probed: tuple[Probe, FloatArray] | None = None
         #: the first step at which nothing is held, left out, still or lost
         self._plain_from = 0
 
@@ -365,6 +374,10 @@ class CStepper:
         """Compute these inputs, which are expressions, in the runs that follow."""
         self._computed = computed
         self._reads[:] = [one.name in computed for one in self.network.inputs]
+
+    def probe(self, probe: Probe, states: FloatArray) -> None:
+        """In the next run put what a probe reads behind each step that is kept into the first rows of ``states``."""
+        self._probed = probe, states
 
     def step(self, state: State, inputs: FloatArray, /) -> None:
         """Advance the state by a step."""
@@ -422,6 +435,10 @@ class CStepper:
             weights=weights.ctypes.data,
             changing=self._changing.ctypes.data,
         )
+        if self._probed is not None:
+            probe, states = self._probed
+            numbers, self._probed = probe.addresses(state), None
+            course.columns, course.states, course.probed = len(numbers), states.ctypes.data, numbers.ctypes.data
         made: int = self._run(self._address, ctypes.addressof(course))
         state.k += made
         return made

@@ -21,9 +21,9 @@ from neurovis_spec.compiler.events.patch import PatchError
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.interrupts import Asked, deferred
 from neurovis_spec.progress import Progress
-from neurovis_spec.runtime.backend import Runner, Stepper, ready
+from neurovis_spec.runtime.backend import Probing, Runner, Stepper, ready
 from neurovis_spec.runtime.checkpoint import load_state, save_state
-from neurovis_spec.runtime.columns import Columns, Numbers, columns_of, recording_of
+from neurovis_spec.runtime.columns import Columns, Numbers, Probe, columns_of, recording_of
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.embodied import Embodied
@@ -204,8 +204,9 @@ def run_steps(network: Network, state: State, course: Course, rows: RowSink, pro
     hands = _Hands(course.every, rows, reader, watch)
     make: _Make = _OneByOne(hands, columns, stepper, body, frozenset(course.inputs or ()))
     pace = _Pace(STRETCH, STRETCH)
-    # a runner gives the activities of all neurons and all changing weights, and nothing else
-    plain = columns.neurons is None and not columns.probe.names and len(columns.weights) == len(network.changing)
+    # a runner gives the activities of all neurons and all changing weights, and states only where it is a probing one
+    plain = columns.neurons is None and len(columns.weights) == len(network.changing)
+    plain = plain and (not columns.probe.names or isinstance(stepper, Probing))
     if (
         isinstance(stepper, Runner)
         and plain
@@ -213,7 +214,7 @@ def run_steps(network: Network, state: State, course: Course, rows: RowSink, pro
         and (course.until is None or course.until.measure.together)
     ):
         reader.leave(stepper)
-        make = _Together(hands, stepper, watched)
+        make = _Together(hands, stepper, columns.probe, watched)
         size = len(network.neurons) + len(network.connections) + 1
         pace = _Pace(max(1, min(_FIRST_STEPS, _FIRST_SIZE // size)), None if watched is None else STRETCH)
     controls, origin, last = Controls(network, backend.functions), state.k, state.k + steps
@@ -335,23 +336,25 @@ class _Together:
 
     hands: _Hands
     runner: Runner
+    #: what is kept of states; nothing where the runner is not a probing one
+    probe: Probe
     watched: Watched | None = None
 
     def steps(self, state: State, first: int, stop: int) -> bool:
         every, rows = self.hands.every, self.hands.rows
         k = first
         while k < stop:
-            activity, weights, *_ = rows.begin(_rows_between(k, stop, every))
+            room = rows.begin(_rows_between(k, stop, every))
             # as far as there is room for rows
-            until = min(stop, -(-k // every) * every + len(activity) * every) if len(activity) else stop
-            made = self._fill(state, k, until, activity, weights)
+            until = min(stop, -(-k // every) * every + len(room.activity) * every) if len(room.activity) else stop
+            made = self._fill(state, k, until, room)
             rows.end(_rows_between(k, made, every))
             k = made
             if rows.over():
                 return False
         return True
 
-    def _fill(self, state: State, first: int, stop: int, activity: FloatArray, weights: FloatArray) -> int:
+    def _fill(self, state: State, first: int, stop: int, room: Rows) -> int:
         """Make steps, until rows are to be handed on at the latest. Gives the step behind them."""
         every, rows, reader, watch = self.hands
         row, k = 0, first
@@ -360,7 +363,7 @@ class _Together:
             while k < begin + len(part):
                 until = watch.next_stop(k, begin + len(part))
                 vectors = part[k - begin : until - begin]
-                made = self._run(state, vectors, activity[row:], weights[row:], every, not watch.warned)
+                made = self._run(state, vectors, room.part(slice(row, None)), every, not watch.warned)
                 row += _rows_between(k, k + made, every)
                 k += made
                 if reader.left and not watch.warned:
@@ -370,28 +373,29 @@ class _Together:
                     return k
         return k
 
-    def _run(
-        self, state: State, vectors: FloatArray, activity: FloatArray, weights: FloatArray, every: int, look: bool
-    ) -> int:
+    def _run(self, state: State, vectors: FloatArray, room: Rows, every: int, look: bool) -> int:
         """Steps, as the runner makes them, or fewer where the run is to end before."""
         if self.watched is None:
-            return self.runner.run(state, vectors, activity, weights, every, look)
+            return self._made(state, vectors, room, every, look)
         before = state.copy()
         # the measure sees every step, the recording one in ``every``
-        if every == 1:
-            seen, learned = activity, weights
-        else:
-            seen, learned = (np.empty((len(vectors), rows.shape[1])) for rows in (activity, weights))
-        made = self.runner.run(state, vectors, seen, learned, 1, look)
-        count = self.watched.made(seen[:made])
+        seen = room if every == 1 else Rows(*(np.empty((len(vectors), rows.shape[1])) for rows in room))
+        made = self._made(state, vectors, seen, 1, look)
+        count = self.watched.made(seen.activity[:made])
         if every > 1:
             kept = slice(-before.k % every, count, every)
             wanted = _rows_between(before.k, before.k + count, every)
-            activity[:wanted], weights[:wanted] = seen[kept], learned[kept]
+            for own, all_ in zip(room, seen, strict=True):
+                own[:wanted] = all_[kept]
         if count < made:  # too far: back to before, and up to the step that ends the run
             state.become(before)
-            self.runner.run(state, vectors[:count], seen, learned, 1, False)
+            self._made(state, vectors[:count], seen, 1, False)
         return count
+
+    def _made(self, state: State, vectors: FloatArray, room: Rows, every: int, look: bool) -> int:
+        if self.probe.names and isinstance(self.runner, Probing):
+            self.runner.probe(self.probe, room.states)
+        return self.runner.run(state, vectors, room.activity, room.weights, every, look)
 
 
 def _rows_between(first: int, stop: int, every: int) -> int:
