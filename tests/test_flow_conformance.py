@@ -268,3 +268,27 @@ neurons: {{A: {{count: 3, model: m}}}}
     runs = [record(network, Course(6, backend=backend)).activity for backend in ("reference", "numpy")]
     assert np.ptp(runs[0][-1]) > 0
     np.testing.assert_allclose(runs[1], runs[0], rtol=1e-12)
+
+
+def test_states_that_are_stepped_in_turn_leave_nothing_for_each_other() -> None:
+    """Steps of two states in turn, with a matrix of other weights, are those of each alone."""
+    spec = """neurovis: 1
+name: x
+time: {dt: 0.1}
+models: {m: {state: {v: {derivative: f(drive) - v}}, activity: v}}
+neurons: {A: {count: 70, model: m, activation: tanh, bias: 0.01*i}}
+connections: {A -> A: {pattern: {random: {probability: 0.9}}, weight: 0.01*(i - j)}}
+"""
+    network = nv.compile_text(spec).network
+    stepper, inputs = NumpyBackend().prepare(network), np.zeros(network.vector_size)
+    one, other = initial_state(network), initial_state(network)
+    other.weights *= -0.5
+    alone = [one.copy(), other.copy()]
+    for state in alone:
+        fresh = NumpyBackend().prepare(network)
+        for _ in range(5):
+            fresh.step(state, inputs)
+    for _ in range(5):
+        stepper.step(one, inputs)
+        stepper.step(other, inputs)
+    assert [one.activity.tobytes(), other.activity.tobytes()] == [state.activity.tobytes() for state in alone]

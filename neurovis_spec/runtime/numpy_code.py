@@ -79,7 +79,7 @@ class Code:
         self.dt, self._variables = dt, variables
         self.namespace: dict[str, object] = {"np": np, **{name: getattr(np, name) for name in _CALLED}}
         self.namespace |= {"held_at": held_at, "hold_cells": hold_cells, "held_among": held_among}
-        #: lines before the steps: arrays that these work in, functions that they call
+        #: lines before the steps: functions that these call, and what is made of weights that stay
         self.before: list[str] = []
         self.lines: list[str] = []
         self.indent = 1
@@ -147,10 +147,10 @@ class Code:
         body, self.lines, self.indent = self.lines, outer, indent
         self.before += [f"    def {name}({', '.join(arguments)}):", *(f"    {line}" for line in body)]
 
-    def array(self, prefix: str, code: str) -> str:
-        """An array to work in, made before the steps."""
+    def array(self, prefix: str, values: FloatArray) -> str:
+        """An array to work in, the same one in all steps."""
         name = self.name(prefix)
-        self.before.append(f"    {name} = {code}")
+        self.namespace[name] = values
         return name
 
     def state(self, use: Use, name: str) -> str:

@@ -4,11 +4,9 @@ In: a Step in the making. Out: lines in its ``Code``. While they are integrated,
 one behind the other in one array, so that a method computes with all at once. What of a port is held over the step is
 made once, before the first stage; a stage is a function of the time. A state v of two neurons gives, with euler,
 
-    f4 = np.empty(2)                             # before the steps: the states at the beginning of one, …
-    f5 = np.empty(2)                             # … where a stage looks, …
-    f6 = np.empty(2)                             # … and its derivatives
-    f7 = f5[0:2]
-    def stage8(t):
+    # kept with the text: f4, the states at the beginning of a step, f5, where a stage looks, f6, its derivatives, and
+    # f7, which is f5[0:2]
+    def stage8(t):                               # before the steps
         f6[0:2] = 3.0 - f7
         if fixed: f6[held] = 0.0                 # of states that are clamped
     …
@@ -146,11 +144,12 @@ class _Flow:
         }
         self.size, self.taken_count = ends[-1], int(self.taken.max(initial=-1)) + 1
         #: the states at the beginning of the step, those where a stage looks, the derivatives there, their slopes
-        self.x, self.y, self.k = self.temporary(), self.temporary(), self.temporary()
+        looked_at = np.empty(self.size)
+        self.x, self.y, self.k = self.temporary(), self.code.array("f", looked_at), self.temporary()
         self.j = self.temporary() if any(part.slopes.trees for part in self.parts) else ""
-        self.sent = self.code.array("f", f"np.empty({self.taken_count})") if self.taken_count else ""
+        self.sent = self.code.array("f", np.empty(self.taken_count)) if self.taken_count else ""
         #: each state where a stage looks
-        self.now = {key: self.code.array("f", f"{self.y}[{_text(place)}]") for key, place in self.places.items()}
+        self.now = {key: self.code.array("f", looked_at[place]) for key, place in self.places.items()}
         #: by population and port what is made of it once a step, before the stages: all that is at the port, where that
         #: is held over the step, else what arrives there and is held
         self.whole: dict[tuple[int, str], str] = {}
@@ -161,7 +160,7 @@ class _Flow:
 
     def temporary(self) -> str:
         """An array to work in, as long as all flow states."""
-        return self.code.array("f", f"np.empty({self.size})")
+        return self.code.array("f", np.empty(self.size))
 
     def numbers(self, value: Callable[[float], float]) -> str:
         """What a method makes of the length of its steps, for each number in the time of its definition."""
@@ -224,7 +223,7 @@ class _Flow:
         """Room for what the noise of the flow states is multiplied by, where there is any."""
         for part in self.parts:
             for name, _ in part.spread.trees:
-                self.step.spread[part.number, name] = self.code.array("g", f"np.empty({len(part.population.members)})")
+                self.step.spread[part.number, name] = self.code.array("g", np.empty(len(part.population.members)))
         return bool(self.step.spread)
 
     def hold(self, part: Part, port: Port) -> None:
@@ -493,7 +492,7 @@ class _Stage:
             return f"einsum('st,s->t', {weights}.reshape({shape}), {sent})"
         key = part.number, port.name
         if key not in self.flow.matrices:
-            matrix = self.flow.matrices[key] = self.code.array("f", f"np.zeros({shape})")
+            matrix = self.flow.matrices[key] = self.code.array("f", np.zeros(shape))
             fill = f"{matrix}.reshape(-1)[{self.code.constant(flat)}] = {weights}"
             if (self.network.connections.rules[port.incoming[staged]] >= 0).any():
                 self.flow.filled.append(fill)
