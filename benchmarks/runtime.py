@@ -199,21 +199,15 @@ def cpg_in_c(network: Network) -> Run:
 ROOM = np.ones(30_000_000)
 
 
-def vectors(network: Network, steps: int) -> npt.NDArray[np.float64]:
-    """The inputs of all steps."""
-    parts = list(InputReader(network).parts(0, steps))
-    return np.ascontiguousarray(np.concatenate(parts)[:steps])
-
-
 def ours_in_c(network: Network) -> Run:
     """Whole runs, as ``record`` makes them: inputs that are expressions are computed within."""
     stepper, n = CBackend().prepare(network), len(network.neurons)
-    given = vectors(network, 20000 if network.vector_size else 1)
     InputReader(network).leave(stepper)
+    inputs = np.ones((20000, network.vector_size))
 
     def made(steps: int) -> None:
-        state = initial_state(network)
-        rows = given[:steps] if network.vector_size else np.zeros((steps, 0))
+        state, rows = initial_state(network), inputs[:steps]
+        assert len(rows) == steps
         activity = ROOM[: steps * n].reshape(steps, n)
         kept = (
             ROOM[steps * n : steps * (n + len(network.changing))].reshape(steps, -1) if len(network.changing) else ROOM
@@ -225,7 +219,7 @@ def ours_in_c(network: Network) -> Run:
 
 def one_by_one(network: Network) -> Run:
     """Steps called from Python, one by one."""
-    stepper, vector = CBackend().prepare(network), vectors(network, 1)[0]
+    stepper, vector = CBackend().prepare(network), next(InputReader(network).rows(0, 1))
     state = initial_state(network)
 
     def made(steps: int) -> None:
