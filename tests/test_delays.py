@@ -102,7 +102,15 @@ def test_what_a_delay_reads_cannot_be_set_in_a_run() -> None:
 
 
 def test_whole_steps_are_the_same_network_however_they_are_written() -> None:
-    written = ["3", "d", "3 ms", "{seconds: 0.003}", "{seconds: d*dt}", "i + 3 - i", "{matrix: [[3, 3], [3, 3], [3, 3]]}"]
+    written = [
+        "3",
+        "d",
+        "3 ms",
+        "{seconds: 0.003}",
+        "{seconds: d*dt}",
+        "i + 3 - i",
+        "{matrix: [[3, 3], [3, 3], [3, 3]]}",
+    ]
     hashes = {compiled(f"pattern: all_to_all, delay: {one}").hash for one in written}
     assert len(hashes) == 1
     assert compiled("pattern: all_to_all, delay: 2").hash not in hashes

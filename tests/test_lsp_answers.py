@@ -280,6 +280,92 @@ def test_names_of_what_is_sent_and_of_ports_are_renamed() -> None:
     assert apply(document, rename(document, place, "door")).source == FLOW.replace("gate", "door")
 
 
+COUPLED = """neurovis: 1
+name: coupled
+time: {dt: 0.1}
+models:
+  cell:
+    parameters: {rest: -60}
+    state: {v: {derivative: rest - v + drive}}
+    outputs: {rate: 2*v}
+    activity: v
+synapses:
+  graded:
+    time: ms
+    parameters: {E: {value: 0, unit: mV, description: where it reverses}}
+    state: {g: {derivative: pre.rate - g}}
+    signal: weight*g*(E - post.v)
+    sign: E - post.rest
+    description: A conductance.
+neurons:
+  A: {model: cell, initial: {v: -50}}
+  B: {model: cell}
+connections:
+  A -> B: {synapse: {graded: {E: -80}}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("at", "there", "missing"),
+    [
+        ("signal: |weight*¦", ["weight", "post", "pre", "g", "E", "tanh", "k"], ["f", "drive", "v", "rest"]),
+        ("signal: |weight*g*(E - post.¦", ["v", "rate", "rest", "activity"], ["g", "E", "post", "tanh"]),
+        ("signal: |weight*g*(E - post.r¦", ["rate", "rest"], ["g"]),
+        ("sign: |¦", ["weight", "E"], ["k"]),
+        ("pre.rate - g}}\n    |s¦", ["signal", "sign"], ["spikes", "send", "ports"]),
+        ("    state: {g: {|¦", ["derivative", "unit", "initial", "each_step"], ["noise", "jump"]),
+        ("{synapse: |¦", ["graded"], ["cell", "oja"]),
+        ("{synapse: |{graded: {¦", ["E"], ["g"]),
+        ("{synapse: |{graded: {E: ¦", ["i", "n_to"], ["A", "post"]),
+    ],
+)
+def test_what_fits_in_synapses_is_offered(at: str, there: list[str], missing: list[str]) -> None:
+    written, typed = at.split("|")
+    found = offered(COUPLED[: COUPLED.index(written) + len(written)] + typed)
+    assert found.keys() >= set(there)
+    assert found.keys().isdisjoint(missing)
+
+
+@pytest.mark.parametrize(
+    ("at", "told"),
+    [
+        (
+            "{synapse: {grad¦ed",
+            ["graded(E = 0 mV)", "dg/dt = pre.rate - g", "signal = weight*g*(E - post.v)", "reverses"],
+        ),
+        ("(E - post.v¦)", ["dv/dt = rest - v + drive"]),
+        ("sign: E - post.re¦st", ["parameter of cell", "`-60`"]),
+        ("weight*g¦*", ["dg/dt = pre.rate - g"]),
+        ("E - po¦st.v", ["the target's activity"]),
+        ("    sig¦nal", ["What arrives at the port"]),
+    ],
+)
+def test_synapses_are_explained(at: str, told: list[str]) -> None:
+    found = hover(*marked(COUPLED.replace(at.replace("¦", ""), at, 1)))
+    assert found is not None
+    assert all(one in found.markdown for one in told), found.markdown
+
+
+def test_what_is_read_of_the_ends_leads_to_the_model_and_is_renamed_with_it() -> None:
+    document, place = marked(COUPLED.replace("post.rest", "post.re¦st"))
+    found = definition(document, place)
+    assert found is not None
+    assert (found.span.line, document.text.part(found.span)) == (6, "rest")
+    assert renamed(COUPLED.replace("{rate:", "{ra¦te:"), "flux") == COUPLED.replace("rate", "flux")
+    assert renamed(COUPLED.replace("{synapse: {graded", "{synapse: {gra¦ded"), "slow") == COUPLED.replace(
+        "graded", "slow"
+    )
+    assert renamed(COUPLED.replace("{E: -80", "{E¦: -80"), "V") == (
+        COUPLED.replace("{E:", "{V:").replace("E - post", "V - post")
+    )
+
+
+def test_where_two_models_have_it_what_is_read_of_the_ends_is_of_neither() -> None:
+    two = COUPLED.replace("synapses:", "  other: {state: {v: {each_step: v}}, activity: v}\nsynapses:")
+    document, place = marked(two.replace("post.v", "post.v¦"))
+    assert definition(document, place) is None
+
+
 @pytest.mark.parametrize(
     ("text", "line", "name"),
     [

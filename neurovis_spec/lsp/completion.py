@@ -23,10 +23,10 @@ from neurovis_spec.language.ros_types import all_types, numbers_of
 from neurovis_spec.language.templates import Hole, pieces
 from neurovis_spec.language.yaml.reader import read_any
 from neurovis_spec.language.yaml.source import Scalar
-from neurovis_spec.lsp.definitions import Definition, known
+from neurovis_spec.lsp.definitions import Definition, definitions, known
 from neurovis_spec.lsp.document import Document, described, ports_of
 from neurovis_spec.lsp.index import Index
-from neurovis_spec.lsp.names import Name, Scope, scope_of
+from neurovis_spec.lsp.names import SECTIONS, Name, Scope, scope_of
 from neurovis_spec.lsp.outline import Path, nodes_at
 from neurovis_spec.lsp.text import Place, Text
 from neurovis_spec.manual.words import functions_of
@@ -40,6 +40,8 @@ _REST = re.compile(r"\w*", re.ASCII)
 #: The instances on the way to a name that is being typed, and the begin of a range that it ends.
 _WAY = re.compile(r"(?:(?<![\w.])|(?<=\.\.))(?:[A-Za-z_]\w*\.(?!\.))+$", re.ASCII)
 _RANGE = re.compile(r"(?<![\w.])[A-Za-z_][\w.]*\.\.(?=(?:[A-Za-z_]\w*\.)*$)", re.ASCII)
+#: What stands before a name of an end of a connection.
+_END = re.compile(r"(?<![\w.])(pre|post)\.$", re.ASCII)
 _NAMES = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 #: Of a larger group only the first and the last neuron are offered; of one that is larger than any, none.
 _FEW = 40
@@ -191,6 +193,8 @@ def _of_role(role: Role | None, scope: Scope, path: Path, front: str, index: Ind
     match role.use:
         case "template" if not _in_braces(front):
             return
+        case "formula" if role.ends and (end := _END.search(front)):
+            yield from _at_end(end[1], index)
         case "formula" | "template":
             yield from _formula(role, scope, path, index, place)
         case "ends" | "references":
@@ -368,6 +372,22 @@ def _model_of(index: Index, group: Path) -> Definition | None:
     told = index.values.get(path)
     inner = (key[-1] for key in index.keys if key[:-1] == path)
     return known("model", index.all_items).get(told.text if told is not None else str(next(inner, "")))
+
+
+def _at_end(end: str, index: Index) -> Iterator[_Offer]:
+    """What there may be at an end of a connection: what the models have that are written here or in use."""
+    groups = (_model_of(index, group.item.path) for group in index.declared("neuron"))
+    own = (model for (section, _), model in definitions(index.all_items).items() if section == SECTIONS["model"])
+    found = {"activity": f"activity at the {end} end"}
+    for model in dict.fromkeys((*own, *(model for model in groups if model is not None))):
+        for names, what in (
+            (model.states, "state"),
+            (model.outputs, "output"),
+            ([one.name for one in model.parameters], "parameter"),
+        ):
+            for name in names:
+                found.setdefault(name, f"{what} of {model.name}")
+    yield from (_Offer(name, "local", detail) for name, detail in found.items())
 
 
 def _of_ends(use: Literal["port", "sent"], scope: Scope, path: Path, index: Index) -> Iterator[_Offer]:

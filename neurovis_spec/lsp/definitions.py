@@ -1,4 +1,4 @@
-"""Activations, models and rules as an editor shows them: parameters, equations, description.
+"""Activations, models, rules and synapses as an editor shows them: parameters, equations, description.
 
 In: Items of a spec, or of the library files that ship. Out: Definitions; those of the spec and the built-in ones look
 the same, since they are written in the same language.
@@ -27,7 +27,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Definition:
-    """An activation, a model or a rule. ``equations`` are lines ``name = expression``."""
+    """An activation, a model, a rule or a synapse. ``equations`` are lines ``name = expression``."""
 
     kind: Kind
     name: str
@@ -133,8 +133,12 @@ def _equations(section: str, texts: Mapping[tuple[str, ...], str]) -> tuple[str,
                 lines.append(f"f(x) = {text}")
             case ("activity",):
                 lines.append(f"activity = {text}")
-            case ("weight", "each_step"):
-                lines.append(f"weight = {text}")
-            case ("weight", "each_episode"):
-                late.append(f"weight = {text} at an episode's end")
+            case ("signal",):
+                lines.append(f"signal = {text}")
+            case ("weight" | "centre" as what, "each_step"):
+                lines.append(f"{what} = {text}")
+            case ("weight" | "centre" as what, "derivative"):
+                lines.append(f"d{what}/dt = {text}")
+            case ("weight" | "centre" as what, "each_episode"):
+                late.append(f"{what} = {text} at an episode's end")
     return tuple(lines + late)

@@ -22,7 +22,7 @@ from neurovis_spec.language.templates import Hole, pieces
 from neurovis_spec.lsp.definitions import known
 from neurovis_spec.lsp.document import Document, described, ports_of
 from neurovis_spec.lsp.index import Found, Index
-from neurovis_spec.lsp.names import DEFINITIONS, Name
+from neurovis_spec.lsp.names import DEFINITIONS, SECTIONS, Name
 from neurovis_spec.lsp.outline import Item
 from neurovis_spec.lsp.text import Place, holds
 from neurovis_spec.manual.words import functions_of
@@ -96,7 +96,7 @@ def _in_expression(text: str, role: Role, at: int) -> bool:
 
 
 def _name(document: Document, name: Name) -> str | None:
-    if name.kind in ("activation", "model", "rule"):
+    if name.kind in SECTIONS:
         definition = known(name.kind, document.index.all_items).get(name.text)
         return None if definition is None else definition.markdown
     found = document.index.find(name)
@@ -273,5 +273,5 @@ def _setting(document: Document, name: Name) -> str | None:
     if not lines:
         return None
     told = f"**{name.text}** of {owner}\n\n```\n" + "\n".join(lines) + "\n```"
-    flow = as_derivative(name.text, lines[0].partition(" = ")[2]) if section == "models" else None
+    flow = as_derivative(name.text, lines[0].partition(" = ")[2]) if section != "activations" else None
     return told if flow is None else f"{told}\n\nAs an equation, which is integrated: `derivative: {flow}`"

@@ -16,17 +16,19 @@ from typing import Final
 
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.grammar import Kind
-from neurovis_spec.lsp.names import Lookup, Name, names_of
+from neurovis_spec.lsp.names import SECTIONS, Lookup, Name, names_of
 from neurovis_spec.lsp.outline import Item
 from neurovis_spec.lsp.text import Text
 
 _NUMBER = re.compile(r"0|[1-9][0-9]*")
 #: No name is longer.
 _LONGEST = 64
+#: The sections of a model with what a connection may read of its ends.
+_OF_ENDS: Final = ("state", "outputs", "parameters")
 #: The kinds that share one namespace.
 SHARED: Final[tuple[Kind, ...]] = ("neuron", "input", "instance")
 #: The kinds that a file shares with those that it includes, or that include it.
-COMMON: Final[tuple[Kind, ...]] = ("module", "activation", "model", "rule")
+COMMON: Final[tuple[Kind, ...]] = ("module", *SECTIONS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +72,18 @@ class Index:
 
     @property
     def _lookup(self) -> Lookup:
-        return Lookup(self.module_of, self._is_signal, lambda name: ("outputs", name) in self.keys)
+        return Lookup(
+            self.module_of, self._is_signal, lambda name: ("outputs", name) in self.keys, self._models_with.get
+        )
+
+    @cached_property
+    def _models_with(self) -> Mapping[str, str]:
+        """The model that alone declares a state, an output or a parameter, by the name of that."""
+        found: dict[str, set[str]] = {}
+        for item in self.all_items:
+            if item.is_key and len(item.path) == 4 and item.path[0] == "models" and item.path[2] in _OF_ENDS:
+                found.setdefault(str(item.path[3]), set()).add(str(item.path[1]))
+        return {name: model for name, (model, *others) in found.items() if not others}
 
     @cached_property
     def declarations(self) -> tuple[Name, ...]:

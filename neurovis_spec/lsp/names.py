@@ -23,10 +23,17 @@ from neurovis_spec.lsp.outline import Item, Path
 from neurovis_spec.lsp.text import Text
 
 #: The kinds that definitions declare, by section.
-DEFINITIONS: Final[Mapping[str, Kind]] = {"activations": "activation", "models": "model", "rules": "rule"}
+DEFINITIONS: Final[Mapping[str, Kind]] = {
+    "activations": "activation",
+    "models": "model",
+    "rules": "rule",
+    "synapses": "synapse",
+}
 SECTIONS: Final[Mapping[Kind, str]] = {kind: section for section, kind in DEFINITIONS.items()}
 #: A name in an expression, and the parenthesis behind the name of a function.
 _IN_FORMULA = re.compile(r"(?<![\w.])([A-Za-z_]\w*)(\s*\()?", re.ASCII)
+#: What is read of an end of a connection.
+_OF_END = re.compile(r"(?<![\w.])(?:pre|post)\.([A-Za-z_]\w*)", re.ASCII)
 _WORDS = frozenset({"and", "or", "not", "if", "else"})
 
 
@@ -69,11 +76,13 @@ class Name:
 @dataclass(frozen=True)
 class Lookup:
     """What the reading of some names needs to know of others: the module of an instance, whether a setting of a rule
-    is a signal, whether an output is called so."""
+    is a signal, whether an output is called so, and the model that alone has a state, an output or a parameter of a
+    name."""
 
     module_of: Callable[[str, str | None], str | None]
     is_signal: Callable[[str, str], bool]
     is_output: Callable[[str], bool]
+    model_with: Callable[[str], str | None]
 
 
 def names_of(items: Iterable[Item], text: Text, lookup: Lookup) -> Iterator[Name]:
@@ -90,7 +99,7 @@ def _names(item: Item, role: Role, scope: Scope, text: Text, lookup: Lookup) -> 
             yield from _formula(item, role, scope, text, lookup)
         case "setting value":
             rule, setting = item.path[-2:] if isinstance(item.path[-1], str) else item.path[-3:-1]
-            if lookup.is_signal(str(rule), str(setting)):
+            if role.kind == "rule" and lookup.is_signal(str(rule), str(setting)):
                 yield from _references(item, scope, text, lookup)
             else:
                 yield from _formula(item, role, scope, text, lookup)
@@ -110,7 +119,7 @@ def _names(item: Item, role: Role, scope: Scope, text: Text, lookup: Lookup) -> 
             if role.kind == "input" and "." in item.text:  # one of an instance: left1.load
                 yield from _references(item, scope, text, lookup)
                 return
-            if role.kind in ("module", "activation", "model", "rule"):
+            if role.kind == "module" or role.kind in SECTIONS:
                 scope = Scope()
             yield _whole(item, role.kind, scope, text, declares)
 
@@ -134,6 +143,17 @@ def _formula(item: Item, role: Role, scope: Scope, text: Text, lookup: Lookup) -
             output = role.kind == "output" and lookup.is_output(match[1])
             kind: Kind = "output" if output else "local" if local else "parameter"
             yield Name(kind, match[1], span, scope, item, False, exact)
+    if role.ends:
+        yield from _of_ends(item, text, lookup)
+
+
+def _of_ends(item: Item, text: Text, lookup: Lookup) -> Iterator[Name]:
+    """The names behind the points of ``pre.v`` and ``post.v``, as far as it is sure which model is meant."""
+    found = [(match, lookup.model_with(match[1])) for match in _OF_END.finditer(item.text)]
+    sure = [(match, model) for match, model in found if model is not None]
+    places = _inside(item, text, [match.span(1) for match, _ in sure])
+    for (match, model), (span, exact) in zip(sure, places, strict=True):
+        yield Name("local", match[1], span, Scope(None, (SECTIONS["model"], model)), item, False, exact)
 
 
 def _references(item: Item, scope: Scope, text: Text, lookup: Lookup) -> Iterator[Name]:

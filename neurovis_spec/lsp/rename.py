@@ -20,7 +20,7 @@ from neurovis_spec.lsp.check import check
 from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.files import CrowdedError, Page
 from neurovis_spec.lsp.index import SHARED, Found, Index, is_common
-from neurovis_spec.lsp.names import Name
+from neurovis_spec.lsp.names import SECTIONS, Name
 from neurovis_spec.lsp.text import Place, Text
 
 #: How many specs that share a declaration are compiled to see whether a rename does harm; each takes its time.
@@ -143,7 +143,7 @@ def _found(document: Document, place: Place) -> Found:
         raise RenameError(_NOTHING)
     found = document.index.find(name)
     if found is None:
-        if name.kind in ("activation", "model", "rule") or name.kind == "local":
+        if name.kind in SECTIONS or name.kind == "local":
             raise RenameError(f"'{name.text}' is not declared in this document")
         raise RenameError(_NOTHING)
     return found

@@ -23,6 +23,7 @@ _SORTS: Final[dict[str, Sort]] = {
     "activations": "definition",
     "models": "definition",
     "rules": "definition",
+    "synapses": "definition",
     "modules": "module",
     "instances": "instance",
 }

@@ -359,7 +359,11 @@ class EntryBuilder:
             return UNKNOWN
         ends, called = (self.sources[shape.i], self.targets[shape.j]), self.context.census.neurons.names
         return reader.each(
-            values, written.span, written.in_seconds, drawn, lambda at: f"{called[ends[0][at]]} -> {called[ends[1][at]]}"
+            values,
+            written.span,
+            written.in_seconds,
+            drawn,
+            lambda at: f"{called[ends[0][at]]} -> {called[ends[1][at]]}",
         )
 
     def _same_delay(self, formula: Formula, in_seconds: bool, shape: _Shape | Unknown) -> Delays | Unknown:

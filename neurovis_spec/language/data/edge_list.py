@@ -119,7 +119,11 @@ def _columns(header: list[str]) -> dict[str, int]:
     for column, name in enumerate(names, 1):
         if name not in _COLUMNS:
             close = nearest(name, _COLUMNS, 1)
-            hint = f"did you mean '{close[0]}'?" if close else "the columns are from, to, weight and perhaps delay, or delay_seconds"
+            hint = (
+                f"did you mean '{close[0]}'?"
+                if close
+                else "the columns are from, to, weight and perhaps delay, or delay_seconds"
+            )
             if name.startswith("#"):
                 hint = NO_COMMENT
             elif separated(name):
