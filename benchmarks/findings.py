@@ -95,13 +95,16 @@ layout:
 render: {gain: {activity: 1, thickness: 2}, theme: dark, labels: true, legend: false}
 """
 #: Mappings whose keys are the author's own names, by the key they stand under.
-_DECLARED = {"parameters", "inputs", "activations", "models", "rules", "neurons", "let", "state", "outputs", "boxes"}
+_DECLARED = {
+    *("parameters", "inputs", "activations", "models", "rules", "synapses", "neurons", "let", "state", "outputs"),
+    "boxes",
+}
 #: Mappings whose keys are references to what stands elsewhere.
 _REFERRED = {"positions", "arrange", "set", "clamp"}
 #: Texts that say what they like.
 _FREE = {"name", "box", "description", "title"}
 #: Keys under which a mapping has one key, a name.
-_CHOICES = {"activation", "model", "pattern", "plasticity"}
+_CHOICES = {"activation", "model", "pattern", "plasticity", "synapse"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,7 +251,7 @@ def possible(words: list[Word], root: Mapping) -> list[Fault]:
 def bound(root: Mapping) -> list[tuple[Span, Span]]:
     """Where each definition declares what can be set, and where something of it is set, or read by its formulas."""
     result: list[tuple[Span, Span]] = []
-    for section in ("activations", "models", "rules"):
+    for section in ("activations", "models", "rules", "synapses"):
         definitions = root.get(section)
         for definition in definitions.entries if isinstance(definitions, Mapping) else ():
             assert isinstance(definition.value, Mapping)

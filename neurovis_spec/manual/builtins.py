@@ -1,6 +1,6 @@
 """The built-in definitions as they ship: description, parameters, and the YAML itself.
 
-In: the library files, ours and those of packages. Out: a Builtin for each activation, model and rule.
+In: the library files, ours and those of packages. Out: a Builtin for each definition.
 """
 
 from __future__ import annotations
@@ -9,17 +9,17 @@ import re
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, get_args
 
 from neurovis_spec import plugins
 from neurovis_spec.compiler.program import DRIVE
 from neurovis_spec.compiler.values.builtin import libraries
-from neurovis_spec.language.library import ActivationModel, Library, ModelModel, RuleModel
+from neurovis_spec.language.library import ActivationModel, Library, ModelModel, RuleModel, SynapseModel, TimedModel
 from neurovis_spec.language.values import ParameterModel
 from neurovis_spec.language.yaml.source import Entry, Mapping
 
-Kind: TypeAlias = Literal["activation", "model", "rule"]
-_Definition: TypeAlias = ActivationModel | ModelModel | RuleModel
+Kind: TypeAlias = Literal["activation", "model", "rule", "synapse"]
+_Definition: TypeAlias = ActivationModel | ModelModel | RuleModel | SynapseModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class Builtin:
     """A definition that needs no declaration. ``parameters``: name, default, meaning; ``yaml``: the definition as it
     stands in its file, its description left out; ``origin``: the entry point that brings it, ``builtin`` for ours;
     ``time``: what of the section ``time`` it needs, as a rule that changes weights at the end of an episode alone;
-    ``ends``: of a model in which unit its time is, what arrives where, and what it gives beside its activity."""
+    ``ends``: in which unit its time is, of a model also what arrives where, and what it gives beside its activity."""
 
     kind: Kind
     name: str
@@ -46,16 +46,17 @@ class Builtin:
         settings += [f"{signal}: T" for signal in self.signals]
         choice = f"{{{self.name}: {{{', '.join(settings)}}}}}" if settings else self.name
         time = f"time: {{{self.time}}}\n" if self.time else ""
-        if self.kind == "rule":
-            return f"{time}connections: {{K -> O: {{weight: 0.1, plasticity: {choice}}}}}"
+        if self.kind in ("rule", "synapse"):
+            key = "plasticity" if self.kind == "rule" else "synapse"
+            return f"{time}connections: {{K -> O: {{weight: 0.1, {key}: {choice}}}}}"
         return f"{time}neurons: {{K: {{{self.kind}: {choice}}}}}"
 
 
 @cache
 def builtins() -> tuple[Builtin, ...]:
-    """All of them: activations, then models, then rules, each in the order of the files."""
+    """All of them: activations, models, rules and synapses, each in the order of the files."""
     found = [builtin for library in libraries() for builtin in _of(library)]
-    order = ("activation", "model", "rule")
+    order = get_args(Kind)
     return tuple(sorted(found, key=lambda builtin: order.index(builtin.kind)))
 
 
@@ -69,6 +70,8 @@ def _of(library: Library) -> list[Builtin]:
     for name, rule in library.rules.items():
         signals = tuple(signal.value for signal in rule.signals)
         result.append(_builtin("rule", name, rule, signals, text, library))
+    for name, synapse in library.synapses.items():
+        result.append(_builtin("synapse", name, synapse, (), text, library))
     return result
 
 
@@ -93,26 +96,33 @@ def _builtin(
 
 def _time(model: _Definition) -> str:
     """What it needs that ``time`` says."""
-    if isinstance(model, RuleModel):
-        return "episode: 100" if model.weight.each_step is None else ""
-    return "dt: 0.001" if isinstance(model, ModelModel) and _flows(model) else ""
+    if isinstance(model, TimedModel) and _flows(model):
+        return "dt: 0.001"
+    parts = model.parts()
+    return "episode: 100" if parts.each_step is None and parts.each_episode is not None else ""
 
 
-def _flows(model: ModelModel) -> bool:
-    return any(state.derivative is not None for state in model.state.values())
+def _flows(model: TimedModel) -> bool:
+    parts = model.parts()
+    states = (parts.state or {}).values()
+    return parts.derivative is not None or any(state.derivative is not None for state in states)
 
 
 def _ends(model: _Definition) -> tuple[tuple[str, str], ...]:
-    """The unit of time of a model, its ports, outputs and what it sends, where it has any that it need not have."""
-    if not isinstance(model, ModelModel):
+    """The unit of time of a definition, and of a model its ports, outputs and what it sends, where it has any that it
+    need not have."""
+    if not isinstance(model, TimedModel):
         return ()
-    unit = "milliseconds" if model.time is not None and model.time.value == "ms" else "seconds"
+    unit = "milliseconds" if model.unit_of_time == "ms" else "seconds"
+    timed = (("time", unit),) if _flows(model) else ()
+    if not isinstance(model, ModelModel):
+        return timed
     ports = [DRIVE]
     for port in model.ports:
         told = ", ".join(word for word in ("" if port.combine == "sum" else port.combine, port.unit) if word)
         ports.append(f"{port.name.value} ({told})" if told else port.name.value)
     rows = (
-        ("time", unit if _flows(model) else ""),
+        *timed,
         ("ports", ", ".join(ports) if model.ports else ""),
         ("outputs", ", ".join(model.outputs)),
         ("sent", "" if model.send is None else model.send.value),

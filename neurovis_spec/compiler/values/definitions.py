@@ -522,8 +522,9 @@ def sorted_by_need(needs: Mapping[str, Collection[str]]) -> tuple[list[str], lis
 
 
 def define(library: Library, findings: Findings, builtin: Definitions, around: Around = NOTHING_AROUND) -> Definitions:
-    """The definitions of a file. Who replaces a built-in one is warned, unless that is one of ``LATER``."""
-    for reading in _READINGS:
+    """The definitions of a file. Who replaces a built-in one is warned, unless that is one of ``LATER``, or a
+    synapse."""
+    for reading in (one for one in _READINGS if one.kind != SYNAPSE):
         node, replaced = library.source.get(reading.kind.section), builtin.of(reading.kind).known()
         for entry in node.entries if isinstance(node, SourceMapping) else ():
             if entry.name in replaced and entry.name not in LATER.get(reading.kind, ()):
