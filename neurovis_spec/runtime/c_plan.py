@@ -148,7 +148,7 @@ class Plan:
         ends = self.network.episode is not None and any(
             state.each_episode is not None for state in part.population.model.definition.lasting
         )
-        return not (ends or one.formulas.ports or {"k", "t"} & one.formulas.read)
+        return not (ends or one.formulas.ports or {"k", "t"} & one.formulas.names)
 
     @cached_property
     def parts(self) -> Mapping[str, int]:

@@ -65,11 +65,8 @@ class Formulas(NamedTuple):
     trees: tuple[tuple[str, Tree], ...] = ()
     let: Let = ()
     ports: tuple[Port, ...] = ()
-
-    @property
-    def read(self) -> frozenset[str]:
-        """All names that they read."""
-        return frozenset().union(*(names(tree) for _, tree in (*self.trees, *self.let)))
+    #: all names that they read
+    names: frozenset[str] = frozenset()
 
 
 class Taken(NamedTuple):
@@ -261,13 +258,13 @@ def _through(network: Network, population: Population, contacts: Mapping[int, Co
 def formulas_of(population: Population, trees: Iterable[tuple[str, Tree | None]], more: Let = ()) -> Formulas:
     """Some formulas of the population's model, with ``more`` intermediate values behind its own."""
     made = _formulas(population.model.definition, trees, more)
-    read = made.read
-    return made._replace(ports=tuple(port for port in population.ports if port.name in read))
+    return made._replace(ports=tuple(port for port in population.ports if port.name in made.names))
 
 
 def _formulas(definition: Definition, trees: Iterable[tuple[str, Tree | None]], more: Let = ()) -> Formulas:
     kept = tuple((name, tree) for name, tree in trees if tree is not None)
-    return Formulas(kept, unfolded((*definition.let, *more), [tree for _, tree in kept]).let)
+    let, read = unfolded((*definition.let, *more), [tree for _, tree in kept])
+    return Formulas(kept, let, names=read)
 
 
 def ends_of(network: Network, projection: Projection) -> dict[str, End]:

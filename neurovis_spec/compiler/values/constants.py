@@ -31,7 +31,6 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray, Indices, IntArray
 from neurovis_spec.compiler.events.settable import Dependent, ParameterFormula, Part, Slot, slots_named
-from neurovis_spec.compiler.limits import LONGEST_DELAY, plural
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Findings, Home, Undeclared, shorten
 from neurovis_spec.language.expressions.evaluate import evaluate_array
