@@ -265,7 +265,9 @@ class _Checker:
     def read(self, formula: Formula, sight: Sight, functions: Mapping[str, int] = _NO_FUNCTIONS) -> Tree | Unknown:
         """The tree of a formula; UNKNOWN where it is invalid, which is reported."""
         tree = parse_formula(formula, sight, self.findings, functions=functions, naming=self.naming)
-        if tree is UNKNOWN or not self._has_ends(tree, formula) or not self.products:
+        if tree is UNKNOWN or not self._has_ends(tree, formula):
+            return UNKNOWN
+        if not self.products:
             return tree
         try:
             made = with_products(tree)
