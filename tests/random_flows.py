@@ -1,4 +1,5 @@
-"""Random specs in which something flows: derivatives and maps mixed, ports, factors, outputs, delays, noise, events."""
+"""Random specs in which something flows: derivatives and maps mixed, ports, factors, outputs, synapses, delays, noise,
+events."""
 
 from __future__ import annotations
 
@@ -57,6 +58,45 @@ PORTS: dict[str, list[Plain]] = {
     "static": ["drive"],
     "leaky_integrator": ["drive"],
 }
+#: what synapses can read of neurons of each model; ``tau`` is a parameter
+READ: dict[str, list[str]] = {
+    "leaky": ["v", "v", "activity", "tau"],
+    "rate": ["v", "w", "both", "rate", "activity", "tau"],
+    "mixed": ["x", "y", "count", "phase", "activity"],
+    "through": ["z", "z", "half", "activity"],
+    "static": ["activity"],
+    "leaky_integrator": ["v", "activity"],
+}
+#: synapses that read X of their source and Y of their target
+_GATE: Plain = {"initial": 0.1, "derivative": "(pre.X - g)/tau"}
+SYNAPSES: list[dict[str, Plain]] = [
+    {"signal": "weight*(pre.X - post.Y)", "sign": "0"},
+    {"signal": "0.3*weight*pre*(1 - 0.2*post.Y^3)"},
+    {"parameters": {"E": 0.8}, "let": {"open": "0.5*pre.X"}, "signal": "weight*open*(E - post.Y)"},
+    {"parameters": {"E": 0.8, "tau": 0.3}, "state": {"g": _GATE}, "signal": "g*(E - post.Y) + 0.1*sent"},
+    {
+        "time": "ms",
+        "parameters": {"E": 0.4, "tau": 250},
+        "let": {"sum": "g + 0.5*h"},
+        "state": {"g": _GATE, "h": {"derivative": "(weight*post.Y - sum)/tau + 0.0001*t"}},
+        "signal": "weight*sum*(E - 0.1*post)",
+    },
+    {
+        "state": {"u": {"initial": 1, "each_step": "0.8*u + 0.1*pre.X", "each_episode": "0.5*u"}},
+        "signal": "weight*u - 0.1*post.Y",
+    },
+    {
+        "state": {
+            "g": {"initial": 0.2, "derivative": "0.5*pre - g", "each_step": "clip(g, -0.3, 0.4)"},
+            "u": {"each_step": "0.5*u + 0.2*post.Y*g", "each_episode": "0"},
+        },
+        "signal": "weight*(g + u)",
+    },
+    {"signal": "0.2*post.Y"},
+    {"parameters": {"E": 0.1}, "signal": "E"},
+    {"signal": "0.1*weight*pre.X*post.Y*(1 + 0.1*t - 0.01*k)"},
+]
+_PHASE: dict[str, Plain] = {"parameters": {"E": 0.3}, "signal": "0.5*weight*sin(pre.X - post.Y - E)"}
 #: a state of each of these models
 _STATES = {"leaky": "v", "rate": "v", "mixed": "x", "through": "z"}
 BIASES: list[Plain] = [0.2, 0.3, "level"]
@@ -75,10 +115,16 @@ def flowing_specs(draw: st.DrawFn, exact: bool = False) -> Spec:
     sizes = {name: chooser.choice([1, 2, 3]) for name in kinds}
     neurons: dict[str, Plain] = {name: _group(chooser, kind, sizes[name]) for name, kind in kinds.items()}
     connections: dict[str, Plain] = {}
+    synapses: dict[str, Plain] = {}
     for source in kinds:
         for target in kinds:
             if chooser.random() < 0.6:
-                connections[f"{source} -> {target}"] = _connection(chooser, kinds, sizes, source, target)
+                body = _connection(chooser, kinds, sizes, source, target)
+                connections[f"{source} -> {target}"] = body
+                if _can_have_synapse(body) and chooser.random() < 0.5:
+                    name = f"s{len(synapses)}"
+                    synapses[name] = _synapse(chooser, kinds[source], kinds[target], exact)
+                    body["synapse"] = {name: {"E": "level"}} if "E" in str(synapses[name]) else name
     method = chooser.choice(EXACT if exact else METHODS)
     spec: Spec = {
         "neurovis": 1,
@@ -96,6 +142,7 @@ def flowing_specs(draw: st.DrawFn, exact: bool = False) -> Spec:
             "rows": {"values": [[0.1, -0.2, 0.3], [0.4, 0.1, 0]]},
         },
         "models": MODELS,
+        "synapses": synapses,
         "neurons": neurons,
         "connections": connections,
         "events": [
@@ -104,6 +151,7 @@ def flowing_specs(draw: st.DrawFn, exact: bool = False) -> Spec:
             {"from": 5, "to": 8, "clamp": {f"Ga.{_STATES[kinds['Ga']]}": "level"}},
             {"at": 6, "lesion": [list(kinds)[-1]]},
             {"at": 9, "mend": [list(kinds)[-1]]},
+            *({"at": at, what: [chosen]} for chosen in [*connections][:1] for at, what in ((2, "lesion"), (7, "mend"))),
         ],
     }  # fmt: skip
     return _without_functions(spec) if exact else spec
@@ -138,9 +186,22 @@ def _group(chooser: random.Random, kind: str, size: int) -> Plain:
     return group
 
 
+def _can_have_synapse(body: dict[str, Plain]) -> bool:
+    """Whether it leads to no port that combines distances."""
+    port = body.get("port", "drive")
+    return port != "far" and not (isinstance(port, dict) and "far" in port)
+
+
+def _synapse(chooser: random.Random, source: str, target: str, exact: bool) -> Plain:
+    made = json.dumps(chooser.choice(SYNAPSES if exact else [*SYNAPSES, _PHASE]))
+    pre, post = chooser.choice(READ[source]), chooser.choice(READ[target])
+    synapse: Plain = json.loads(made.replace("pre.X", f"pre.{pre}").replace("post.Y", f"post.{post}"))
+    return synapse
+
+
 def _connection(
     chooser: random.Random, kinds: dict[str, str], sizes: dict[str, int], source: str, target: str
-) -> Plain:
+) -> dict[str, Plain]:
     body: dict[str, Plain] = {"weight": chooser.choice(["w*(1 + i - j)/3", 0.5, -0.7])}
     if sizes[source] > 1 or sizes[target] > 1:
         body["pattern"] = chooser.choice(PATTERNS)

@@ -211,8 +211,8 @@ def _rows(network: Network, operation: Operation) -> Iterator[tuple[str, str, st
                 yield "integrate", _members(network, one), _flows(network.populations[one].model.definition, how)
             for one in connected:
                 yield "integrate", _connected(network, one), _flows(network.projections[one].use.definition, how)
-        case Receive(projection=one):
-            states = network.projections[one].use.definition.state
+        case Receive(projection=one, phases=phases):
+            states = network.projections[one].during(phases).use.definition.state
             once = [one.name for one in states if (one.each_step or one.each_episode) and not isinstance(one, Check)]
             if once:
                 yield "receive", _connected(network, one), ", ".join(once)

@@ -6,7 +6,7 @@ Projections (connections that learn by one rule) and the program, an ordered lis
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain, pairwise
 from typing import NamedTuple
 
@@ -32,6 +32,7 @@ from neurovis_spec.compiler.program import (
     Learn,
     Operation,
     Owner,
+    Phase,
     Population,
     Port,
     PortOf,
@@ -65,11 +66,32 @@ def make_program(
         before = sum(population.level < order.stages.level for population in populations)
         integration = _integration(populations, projected.projections, order.stages, by)
     updates: list[list[Operation]] = [[Gather(number), Update(number)] for number in range(len(populations))]
-    for number, target in projected.targets.items():
-        if projected.projections[number].use.definition.received:
-            updates[target].insert(-2, Receive(number))
     learning = _learning(projected.projections)
-    return ReadInputs(), *chain(*updates[:before]), *integration, *chain(*updates[before:]), Send(), *learning
+    program = ReadInputs(), *chain(*updates[:before]), *integration, *chain(*updates[before:]), Send(), *learning
+    return receiving(program, projected.projections, projected.targets)
+
+
+def receiving(
+    program: Iterable[Operation], projections: Sequence[Projection], targets: Mapping[int, int]
+) -> tuple[Operation, ...]:
+    """The program in which what of the states of synapses is made once a step is: an episode's end of it when their
+    targets are updated, the rest before anything is gathered for these. ``targets`` are their populations, by the
+    numbers of the projections."""
+    made: list[Operation] = []
+    for operation in program:
+        if isinstance(operation, Receive):
+            continue
+        made.append(operation)
+        if isinstance(operation, Gather | Update):
+            phase: Phase = "each_step" if isinstance(operation, Gather) else "each_episode"
+            place = len(made) - isinstance(operation, Gather)
+            made[place:place] = [
+                Receive(number, (phase,))
+                for number, target in targets.items()
+                if target == operation.population
+                and any(getattr(one, phase) is not None for one in projections[number].use.definition.state)
+            ]
+    return tuple(made)
 
 
 def _learning(projections: tuple[Projection, ...]) -> Iterator[Operation]:

@@ -412,10 +412,11 @@ class Send(Operation):
 
 @dataclass(frozen=True, slots=True)
 class Receive(Operation):
-    """The states of a synapse that have an ``each_step`` or an ``each_episode``, from old values, before the ports of
-    its targets are made."""
+    """What of the states of a synapse is made once a step, from old values: ``each_step`` before the ports of its
+    targets are made, ``each_episode`` when these are updated, so that the last signal of an episode is of before."""
 
     projection: int
+    phases: tuple[Phase, ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,25 +21,23 @@ import math
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
-from itertools import chain
 from types import MappingProxyType
 
 import numpy as np
 
 from neurovis_spec.compiler.events.settable import HIGH, LOW
+from neurovis_spec.compiler.lower import receiving
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import (
     SYNAPSE,
     UNDEFINED_F,
     Check,
     Definition,
-    Gather,
     Key,
     Operation,
     Population,
     Projection,
     Quantity,
-    Receive,
     Use,
 )
 from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
@@ -77,16 +75,14 @@ def with_checks(network: Network) -> Network:
 
 
 def _receiving(network: Network, projections: tuple[Projection, ...]) -> tuple[Operation, ...]:
-    """The program, in which synapses of which a state is made once a step receive before their targets are."""
+    """The program with what the synapses of these have to do once a step."""
     numbers = network.located("neuron").numbers
-    receiving: dict[int, list[Operation]] = {}
-    for number, one in enumerate(projections):
-        if one.kind == SYNAPSE and one.use.definition.received:
-            target = int(numbers[network.connections.targets[one.members[:1]][0]])
-            receiving.setdefault(target, []).append(Receive(number))
-    others = (operation for operation in network.program if not isinstance(operation, Receive))
-    found = [[*(receiving.get(one.population, ()) if isinstance(one, Gather) else ()), one] for one in others]
-    return tuple(chain.from_iterable(found))
+    targets = {
+        number: int(numbers[network.connections.targets[one.members[:1]][0]])
+        for number, one in enumerate(projections)
+        if one.kind == SYNAPSE
+    }
+    return receiving(network.program, projections, targets)
 
 
 def without_checks(network: Network) -> Network:

@@ -9,17 +9,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-import numpy as np
-
 from neurovis_spec.arrays import FloatArray, subscript
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Population, Port
+from neurovis_spec.compiler.program import Population
 from neurovis_spec.runtime.backend import Availability, Capabilities
 from neurovis_spec.runtime.numpy_arrivals import Step
 from neurovis_spec.runtime.numpy_code import Code
 from neurovis_spec.runtime.numpy_operations import emit
 from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import signal_layout
+from neurovis_spec.runtime.stages import port_with
 from neurovis_spec.runtime.state import Mask, State, Structure
 from neurovis_spec.runtime.watch import all_finite, carried_by
 
@@ -97,18 +96,4 @@ def _without(population: Population, gone: Mask) -> Population:
     """A population without some connections."""
     if not any(gone[port.incoming].any() for port in population.ports):
         return population
-    return replace(population, ports=tuple(_port_without(port, ~gone[port.incoming]) for port in population.ports))
-
-
-def _port_without(port: Port, keep: Mask) -> Port:
-    """A port with those of its connections alone that it keeps."""
-    factors, staged = port.factors, port.staged
-    if staged is not None:
-        staged = (np.cumsum(keep) - 1)[staged[keep[staged]]]
-    return replace(
-        port,
-        incoming=port.incoming[keep],
-        slots=port.slots[keep],
-        factors=None if factors is None else factors[keep],
-        staged=staged,
-    )
+    return replace(population, ports=tuple(port_with(port, ~gone[port.incoming]) for port in population.ports))

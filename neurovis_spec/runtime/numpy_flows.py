@@ -129,7 +129,7 @@ class _Flow:
         working = [_Joined(one, *step.working(one.number)) for one in contacts_of(step.network, operation)]
         self.contacts = {one.at.number: one for one in working if len(one.projection.members)}
         #: of activities and outlets whether they are, where connections read them now, those of a stage
-        self.flowing = flowing(step.whole) if self.contacts else np.zeros(0, dtype=np.bool_)
+        self.flowing = flowing(step.whole) if working else np.zeros(0, dtype=np.bool_)
         self.parts = parts_of(step.network, operation, self.flowing)
         #: where in what is taken at a stage each activity and each outlet lies, −1 for the others
         self.taken = places_among_taken(self.network, self.parts)

@@ -91,10 +91,11 @@ def _diffuse(operation: Diffuse, step: Step) -> None:
 
 @emit.register
 def _receive(operation: Receive, step: Step) -> None:
-    """The states of synapses at a step and, where they have one, at an episode's end."""
-    code, (projection, some) = step.code, step.working(operation.projection)
+    """The states of synapses."""
+    code, (whole, some) = step.code, step.working(operation.projection)
+    projection = whole.during(operation.phases)
     definition = replace(projection.use.definition, gives=())  # signals are formed at ports
-    if not len(projection.members) or not any(one.each_step or one.each_episode for one in definition.state):
+    if not len(projection.members):
         return
     seen = code.parameters(projection.use, some) | seen_before_update(step, projection)
     place = "" if some is None else f"[{code.constant(some)}]"

@@ -200,10 +200,10 @@ class ReferenceStepper(Seen):
         if len(state.history):
             state.history[state.k % len(state.history)] = sent
 
-    def receive(self, number: int, state: State) -> None:
-        """The states of synapses from old values; at an episode's end, once more from what these gave."""
-        projection = self.network.projections[number]
-        self.hold_states(self.behind[number][0], state)
+    def receive(self, operation: Receive, state: State) -> None:
+        """The states of synapses from old values."""
+        projection = self.network.projections[operation.projection].during(operation.phases)
+        self.hold_states(self.behind[operation.projection][0], state)
         for position, connection in enumerate(projection.members.tolist()):
             if not state.conditions.structure.gone[connection]:
                 seen = self.known(projection.use, position, state) | self.before_update(projection, position, state)
@@ -268,7 +268,7 @@ def _gather(operation: Gather, by: ReferenceStepper, state: State, inputs: Float
 
 @perform.register
 def _receive(operation: Receive, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
-    by.receive(operation.projection, state)
+    by.receive(operation, state)
 
 
 @perform.register

@@ -176,7 +176,7 @@ def parts_of(network: Network, operation: Integrate, flows: BoolArray | None = N
     taken = _taken(network, operation, contacts.values(), flowing(network) if contacts and flows is None else flows)
     parts = []
     for number in operation.populations:
-        population, slopes = network.populations[number], Jacobian((), {})
+        population, slopes = _at_stages(network, network.populations[number]), Jacobian((), {})
         model = population.model.definition
         if operation.method in BY_SLOPE:
             slopes, activation = jacobian(model), population.activation
@@ -199,6 +199,33 @@ def parts_of(network: Network, operation: Integrate, flows: BoolArray | None = N
             )
         )
     return tuple(parts)
+
+
+def _at_stages(network: Network, population: Population) -> Population:
+    """A population without the signals of synapses that a stage does not make. Where something is taken of some members
+    they may arrive at others, of which it is not."""
+    kept = [np.ones(len(port.incoming), dtype=np.bool_) for port in population.ports]
+    for port, keep in zip(population.ports, kept, strict=True):
+        keep[network.synapses.numbers[port.incoming] >= 0] = False
+        if port.staged is not None:
+            keep[port.staged] = True
+    if all(keep.all() for keep in kept):
+        return population
+    return replace(population, ports=tuple(map(port_with, population.ports, kept)))
+
+
+def port_with(port: Port, keep: BoolArray) -> Port:
+    """A port with those of its connections alone that it keeps."""
+    factors, staged = port.factors, port.staged
+    if staged is not None:
+        staged = (np.cumsum(keep) - 1)[staged[keep[staged]]]
+    return replace(
+        port,
+        incoming=port.incoming[keep],
+        slots=port.slots[keep],
+        factors=None if factors is None else factors[keep],
+        staged=staged,
+    )
 
 
 def contacts_of(network: Network, operation: Integrate) -> tuple[Contacts, ...]:
