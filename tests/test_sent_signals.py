@@ -156,6 +156,9 @@ def test_a_recording_that_lacks_it_says_so_and_has_no_colours() -> None:
 
 def test_a_partial_recording_holds_no_more_than_is_asked_for() -> None:
     assert compiled(TEXT).run(3, neurons=["A"]).state_names == ()
+    assert len(compiled(TEXT).run(3, weights="none").state_names) == 3  # no weight changes: it is whole
+    learning = compiled(TEXT.replace("A1 -> B2: {", "A1 -> B2: {plasticity: hebbian, "))
+    assert learning.run(3, weights="none").state_names == ()
 
 
 def test_networks_that_send_activities_record_no_more() -> None:

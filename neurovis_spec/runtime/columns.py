@@ -128,7 +128,7 @@ def columns_of(network: Network, keep: Keep = ALL, body: Sensing | None = None) 
             outputs[output.name] = tuple(list(states).index(one) for one in of_output), output.scalar
     shown = (StateOf.of("neuron", one.state, one.indices) for one in network.render.show)
     states.update(dict.fromkeys(singles(shown)))
-    if keep.weights and not keep.neurons:
+    if not keep.neurons and (keep.weights or not len(network.changing)):
         states.update(dict.fromkeys(singles(network.sent)))
     for reference in keep.states:
         states.update(dict.fromkeys(singles(find_states(network, reference, names))))
