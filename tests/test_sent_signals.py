@@ -97,8 +97,7 @@ def test_glyphs_add_up_what_is_sent() -> None:
     network = compiled(TEXT + "render: {collapse: [A, B]}\n")
     made = network.run()
     view = view_of(network, network.gains_for(made))
-    signals = view.drawn.signals(at(network, made, 20))
-    assert signals is not None
+    signals = view.drawn.signals(at(network, made, 20)).value
     assert signals.tolist() == pytest.approx([sum(sent_in(made, 20)[:3])])
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,7 +31,7 @@ from neurovis_spec.scene import texts
 from neurovis_spec.scene.lesions import lesions_of
 from neurovis_spec.scene.reached import Reached, largest_signals, reached, reached_by
 from neurovis_spec.scene.shown_states import ShownStates
-from neurovis_spec.scene.signals import Signals, weights_of
+from neurovis_spec.scene.signals import Signal, Signals, weights_of
 
 if TYPE_CHECKING:
     from neurovis_spec.runtime.recording import Recording, Snapshot
@@ -104,12 +105,18 @@ class Gathered:
         states = ShownStates(self.network)
         return states.put(activity, self.mean(shown)[..., states.neurons])
 
-    def signals(self, snapshot: Snapshot) -> FloatArray | None:
-        """What a step of the whole sends along each line that is drawn, added up; None where nothing is collapsed."""
+    def signals(self, snapshot: Snapshot) -> Signal:
+        """What a step of the whole sends along each line that is drawn, added up where something is collapsed."""
+        sent = self._signals.at(snapshot)
         if not self.any:
-            return None
+            return sent
         with np.errstate(over="ignore", invalid="ignore"):
-            return self.total(Signals(self.whole).at(snapshot).value)
+            total = self.total(sent.value)
+        return Signal(total, np.ones_like(total))
+
+    @cached_property
+    def _signals(self) -> Signals:
+        return Signals(self.whole)
 
     def reached(self, recording: Recording) -> Reached:
         """How far a recording of the whole takes what is drawn."""

@@ -53,16 +53,14 @@ class Looks:
     bars: npt.NDArray[np.bool_]
 
 
-def looks(
-    network: Network, snapshot: Snapshot, gains: Gains, widest: float, signals: FloatArray | None = None
-) -> Looks:
-    """What a step looks like, with lines of at most this width; ``signals`` (m,) are what is sent along lines that
-    stand for several connections."""
+def looks(network: Network, snapshot: Snapshot, gains: Gains, widest: float, signals: Signal | None = None) -> Looks:
+    """What a step looks like, with lines of at most this width; ``signals`` are what is sent along each, by default
+    what the network sends."""
     widths = encoding.line_width(snapshot.weights, gains.thickness, widest)
     changes = encoding.glow(snapshot.weights, snapshot.previous_weights, gains.change)
     seen = snapshot.activity if snapshot.seen is None else snapshot.seen
-    signal = Signals(network).at(snapshot) if signals is None else Signal(signals, np.ones_like(signals))
-    lines = encoding.connection_colour(signal.sent, signal.weight, gains.signal)
+    sent, weight = Signals(network).at(snapshot) if signals is None else signals
+    lines = encoding.connection_colour(sent, weight, gains.signal)
     if snapshot.shown is not None:
         states = ShownStates(network)
         seen = states.put(seen, snapshot.shown[states.neurons])
