@@ -48,13 +48,15 @@ connections:
 
 
 def same_bits(network: nv.CompiledNetwork, steps: int) -> None:
-    """Activities, weights and states of the C backend are the reference's, step by step and many steps by a call."""
+    """Activities, weights and states of the C backend are the reference's, many steps by a call and one by one."""
     states = Keep(states=("all",))
     expected, found = (record(network.network, Course(steps, backend=one, keep=states)) for one in ("reference", "c"))
     for part in ("activity", "weights", "states"):
         np.testing.assert_array_equal(getattr(found, part), getattr(expected, part), part)
-    together = record(network.network, Course(steps, backend="c", keep=Keep(weights=False)))
-    np.testing.assert_array_equal(together.activity, expected.activity)
+    one_by_one = record(
+        network.network, Course(steps, backend="c", keep=Keep(neurons=(network.network.neurons.names[0],)))
+    )
+    np.testing.assert_array_equal(one_by_one.activity[:, 0], expected.activity[:, 0])
 
 
 DISTANCES = """

@@ -62,6 +62,22 @@ def test_a_run_ends_at_the_first_step_after_which_it_is_true(backend: str) -> No
     assert ending.values == {"mean(signal, last=5)": pytest.approx(1.0)}
 
 
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("every", [1, 7])
+def test_states_are_recorded_up_to_there(every: int, backend: str) -> None:
+    """Of connections too, and with many steps by a call."""
+    rule = "rules: {drift: {state: {p: {each_step: 0.9*p + pre}, q: {each_step: q + post}}, weight: {each_step: p}}}\n"
+    model = "models: {m: {state: {v: {initial: 1, each_step: 0.9*v + 0.1*drive}}, activity: v}}\n"
+    text = SPEC.replace("B: {}", "B: {model: m, count: 2}").replace("hebbian: {rate: 0.001}", "drift: {}")
+    network = nv.compile_text(text.replace("{weight: 0,", "{weight: 0, pattern: all_to_all,") + rule + model)
+    recording = network.run(until=MEAN, backend=backend, every=every, states=["all"])
+    whole = network.run(backend="reference", states=["all"])
+    rows = slice(0, FIRST + 1, every)
+    assert recording.states.shape[1] == 6
+    for part in ("step", "activity", "weights", "states"):
+        np.testing.assert_allclose(getattr(recording, part), getattr(whole, part)[rows], rtol=1e-12, err_msg=part)
+
+
 @pytest.mark.parametrize("name", ["x.npz", "x.csv"])
 @pytest.mark.parametrize("every", [1, 7])
 def test_a_streamed_run_ends_there_too(folder: Path, name: str, every: int) -> None:
