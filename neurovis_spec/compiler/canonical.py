@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.digest import TREES, Content, Record, content, digest
@@ -55,9 +56,12 @@ SCHEMA: Mapping[type, Content] = {
 def content_hash(network: Network) -> str:
     """The hash of a network, before events change anything in it."""
     neurons = network.neurons
+    outlets = [one.name for one in network.outlets]
+    members = [len(network.populations[one.population].members) for one in network.outlets]
+    names = np.repeat(["", *outlets, ""], [len(neurons), *members, network.input_size])
     arranged, places = _arranged(network.inputs)
     count = len(neurons)
-    moved = np.concatenate((np.arange(count), count + places))
+    moved = np.concatenate((network.neuron_of, count + places))
     return digest(
         "neurovis 1",
         network.name,
@@ -70,7 +74,7 @@ def content_hash(network: Network) -> str:
         arranged,
         sorted(network.outputs, key=lambda output: output.name),
         [_population(one) for one in network.populations],
-        [_projection(one, moved) for one in network.projections],
+        [_projection(one, moved, names) for one in network.projections],
         network.noises,
         *((output.name, *singles(output.states)) for output in network.outputs if output.states),
         *([("starts", neurons.starts)] if neurons.starts else []),
@@ -126,12 +130,15 @@ def _population(population: Population) -> Record:
     return Record("Block", fields)
 
 
-def _projection(one: Projection, moved: IntArray) -> Record:
-    """``moved``: where each place of all activities and inputs is here."""
+def _projection(one: Projection, moved: IntArray, names: npt.NDArray[np.str_]) -> Record:
+    """``moved``: where each place of all activities, outlets and inputs is here, an outlet where its neuron is;
+    ``names`` what each outlet is called."""
     signals = {name: moved[indices] for name, indices in one.signals.items()}
     rule, parameters = _definition(one.rule.definition), one.rule.parameters
     fields = {"rule": rule, "members": one.members, "parameters": parameters, "signals": signals}
-    return Record("Plasticity", fields | ({"place": one.place} if one.place else {}))
+    states = {name: names[indices].tolist() for name, indices in one.signals.items() if names[indices].any()}
+    further = {"place": one.place, "states": states}
+    return Record("Plasticity", fields | {name: value for name, value in further.items() if value})
 
 
 def _definition(made: Definition) -> Record:

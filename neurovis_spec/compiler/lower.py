@@ -16,6 +16,7 @@ from neurovis_spec.arrays import FloatArray, Indices, IntArray, frozen, narrow, 
 from neurovis_spec.compiler.connections.connect import Connected
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.connections.in_use import InUse, Piece
+from neurovis_spec.compiler.connections.signals import Signal
 from neurovis_spec.compiler.levels import Order, Stages
 from neurovis_spec.compiler.network import Outlet, outlets_of, taken_at
 from neurovis_spec.compiler.neurons.groups import Built
@@ -272,6 +273,10 @@ class _Some(NamedTuple):
     members: IntArray
     inside: IntArray
 
+    def signal(self, name: str) -> Signal:
+        """Where a signal of the rule comes from."""
+        return self.use.signals[name].some(self.piece.places[self.inside])
+
 
 def make_projections(made: Connected, populations: tuple[Population, ...]) -> Projected:
     """One Projection a rule, at a place among those of its connections, and one a synapse and population of targets,
@@ -311,8 +316,10 @@ def _alike(use: InUse, piece: Piece, targets: IntArray) -> Iterator[tuple[_Alike
 
 def _asked(bundles: Sequence[Bundle]) -> set[str]:
     """The names of what is taken of neurons beside their activities."""
-    read = {name.name for one in bundles for use in one.uses for piece in use.pieces for name in piece.read}
-    return read.union(one.route.sends for one in bundles)
+    uses = [use for one in bundles for use in one.uses]
+    read = {name.name for use in uses for piece in use.pieces for name in piece.read}
+    signals = {name for use in uses for signal in use.signals.values() for name in signal.states}
+    return read.union(signals, (one.route.sends for one in bundles))
 
 
 def _first_rules(made: Connected, projections: tuple[Projection, ...]) -> Iterator[Indices]:
@@ -341,6 +348,14 @@ class _Ends(NamedTuple):
         ends = self.made.sources if name.side == "pre" else self.made.targets
         return np.asarray(taken_at(self.populations, self.outlets, self.neurons, name.name)[ends.some(members)])
 
+    def signal(self, signal: Signal) -> IntArray:
+        """Where a signal of some connections stands, among activities, outlets and inputs."""
+        places, count = signal.places, sum(len(self.populations[one.population].members) for one in self.outlets)
+        result = places + np.where(places < self.neurons, 0, count)
+        for name, own in signal.states.items():
+            result[own] = taken_at(self.populations, self.outlets, self.neurons, name)[places[own]]
+        return result
+
 
 def _projection(number: int, key: _Alike, some: list[_Some], ends: _Ends) -> Projection:
     """The connections that have one rule or synapse in common."""
@@ -352,9 +367,9 @@ def _projection(number: int, key: _Alike, some: list[_Some], ends: _Ends) -> Pro
         for name in definition.parameters
     }
     signals = {
-        name: frozen(np.concatenate([one.use.signals[name][one.piece.places[one.inside]] for one in some]))
-        for name in first.use.signals
+        name: frozen(np.concatenate([ends.signal(one.signal(name)) for one in some])) for name in first.use.signals
     }
+    names = frozenset(name for one in some for signal in one.use.signals.values() for name in signal.states)
     read = {name.text: frozen(ends.read(name, members)) for name in first.piece.read}
     use = Use(Owner(definition.kind.name, number), definition, parameters)
-    return Projection(members, (use,), signals, read, key.place)
+    return Projection(members, (use,), signals, read, key.place, names)

@@ -461,6 +461,12 @@ class Network:
         return sum(len(self.populations[one.population].members) for one in self.outlets)
 
     @cached_property
+    def neuron_of(self) -> IntArray:
+        """The neuron of each activity, and behind these of each outlet."""
+        members = [self.populations[one.population].members for one in self.outlets]
+        return frozen(np.concatenate([np.arange(len(self.neurons)), *members]))
+
+    @cached_property
     def sending(self) -> IntArray | None:
         """What each connection takes, (m,): an index into the activities of all neurons followed by the outlets; None
         where all take activities, which are those of their sources."""

@@ -122,11 +122,21 @@ def sole(node: Mapping, what: str, hint: str, info: ValidationInfo) -> Entry:
     return node.entries[0]
 
 
-def _choice(kind: Kind, value: Role) -> Either:
-    """A name, or a mapping from it to its settings, each a formula or several."""
+#: The key under which a signal of a rule has one component for each source.
+FROM: Final = "from"
+
+
+def _choice(kind: Kind, value: Role, *others: Map) -> Either:
+    """A name, or a mapping from it to its settings, each a formula or several, or something else."""
     formula = Plain(FORMULA.written, value, formula=True)
-    settings = Map({}, Either((formula, ListOf(formula))), Role("setting", kind), nothing=True)
+    settings = Map({}, Either((formula, ListOf(formula), *others)), Role("setting", kind), nothing=True)
     return Either((TEXT, Map({}, settings, Role("choice", kind), one=True)))
+
+
+def _of_sources(value: Role) -> Map:
+    """A signal with one component for each source."""
+    name = Plain({"type": "string"}, value)
+    return Map({FROM: Key(Either((name, ListOf(name))), "What has one value for each source.", True)}, one=True)
 
 
 ActivationField = Annotated[Choice, Leaf(as_choice, _choice("activation", GROUP)), Role("choice", "activation")]
@@ -141,7 +151,7 @@ def as_choices(node: Node, info: ValidationInfo) -> tuple[Choice, ...]:
     return tuple(as_choice(item, info) for item in one_or_more(node))
 
 
-_RULE: Final = _choice("rule", RULE_SETTING)
+_RULE: Final = _choice("rule", RULE_SETTING, _of_sources(RULE_SETTING))
 RulesField = Annotated[
     tuple[Choice, ...], Leaf(as_choices, Either((_RULE, ListOf(_RULE, least=1)))), Role("choice", "rule")
 ]

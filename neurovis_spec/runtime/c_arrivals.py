@@ -131,17 +131,24 @@ def taken(network: Network, code: Code, connections: Indices, place: Place) -> s
     return taken_at(network, code, network.sending[connections], place)
 
 
-def taken_at(network: Network, code: Code, index: Indices, place: Place, behind: str = "outlets") -> str:
-    """One of some numbers, by indices into all activities, followed by the array that is called so: outlets, as
-    ``Network.sending`` numbers them, or the inputs of a step."""
-    n = len(network.neurons)
-    own = index if not isinstance(place, int) else index[place : place + 1]
-    if (own < n).all():
-        return f"activity[{code.at(index, place)}]"
-    if (own >= n).all():
-        return f"{behind}[{code.at(index - n, place)}]"
+def taken_at(network: Network, code: Code, index: Indices, place: Place) -> str:
+    """One of some numbers, by indices into all activities, followed by the outlets, as ``Network.sending`` numbers
+    them, followed by the inputs of a step, as signals of rules are numbered."""
+    sizes = {"activity": len(network.neurons), "outlets": network.outlet_count, "s": network.vector_size}
+    own, start, parts = index if not isinstance(place, int) else index[place : place + 1], 0, dict[str, int]()
+    for name, size in sizes.items():
+        if ((own >= start) & (own < start + size)).any():
+            parts[name] = start
+        start += size
+    *others, last = parts
+    if not others:
+        return f"{last}[{code.at(index - parts[last] if parts[last] else index, place)}]"
     where = code.at(index, place)
-    return f"({where} < {n} ? activity[{where}] : {behind}[{where} - {n}])"
+    found = f"{last}[{where} - {parts[last]}]"
+    for name in reversed(others):
+        at = f"{where} - {parts[name]}" if parts[name] else where
+        found = f"{where} < {parts[name] + sizes[name]} ? {name}[{at}] : {found}"
+    return f"({found})"
 
 
 def _different(delays: Indices) -> list[int]:

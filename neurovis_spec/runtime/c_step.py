@@ -598,8 +598,8 @@ class StepCode:
         return f"history[(size_t)({row})*{n} + {source}]"
 
     def signal(self, indices: IntArray, place: Place) -> str:
-        """A signal of a rule: an activity or an input."""
-        return taken_at(self.network, self.code, indices, place, behind="s")
+        """A signal of a rule: an activity, an outlet or an input."""
+        return taken_at(self.network, self.code, indices, place)
 
 
 class _Own(NamedTuple):

@@ -242,14 +242,16 @@ def seen_at(step: Step, projection: Projection) -> dict[str, str]:
     seen = ends_at(step, projection)
     for signal, indices in projection.signals.items():
         if signal in projection.read:
-            seen[signal] = code.let("a", _signal(code, indices, len(network.neurons), network.vector_size))
+            seen[signal] = code.let("a", _signal(code, indices, network))
     return seen
 
 
-def _signal(code: Code, indices: IntArray, n: int, inputs: int) -> str:
-    """A signal of a rule: activities, inputs, or some of both; an index of n or more is one of ``s``, behind n."""
-    if (indices < n).all():
-        return code.select("activity", indices, n, broadcast=True)
-    if (indices >= n).all():
-        return code.select("s", indices - n, inputs, broadcast=True)
-    return code.select("np.concatenate((activity, s))", indices, n + inputs)
+def _signal(code: Code, indices: IntArray, network: Network) -> str:
+    """A signal of a rule: activities, outlets, inputs, or several of them, which are numbered in this order."""
+    start, sizes = 0, {"activity": len(network.neurons), "outlets": network.outlet_count, "s": network.vector_size}
+    for array, size in sizes.items():
+        if ((indices >= start) & (indices < start + size)).all():
+            return code.select(array, indices - start, size, broadcast=True)
+        start += size
+    arrays = ", ".join(array for array, size in sizes.items() if size)
+    return code.select(f"np.concatenate(({arrays}))", indices, start)

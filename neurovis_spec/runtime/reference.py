@@ -223,7 +223,8 @@ class ReferenceStepper(Seen):
         """The weight and the states of one connection."""
         low, high = self.low.at(connection, state), self.high.at(connection, state)
         seen = self.known(projection.rule, position, state) | self.seen(projection, position, state)
-        signals = (*state.activity.tolist(), *inputs.tolist())  # as ``Projection.signals`` numbers them
+        # as ``Projection.signals`` numbers them
+        signals = (*state.activity.tolist(), *state.outlets.tolist(), *inputs.tolist())
         seen |= {signal: signals[indices[position]] for signal, indices in projection.signals.items()}
         weight = Bounded(float(state.weights[connection]), low, high)
         state.weights[connection] = self.change(projection.rule, position, seen, state, {"weight": weight})["weight"]

@@ -36,11 +36,12 @@ class Teacher:
 def teachers_of(network: Network) -> list[Teacher]:
     """Every pair once, in the order of the rules; none from a neuron to itself."""
     found: dict[tuple[int, int], Teacher] = {}
+    neurons = network.neuron_of.tolist()
     for projection in network.projections:
         for signal, sources in projection.signals.items():
             for source, target in zip(sources.tolist(), network.connections.targets[projection.members], strict=True):
-                if source < len(network.neurons) and source != target:
-                    pair = (int(source), int(target))
+                if source < len(neurons) and neurons[source] != target:
+                    pair = (neurons[source], int(target))
                     found.setdefault(pair, Teacher(*pair, signal, projection.rule.definition.name))
     return list(found.values())
 

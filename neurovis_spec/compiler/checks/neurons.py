@@ -148,13 +148,13 @@ def _idle(network: Network) -> Mask:
 
 def _needed(network: Network) -> Mask:
     """Whether an output or a rule asks for a neuron."""
-    n = len(network.neurons)
-    needed = np.zeros(n, dtype=np.bool_)
+    neurons = network.neuron_of
+    needed = np.zeros(len(network.neurons), dtype=np.bool_)
     for output in network.outputs:
         needed[output.neurons] = True
     for projection in network.projections:
         for signal in projection.signals.values():
-            needed[signal[signal < n]] = True
+            needed[neurons[signal[signal < len(neurons)]]] = True
     return needed
 
 

@@ -105,7 +105,7 @@ def _watched(network: Network) -> set[str]:
 
 def _is_own(bundle: Bundle, place: int, signal: str) -> bool:
     """Whether a signal of a rule is, for every connection, the activity of its own target."""
-    return bool(bundle.rules) and np.array_equal(bundle.rules[place].signals[signal], bundle.targets)
+    return bool(bundle.rules) and bundle.rules[place].signals[signal].is_activity_of(bundle.targets)
 
 
 def _check_signal(used: _Used, signal: str, network: Network, findings: Findings) -> None:

@@ -72,7 +72,7 @@ def _events(compiled: Compiled, findings: Findings) -> None:
 def _inputs(compiled: Compiled, findings: Findings) -> None:
     """Inputs that neither a group nor a rule reads; of a module those that are read in no instance."""
     network = compiled.network
-    n = len(network.neurons)
+    n = len(network.neurons) + network.outlet_count
     read = set(network.neurons.input.tolist()).union(*(one.tolist() for one in network.neurons.port_input.values()))
     for projection in network.projections:
         for signal in projection.signals.values():

@@ -23,8 +23,9 @@ from neurovis_spec.compiler.connections.edges import EdgeReader, End
 from neurovis_spec.compiler.connections.ends import Ends, counted
 from neurovis_spec.compiler.connections.in_use import InUse, Joined, in_use
 from neurovis_spec.compiler.connections.patterns import all_to_all, empty_reason, pairs_of
-from neurovis_spec.compiler.connections.plasticity import ConnectionEnds, Learning, Place, rules_of
+from neurovis_spec.compiler.connections.plasticity import Learning, rules_of
 from neurovis_spec.compiler.connections.routes import default_delays, route_of
+from neurovis_spec.compiler.connections.signals import ConnectionEnds, Place
 from neurovis_spec.compiler.connections.weight_scale import Scaled, check_scale, scaled
 from neurovis_spec.compiler.events.settable import Assembled, Distance, Part
 from neurovis_spec.compiler.limits import Limits, amount
@@ -513,10 +514,11 @@ class EntryBuilder:
             return ()
         place = Place(
             self._connection_ends(shape),
-            target_count=UNKNOWN if self.targets is UNKNOWN else len(self.targets),
+            sources=UNKNOWN if self.sources is UNKNOWN else len(self.sources),
+            targets=UNKNOWN if self.targets is UNKNOWN else len(self.targets),
             scope=self.context.scope,
             directory=self.context.directory,
-            neurons=len(self.context.census.neurons),
+            census=self.context.census,
         )
         return rules_of(self.body.plasticity, place)
 

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray
+from neurovis_spec.compiler.connections.signals import Signal
 from neurovis_spec.compiler.events.settable import Part
 from neurovis_spec.compiler.neurons.groups import Built, is_written
 from neurovis_spec.compiler.neurons.populate import Census
@@ -42,12 +43,12 @@ class Piece(NamedTuple):
 
 class InUse(NamedTuple):
     """A rule or a synapse of an entry. ``parts``: which of its parameters, those of the ends among them, follow
-    parameters of the run. Of a rule ``signals`` says where these come from, one index a connection, and ``place`` is
+    parameters of the run. Of a rule ``signals`` says where these come from, and ``place`` is
     its place among the rules."""
 
     pieces: tuple[Piece, ...]
     parts: tuple[Part, ...]
-    signals: Mapping[str, IntArray] = MappingProxyType({})
+    signals: Mapping[str, Signal] = MappingProxyType({})
     place: int = 0
 
 

@@ -28,6 +28,7 @@ from neurovis_spec.language.located import IDENTIFIER, Formula, Located, formula
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.values import Choice, FormulaList, Initial
 from neurovis_spec.language.yaml.source import AnyList, Entry, Scalar, one_or_more
+from neurovis_spec.language.yaml.source import Mapping as Written
 from neurovis_spec.likeness import did_you_mean, meant, suggest
 
 #: What other languages call activations, models and rules.
@@ -121,10 +122,11 @@ def _named_definition(choice: Choice, known: Names[Defined], kind: Kind, finding
 def check_settings(choice: Choice, constants: Constants, extra: Collection[str] = ()) -> None:
     """Evaluate the settings of a definition that is UNKNOWN, as far as they are no names: these may be signals."""
     for entry in choice.settings.entries:
-        nodes = one_or_more(entry.value)
+        nodes = () if isinstance(entry.value, Written) else one_or_more(entry.value)
         for node in nodes[:_MOST_CHECKED]:
-            name = isinstance(node, Scalar) and isinstance(node.value, str) and IDENTIFIER.fullmatch(node.value.strip())
-            formula = UNKNOWN if name else formula_of(node, constants.findings)
+            text = node.value.strip() if isinstance(node, Scalar) and isinstance(node.value, str) else ""
+            is_name = all(map(IDENTIFIER.fullmatch, text.split(".")))
+            formula = UNKNOWN if is_name else formula_of(node, constants.findings)
             if formula is not UNKNOWN:
                 constants.value(formula, dict.fromkeys(extra, UNKNOWN))
 

@@ -1,0 +1,103 @@
+"""Random specs of what learns: groups whose models have states and outputs, connections of several rules, which see
+states and outputs of any group; always legal, never explosive."""
+
+from __future__ import annotations
+
+import random
+
+from hypothesis import strategies as st
+from random_specs import Plain, Spec
+
+#: states by each_step and by derivative, outputs
+_MODELS: dict[str, Plain] = {
+    "stepping": {
+        "parameters": {"keep": 0.5},
+        "state": {"v": {"each_step": "keep*v + 0.3*drive"}, "w": {"each_step": "0.5*v"}},
+        "outputs": {"twice": "2*v - w"},
+        "activity": "f(v)",
+    },
+    "flowing": {
+        "time": "ms",
+        "parameters": {"keep": 40},
+        "state": {"v": {"initial": 0.1, "derivative": "(0.5*drive - v)/keep"}, "w": {"each_step": "0.5*v"}},
+        "outputs": {"twice": "2*v + 0.1*drive"},
+        "activity": "f(v)",
+    },
+}
+_RULES: dict[str, Plain] = {
+    "chase": {
+        "signals": ["error", "gain"],
+        "state": {"seen": {"each_step": "0.5*seen + 0.1*tanh(gain)*pre", "each_episode": "seen/2"}},
+        "weight": {"each_step": "weight - 0.01*tanh(error)*seen"},
+    },
+    "fade": {
+        "parameters": {"rate": 0.05},
+        "state": {"mean": {"each_step": "mean + rate*(post - mean)"}},
+        "weight": {"each_step": "weight - rate*weight", "each_episode": "weight + 0.01*mean"},
+    },
+    "grow": {
+        "parameters": {"step": 0.01},
+        "signals": ["by"],
+        "let": {"both": "tanh(pre)*tanh(by)"},
+        "weight": {"each_step": "weight + step*both"},
+    },
+}
+
+
+@st.composite
+def learning_specs(draw: st.DrawFn) -> Spec:
+    """A spec as a mapping."""
+    chooser = random.Random(draw(st.integers(0, 2**32)))
+    sizes = {f"G{letter}": chooser.choice([1, 2, 3]) for letter in "abcd"[: draw(st.integers(1, 4))]}
+    wave: dict[str, Plain] = {"expression": "sin(k/3)"}
+    neurons: dict[str, Plain] = {
+        name: {
+            "count": size,
+            "model": chooser.choice([*_MODELS, "stepping"]),
+            "bias": round(chooser.uniform(-0.5, 0.5), 2),
+            "activation": chooser.choice(["tanh", "sigmoid"]),
+            **({"input": "wave"} if chooser.random() < 0.5 else {}),
+        }
+        for name, size in sizes.items()
+    }
+    connections: dict[str, Plain] = {}
+    for source in sizes:
+        for target in sizes:
+            if chooser.random() < 0.6:
+                connections[f"{source} -> {target}"] = _body(chooser, sizes, source, target)
+    time: dict[str, Plain] = {"dt": 0.01, "episode": 4, "integrate": chooser.choice(["heun", "rk4", "exponential"])}
+    return {
+        "neurovis": 1, "name": "learning", "seed": chooser.randrange(100), "time": time, "inputs": {"wave": wave},
+        "models": _MODELS, "rules": _RULES, "neurons": neurons, "connections": connections,
+    }  # fmt: skip
+
+
+def _body(chooser: random.Random, sizes: dict[str, int], source: str, target: str) -> Spec:
+    body: Spec = {"weight": "uniform(-0.3, 0.3)", "pattern": "all_to_all", "self": True}
+    body["delay"] = chooser.choice([1, 1, 2, 3])
+    rules = chooser.sample([*_RULES], chooser.choice([0, 1, 2, 2, 3]))
+    if rules:
+        body["plasticity"] = [_used(chooser, rule, sizes, source, target) for rule in rules]
+        if chooser.random() < 0.4:
+            body["bounds"] = [-0.31, 0.31]
+    return body
+
+
+def _used(chooser: random.Random, rule: str, sizes: dict[str, int], source: str, target: str) -> Plain:
+    if rule == "fade":
+        return "fade" if chooser.random() < 0.5 else {"fade": {"rate": 0.02}}
+    signals = ["error", "gain"] if rule == "chase" else ["by"]
+    return {rule: {name: _signal(chooser, sizes, source, target) for name in signals}}
+
+
+def _signal(chooser: random.Random, sizes: dict[str, int], source: str, target: str) -> Plain:
+    end, by_source = (source, True) if chooser.random() < 0.5 else (target, False)
+    fitting = [name for name, size in sizes.items() if size in (1, sizes[end])]
+    what: Plain = chooser.choice(fitting) + chooser.choice(["", ".v", ".twice"])
+    if chooser.random() < 0.2:
+        what = "wave"
+    elif chooser.random() < 0.2:  # of several, one after the other
+        name = chooser.choice([*sizes])
+        first = f"{name if sizes[name] == 1 else f'{name}1'}.w"
+        what = [first, *["wave"] * (sizes[end] - 1)]
+    return {"from": what} if by_source else what
