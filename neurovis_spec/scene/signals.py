@@ -65,7 +65,7 @@ class RecordedSent:
     def rows(self, rows: slice) -> FloatArray:
         """Of some rows (rows, k)."""
         states, step = self.recording.states[rows][:, self.columns], self.recording.step[rows]
-        silent = np.arange(len(self.recording))[rows, None] >= self.by_hand
+        silent = np.arange(*rows.indices(len(self.recording)))[:, None] >= self.by_hand
         for at, mended, lesioned in self.lesions:
             after = step >= at
             silent[np.ix_(after, mended)] = False
