@@ -380,9 +380,10 @@ def _outputs_of(cycle: Cycle, connected: Connected, census: Census) -> tuple[str
 
 
 def _signals_fit(bundles: tuple[Bundle, ...], findings: Findings) -> bool:
-    """Whether the signals under way fit into memory: delays of all connections together."""
+    """Whether the signals under way fit into memory: delays of all connections together. With a synapse nothing is
+    under way."""
     total = 0
-    for bundle in bundles:
+    for bundle in (one for one in bundles if one.synapse is None):
         total += int(bundle.delays.sum())
         if total > MOST_SIGNALS:
             message = f"{amount(total)} signals would be under way at once (connections times delay); "

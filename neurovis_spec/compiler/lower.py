@@ -290,7 +290,7 @@ def make_projections(made: Connected, populations: tuple[Population, ...]) -> Pr
         for use in bundle.uses:
             for piece in use.pieces:
                 of_kind = found[piece.definition.kind.name]
-                for key, inside in _alike(use, piece, population_of[bundle.targets[piece.places]]):
+                for key, inside in _alike(use, piece, bundle.targets, population_of):
                     some = _Some(use, piece, start + piece.places[inside], inside)
                     of_kind.setdefault(key, []).append(some)
         start += len(bundle.sources)
@@ -302,16 +302,17 @@ def make_projections(made: Connected, populations: tuple[Population, ...]) -> Pr
     return Projected(projections, tuple(_first_rules(made, projections)), targets)
 
 
-def _alike(use: InUse, piece: Piece, targets: IntArray) -> Iterator[tuple[_Alike, IntArray]]:
-    """The connections of a piece by what projections they are members of. ``targets``: the populations of theirs."""
+def _alike(use: InUse, piece: Piece, targets: Indices, population_of: IntArray) -> Iterator[tuple[_Alike, IntArray]]:
+    """The connections of a piece by what projections they are members of. ``targets``: of all of its entry."""
     definition = piece.definition
     read = {name.text for name in definition.end_names}
     names = definition.kind.name, definition.name, tuple(one for one in definition.parameters if one in read)
     if definition.kind == RULE:
-        yield _Alike(*names, use.place), np.arange(len(targets), dtype=np.int64)
+        yield _Alike(*names, use.place), np.arange(len(piece.places), dtype=np.int64)
         return
-    for population in np.flatnonzero(np.bincount(targets)).tolist():
-        yield _Alike(*names, use.place, population), np.flatnonzero(targets == population)
+    populations = population_of[targets[piece.places]]
+    for population in np.flatnonzero(np.bincount(populations)).tolist():
+        yield _Alike(*names, use.place, population), np.flatnonzero(populations == population)
 
 
 def _asked(bundles: Sequence[Bundle]) -> set[str]:
@@ -324,14 +325,16 @@ def _asked(bundles: Sequence[Bundle]) -> set[str]:
 
 def _first_rules(made: Connected, projections: tuple[Projection, ...]) -> Iterator[Indices]:
     """For each entry the projection of the first rule of each of its connections, −1 without."""
-    first = np.full(int(made.sizes.sum()), -1, dtype=np.int64)
-    for number, one in enumerate(projections):
-        if one.kind == RULE and one.place == 0:
-            first[one.members] = number
+    firsts = [(number, one) for number, one in enumerate(projections) if one.kind == RULE and one.place == 0]
     start = 0
-    for size in made.sizes.tolist():
-        some = first[start : start + size]
-        yield np.broadcast_to(some[:1], some.shape) if size and (some == some[0]).all() else some
+    for bundle in made.bundles:
+        size = len(bundle.sources)
+        found = np.full(size if bundle.rules else 0, -1, dtype=np.int64)
+        for number, one in firsts if bundle.rules else ():
+            inside = slice(*np.searchsorted(one.members, (start, start + size)))
+            found[one.members[inside] - start] = number
+        alike = not len(found) or (found == found[0]).all()
+        yield np.broadcast_to(found[:1] if len(found) else np.int64(-1), (size,)) if alike else found
         start += size
 
 

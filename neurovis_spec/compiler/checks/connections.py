@@ -15,6 +15,7 @@ from neurovis_spec.compiler.connections.delays import warn_rounded
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.names.references import Section
+from neurovis_spec.compiler.network import Route
 from neurovis_spec.diagnostics import Findings, shorten
 from neurovis_spec.language.yaml.source import Mapping, one_or_more
 
@@ -66,10 +67,10 @@ def _doubled_pairs(entries: list[list[Bundle]], neurons: int) -> Iterator[_Doubl
     bundles = [bundle for entry in entries for bundle in entry]
     if len(bundles) < 2:
         return
-    routes = {route: number for number, route in enumerate(dict.fromkeys(bundle.route for bundle in bundles))}
-    # a pair (source, target) as one number; those of different routes are no pairs
+    routes = {way: number for number, way in enumerate(dict.fromkeys(map(_way, bundles)))}
+    # a pair (source, target) as one number; those of different routes or synapses are no pairs
     pairs = np.concatenate([
-        (bundle.sources.astype(np.int64) * neurons + bundle.targets) * len(routes) + routes[bundle.route]
+        (bundle.sources.astype(np.int64) * neurons + bundle.targets) * len(routes) + routes[_way(bundle)]
         for bundle in bundles
     ])  # fmt: skip
     ordered = np.sort(pairs)
@@ -83,6 +84,11 @@ def _doubled_pairs(entries: list[list[Bundle]], neurons: int) -> Iterator[_Doubl
         first = int(order[np.searchsorted(ordered, pairs[position])])
         source, target = divmod(int(pairs[position]) // len(routes), neurons)
         yield _DoubledPair(int(entry_of[first]), int(entry_of[position]), source, target)
+
+
+def _way(bundle: Bundle) -> tuple[Route, str]:
+    """What the connections of an entry take, where they bring it, and by which synapse."""
+    return bundle.route, "" if bundle.synapse is None else bundle.synapse.definition.name
 
 
 def check_beyond_run(compiled: Compiled, findings: Findings) -> None:

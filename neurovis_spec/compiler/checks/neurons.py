@@ -21,7 +21,7 @@ from neurovis_spec.compiler.events.settable import bias_of
 from neurovis_spec.compiler.names.references import key_span
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.initial_states import beginning
-from neurovis_spec.compiler.program import DRIVE, Definition, Population
+from neurovis_spec.compiler.program import DRIVE, SYNAPSE, Definition, Population
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
@@ -127,6 +127,9 @@ def _idle(network: Network) -> Mask:
         if port.combine == "distance":  # |c| away from a signal of 0
             for incoming in pieces(port.incoming):
                 quiet[connections.targets[incoming]] = False
+    for projection in network.projections:
+        if projection.kind == SYNAPSE:  # which may bring something of nothing
+            quiet[connections.targets[projection.members]] = False
     if not len(connections):
         quiet &= _needed(network)
     if not quiet.any():
