@@ -163,6 +163,11 @@ class _Coupled:
         return self.taken.of_entries(lambda synapse: True)
 
     @cached_property
+    def now(self) -> BoolArray:
+        """For each connection whether it takes anything of its source that is of now."""
+        return self.wired.undelayed | self.taken.of_entries(_reads_sent)
+
+    @cached_property
     def receiving(self) -> BoolArray:
         """For each connection whether its synapse has states that are made once a step."""
         return self.taken.of_entries(lambda synapse: synapse.received)
@@ -261,7 +266,7 @@ class _Coupled:
     def _passed_on(self, port: str, making: BoolArray) -> BoolArray:
         """For each neuron whether any of some connections takes of it, at a stage, what reads a port."""
         reading = self.through[port] & self.made
-        before = self.taken.neurons("pre", making & self.wired.undelayed, reading)
+        before = self.taken.neurons("pre", making & self.now, reading)
         return before | self.taken.neurons("post", making, reading)
 
     @cached_property
@@ -305,7 +310,7 @@ class _Coupled:
     def _taken_at_stages(self) -> BoolArray:
         """For each neuron whether anything of it is taken at each stage, by connections, synapses or rules."""
         taken = self.taken
-        sources = taken.neurons("pre", self.making & (self.wired.undelayed | taken.of_entries(_reads_sent)), self.made)
+        sources = taken.neurons("pre", self.making & self.now, self.made)
         return sources | taken.neurons("post", self.making, self.made) | self._by_rules
 
     @cached_property
@@ -354,7 +359,7 @@ class _Coupled:
         what reads ports there; a synapse that reads such an output of its target makes it wait for itself."""
         edges, taken = [], self.taken
         closing = self.made & np.logical_or.reduce([*self.through.values()])
-        before = (taken.any("pre", closing) | ~self.synapse) & self.wired.undelayed
+        before = (taken.any("pre", closing) | ~self.synapse) & self.now
         behind = taken.any("post", closing)
         for port, (_, connections, sources, targets) in self.open.items():
             waits = self.staged[port] & self._passed_on(port, self.making)[targets]

@@ -63,6 +63,7 @@ from neurovis_spec.runtime.stages import (
     parts_of,
     places_among_taken,
     taken_by,
+    taken_in_order,
     times,
 )
 
@@ -246,7 +247,7 @@ class _Flow:
         code, connections = self.code, self.network.connections
         members, contacts = joined.projection.members, joined.at
         every = (contacts.signal, contacts.derivatives, contacts.slopes, contacts.back)
-        read = frozenset().union(*(one.names for one in every))
+        read = frozenset().union(*(one.read for one in every))
         if "weight" in read:
             joined.held["weight"] = code.let("w", code.select("weights", members, len(connections)))
         for name, end in ends_of(self.network, joined.projection).items():
@@ -337,17 +338,13 @@ class _Stage:
         if self.sent:
             return
         self.sent = self.taking = True
-        count = 0
-        for part in self.flow.parts:
-            for taken in part.taken:
-                place = f"{self.flow.sent}[{count}:{count + len(taken.places)}]"
-                (value,) = self.values(part, taken.formulas).values()
-                self.code.line(f"{place} = {value}")
-                if taken.is_activity:
-                    held = f"holds[{part.number}]"
-                    positions = self.code.constant(self.flow.taken)
-                    self.code.line(f"if holds and {held}: {self.flow.sent}[{positions}[{held}[0]]] = {held}[1]")
-                count += len(taken.places)
+        for part, taken in taken_in_order(self.flow.parts):
+            begin = int(self.flow.taken[taken.places[0]])
+            (value,) = self.values(part, taken.formulas).values()
+            self.code.line(f"{self.flow.sent}[{begin}:{begin + len(taken.places)}] = {value}")
+            if taken.is_activity:
+                held, positions = f"holds[{part.number}]", self.code.constant(self.flow.taken)
+                self.code.line(f"if holds and {held}: {self.flow.sent}[{positions}[{held}[0]]] = {held}[1]")
         self.taking = False
 
     def values(self, part: Part, formulas: Formulas) -> dict[str, str]:
@@ -392,7 +389,7 @@ class _Stage:
             for one in joined.use.definition.state:
                 now = self.flow.now.get(Key(joined.use.owner, one.name))
                 known[one.name] = now or cell_of(self.code, joined.projection, one.name, joined.some)
-        for name in joined.anew.keys() & formulas.names - known.keys():
+        for name in joined.anew.keys() & formulas.read - known.keys():
             known[name] = self.read_anew(joined, name)
         for name, tree in formulas.let:
             if name not in known:
@@ -415,7 +412,7 @@ class _Stage:
         known = {} if self.taking else self.joined.setdefault(number, {})
         if _FORMED not in known:
             (value,) = self.values_of(joined, joined.at.signal).values()
-            known[_FORMED] = each(self.step, joined.projection, joined.at.signal.names, value)
+            known[_FORMED] = each(self.step, joined.projection, joined.at.signal.read, value)
         return known[_FORMED]
 
     def back(self, part: Part, through: Through) -> str:
@@ -427,7 +424,7 @@ class _Stage:
             joined = self.flow.contacts[one.number]
             value = self.values_of(joined, joined.at.back).get(through.state)
             if value is not None:
-                value = each(self.step, joined.projection, joined.at.back.names, value)
+                value = each(self.step, joined.projection, joined.at.back.read, value)
                 parts.append((some_of(self.step, one, value), one.places))
         places = np.sort(np.concatenate([places for _, places in parts]))
         parts = [(values, np.searchsorted(places, own)) for values, own in parts]

@@ -31,6 +31,7 @@ from neurovis_spec.runtime.stages import (
     contacts_of,
     flowing,
     parts_of,
+    taken_in_order,
     times,
 )
 from neurovis_spec.runtime.state import State
@@ -139,13 +140,12 @@ class Flow:
         """What is taken at a stage, population by population."""
         sent = [*state.activity.tolist(), *state.outlets.tolist()]
         stage = Stage(state, still, x, t, at_stage(self.network, inputs, state, t), sent)
-        for part in self.parts:
-            for taken in part.taken:
-                (values,) = self.values(part, taken.formulas, stage).values()
-                for position, neuron in enumerate(part.population.members.tolist()):
-                    held = state.conditions.held_at(neuron) if taken.is_activity else None
-                    value = values[position] if held is None else held
-                    sent[taken.places[position]] = 0.0 if state.conditions.lesioned_neurons[neuron] else value
+        for part, taken in taken_in_order(self.parts):
+            (values,) = self.values(part, taken.formulas, stage).values()
+            for position, neuron in enumerate(part.population.members.tolist()):
+                held = state.conditions.held_at(neuron) if taken.is_activity else None
+                value = values[position] if held is None else held
+                sent[taken.places[position]] = 0.0 if state.conditions.lesioned_neurons[neuron] else value
         return stage
 
     def derivatives(self, stage: Stage) -> Numbers:

@@ -90,7 +90,8 @@ class Through(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """A population at a stage. What is ``taken`` of all populations comes first, then the derivatives of all."""
+    """A population at a stage. What is ``taken`` of all populations comes first (``taken_in_order``), then the
+    derivatives of all."""
 
     number: int
     population: Population
@@ -390,6 +391,12 @@ def given(model: Definition, name: str) -> Tree | None:
 def taken_by(network: Network) -> Indices:
     """What each connection takes (m,): an index into the activities of all neurons followed by the outlets."""
     return network.connections.sources.compact() if network.sending is None else network.sending
+
+
+def taken_in_order(parts: Iterable[Part]) -> list[tuple[Part, Taken]]:
+    """All that is taken at a stage, each behind what it needs: what reads no port comes first."""
+    every = [(part, one) for part in parts for one in part.taken]
+    return sorted(every, key=lambda one: bool(one[1].formulas.ports))
 
 
 def places_among_taken(network: Network, parts: Iterable[Part]) -> IntArray:
