@@ -224,7 +224,7 @@ class _Coupled:
         n, taken = len(self.model), self.taken
         mixed = {port: self.held.get(port, np.zeros(n, dtype=np.bool_)).copy() for port in self.wired.lines}
         flowing = taken.of_models(lambda model, name: flows_by(model, name) is not None)
-        delayed = ~self.wired.fluent & taken.any("pre", np.ones_like(flowing))
+        delayed = ~self.wired.fluent & taken.waited_for
         bringing = ~delayed & (~self.synapse | taken.of_entries(signal_flows))
         while True:
             for port, values in mixed.items():

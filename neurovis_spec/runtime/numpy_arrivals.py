@@ -174,7 +174,7 @@ def before_update(step: Step, number: int) -> str:
         for name, tree in formulas.let:
             known[name] = code.let("m", code.expression(tree, known))
         ((_, tree),) = formulas.trees
-        step.formed[number] = each(step, projection, formulas.read, code.expression(tree, known))
+        step.formed[number] = each(step, projection, formulas.names, code.expression(tree, known))
     return step.formed[number]
 
 

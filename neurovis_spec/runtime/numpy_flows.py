@@ -247,7 +247,7 @@ class _Flow:
         code, connections = self.code, self.network.connections
         members, contacts = joined.projection.members, joined.at
         every = (contacts.signal, contacts.derivatives, contacts.slopes, contacts.back)
-        read = frozenset().union(*(one.read for one in every))
+        read = frozenset().union(*(one.names for one in every))
         if "weight" in read:
             joined.held["weight"] = code.let("w", code.select("weights", members, len(connections)))
         for name, end in ends_of(self.network, joined.projection).items():
@@ -389,7 +389,7 @@ class _Stage:
             for one in joined.use.definition.state:
                 now = self.flow.now.get(Key(joined.use.owner, one.name))
                 known[one.name] = now or cell_of(self.code, joined.projection, one.name, joined.some)
-        for name in joined.anew.keys() & formulas.read - known.keys():
+        for name in joined.anew.keys() & formulas.names - known.keys():
             known[name] = self.read_anew(joined, name)
         for name, tree in formulas.let:
             if name not in known:
@@ -412,7 +412,7 @@ class _Stage:
         known = {} if self.taking else self.joined.setdefault(number, {})
         if _FORMED not in known:
             (value,) = self.values_of(joined, joined.at.signal).values()
-            known[_FORMED] = each(self.step, joined.projection, joined.at.signal.read, value)
+            known[_FORMED] = each(self.step, joined.projection, joined.at.signal.names, value)
         return known[_FORMED]
 
     def back(self, part: Part, through: Through) -> str:
@@ -424,7 +424,7 @@ class _Stage:
             joined = self.flow.contacts[one.number]
             value = self.values_of(joined, joined.at.back).get(through.state)
             if value is not None:
-                value = each(self.step, joined.projection, joined.at.back.read, value)
+                value = each(self.step, joined.projection, joined.at.back.names, value)
                 parts.append((some_of(self.step, one, value), one.places))
         places = np.sort(np.concatenate([places for _, places in parts]))
         parts = [(values, np.searchsorted(places, own)) for values, own in parts]

@@ -18,7 +18,16 @@ from typing import Final, NamedTuple, TypeAlias
 import numpy as np
 
 from neurovis_spec.arrays import BoolArray, Indices, IntArray
-from neurovis_spec.compiler.flows import BY_SLOPE, Jacobian, flows_by, jacobian, reads, slope_by, with_slope
+from neurovis_spec.compiler.flows import (
+    BY_SLOPE,
+    Jacobian,
+    flows_by,
+    jacobian,
+    reads,
+    signal_flows,
+    slope_by,
+    with_slope,
+)
 from neurovis_spec.compiler.levels import held_at
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import (
@@ -359,17 +368,19 @@ def flowing(network: Network) -> BoolArray:
 
 
 def _bringing(network: Network, flows: BoolArray) -> BoolArray:
-    """For each connection whether what it brings flows, as far as what it takes does."""
-    delays = network.connections.delays.whole()
-    result = np.asarray((delays == 0) & flows[taken_by(network)])
+    """For each connection whether what it brings flows, as far as what it takes does: undelayed, or by a continuous
+    delay."""
+    connections = network.connections
+    fluent = connections.delays.whole() == 0
+    if connections.lags is not None:
+        fluent |= ~np.isnan(connections.lags.whole())
+    result = np.asarray(fluent & flows[taken_by(network)])
     for projection in network.projections:
-        definition = projection.use.definition
-        if definition.kind == SYNAPSE:
-            held = {"k", *(one.name for one in definition.state if one.derivative is None)}
-            result[projection.members] = held.isdisjoint(projection.read)
-            for end in ends_of(network, projection).values():
-                now = (delays[projection.members] == 0) | (not end.past)
-                result[projection.members] &= now & flows[end.places]
+        members = projection.members
+        if projection.kind == SYNAPSE:
+            result[members] = signal_flows(projection.use.definition)
+            for name, end in ends_of(network, projection).items():
+                result[members] &= flows[end.places] & (fluent[members] | name.startswith("post"))
     return result
 
 
