@@ -55,8 +55,13 @@ class Models:
     def into_flow(self, targets: Indices, route: Route) -> npt.NDArray[np.bool_]:
         """For each connection to one of these whether a derivative there reads what arrives."""
         ports = [name for name, _ in route.ports]
-        reading = [not ports_read_by(one).flow.isdisjoint(ports) for one in self.different]
+        reading = [not read.isdisjoint(ports) for read in self._read_by_flow]
         return np.array(reading, dtype=np.bool_)[self.of[targets]]
+
+    @cached_property
+    def _read_by_flow(self) -> list[frozenset[str]]:
+        """The ports that derivatives of each model read."""
+        return [ports_read_by(one).flow for one in self.different]
 
     @property
     def flow(self) -> bool:
