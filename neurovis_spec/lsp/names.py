@@ -15,6 +15,7 @@ from typing import Final
 
 from neurovis_spec.compiler.values.constants import ALWAYS
 from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.expressions.lexer import OF_END
 from neurovis_spec.language.grammar import Kind, Role
 from neurovis_spec.language.places import role_of
 from neurovis_spec.language.references import Arrow, DottedName, NeuronRange, Part, RuleState, Sum, parse
@@ -32,8 +33,6 @@ DEFINITIONS: Final[Mapping[str, Kind]] = {
 SECTIONS: Final[Mapping[Kind, str]] = {kind: section for section, kind in DEFINITIONS.items()}
 #: A name in an expression, and the parenthesis behind the name of a function.
 _IN_FORMULA = re.compile(r"(?<![\w.])([A-Za-z_]\w*)(\s*\()?", re.ASCII)
-#: What is read of an end of a connection.
-_OF_END = re.compile(r"(?<![\w.])(?:pre|post)\.([A-Za-z_]\w*)", re.ASCII)
 _WORDS = frozenset({"and", "or", "not", "if", "else"})
 
 
@@ -149,7 +148,7 @@ def _formula(item: Item, role: Role, scope: Scope, text: Text, lookup: Lookup) -
 
 def _of_ends(item: Item, text: Text, lookup: Lookup) -> Iterator[Name]:
     """The names behind the points of ``pre.v`` and ``post.v``, as far as it is sure which model is meant."""
-    found = [(match, lookup.model_with(match[1])) for match in _OF_END.finditer(item.text)]
+    found = [(match, lookup.model_with(match[1])) for match in OF_END.finditer(item.text)]
     sure = [(match, model) for match, model in found if model is not None]
     places = _inside(item, text, [match.span(1) for match, _ in sure])
     for (match, model), (span, exact) in zip(sure, places, strict=True):

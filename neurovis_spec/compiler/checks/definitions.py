@@ -27,6 +27,7 @@ from neurovis_spec.compiler.values.definitions import Defined
 from neurovis_spec.diagnostics import Findings, Span, listed
 from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
+from neurovis_spec.language.expressions.lexer import OF_END
 from neurovis_spec.language.expressions.parser import parse
 from neurovis_spec.language.expressions.tree import ExpressionError, Tree, names
 from neurovis_spec.language.grammar import ACTIVITIES
@@ -52,15 +53,15 @@ _NOUNS = {"let": "intermediate value", "signals": "signal", "parameters": "param
 
 def check_formulas(compiled: Compiled, findings: Findings) -> None:
     """Warn of parts of definitions that nothing reads, and of formulas that replace what they should change."""
-    shown = _shown(compiled.network)
+    shown, at_ends = _shown(compiled.network), _read_at_ends(compiled)
     for library in compiled.libraries:
         for kind, result_noun in _RESULT_NOUN.items():
             for name, model in library.definitions[kind.section].items():
                 written = model.parts()
                 parts = _parts_of(model, written)
                 result = f"the {written.gives}" if written.gives else result_noun
-                _check_parts(parts, written, result, findings)
-                _check_flows(parts, written, shown if kind == MODEL else frozenset(), result, findings)
+                _check_parts(parts, written, result, at_ends if kind == MODEL else (), findings)
+                _check_flows(parts, written, shown if kind == MODEL else (), result, findings)
                 if kind.lasting:
                     _check_replaced(parts, written, compiled.library.definitions.of(kind).known()[name], findings)
 
@@ -113,12 +114,25 @@ def _reached(names: Iterable[str], parts: AnyMapping[str, _Part]) -> set[str]:
     return found
 
 
-def _check_parts(parts: AnyMapping[str, _Part], written: Parts, result_noun: str, findings: Findings) -> None:
-    """Warn of each part that neither the result nor any state depends on. All states count as read, as an output, or
-    whoever runs the network, can record them. A part that only such parts read is not reported: that follows from
-    these."""
+def _read_at_ends(compiled: Compiled) -> set[str]:
+    """What rules, synapses and delays read of the models at both ends of connections."""
+    found = {end.name for one in compiled.network.projections for end in one.use.definition.end_names}
+    for section, _ in compiled.sections:
+        for _, body in section.connections:
+            delay = body.source.get("delay")
+            for text in () if delay is None else _texts_in(delay):
+                found.update(OF_END.findall(text))
+    return found
+
+
+def _check_parts(
+    parts: AnyMapping[str, _Part], written: Parts, result_noun: str, elsewhere: Collection[str], findings: Findings
+) -> None:
+    """Warn of each part that neither the result nor any state depends on, nor is read ``elsewhere``. All states count
+    as read, as an output, or whoever runs the network, can record them. A part that only such parts read is not
+    reported: that follows from these."""
     states = [name for name, part in parts.items() if part.section == "state"]
-    used = _reached([*_given(written), *states], parts)
+    used = _reached([*_given(written), *states, *elsewhere], parts)
     unused = {name: part for name, part in parts.items() if name not in used}
     for name, (section, span, _, _) in unused.items():
         if any(name in part.reads for other, part in unused.items() if other != name):

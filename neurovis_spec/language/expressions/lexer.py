@@ -42,8 +42,8 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _REFERENCE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(?:\.{1,2}[A-Za-z_][A-Za-z0-9_]*)*")
 #: And ``(K1 -> O).eligibility``, ``(A -> B (2)).x``: an arrow stands nowhere else.
 _OF_RULE = re.compile(r"\([^()]*->[^()]*(?:\([0-9]+\)\s*)?\)\s*\.\s*[A-Za-z_][A-Za-z0-9_]*")
-#: What a connection reads of an end: ``pre.v``.
-_OF_END = re.compile(r"(?:pre|post)\.[A-Za-z_][A-Za-z0-9_]*")
+#: What a connection reads of an end, ``pre.v``, and of that the name behind the point.
+OF_END = re.compile(r"(?<![\w.])(?:pre|post)\.([A-Za-z_]\w*)", re.ASCII)
 #: One number of several: ``legs[3]``.
 _SUBSCRIPT = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)\[(?:\s*([0-9]{1,9})\s*\])?")
 _KEYWORD = re.compile(r"=(?!=)")
@@ -147,7 +147,7 @@ def _special(text: str, at: int, naming: Naming, found: Sequence[Token]) -> Toke
         case "subscripts":
             return _subscripted(text, at)
         case "ends":
-            end = _OF_END.match(text, at)
+            end = OF_END.match(text, at)
             return None if end is None else Token("name", end.group(), at, end.end())
     return None
 
