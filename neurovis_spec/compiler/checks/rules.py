@@ -63,35 +63,38 @@ def _check_rule(used: _Used, network: Network, findings: Findings) -> None:
     for signal in rule.signals:
         if all(_is_own(bundle, used.place, signal) for bundle in used.entry.bundles):
             _check_signal(used, signal, network, findings)
-    if network.episode is None and rule.given.each_step is None:
-        message = f"'{rule.name}' changes weights at the end of an episode, and there are none: no weight will change"
+    what, changes_within = rule.given.name, rule.given.each_step or rule.given.derivative
+    if network.episode is None and changes_within is None:
+        message = f"'{rule.name}' changes {what}s at the end of an episode, and there are none: no {what} will change"
         hint = "say how many steps an episode has, as in time: {episode: 100}"
         findings.warning("no-effect", used.choice.name.span, message, hint)
 
 
 def changes(rule: Definition, parameters: Mapping[str, FloatArray], own: Collection[str] = ()) -> bool:
-    """Whether a weight changes in a few steps and episodes with arbitrary values, from the states' initial values; the
-    signals of ``own`` are the target's activity."""
+    """Whether a weight (or centre) changes in a few steps and episodes with arbitrary values, from the states' initial
+    values; the signals of ``own`` are the target's activity."""
     generator = np.random.default_rng(0)  # the points of a test, not a draw of the network
-    values: dict[str, Value] = {**CONSTANTS, "dt": 0.5, "weight": generator.uniform(-2.0, 2.0, _POINTS)}
+    given = rule.given
+    values: dict[str, Value] = {**CONSTANTS, "dt": 0.5, given.name: generator.uniform(-2.0, 2.0, _POINTS)}
     values |= {name: float(array[0]) for name, array in parameters.items()}
     values |= {state.name: evaluate_array(state.initial, values) for state in rule.state}
     for k in range(_STEPS):
         values |= {"k": float(k), "t": k * 0.5}
-        for name in (*ACTIVITIES, *rule.signals):
+        for name in (*ACTIVITIES, *rule.signals, *(end.text for end in rule.end_names)):
             values[name] = generator.uniform(-2.0, 2.0, _POINTS) * 10.0 ** (k % 3)
         values |= dict.fromkeys(own, values["post"])
         for episode in (False, True):
             new: dict[str, Value] = {}
             for name, tree in rule.let:
                 values[name] = evaluate_array(tree, values)
-            weight = rule.given.each_episode if episode else rule.given.each_step
-            if weight is not None and not np.array_equal(evaluate_array(weight, values), values["weight"]):
-                return True
-            for state in rule.state:
-                change = state.each_episode if episode else state.each_step
+            for one in (*rule.state, given):
+                change = one.each_episode if episode else one.each_step
                 if change is not None:
-                    new[state.name] = evaluate_array(change, values)
+                    new[one.name] = evaluate_array(change, values)
+                elif one.derivative is not None and not episode:
+                    new[one.name] = values[one.name] + 0.5 * evaluate_array(one.derivative, values)
+            if given.name in new and not np.array_equal(new[given.name], values[given.name]):
+                return True
             values |= new
     return False
 
@@ -119,7 +122,7 @@ def _check_signal(used: _Used, signal: str, network: Network, findings: Findings
         return
     message = (
         f"'{shorten(learning.texts[signal])}' is this connection's own end: '{signal}' is then always 'post', and "
-        f"'{rule.name}' changes no weight"
+        f"'{rule.name}' changes no {rule.given.name}"
     )
     findings.warning("no-effect", span, message, "name a neuron or an input that says what 'post' should be")
 
@@ -165,7 +168,7 @@ def _check_rate(used: _Used, findings: Findings) -> None:
         if "rate" not in learning.parameters or learning.parameters["rate"].any():
             continue
         if not changes(learning.rule, learning.parameters):
-            message = f"the rate of '{learning.rule.name}' is 0: no weight will change"
+            message = f"the rate of '{learning.rule.name}' is 0: no {learning.rule.given.name} will change"
             span = choice.name.span if written is None else written.span
             findings.warning("zero-rate", span, message, "give it a rate, or leave the plasticity out")
             return
