@@ -77,6 +77,35 @@ def test_a_column_of_seconds_is_checked(rows: str, message: str, tmp_path: Path)
     assert message in str(caught.value)
 
 
+def test_parameters_of_the_models_at_the_ends() -> None:
+    text = """\
+time: {dt: 1 ms}
+parameters: {slow: 4, g: 2, other: 1}
+models:
+  m: {parameters: {lag: 2, tau: 1}, activity: tau*drive}
+neurons:
+  A: {count: 2, model: {m: {lag: [3, slow], tau: other}}}
+  B: {count: 2, model: {m: {tau: g}}}
+  C: {}
+connections:
+  A -> B: {pattern: all_to_all, delay: DELAY}
+"""
+    for delay, expected, structural in (
+        ("pre.lag + j", [3, 4, 4, 5], {"slow"}),
+        ("{seconds: (post.lag + post.tau)*dt}", [4, 4, 4, 4], {"g"}),
+        ('"round(uniform(0, 1))*0 + pre.tau"', [1, 1, 1, 1], {"other"}),
+    ):
+        network = network_of(text.replace("DELAY", delay))
+        assert network.connections.delays.tolist() == expected
+        assert network.structural == structural
+    with pytest.raises(nv.SpecError) as caught:
+        network_of(text.replace("A -> B", "A -> C").replace("pattern: all_to_all, delay: DELAY", "delay: 1 + post.lag"))
+    (one,) = caught.value.diagnostics
+    assert (one.code, one.span.column, one.message) == (
+        "unknown-name", 23, "the model 'static' of 'C' has no parameter 'lag'",
+    )  # fmt: skip
+
+
 def test_drawn_delays_are_rounded_and_draw_for_themselves() -> None:
     drawn = np.array(delays('delay: "normal(9, 2)"'))
     assert len(set(drawn.tolist())) > 2

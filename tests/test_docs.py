@@ -79,7 +79,7 @@ def test_every_key_is_described_and_most_are_shown(key: Key) -> None:
 
 def test_defaults_stand_apart_from_the_meaning() -> None:
     found = {key.path: (key.kind, key.default) for key in keys()}
-    assert found["connections.delay"] == ("number or expression", "1")
+    assert found["connections.delay"] == ("number or expression or {seconds: …} or {matrix: …}", "1")
     assert found["time.steps"] == ("number or expression", "1000")
     assert found["neurons.activation"] == ("name or {name: {…}}", "identity")
     assert found["neurons.combine"] == ("sum, product, distance", "sum")
@@ -209,7 +209,7 @@ def test_the_nearest_name_is_offered() -> None:
 def test_the_command() -> None:
     done = docs("connections.delay")
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.startswith("connections.delay, a key, number or expression, by default 1\n")
+    assert done.stdout.startswith("connections.delay, a key, number or expression or {seconds: …} or {matrix: …}, by")
     done = docs()
     assert (done.returncode, done.stderr) == (0, "")
     assert "reward_modulated" in done.stdout

@@ -77,7 +77,8 @@ def _key(key: Key) -> str:
         choices = [*PATTERNS]
     if role.use in ("formula", "template") and (role.sees or role.draws):
         draws = "; they may draw random numbers" if role.draws else ""
-        parts.append(filled(f"its expressions know parameters, {', '.join(role.sees)}{draws}"))
+        seen = (*role.sees, *(("pre.X", "post.X") if role.ends else ()))
+        parts.append(filled(f"its expressions know parameters, {', '.join(seen)}{draws}"))
     if choices:
         parts.append(filled(f"built in: {', '.join(choices)}"))
     below = keys_of(key.path)

@@ -78,7 +78,7 @@ GROUP: Final = Role("formula", sees=("i", "n"))
 GROUP_DRAWN: Final = Role("formula", sees=("i", "n"), draws=True)
 NOISE: Final = Role("formula", sees=("k", "t", "i", "n"), draws=True)
 PAIR: Final = Role("formula", sees=("i", "j", "n_from", "n_to", "distance"), draws=True)
-DELAY: Final = Role("formula", sees=PAIR.sees, draws=True)
+DELAY: Final = Role("formula", sees=PAIR.sees, draws=True, ends=True)
 CELL: Final = Role("formula", sees=("i", "j", "n_from", "n_to"), draws=True)
 #: What the settings of a rule or a synapse see.
 _OF_PAIRS: Final = ("i", "j", "n_from", "n_to")

@@ -30,6 +30,8 @@ from neurovis_spec.language.yaml.source import Mapping, Scalar
 _DEFAULT = re.compile(r" \(default ([^()]*)\)")
 #: Where a mapping of the author's names stands between a section and its keys, as in ``neurons.GROUP.count``.
 _SINGLE = "{name: {…}}"
+#: keys of which one is given are listed up to so many
+_FEW = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,6 +134,8 @@ def _word(fits: object) -> str:
         case ListOf(item=item):
             word = _word(item)
             return f"list of {word}s" if word in ("text", "name") else "list"
+        case Map(one=True, other=None, known=known) if len(known) <= _FEW:
+            return " or ".join(f"{{{name}: …}}" for name in known)
         case Map(one=True, known=known):
             return _SINGLE if all(isinstance(key.shape, Map) for key in known.values()) else "{name: …}"
         case Map(known={"file": _}):

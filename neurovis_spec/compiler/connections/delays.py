@@ -110,10 +110,10 @@ class DelayReader:
             hint = "write round(…), or a time: {seconds: …}"
             self.constants.findings.error("not-an-integer", span, message, hint)
             return UNKNOWN
-        steps = self._within(np.where(given, exact, 0.0), span, in_seconds, called)
-        if steps is UNKNOWN:
+        found = self._within(np.where(given, exact, 0.0), span, in_seconds, called)
+        if found is UNKNOWN:
             return UNKNOWN
-        steps = narrow(np.where(given, steps, -1))
+        steps = narrow(np.where(given, found, -1))
         return Delays(steps, exact, (Timed(span, "", np.flatnonzero(given)),)) if in_seconds else Delays(steps)
 
     def _within(

@@ -210,11 +210,11 @@ class EdgeReader:
         for place in long[:PATIENCE]:
             message = f"row {table.row(place)} of the file: a delay must be at most {LONGEST_DELAY:,}"
             self.constants.findings.error("out-of-range", span, message, key=("delay", place))
-        given = Delays(delays)
+        given: Delays | Unknown = Delays(delays)
         if table.seconds is not None:
             reader = DelayReader(self.constants)
             timed = reader.each(table.seconds, span, True, False, lambda edge: f"row {table.row(edge)} of the file")
-            given = UNKNOWN if timed is UNKNOWN else timed.over(given)
+            given = UNKNOWN if timed is UNKNOWN else timed.over(Delays(delays))
         if i is UNKNOWN or j is UNKNOWN or long or table.fault is not None or given is UNKNOWN:
             return UNKNOWN
         return EdgeList(i, j, table.weights, given)

@@ -11,8 +11,9 @@ does: weights that are scaled together are one Scaled, what depends on positions
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -32,21 +33,24 @@ from neurovis_spec.compiler.limits import Limits, amount
 from neurovis_spec.compiler.names.references import Directory
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import PLAIN_ROUTE, Route
+from neurovis_spec.compiler.neurons.groups import is_written
 from neurovis_spec.compiler.neurons.labels import check_length
 from neurovis_spec.compiler.neurons.populate import Census
-from neurovis_spec.compiler.program import DRIVE, SYNAPSE
+from neurovis_spec.compiler.program import DRIVE, MODEL, SYNAPSE
 from neurovis_spec.compiler.values.arguments import Each, Settled, check_initials, settled_of
 from neurovis_spec.compiler.values.constants import Constants, Randomness, Value
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.compiler.values.matrices import Grid, grid_of
-from neurovis_spec.diagnostics import Span
-from neurovis_spec.language.expressions.tree import draws, names
+from neurovis_spec.diagnostics import Home, Span, Undeclared, shorten
+from neurovis_spec.language.expressions.tree import Name, draws, names, walk
+from neurovis_spec.language.grammar import Role
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import ConnectionModel
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
 from neurovis_spec.language.values import Delay, FileReference, MatrixRows
 from neurovis_spec.language.yaml.source import Scalar
+from neurovis_spec.likeness import suggest
 
 #: Keys of a body that say which connections there are.
 _SHAPING = frozenset({"matrix", "edges", "pattern", "centre", "rows", "self"})
@@ -348,11 +352,10 @@ class EntryBuilder:
             if tree is UNKNOWN:
                 return UNKNOWN
             drawn = bool(draws(tree))
-            if names(tree).isdisjoint(_DELAY.sees) and not drawn:
+            if not (drawn or any(name in _DELAY.sees or "." in name for name in names(tree))):
                 return self._same_delay(written.value, written.in_seconds, shape)
-            if "distance" in names(tree):
-                self._go_by_position()
-            values = self._values(written.value, shape, "delay")
+            self._go_by_ends(names(tree))
+            values = self._values(written.value, shape, "delay", _DELAY)
         else:
             grid = self._grid(written.value, "delay")
             values = UNKNOWN if grid is UNKNOWN or shape is UNKNOWN else grid.values[shape.i, shape.j]
@@ -377,19 +380,29 @@ class EntryBuilder:
             return Delays(steps)
         return Delays(steps, exact, (Timed(formula.span, text_of(formula)),))
 
-    def _go_by_position(self) -> None:
-        """What places the neurons is structural, since something that is does depend on it."""
-        for end in (self.sources, self.targets):
-            if end is not UNKNOWN:
-                self.context.census.go_by_position(end.astype(np.int64))
+    def _go_by_ends(self, used: Collection[str]) -> None:
+        """What is read of the ends is structural, since something that is does depend on it."""
+        census = self.context.census
+        for side, end in (("pre.", self.sources), ("post.", self.targets)):
+            neurons = np.zeros(0, dtype=np.int64) if end is UNKNOWN else end.astype(np.int64)
+            if "distance" in used:
+                census.go_by_position(neurons)
+            for name in used:
+                if name.startswith(side):
+                    census.go_by_parameter(name.removeprefix(side), neurons)
 
-    def _values(self, formula: Formula, shape: _Shape | Unknown, purpose: str) -> FloatArray | Unknown:
-        """The values of a formula of i, j, n_from, n_to (and distance), one for every pair."""
-        if shape is UNKNOWN or self.sources is UNKNOWN or self.targets is UNKNOWN:
-            self.constants.value(formula, dict.fromkeys(_WEIGHT.sees, UNKNOWN), UNKNOWN)
-            return UNKNOWN
-        tree = self.constants.tree(formula, _WEIGHT)
+    def _values(
+        self, formula: Formula, shape: _Shape | Unknown, purpose: str, role: Role = _WEIGHT
+    ) -> FloatArray | Unknown:
+        """The values of a formula of i, j, n_from, n_to (and distance, and what the ``role`` sees), one for every
+        pair."""
+        tree = self.constants.tree(formula, role)
         if tree is UNKNOWN:
+            return UNKNOWN
+        of_ends = [node for node in walk(tree) if isinstance(node, Name) and "." in node.name]
+        if shape is UNKNOWN or self.sources is UNKNOWN or self.targets is UNKNOWN:
+            unknown = (*role.sees, *(node.name for node in of_ends))
+            self.constants.value(formula, dict.fromkeys(unknown, UNKNOWN), UNKNOWN)
             return UNKNOWN
         used = names(tree)
         extra: dict[str, Value] = {"n_from": float(len(self.sources)), "n_to": float(len(self.targets))}
@@ -407,6 +420,11 @@ class EntryBuilder:
             with np.errstate(over="ignore"):  # what is then infinite is found where it matters
                 difference = ends[0] - ends[1]
                 extra["distance"] = np.hypot(difference[:, 0], difference[:, 1])
+        for node in of_ends:
+            of_end = self._of_end(node.name, formula.node.at(node.start, node.end), shape)
+            if of_end is UNKNOWN:
+                return UNKNOWN
+            extra[node.name] = of_end
         randomness = Randomness(self._stream(purpose), shape.i, shape.j)
         with self.constants.following() as parts:
             value = self.constants.value(formula, extra, randomness)
@@ -419,6 +437,23 @@ class EntryBuilder:
         if value is UNKNOWN:
             return UNKNOWN
         return np.broadcast_to(np.asarray(value, dtype=np.float64), shape.i.shape)
+
+    def _of_end(self, name: str, span: Span, shape: _Shape) -> FloatArray | Unknown:
+        """What ``pre.tau`` or ``post.tau`` is, one for every pair: a parameter of the model at that end."""
+        side, _, parameter = name.partition(".")
+        neurons, places = (self.sources, shape.i) if side == "pre" else (self.targets, shape.j)
+        assert neurons is not UNKNOWN
+        for one in self.context.census.groups_of(neurons[np.unique(places)]):
+            model = one.kind.model
+            if not (is_written(one.kind, one.model) and model.sound):
+                return UNKNOWN
+            if parameter not in model.parameters:
+                message = f"the model '{model.definition.name}' of '{one.name}' has no parameter '{shorten(parameter)}'"
+                hint = partial(suggest, parameter, model.definition.parameters, "it has")
+                lost = Undeclared(parameter, Home((MODEL.section, model.definition.name), ("parameters",)))
+                self.constants.findings.error("unknown-name", span, message, hint, undeclared=lost)
+                return UNKNOWN
+        return self.context.census.parameter(parameter)[neurons[places]]
 
     def _misplaced(self) -> bool:
         """Whether what the spec says of a position of these neurons is invalid."""

@@ -138,6 +138,19 @@ class Census:
         for one in self.groups_of(neurons):
             depend_on_positions(one.model.position, one.constants)
 
+    def parameter(self, name: str) -> FloatArray:
+        """The parameter of this name of the model of each neuron (n,), NaN where it has none."""
+        result = np.full(len(self.neurons), np.nan)
+        for one in self.groups:
+            if name in one.kind.model.parameters:
+                result[one.group.start : one.group.start + one.group.count] = one.kind.model.parameters[name]
+        return result
+
+    def go_by_parameter(self, name: str, neurons: IntArray) -> None:
+        """Mark the parameters of the run that this one of the models of these neurons follows as structural."""
+        for one in self.groups_of(neurons):
+            one.constants.depend_on(part for part in one.kind.model.parts if part.name == name)
+
     @property
     def directory(self) -> Directory:
         """How everything is called in the spec itself."""

@@ -305,13 +305,15 @@ class Constants:
         """The tree of a formula over the parameters and what it sees, for a caller that evaluates it; else findings.
         ``later`` are parameters that it does not see."""
         known = Scope((role.sees, self.names, ALWAYS))
-        sight = Sight(known, what, later, self.outside, self.home)
-        tree = parse_formula(formula, sight, self.findings, random=role.draws)
+        sight = Sight(known, what, later, self.outside, self.home, role.ends)
+        naming: Naming = "ends" if role.ends else ""
+        tree = parse_formula(formula, sight, self.findings, random=role.draws, naming=naming)
         if tree is UNKNOWN:
             return UNKNOWN
         used = names(tree)
         self.read |= used
-        return UNKNOWN if any(self.names[name] is UNKNOWN for name in used.difference(role.sees, ALWAYS)) else tree
+        own = (name for name in used.difference(role.sees, ALWAYS) if "." not in name)
+        return UNKNOWN if any(self.names[name] is UNKNOWN for name in own) else tree
 
     def unchecked(
         self,
@@ -325,7 +327,9 @@ class Constants:
         ``places`` are the indices of the Part that is collected, where the value follows a parameter."""
         if not isinstance(formula.value, str):
             return UNKNOWN if formula.value is UNKNOWN else float(formula.value)
-        tree = self.tree(formula, Role("formula", sees=tuple(extra or ()), draws=randomness is not None))
+        seen = tuple(extra or ())
+        ends = any("." in name for name in seen)
+        tree = self.tree(formula, Role("formula", sees=seen, draws=randomness is not None, ends=ends))
         if tree is UNKNOWN:
             return UNKNOWN
         used = names(tree)

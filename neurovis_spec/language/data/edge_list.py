@@ -51,6 +51,7 @@ _MASKS: Final = np.array([(1 << 8 * size) - 1 for size in range(9)], dtype=np.ui
 #: odd numbers that spread words over places (the golden ratio's, as in Knuth 6.4, and powers of it)
 _SPREAD: Final = [np.uint64(pow(0x9E3779B97F4A7C15, power, 1 << 64)) for power in range(1, _WORDS + 1)]
 _HINT: Final = "the first row is 'from,to', 'from,to,weight' or 'from,to,weight,delay'"
+_ALL: Final = "the columns are from, to, weight and perhaps delay or delay_seconds"
 #: the columns of numbers
 _NUMBERS: Final = _COLUMNS[2:]
 
@@ -119,11 +120,7 @@ def _columns(header: list[str]) -> dict[str, int]:
     for column, name in enumerate(names, 1):
         if name not in _COLUMNS:
             close = nearest(name, _COLUMNS, 1)
-            hint = (
-                f"did you mean '{close[0]}'?"
-                if close
-                else "the columns are from, to, weight and perhaps delay, or delay_seconds"
-            )
+            hint = f"did you mean '{close[0]}'?" if close else _ALL
             if name.startswith("#"):
                 hint = NO_COMMENT
             elif separated(name):
