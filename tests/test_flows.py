@@ -290,6 +290,52 @@ def test_an_activation_in_a_derivative_is_used() -> None:
     assert nv.compile_text(f"{text}neurons: {{A: {{model: m, activation: tanh, bias: 1}}}}").warnings == ()
 
 
+# ---- what is taken at a stage ------------------------------------------------------------------------------------
+
+RATE = """
+    ports: [q]
+    state: {v: {initial: 1, derivative: drive - v}}
+    outputs: {rate: v + drive, more: q}
+    activity: v
+"""
+RATES = f"models:\n  cell: {RATE}  same: {RATE}"
+BACKENDS = ["reference", "numpy", pytest.param("c", marks=pytest.mark.compiler)]
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_neuron_may_send_what_reads_a_port_beside_what_reads_none(backend: str) -> None:
+    """A.v -> B.rate -> A.rate is no loop: the first of these reads nothing."""
+    text = f"""{HEAD}{RATES}neurons: {{A: {{model: cell}}, B: {{model: cell}}, C: {{model: cell}}}}
+connections:
+- A -> B: {{send: v, delay: 0}}
+- B -> A: {{send: rate, delay: 0, weight: 0.3}}
+- A -> C: {{send: rate, delay: 0}}
+"""
+    m = np.array([[0.3 - 1, 0.3, 0], [1, -1, 0], [1.3, 0.3, -1]])  # x' = m x
+    values, vectors = np.linalg.eig(m)
+    exact = (vectors @ np.diag(np.exp(0.5 * values)) @ np.linalg.inv(vectors) @ np.ones(3)).real
+    np.testing.assert_allclose(nv.compile_text(text).run(6, backend=backend).activity[5], exact, rtol=1e-6)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_what_is_taken_is_made_behind_what_it_reads(backend: str) -> None:
+    """Also where a neuron that is updated together with others reads more of a stage than these."""
+    text = f"""{HEAD}{RATES}neurons: {{GROUPS, X: {{model: cell}}, Y: {{model: cell, bias: 1}},
+  Z: {{model: cell}}, M: {{count: 3}}}}
+connections:
+- Y -> X: {{send: rate, delay: 0}}
+- X -> P2: {{send: rate, delay: 0, weight: -0.7}}
+- P1 -> Z: {{send: rate, delay: 0}}
+- M -> M: {{delay: 0, edges: [[M1, M2], [M2, M3]]}}
+- M3 -> P1: {{delay: 0, port: q}}
+"""
+    together, apart = (
+        nv.compile_text(text.replace("GROUPS", groups)).run(5, backend=backend)
+        for groups in ("P: {count: 2, model: cell}", "P1: {model: cell}, P2: {model: same}")
+    )
+    assert np.array_equal(together.activity, apart.activity)
+
+
 # ---- where a run begins ------------------------------------------------------------------------------------------
 
 

@@ -356,17 +356,25 @@ class _Coupled:
 
     def _stages(self) -> IntArray | Cycle:
         """For each neuron its level within a stage. Without a synapse a neuron waits for whatever it takes, else for
-        what reads ports there; a synapse that reads such an output of its target makes it wait for itself."""
+        what reads ports there; a synapse that reads such an output of its target makes it wait for itself. Where
+        neurons would wait for each other, they wait for what reads ports alone: one may send such a thing beside one
+        that reads none."""
+        level = self._levels_of_stage(~self.synapse)
+        if isinstance(level, Cycle):
+            level = self._levels_of_stage(np.zeros(len(self.synapse), dtype=np.bool_))
+        return level._replace(algebraic=True) if isinstance(level, Cycle) else level
+
+    def _levels_of_stage(self, always: BoolArray) -> IntArray | Cycle:
+        """The same, where ``always`` are the connections (m,) whose target waits for whatever it takes."""
         edges, taken = [], self.taken
         closing = self.made & np.logical_or.reduce([*self.through.values()])
-        before = (taken.any("pre", closing) | ~self.synapse) & self.now
+        before = (taken.any("pre", closing) | always) & self.now
         behind = taken.any("post", closing)
         for port, (_, connections, sources, targets) in self.open.items():
             waits = self.staged[port] & self._passed_on(port, self.making)[targets]
             for begins, of in ((sources, waits & before[connections]), (targets, waits & behind[connections])):
                 edges.append((connections[of], begins[of], targets[of]))
-        level = levels_along(len(self.model), *_joined(edges))
-        return level._replace(algebraic=True) if isinstance(level, Cycle) else level
+        return levels_along(len(self.model), *_joined(edges))
 
     def _waits(self, known: BoolArray) -> tuple[Indices, Indices, Indices]:
         """Who waits for whom within a step: the connection (−1 for none), the first, and the one that waits. ``known``:

@@ -38,7 +38,7 @@ from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, Sent, taken_at
 from neurovis_spec.runtime.c_code import Place, plus, words_of
 from neurovis_spec.runtime.c_plan import BEGIN, MIDDLE, STAGES, FlowState, Plan
 from neurovis_spec.runtime.c_step import StepCode, write, write_input
-from neurovis_spec.runtime.stages import INSIDE, Formulas, Part, Taken, formulas_of, given
+from neurovis_spec.runtime.stages import INSIDE, Formulas, Part, Taken, formulas_of, given, taken_in_order
 
 #: What a state changes by in a substep of the length h, by its derivative f and j = ∂f/∂x.
 _CHANGES: Mapping[Method, str] = {
@@ -228,10 +228,9 @@ class _Integration:
         """The inputs of a stage, what connections take at it, the derivatives."""
         self.inputs()
         parts = self.plan.of_stage
-        for part in parts:
-            for one in part.taken:
-                with self.unless_there(part, one, first):
-                    self.neurons(part, one.formulas, partial(self.give, part, one))
+        for part, one in taken_in_order(parts):
+            with self.unless_there(part, one, first):
+                self.neurons(part, one.formulas, partial(self.give, part, one))
         for part in parts:
             if part.flows:
                 self.neurons(part, part.derivatives, partial(self.slope, part))

@@ -405,9 +405,10 @@ def taken_by(network: Network) -> Indices:
 
 
 def taken_in_order(parts: Iterable[Part]) -> list[tuple[Part, Taken]]:
-    """All that is taken at a stage, each behind what it needs: what reads no port comes first."""
+    """All that is taken at a stage, each behind what it needs: first what reads no port, then by the levels within a
+    step, as whoever reads a port at all is behind what reads others and is brought there."""
     every = [(part, one) for part in parts for one in part.taken]
-    return sorted(every, key=lambda one: bool(one[1].formulas.ports))
+    return sorted(every, key=lambda one: one[0].population.level if one[1].formulas.ports else -1)
 
 
 def places_among_taken(network: Network, parts: Iterable[Part]) -> IntArray:
