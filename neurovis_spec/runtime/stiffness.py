@@ -17,7 +17,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Integrate, Population, Quantity
 from neurovis_spec.compiler.stiffness import Stiffest, limit_of
 from neurovis_spec.language.expressions.tree import ExpressionError
-from neurovis_spec.runtime.backend import ready
+from neurovis_spec.runtime.backend import BackendError, ready
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.state import Conditions, State, initial_state
 
@@ -41,9 +41,10 @@ def stiffest_of_run(network: Network, steps: int, conditions: Conditions | None 
         return None
     try:
         sloped, slopes = _with_slopes(network)
-    except ExpressionError:
-        return None  # a derivative is too long for anything to be told of it
-    state, made = initial_state(sloped), ready(sloped, "numpy")
+        made = ready(sloped, "numpy")
+    except (ExpressionError, BackendError):
+        return None  # a derivative is too long, or array code does not carry all that there is
+    state = initial_state(sloped)
     if conditions is not None:
         state.conditions = conditions.copy()
     reader = InputReader(sloped, by=made.functions)
