@@ -82,6 +82,20 @@ def test_what_diverges_by_itself_is_not_called_stiff() -> None:
     assert all("stiff" not in str(one.message) for one in told)
 
 
+def test_states_of_connections_alone_diverge_without_a_word_of_it() -> None:
+    text = """\
+neurovis: 1
+name: x
+time: {dt: 0.1}
+synapses: {growing: {state: {g: {initial: 1, derivative: g^2}}, signal: g*pre}}
+neurons: {A: {bias: 1}, B: {}}
+connections: {A -> B: {synapse: growing}}
+"""
+    with pytest.warns(RuntimeWarning) as told:
+        nv.compile_text(text).run(60, backend="reference")
+    assert all("stiff" not in str(one.message) for one in told)
+
+
 def test_a_picture_warns_of_what_the_run_bears_by_luck(tmp_path: Path) -> None:
     """Not where the run is no longer finite, which tells it itself, nor where validate has told it."""
     made = cell("85 us")

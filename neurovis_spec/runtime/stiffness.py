@@ -37,19 +37,21 @@ class _Slope(NamedTuple):
 def stiffest_of_run(network: Network, steps: int, conditions: Conditions | None = None) -> Stiffest | None:
     """What is too stiff for the method in a run of so many steps, as far as it is followed, most of all; None where
     nothing is, or nothing is known of it. ``conditions`` are those of a run under way."""
-    if limit_of(network) is None:
+    steps = min(steps, _MOST_STEPS, _MOST_NUMBERS // (len(network.neurons) + len(network.connections)))
+    if limit_of(network) is None or not steps:
         return None
     try:
         sloped, slopes = _with_slopes(network)
         made = ready(sloped, "numpy")
     except (ExpressionError, BackendError):
         return None  # a derivative is too long, or array code does not carry all that there is
+    if not slopes:
+        return None  # connections alone have states that flow
     state = initial_state(sloped)
     if conditions is not None:
         state.conditions = conditions.copy()
     reader = InputReader(sloped, by=made.functions)
     reader.use(state)
-    steps = min(steps, _MOST_STEPS, max(1, _MOST_NUMBERS // (len(network.neurons) + len(network.connections))))
     found: list[Stiffest] = []
     with np.errstate(all="ignore"):
         for k, vector in enumerate(reader.rows(0, steps)):
