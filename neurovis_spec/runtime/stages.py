@@ -405,8 +405,8 @@ def taken_by(network: Network) -> Indices:
 
 
 def taken_in_order(parts: Iterable[Part]) -> list[tuple[Part, Taken]]:
-    """All that is taken at a stage, each behind what it needs: first what reads no port, then by the levels within a
-    step, as whoever reads a port at all is behind what reads others and is brought there."""
+    """All that is taken at a stage, each behind what it needs: first what reads no port; then by the levels of a step,
+    in which whoever sends what reads a port is behind all who bring such a thing there."""
     every = [(part, one) for part in parts for one in part.taken]
     return sorted(every, key=lambda one: one[0].population.level if one[1].formulas.ports else -1)
 
