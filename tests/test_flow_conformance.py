@@ -242,6 +242,25 @@ def test_a_full_matrix_adds_up_in_the_same_order(plastic: str, growth: str, monk
     assert np.isinf(runs[0].states).any() == ("300" in growth)
 
 
+@pytest.mark.parametrize("targets", [1, 2])
+def test_what_few_neurons_get_of_many_adds_up_in_the_same_order(targets: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = f"""
+neurovis: 1
+name: few
+time: {{dt: 0.1}}
+models:
+  m: {{state: {{v: {{derivative: -v}}}}, activity: v}}
+  o: {{state: {{v: {{derivative: drive - v}}}}, activity: v}}
+neurons: {{A: {{count: 400, model: m, initial: {{v: sin(i)}}}}, B: {{count: {targets}, model: o}}}}
+connections: {{A -> B: {{weight: "normal(0, 1)", pattern: all_to_all}}}}
+"""
+    network, runs = nv.compile_text(text).network, []
+    for least in (400, 1 << 62):
+        monkeypatch.setattr(numpy_flows, "_DENSE", least)
+        runs.append(record(network, Course(5, backend="numpy")).activity.tobytes())
+    assert runs[0] == runs[1]
+
+
 def test_a_matrix_that_only_noise_reads_has_the_weights_of_the_step() -> None:
     network = nv.compile_text("""
 neurovis: 1

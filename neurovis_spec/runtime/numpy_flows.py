@@ -476,17 +476,19 @@ class _Stage:
         of a matrix of weights, which adds in the same order; it has a 0 where there is no connection, which an infinite
         activity must not make NaN."""
         _, staged = apart(port)
-        count, slots = len(part.population.members), port.slots[staged].astype(np.int64)
+        count, slots = len(part.population.members), port.slots[staged]
+        if _row_by_row(taken, slots, count):
+            sent = self.code.select(self.flow.sent, taken[::count], self.flow.taken_count)
+            return f"einsum('st,s->t', {weights}.reshape({(len(taken) // count, count)}), {sent})"
+        slots = slots.astype(np.int64)
         rows, row = np.unique(taken, return_inverse=True)
         flat, size = row * count + slots, len(rows) * count
         one_by_one = accumulated(self.step, part.population, port, staged, signals)
         in_order = np.argsort(slots, kind="stable")
         ascends = np.diff(flat[in_order])[np.diff(slots[in_order]) == 0] > 0
-        if not ascends.all() or 2 * len(flat) < size:
+        if count == 1 or not ascends.all() or 2 * len(flat) < size:
             return one_by_one
         sent, shape = self.code.select(self.flow.sent, rows, self.flow.taken_count), (len(rows), count)
-        if np.array_equal(flat, np.arange(size)):
-            return f"einsum('st,s->t', {weights}.reshape({shape}), {sent})"
         key = part.number, port.name
         if key not in self.flow.matrices:
             matrix = self.flow.matrices[key] = self.code.array("f", np.zeros(shape))
@@ -497,6 +499,15 @@ class _Stage:
                 self.code.before.append(f"    {fill}")
         a = self.code.let("a", sent)
         return f"einsum('st,s->t', {self.flow.matrices[key]}, {a}) if isfinite(dot({a}, {a})) else {one_by_one}"
+
+
+def _row_by_row(taken: Indices, slots: Indices, count: int) -> bool:
+    """Whether connections are a full matrix as they lie: from each of what they take to all of ``count`` neurons. A
+    matrix of one column is none, since a product adds up that in another order."""
+    if count == 1 or len(slots) % count:
+        return False
+    rows = taken[::count].reshape(-1, 1)
+    return bool((slots.reshape(-1, count) == np.arange(count)).all() and (taken.reshape(-1, count) == rows).all())
 
 
 def _text(place: slice) -> str:
