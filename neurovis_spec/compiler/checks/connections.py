@@ -134,6 +134,10 @@ def _check_no_effect(entry: WrittenEntry, findings: Findings) -> None:
     if body.self is not None and body.self.value and bundles and all(bundle.ends_disjoint for bundle in bundles):
         message = "'self: true' changes nothing: no neuron is in both ends of this connection"
         findings.warning("no-effect", body.self.span, message, "remove it")
+    synapse = next((bundle.synapse.definition for bundle in bundles if bundle.synapse and not bundle.rules), None)
+    if body.weight is not None and synapse is not None and "weight" not in synapse.read:
+        message = f"the synapse '{synapse.name}' does not read 'weight': what arrives does not depend on it"
+        findings.warning("no-effect", body.weight.span, message, "let its signal read it, or leave it out")
     scale = body.scale
     if scale is not None and scale.indegree is not None and not scale.indegree.value:
         findings.warning("no-effect", scale.indegree.span, "'indegree: false' scales nothing", "remove it")
