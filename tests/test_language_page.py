@@ -183,6 +183,12 @@ def test_the_coupled_oscillators_keep_one_time() -> None:
     assert (together[-1, 1] - together[-1, 0]) % 1 * 2 * np.pi == pytest.approx(0.7, abs=0.05)
 
 
+def test_the_three_cells_settle_where_the_page_says() -> None:
+    run = nv.compile_text(example("three_cells")).run()
+    assert [run[cell][-1] for cell in "ABC"] == pytest.approx([-52.5, -57.5, -62.3], abs=0.05)
+    assert 1 / (1 + np.exp((-52 - run["A"][-1]) / 2)) == pytest.approx(0.44, abs=0.005)
+
+
 def test_the_noise_has_the_deviation_that_the_page_says() -> None:
     assert round(float(nv.compile_text(example("noise")).run()["X"][250:].std()), 2) == 2.01
 
