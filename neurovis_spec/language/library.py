@@ -363,6 +363,10 @@ class SynapseModel(TimedModel):
     """A synapse of one's own: what a connection brings to its port."""
 
     BARE: ClassVar[str] = "signal"
+    ELSEWHERE: ClassVar[AnyMapping[str, str]] = {
+        **dict.fromkeys(("output", "current", "value", "equation", "psc"), "signal"),
+        **dict.fromkeys(("states", "variables"), "state"),
+    }
 
     parameters: Annotated[Named[ParameterField], LOCAL] = Field(default_factory=dict, description="Names and defaults.")
     let: Annotated[Named[Annotated[FormulaField, IN_SYNAPSE]], LOCAL] = Field(

@@ -153,6 +153,8 @@ def name_hint(name: str) -> str:
     >>> name_hint("left-leg"), name_hint("2nd")[:16]
     ("did you mean 'left_leg'?", 'a name is a lett')
     """
+    if "->" in name:
+        return "a connection stands under 'connections'"
     seen = in_ascii(name)
     if seen == name:  # with blanks or signs within it
         seen = _PARTING.sub("_", name)

@@ -15,7 +15,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.settable import Assembled, Dependent, ParameterFormula, Part, Subset
 from neurovis_spec.compiler.limits import PATIENCE, plural
-from neurovis_spec.compiler.program import Definition, Kind
+from neurovis_spec.compiler.program import RULE, SYNAPSE, Definition, Kind
 from neurovis_spec.compiler.values.constants import Constants, Randomness, Value, value_of
 from neurovis_spec.compiler.values.definitions import Default, Defined, Definitions, check_bounds
 from neurovis_spec.compiler.values.draws import Stream
@@ -42,6 +42,8 @@ _ELSEWHERE: Final[Mapping[str, str]] = {
     **dict.fromkeys(("ctrnn", "leaky_integrate"), "leaky_integrator"),
     **dict.fromkeys(("hebb", "hebbs"), "hebbian"),
 }
+#: Under which keys connections have definitions.
+_AT_CONNECTIONS: Final[Mapping[Kind, str]] = {RULE: "plasticity", SYNAPSE: "synapse"}
 #: Values of a list that are checked where it is not known how many there should be.
 _MOST_CHECKED = 1000
 
@@ -87,7 +89,7 @@ def settled_of(
     choice: Choice, kind: Kind, definitions: Definitions, constants: Constants, each: Each, n: int | Unknown
 ) -> Settled | Unknown:
     """The definition that a choice names, with its settings for ``each`` of n; UNKNOWN where there is none."""
-    defined = _named_definition(choice, definitions.of(kind), kind, constants.findings)
+    defined = _named_definition(choice, definitions, kind, constants.findings)
     if defined is UNKNOWN:
         check_settings(choice, constants, each.names)
         return UNKNOWN
@@ -103,10 +105,10 @@ def settled_of(
     return Settled(definition, values, named, entries)
 
 
-def _named_definition(choice: Choice, known: Names[Defined], kind: Kind, findings: Findings) -> Defined | Unknown:
+def _named_definition(choice: Choice, definitions: Definitions, kind: Kind, findings: Findings) -> Defined | Unknown:
     """The definition that a choice names; an unknown name is answered with the nearest ones, and taken for the one that
     it can only be meant for."""
-    name, what = choice.name, kind.name
+    name, what, known = choice.name, kind.name, definitions.of(kind)
     found = known.get(name.value)
     if found is None:
         right = None if findings.many else meant(name.value, known)
@@ -114,6 +116,9 @@ def _named_definition(choice: Choice, known: Names[Defined], kind: Kind, finding
         lost = Undeclared(name.value, Home((), (kind.section,)))
         elsewhere = _ELSEWHERE.get(name.value.casefold(), "")
         hint: Hint = did_you_mean([elsewhere]) if elsewhere in known else partial(suggest, name.value, known, "known")
+        for other, key in _AT_CONNECTIONS.items():
+            if kind in _AT_CONNECTIONS and name.value in definitions.of(other).known():
+                hint = f"'{name.value}' is a {other.name}: write {key}: {name.value}"
         findings.error(f"unknown-{what}", name.span, message, hint, undeclared=lost)
         found = UNKNOWN if right is None else known[right]
     return found

@@ -53,6 +53,8 @@ V = TypeVar("V")
 ALWAYS = (*CONSTANTS, "dt")
 #: A number before a unit: ``10*ms``.
 _FACTOR = re.compile(r"((?:^\s*[+-])?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*\*\s*$")
+#: What other languages write for what is at an end of a connection: ``v_pre``.
+_END_BEHIND = re.compile(r"(\w+)_(pre|post)", re.ASCII)
 #: A number this close to an integer is that integer.
 NEAR_INTEGER = 1e-9
 _NOT_FINITE = "look for a division by zero, an overflow, or a root or logarithm of a negative number"
@@ -143,7 +145,9 @@ def parse_formula(
     for name, start, end in used:
         few = () if findings.many else known
         message, hint = _unknown(name, few, functions or {}, sight.what)
-        if name in sight.later:
+        if sight.ends and (meant := _END_BEHIND.fullmatch(name)):
+            hint = f"what '{meant[1]}' is at an end of a connection is written {meant[2]}.{meant[1]}"
+        elif name in sight.later:
             message, hint = f"'{name}' comes later", "a parameter sees those that are declared before it"
         elif name in sight.outside.names:
             hint = sight.outside.hint.format(name)
