@@ -222,19 +222,26 @@ def _of_role(role: Role | None, scope: Scope, path: Path, front: str, index: Ind
         case "field":
             of = index.values.get((*path[:-1], "type"))
             yield from (_Offer(name, "word") for name in (() if of is None else numbers_of(of.text)))
-        case "names" if role.kind == "input":
+        case "names":
+            yield from _names(role, scope, path, index)
+
+
+def _names(role: Role, scope: Scope, path: Path, index: Index) -> Iterator[_Offer]:
+    """The names of what is declared elsewhere."""
+    match role.kind:
+        case "input":
             module = _owner(path, scope, index)
             yield from (_Offer(name.text, "input") for name in index.declared("input", module))
             if "instances" not in path:
                 yield from _inner_inputs(module, index)
-        case "names" if role.kind == "parameter":
+        case "parameter":
             module = _owner(path, scope, index)
             yield from _parameters(index.declared("parameter", module), index)
-        case "names" if role.kind == "module":
+        case "module":
             yield from _modules(index)
-        case "names" if role.kind == "output":
+        case "output":
             yield from (_Offer(name.text, "word", "output") for name in index.declared("output"))
-        case "names" if role.kind == "local" and scope.definition is not None:
+        case "local" if scope.definition is not None:
             own = ((name.text, str(name.item.path[2])) for name in index.locals(*scope.definition))
             sent = ((name, section) for name, section in own if section in ("state", "outputs"))
             yield from (_Offer(name, "local", section) for name, section in (*sent, ("activity", "")))
