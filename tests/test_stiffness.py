@@ -29,7 +29,7 @@ def test_a_cell_is_too_stiff_within_its_spike_alone() -> None:
     assert stiffest_of_run(made.network, 10) is None
     worst = stiffest_of_run(made.network, 300)
     assert worst is not None
-    assert (worst.neuron, worst.state) == ("A", "v")
+    assert (worst.owner, worst.state) == ("A", "v")
     assert worst.step is not None
     assert 10 < worst.step < 60
 

@@ -6,19 +6,21 @@ In: a Network, how the derivative of a state changes with it. Out: whether the s
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray
-from neurovis_spec.compiler.flows import jacobian, with_slope
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.flows import jacobian, slope_by, with_slope
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.neurons.initial_states import beginning
-from neurovis_spec.compiler.program import Population, Port
+from neurovis_spec.compiler.neurons.initial_states import Beginning, beginning, initial_states
+from neurovis_spec.compiler.program import MODEL, SYNAPSE, Definition, EndName, Population, Port, Projection
 from neurovis_spec.language.expressions.evaluate import Value
-from neurovis_spec.language.expressions.tree import ExpressionError
+from neurovis_spec.language.expressions.functions import CONSTANTS
+from neurovis_spec.language.expressions.tree import ExpressionError, Name, Tree
 from neurovis_spec.language.units import TIMES
 from neurovis_spec.language.words import Method
 
@@ -33,10 +35,10 @@ def limit_of(network: Network) -> float | None:
 
 
 class Stiffest(NamedTuple):
-    """The state that decays fastest: the neuron, the state, how fast, per second, and at which step; None before the
-    first one."""
+    """The state that decays fastest: the neuron or the connection, the state, how fast, per second, and at which step;
+    None before the first one."""
 
-    neuron: str
+    owner: str
     state: str
     slope: float
     step: int | None = None
@@ -53,7 +55,7 @@ class Stiffest(NamedTuple):
         assert by is not None
         reached = network.dt / by.substeps * self.slope
         most = _shown(limit / self.slope * by.substeps, network.dt_unit)
-        where = f"'{self.neuron}'" + ("" if self.step is None else f" at step {self.step}")
+        where = f"'{self.owner}'" + ("" if self.step is None else f" at step {self.step}")
         message = f"dt·∂{self.state}'/∂{self.state} is {reached:.3g} at {where}; the limit of {by.method} is {limit:g}"
         return message, f"take a dt of at most {most}, or integrate: exponential"
 
@@ -67,27 +69,116 @@ def stiffest_at_begin(network: Network) -> Stiffest | None:
 
 
 def _slopes(network: Network) -> Iterator[Stiffest]:
-    """For each flow state how its derivative changes with it where a run begins, at the neuron where that is least.
-    What arrives is taken for nothing but the bias."""
-    for population in network.populations:
+    """For each flow state how its derivative changes with it where a run begins, at the neuron or the connection where
+    that is least. What arrives is taken for nothing but the bias; how much a synapse gives way to its target counts."""
+    joined = [one for one in network.projections if one.kind == SYNAPSE or one.use.definition.flows]
+    at_ends = _at_ends(network) if joined else np.zeros(0)
+    connected = [_Connected(one, _begun_at(network, one, at_ends)) for one in joined]
+    for population in (one for one in network.populations if one.model.definition.flows):
         model = population.model.definition
-        if not model.flows:
-            continue
-        try:
-            slopes, activation = jacobian(model), with_slope(population.activation.definition)
-        except ExpressionError:
-            continue  # it is too long to be told anything of
-        ports: dict[str, Value] = {port.name: _resting(network, population, port) for port in population.ports}
-        sloped = replace(population, activation=replace(population.activation, definition=activation))
-        begin = beginning(sloped, network.dt, network.neurons.starts, ports)
-        for name, tree in slopes.let:
-            begin.values[name] = begin.of(tree)
-        for state, tree in slopes.diagonal.items():
-            found = np.broadcast_to(begin.of(tree), population.members.shape)
-            if np.isfinite(found).any():
-                place = int(np.nanargmin(np.where(np.isfinite(found), found, np.nan)))
-                neuron = network.neurons.names[population.members[place]]
-                yield Stiffest(neuron, state, float(found[place]) * model.per_second)
+        with suppress(ExpressionError):  # where it is too long to be told anything of
+            slopes = jacobian(model)
+            begin = _with(_begun(network, population), slopes.let)
+            for state, tree in slopes.diagonal.items():
+                found = np.asarray(begin.of(tree)) + _giving_way(population, state, begin, connected)
+                yield from _least(found, state, model, population.members, network.neurons.names)
+    for projection, begin in connected:
+        made = projection.use.definition
+        with suppress(ExpressionError):
+            slopes = jacobian(made)
+            for state, tree in slopes.diagonal.items():
+                own = _with(begin, slopes.let).of(tree)
+                yield from _least(own, state, made, projection.members, network.connection_names)
+
+
+def _least(
+    slopes: Value, state: str, definition: Definition, members: IntArray, names: Sequence[str]
+) -> Iterator[Stiffest]:
+    """Where the slope of a state is least, of those that are finite."""
+    found = np.broadcast_to(slopes, members.shape)
+    if np.isfinite(found).any():
+        place = int(np.nanargmin(np.where(np.isfinite(found), found, np.nan)))
+        yield Stiffest(names[members[place]], state, float(found[place]) * definition.per_second)
+
+
+def _begun(network: Network, population: Population) -> Beginning:
+    """What formulas of a model see where a run begins, and may call, the derivative of the activation among it. Raises
+    ExpressionError."""
+    ports: dict[str, Value] = {port.name: _resting(network, population, port) for port in population.ports}
+    if population.model.definition.flows:
+        activation = with_slope(population.activation.definition)
+        population = replace(population, activation=replace(population.activation, definition=activation))
+    return beginning(population, network.dt, network.neurons.starts, ports)
+
+
+def _with(begin: Beginning, let: Iterable[tuple[str, Tree]]) -> Beginning:
+    """The same with further intermediate values."""
+    for name, tree in let:
+        begin.values[name] = begin.of(tree)
+    return begin
+
+
+def _at_ends(network: Network) -> FloatArray:
+    """What begins where the ends of connections are read: the activities of all neurons, then the outlets; NaN where
+    too much is written for anything to be told."""
+    n = len(network.neurons)
+    result = np.full(n + network.outlet_count, np.nan)
+    for number, population in enumerate(network.populations):
+        given = {one.name: one.each_step for one in population.model.definition.gives}
+        outlets = [one for one in network.outlets if one.population == number]
+        places = {one.name: n + one.start + np.arange(len(population.members)) for one in outlets}
+        with suppress(ExpressionError):
+            begin = _begun(network, population)
+            for name, where in {MODEL.gives: population.members, **places}.items():
+                result[where] = begin.of(given.get(name) or Name(name))
+    return result
+
+
+class _Connected(NamedTuple):
+    """A projection, and what its formulas see where a run begins."""
+
+    projection: Projection
+    begin: Beginning
+
+
+def _begun_at(network: Network, projection: Projection, at_ends: FloatArray) -> Beginning:
+    """What formulas of a synapse or a rule see where a run begins; of ``pre`` as if it had no delay. Nothing is known
+    of signals."""
+    use, members, connections = projection.use, projection.members, network.connections
+    definition = use.definition
+    sent = connections.sources[members] if network.sending is None else network.sending[members]
+    values: dict[str, Value] = {**CONSTANTS, "dt": network.dt * definition.per_second, "t": 0.0, "k": 0.0}
+    values |= dict.fromkeys(definition.signals, np.nan)
+    values |= {"pre": at_ends[sent], "sent": at_ends[sent], "post": at_ends[connections.targets[members]]}
+    values |= {name: at_ends[places] for name, places in projection.ends.items()}
+    values |= {"weight": connections.weights[members], "centre": connections.centres[members], **use.parameters}
+    values |= initial_states(use, members, network.dt)
+    return _with(Beginning(values, {}), definition.let)
+
+
+def _giving_way(population: Population, state: str, begin: Beginning, connected: Iterable[_Connected]) -> FloatArray:
+    """How much the derivative of a state changes with it through synapses that read it at their target, and ports that
+    are sums."""
+    model, result = population.model.definition, np.zeros(len(population.members))
+    derivative = next(one.derivative for one in model.flows if one.name == state)
+    for port in (one for one in population.ports if one.combine == "sum"):
+        brought = np.zeros(len(population.members))
+        for projection, seen in connected:
+            made, text = projection.use.definition, EndName("post", state).text
+            inside = np.isin(port.incoming, projection.members)
+            if made.kind != SYNAPSE or text not in projection.ends or not inside.any():
+                continue
+            assert made.given.each_step is not None
+            back = slope_by(made, made.given.each_step, text)
+            slopes = np.broadcast_to(_with(seen, back.let).of(back.tree), projection.members.shape)
+            factors = 1.0 if port.factors is None else port.factors[inside]
+            places = np.searchsorted(projection.members, port.incoming[inside])
+            np.add.at(brought, port.slots[inside], slopes[places] * factors)
+        if brought.any():
+            assert derivative is not None
+            by_port = slope_by(model, derivative, port.name)
+            result += _with(begin, by_port.let).of(by_port.tree) * brought
+    return result
 
 
 def _resting(network: Network, population: Population, port: Port) -> FloatArray:
