@@ -234,6 +234,61 @@ def test_jansen_rit() -> None:
     assert np.abs(found - expected).max() / finer > 13
 
 
+FITZHUGH_NAGUMO = """
+time: {dt: 0.05}
+models:
+  fitzhugh_nagumo:
+    parameters: {a: 0.7, b: 0.8, eps: 0.08}
+    state: {v: {derivative: v - v^3/3 - w + drive}, w: {derivative: eps*(v + a - b*w)}}
+    activity: v
+synapses: {gap_junction: {signal: weight*(pre.v - post.v), sign: 0}}
+neurons: {N: {count: 10, model: fitzhugh_nagumo, bias: 0.5, initial: {v: sin(i), w: 0.1*i}}}
+connections:
+  N -> N: {weight: 0.2, pattern: {band: {width: 1}}, synapse: gap_junction}
+  N1 -> N10: {weight: 0.2, synapse: gap_junction}
+  N10 -> N1: {weight: 0.2, synapse: gap_junction}
+"""
+
+
+def test_a_ring_of_fitzhugh_and_nagumo_with_gap_junctions() -> None:
+    """Ten cells (1961), each joined to its neighbours."""
+
+    def ring(t: float, x: FloatArray) -> FloatArray:
+        v, w = x[:10], x[10:]
+        joined = 0.2 * (np.roll(v, 1) - v) + 0.2 * (np.roll(v, -1) - v)
+        return np.concatenate((v - v**3 / 3 - w + 0.5 + joined, 0.08 * (v + 0.7 - 0.8 * w)))
+
+    start = [*np.sin(np.arange(10)).tolist(), *(0.1 * np.arange(10)).tolist()]
+    expected = exact(ring, start, 0.05, 1000)[:, :10]
+    assert np.abs(run(FITZHUGH_NAGUMO, 1000) - expected).max() < 1.9e-6
+    assert np.ptp(expected[500:]) > 3  # they fire
+
+
+KURAMOTO = """
+time: {dt: 0.0125}
+models:
+  phase: {parameters: {omega: 1}, state: {theta: {derivative: omega + drive}}, activity: theta}
+synapses: {pull: {parameters: {lag: 0}, signal: weight*sin(pre.theta - post.theta - lag)}}
+neurons: {N: {count: 20, model: {phase: {omega: 1 + 0.05*i}}, initial: {theta: 0.3*i*i}}}
+connections: {N -> N: {weight: 1/20, pattern: all_to_all, synapse: {pull: {lag: 0.3}}}}
+"""
+
+
+def test_oscillators_of_kuramoto_and_sakaguchi() -> None:
+    """Twenty phases (1986), each pulled by all others with a lag: up to 1.8e2 rad."""
+    omega, others = 1 + 0.05 * np.arange(20), ~np.eye(20, dtype=np.bool_)
+
+    def phases(t: float, theta: FloatArray) -> FloatArray:
+        pulled: FloatArray = np.sin(theta[None, :] - theta[:, None] - 0.3) / 20
+        return omega + pulled.sum(axis=1, where=others)
+
+    start = (0.3 * np.arange(20) ** 2).tolist()
+    expected = exact(phases, start, 0.0125 * 80, 55, rtol=1e-13)
+    found = run(KURAMOTO, 55 * 80)[::80]
+    assert 180 < expected.max() < 190
+    assert np.abs(found - expected).max() < 8e-10
+
+
 def test_the_noise_of_two_hundred_has_the_deviation_of_theory() -> None:
     spec = """
 time: {dt: 0.001, integrate: euler}

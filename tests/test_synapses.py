@@ -1,0 +1,303 @@
+"""Synapses in a run: of what signals are formed, and when; against loops by hand, and solutions in closed form."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+import neurovis_spec as nv
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.runtime.formed import signals_of
+from neurovis_spec.runtime.simulation import Simulation
+
+BACKENDS = ["reference", "numpy"]
+
+
+def network_of(text: str) -> Network:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return nv.compile_text("neurovis: 1\nname: x\n" + text).network
+
+
+def steps(simulation: Simulation, count: int) -> None:
+    for _ in range(count):
+        simulation.step()
+
+
+def cell(simulation: Simulation, kind: str, name: str, number: int = 0) -> FloatArray:
+    """A state or an output of the definition of a kind in use, the ``number``-th of those that have it."""
+    cells = [own[name] for owner, own in simulation.state().cells.items() if owner.kind == kind and name in own]
+    return cells[number]
+
+
+# ---- as the map sees it -------------------------------------------------------------------------------------------
+
+MAPS = """
+time: {episode: 4}
+inputs: {count: {expression: k + 1}}
+models:
+  leaky: {state: {v: {each_step: 0.5*v + drive}}, outputs: {twice: 2*v}, activity: v - 1}
+synapses:
+  trace:
+    state: {u: {initial: 1, each_step: 0.5*u + pre, each_episode: 0.25*u}}
+    signal: weight*u*(10 - post.twice) + sent + 0.5*post
+neurons: {A: {input: count}, B: {model: leaky}}
+connections: {A -> B: {weight: 0.25, synapse: trace, delay: 2}}
+"""
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_signal_is_formed_of_what_was_sent_of_the_target_before_it_is_updated_and_of_new_states(
+    backend: str,
+) -> None:
+    simulation = Simulation(network_of(MAPS), backend)
+    u, v, post = 1.0, 0.0, 0.0
+    twice = 0.0
+    for k in range(10):
+        simulation.step()
+        pre = float(k - 1) if k >= 2 else 0.0  # of two steps ago; nothing was sent before step 0
+        u = 0.5 * u + pre
+        v = 0.5 * v + (0.25 * u * (10 - twice) + (k + 1) + 0.5 * post)
+        twice, post = 2 * v, v - 1
+        if (k + 1) % 4 == 0:
+            u *= 0.25  # behind the signal of the last step
+        assert simulation.activity[1] == pytest.approx(post, rel=1e-15)
+        assert cell(simulation, "synapse", "u")[0] == u
+
+
+BEHIND = """
+time: {dt: 0.1, integrate: euler}
+models:
+  flow: {state: {v: {initial: 1, derivative: -v}}, outputs: {half: v/2}, activity: drive}
+synapses: {seen: {signal: weight*post.v + 10*post.half + 100*pre}}
+neurons: {A: {bias: 1}, B: {model: flow}}
+connections: {A -> B: {weight: 1, synapse: seen, delay: 0}}
+"""
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_what_flows_of_the_target_is_seen_as_it_is_integrated_and_else_as_it_was(backend: str) -> None:
+    simulation = Simulation(network_of(BEHIND), backend)
+    v, half = 1.0, 0.0
+    for k in range(5):
+        simulation.step()
+        v = v + 0.1 * -v if k else v
+        assert simulation.activity[1] == pytest.approx(v + 10 * half + 100, rel=1e-14)
+        half = v / 2
+    simulation.clamp("B.v", 0.25)
+    simulation.step()
+    assert simulation.activity[1] == pytest.approx(0.25 + 10 * half + 100, rel=1e-14)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_state_that_is_held_from_the_start_on_is_seen_so_at_step_0(backend: str) -> None:
+    network = network_of(BEHIND + "events: [{from: 0, clamp: {B.v: 3}}]\n")
+    simulation = Simulation(network, backend)
+    simulation.step()
+    assert simulation.activity[1] == 103.0
+
+
+# ---- at stages ----------------------------------------------------------------------------------------------------
+
+CONDUCTANCE = """
+time: {dt: DT, integrate: METHOD}
+models:
+  cell: {ports: [p], let: {leak: 0.5*(drive - v)}, state: {v: {initial: 0, derivative: 2*leak + p/4}}, activity: v}
+synapses:
+  fixed: {parameters: {E: 1}, let: {open: weight*(E - post.v)}, signal: 2*open}
+neurons: {S: {}, C: {count: 2, model: cell}}
+connections:
+  S -> C1: {weight: 3, synapse: fixed, port: {drive: 1, p: 0.5}}
+  S -> C2: {weight: 1, synapse: {fixed: {E: -2}}, port: p}
+"""
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_the_slope_goes_through_ports_into_the_state_of_the_target(backend: str) -> None:
+    """For what is linear in the state of the target the exponential method is exact, conductances included, however
+    long a step is."""
+    network = network_of(CONDUCTANCE.replace("DT", "0.7").replace("METHOD", "exponential"))
+    simulation = Simulation(network, backend)
+    # v' = (6(1 - v) - v) + 3(1 - v)/4, and v' = -v + 2(-2 - v)/4
+    rates, limits = np.array([7.75, 1.5]), np.array([6.75 / 7.75, -1 / 1.5])
+    for k in range(5):
+        simulation.step()
+        expected = limits * (1 - np.exp(-rates * 0.7 * k))
+        np.testing.assert_allclose(simulation.activity[1:], expected, rtol=1e-12, atol=1e-15)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_semi_implicit_takes_the_same_slope(backend: str) -> None:
+    network = network_of(CONDUCTANCE.replace("DT", "0.7").replace("METHOD", "semi_implicit"))
+    simulation = Simulation(network, backend)
+    steps(simulation, 2)
+    np.testing.assert_allclose(simulation.activity[1:], [0.7 * 6.75 / (1 + 0.7 * 7.75), -0.7 / (1 + 0.7 * 1.5)])
+
+
+STATES = """
+time: {dt: 0.01}
+models:
+  source: {state: {x: {initial: 1, derivative: -x}}, activity: x}
+  target: {state: {v: {initial: 0.5, derivative: drive - v}}, activity: v}
+synapses:
+  low_pass:
+    time: ms
+    parameters: {tau: 500}
+    state: {g: {derivative: (pre.x - g)/tau}, h: {initial: 2, derivative: (post.v - h)/tau}}
+    signal: weight*g + h
+neurons: {A: {model: source}, B: {model: target}}
+connections: {A -> B: {weight: 3, synapse: low_pass}}
+"""
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_states_of_synapses_are_integrated_with_those_of_neurons(backend: str) -> None:
+    """A chain of linear equations: its matrix is exponentiated."""
+    simulation = Simulation(network_of(STATES), backend)
+    steps(simulation, 101)
+    matrix = np.array([[-1, 0, 0, 0], [2, -2, 0, 0], [0, 0, -2, 2], [0, 3, 1, -1.0]])  # x, g, h, v
+    values, vectors = np.linalg.eig(matrix)
+    expected = (vectors @ np.diag(np.exp(values)) @ np.linalg.solve(vectors, np.array([1, 0, 2, 0.5]))).real
+    found = [simulation.activity[0], *(cell(simulation, "synapse", name)[0] for name in "gh"), simulation.activity[1]]
+    np.testing.assert_allclose(found, expected, rtol=1e-7)
+
+
+HELD = """
+time: {dt: 0.1, integrate: euler}
+models: {flow: {state: {v: {initial: INITIAL, derivative: drive}}, activity: v}}
+synapses: {gap: {signal: weight*(pre.v - post.v)}}
+neurons: {A: {model: flow, bias: 1, initial: {v: 4}}, B: {model: flow}}
+connections: {A -> B: {weight: 1, synapse: gap, delay: 2}}
+"""
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_delay_of_steps_holds_what_was_sent_and_of_before_there_is_nothing(backend: str) -> None:
+    simulation = Simulation(network_of(HELD.replace("INITIAL", "0.5")), backend)
+    a, b = [4.0], 0.5
+    for k in range(6):
+        simulation.step()
+        if k:
+            pre = a[k - 2] if k >= 2 else 0.0
+            b += 0.1 * (pre - b)
+            a.append(a[-1] + 0.1)
+        assert simulation.activity.tolist() == pytest.approx([a[-1], b], rel=1e-14)
+
+
+# ---- what events do -----------------------------------------------------------------------------------------------
+
+EVENTS = """
+time: {dt: 0.1, integrate: euler}
+parameters: {E: 1, tau: 2}
+models:
+  source: {parameters: {gain: 1}, state: {x: {initial: 1, derivative: 0.5}}, activity: x}
+  target: {state: {v: {derivative: drive}}, activity: v}
+synapses:
+  s: {parameters: {E: 0}, state: {g: {derivative: pre.x - g}, u: {each_step: u + pre.gain}}, signal: g*(E - post.v) + u}
+neurons: {A: {model: {source: {gain: tau}}}, B: {model: target}}
+connections: {A -> B: {weight: 1, synapse: {s: {E: E}}}}
+"""
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("what", ["A -> B", "A", "B"])
+def test_the_states_of_what_is_lesioned_stay_and_it_brings_nothing(backend: str, what: str) -> None:
+    simulation = Simulation(network_of(EVENTS), backend)
+    steps(simulation, 4)
+    kept = {name: cell(simulation, "synapse", name).copy() for name in "gu"}
+    v = cell(simulation, "model", "v").copy()
+    simulation.lesion(what)
+    for _ in range(3):
+        simulation.step()
+        assert all((cell(simulation, "synapse", name) == values).all() for name, values in kept.items())
+        assert (cell(simulation, "model", "v") == v).all()
+        assert signals_of(simulation.network, simulation.state(), simulation.connection_weights).tolist() == [0.0]
+    simulation.mend(what)
+    simulation.step()
+    assert (cell(simulation, "synapse", "u") == kept["u"] + 2).all()
+    assert cell(simulation, "synapse", "g") != kept["g"]
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_parameters_of_a_synapse_and_of_an_end_of_it_are_set(backend: str) -> None:
+    simulation = Simulation(network_of(EVENTS), backend)
+    x, g, u, v = 1.0, 0.0, 0.0, 0.0
+    settings: dict[int, Mapping[str, float]] = {2: {"E": 3.0}, 4: {"tau": -1.0}}
+    known = {"E": 1.0, "tau": 2.0}
+    for k in range(7):
+        if k in settings:
+            simulation.set(**settings[k])
+            known |= settings[k]
+        simulation.step()
+        if k:
+            x, g, v = x + 0.05, g + 0.1 * (x - g), v + 0.1 * (g * (known["E"] - v) + u)
+            u += known["tau"]
+        assert simulation.activity.tolist() == pytest.approx([x, v], rel=1e-14)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_what_is_held_at_an_end_is_held_at_stages(backend: str) -> None:
+    """The activity of a source, and the state of a target."""
+    network = network_of("""
+time: {dt: 0.5}
+models: {flow: {state: {v: {initial: 1, derivative: drive - v}}, activity: v}}
+synapses: {s: {state: {q: {derivative: pre + 10*post.v}}, signal: "0"}}
+neurons: {A: {model: flow}, B: {model: flow}}
+connections: {A -> B: {synapse: s}}
+""")
+    simulation = Simulation(network, backend)
+    simulation.step()
+    simulation.clamp("A", 2.0)
+    simulation.clamp("B.v", 3.0)
+    simulation.step()
+    assert cell(simulation, "synapse", "q")[0] == pytest.approx(0.5 * 32, rel=1e-15)
+
+
+# ---- pictures -----------------------------------------------------------------------------------------------------
+
+SHOWN = """
+time: {dt: 0.1}
+parameters: {lag: 0.5}
+models:
+  flow: {parameters: {omega: 2}, state: {x: {initial: 0.3, derivative: omega + drive}}, activity: sin(x)}
+synapses:
+  pull:
+    parameters: {lag: 0}
+    let: {between: pre.x - post.x}
+    state: {u: {each_step: u + 0.1}}
+    signal: weight*sin(between - lag) + u + pre.omega + t
+neurons: {A: {count: 2, model: flow}, S: {activation: tanh, bias: 0.3}}
+connections:
+  A -> A: {weight: 0.5, pattern: all_to_all, synapse: {pull: {lag: lag}}, delay: DELAY}
+  S -> A: {weight: 2, pattern: all_to_all, plasticity: {oja: {rate: 0.1}}}
+"""
+
+
+@pytest.mark.parametrize("delay", [0, 1, 2])
+def test_signals_are_those_of_the_end_of_the_step(delay: int) -> None:
+    simulation = Simulation(network_of(SHOWN.replace("DELAY", str(delay))), "numpy")
+    simulation.set(lag=0.25)
+    past: list[FloatArray] = []
+    for k in range(5):
+        weights = simulation.connection_weights.copy()
+        simulation.step()
+        past.append(cell(simulation, "model", "x").copy())
+        x, (s,) = past[-1], simulation.activity[2:]
+        pre = past[k - delay] if k >= delay else np.zeros(2)
+        expected = [
+            0.5 * math.sin(pre[source] - x[target] - 0.25) + cell(simulation, "synapse", "u")[0] + 2 + k * 0.1
+            for source, target in ((1, 0), (0, 1))
+        ]
+        found = signals_of(simulation.network, simulation.state(), weights)
+        by_ends = dict(zip(simulation.network.connection_names, found.tolist(), strict=True))
+        assert [by_ends["A2 -> A1"], by_ends["A1 -> A2"]] == pytest.approx(expected, rel=1e-12)
+        assert [by_ends["S -> A1"], by_ends["S -> A2"]] == pytest.approx([w * s for w in weights[2:]], rel=1e-15)
+    simulation.lesion("A1")
+    simulation.step()
+    found = signals_of(simulation.network, simulation.state(), simulation.connection_weights)
+    assert np.flatnonzero(found).tolist() == [3]
