@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import random
+from itertools import islice
 
 from hypothesis import strategies as st
 from random_specs import Plain, Spec
@@ -151,10 +152,15 @@ def flowing_specs(draw: st.DrawFn, exact: bool = False) -> Spec:
             {"from": 5, "to": 8, "clamp": {f"Ga.{_STATES[kinds['Ga']]}": "level"}},
             {"at": 6, "lesion": [list(kinds)[-1]]},
             {"at": 9, "mend": [list(kinds)[-1]]},
-            *({"at": at, what: [chosen]} for chosen in [*connections][:1] for at, what in ((2, "lesion"), (7, "mend"))),
+            *_loss(connections),
         ],
     }  # fmt: skip
     return _without_functions(spec) if exact else spec
+
+
+def _loss(connections: dict[str, Plain]) -> list[Plain]:
+    """The events by which the first connection is lesioned for a while."""
+    return [{"at": at, what: [first]} for first in islice(connections, 1) for at, what in ((2, "lesion"), (7, "mend"))]
 
 
 def _without_functions(spec: Spec) -> Spec:

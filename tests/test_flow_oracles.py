@@ -280,7 +280,8 @@ def test_oscillators_of_kuramoto_and_sakaguchi() -> None:
 
     def phases(t: float, theta: FloatArray) -> FloatArray:
         pulled: FloatArray = np.sin(theta[None, :] - theta[:, None] - 0.3) / 20
-        return omega + pulled.sum(axis=1, where=others)
+        found: FloatArray = omega + pulled.sum(axis=1, where=others)
+        return found
 
     start = (0.3 * np.arange(20) ** 2).tolist()
     expected = exact(phases, start, 0.0125 * 80, 55, rtol=1e-13)

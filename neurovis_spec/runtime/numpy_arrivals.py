@@ -167,10 +167,10 @@ def before_update(step: Step, number: int) -> str:
     """The signals of synapses before their targets are updated."""
     if number not in step.formed:
         code, (projection, some) = step.code, step.working(number)
-        known = code.parameters(projection.use, some) | seen_before_update(step, projection)
+        formulas = signal_of(projection)
+        known = code.parameters(projection.use, some) | seen_before_update(step, projection, formulas.names)
         for one in projection.use.definition.state:
             known[one.name] = cell_of(code, projection, one.name, some)
-        formulas = signal_of(projection)
         for name, tree in formulas.let:
             known[name] = code.let("m", code.expression(tree, known))
         ((_, tree),) = formulas.trees
@@ -184,29 +184,28 @@ def cell_of(code: Code, projection: Projection, state: str, some: IntArray | Non
     return cell if some is None else f"{cell}[{code.constant(some)}]"
 
 
-def seen_before_update(step: Step, projection: Projection) -> dict[str, str]:
-    """What synapses see before their targets are updated: weights, and both ends, of these the states that flow as they
-    are behind the integration."""
+def seen_before_update(step: Step, projection: Projection, read: Collection[str]) -> dict[str, str]:
+    """What synapses see before their targets are updated, as far as it is ``read``: weights, and both ends, of these
+    the states that flow as they are behind the integration."""
     code, network = step.code, step.network
     number, states = target_of(network, projection), behind_flow(network, projection)
-    target = network.populations[number]
-    if states:
-        code.line(f"if fixed: hold_cells(fixed, {code.constant(target.model.owner)}, cells)")
+    target, seen = network.populations[number], dict[str, str]()
     at = np.searchsorted(target.members, network.connections.targets[projection.members])
-    seen = {
-        name: code.let("a", code.select(code.state(target.model, state), at, len(target.members), broadcast=True))
-        for name, state in states.items()
-    }
+    for name in (one for one in states if one in read):
+        if not seen:
+            code.line(f"if fixed: hold_cells(fixed, {code.constant(target.model.owner)}, cells)")
+        cells = code.state(target.model, states[name])
+        seen[name] = code.let("a", code.select(cells, at, len(target.members), broadcast=True))
     seen["weight"] = code.select("weights", projection.members, len(network.connections))
-    return seen | ends_at(step, projection, seen)
+    return seen | ends_at(step, projection, {one for one in read if one not in seen})
 
 
-def ends_at(step: Step, projection: Projection, known: Collection[str] = ()) -> dict[str, str]:
-    """What the definition of a projection reads of both ends of its connections, but for what is known."""
+def ends_at(step: Step, projection: Projection, read: Collection[str]) -> dict[str, str]:
+    """What the definition of a projection sees of both ends of its connections, as far as it is ``read``."""
     return {
         name: step.code.let("a", end_at(step, projection.members, end))
         for name, end in ends_of(step.network, projection).items()
-        if name not in known
+        if name in read
     }
 
 

@@ -55,7 +55,7 @@ from neurovis_spec.runtime.numpy_arrivals import (
 )
 from neurovis_spec.runtime.numpy_code import FIRST, Cell, Code, emit_change
 from neurovis_spec.runtime.numpy_flows import diffuse, integrate
-from neurovis_spec.runtime.stages import formulas_of, given
+from neurovis_spec.runtime.stages import formulas_of, given, unfolded
 
 
 @singledispatch
@@ -97,7 +97,9 @@ def _receive(operation: Receive, step: Step) -> None:
     definition = replace(projection.use.definition, gives=())  # signals are formed at ports
     if not len(projection.members):
         return
-    seen = code.parameters(projection.use, some) | seen_before_update(step, projection)
+    trees = (tree for one in definition.state for tree in (one.each_step, one.each_episode))
+    read = unfolded(definition.let, trees).names
+    seen = code.parameters(projection.use, some) | seen_before_update(step, projection, read)
     place = "" if some is None else f"[{code.constant(some)}]"
     cells = {
         one.name: Cell(f"{cell}{place}", f"{cell}{place or '[:]'}")
@@ -239,7 +241,7 @@ def _bounded(code: Code, network: Network, projection: Projection, weight: str) 
 def seen_at(step: Step, projection: Projection) -> dict[str, str]:
     """Arrays for pre, sent, post and the signals; only what the definitions read is gathered."""
     code, network = step.code, step.network
-    seen = ends_at(step, projection)
+    seen = ends_at(step, projection, projection.read)
     for signal, indices in projection.signals.items():
         if signal in projection.read:
             seen[signal] = code.let("a", _signal(code, indices, network))
