@@ -176,6 +176,8 @@ class Written:
     packed: int
     #: how many numbers an integration keeps
     work: int
+    #: whether connections share signals
+    shares: bool
 
 
 _written: WeakKeyDictionary[Network, dict[bool, Written]] = WeakKeyDictionary()
@@ -185,7 +187,9 @@ def written(network: Network, own_signals: bool = False) -> Written:
     """The C of a network, for states that share signals or have each connection its own; made once for each."""
     found = _written.setdefault(network, {})
     if own_signals not in found:
-        found[own_signals] = _write(network, signal_layout(network, own_signals))
+        made = found[own_signals] = _write(network, signal_layout(network, own_signals))
+        if not made.shares:  # then each has its own, whoever asks
+            found[True] = made
     return found[own_signals]
 
 
@@ -240,7 +244,9 @@ def _write(network: Network, layout: SignalLayout) -> Written:
         "\n".join(bodies),
     ]
     text = "\n\n".join(part for part in parts if part) + _TAIL
-    return Written(text, tuple(tables.passed_in), whole.count if fused else 0, c_plan.work_size(plan))
+    return Written(
+        text, tuple(tables.passed_in), whole.count if fused else 0, c_plan.work_size(plan), bool(layout.shared)
+    )
 
 
 def _functions(small: bool, watched: bool) -> tuple[_Function, ...]:
@@ -343,7 +349,7 @@ class CStepper:
         self._k, self._form_there = 0, _PLAIN
         self._before = np.zeros(len(network.neurons))
         self._pointers.before = self._before.ctypes.data
-        self._take_code(own_signals=not signal_layout(network).shared)
+        self._take_code(own_signals=not written(network).shares)
         #: the state whose arrays the struct points to, these arrays, and the objects that say what holds in it: where
         #: each is still the same one, nothing has changed
         self._known_state: State | None = None
