@@ -101,6 +101,8 @@ _PHASE: dict[str, Plain] = {"parameters": {"E": 0.3}, "signal": "0.5*weight*sin(
 #: a state of each of these models
 _STATES = {"leaky": "v", "rate": "v", "mixed": "x", "through": "z"}
 BIASES: list[Plain] = [0.2, 0.3, "level"]
+#: three of them are continuous where what is sent flows into a derivative
+DELAYS: list[Plain] = [None, None, None, 0, 1, 3, "0.3 s", "0.1 s", {"seconds": "0.13 + 0.05*i + 0.1*j"}, "i + 2*j"]
 PATTERNS: list[Plain] = ["all_to_all", "all_to_all", {"random": {"probability": 0.6}}]
 EXACT = ["euler", "heun", "rk4", "semi_implicit"]
 METHODS = [*EXACT, "exponential"]
@@ -211,7 +213,7 @@ def _connection(
     body: dict[str, Plain] = {"weight": chooser.choice(["w*(1 + i - j)/3", 0.5, -0.7])}
     if sizes[source] > 1 or sizes[target] > 1:
         body["pattern"] = chooser.choice(PATTERNS)
-    delay = chooser.choice([None, None, 0, 1, 3])
+    delay = chooser.choice(DELAYS)
     if delay is not None:
         body["delay"] = delay
     sent = chooser.choice(SENT[kinds[source]])

@@ -191,14 +191,21 @@ def _as_they_left(
     return bool((alike & (old.weights[one] == state.weights[other])).all())
 
 
+def _as_delayed(network: Network, connections: IntArray) -> FloatArray:
+    """The delays of connections in steps: of continuous ones less than 0, as they are exactly."""
+    delays = network.connections.delays[connections].astype(np.float64)
+    lags = network.connections.lags
+    return delays if lags is None else np.where(np.isnan(lags[connections]), delays, -lags[connections])
+
+
 def _carry_signals(
     was: Network, old: State, network: Network, state: State, connections: tuple[IntArray, IntArray]
 ) -> None:
-    delays = network.connections.delays[connections[1]]
     before, after = signal_layout(was, old.own_signals), signal_layout(network, state.own_signals)
     joined = (before.offsets[connections[0]] < 0) != (after.offsets[connections[1]] < 0)
-    same = (was.connections.delays[connections[0]] == delays) & ~joined
-    one, other, delays = connections[0][same], connections[1][same], delays[same]
+    same = (_as_delayed(was, connections[0]) == _as_delayed(network, connections[1])) & ~joined
+    one, other = connections[0][same], connections[1][same]
+    lengths = after.lengths[other].astype(np.int64)
     shares = after.shares[other]
     if not _as_they_left(old, before, state, after, one[shares], other[shares]):
         have_own_signals(network, state)
@@ -209,8 +216,8 @@ def _carry_signals(
     if own.any():
         parts.append((own, signal_layout(was, own=True).offsets, signals_of_each(was, old)))
     for which, offsets, signals in parts:
-        for delay in np.unique(delays[which]).tolist():
-            some, slots = which & (delays == delay), np.arange(delay)
+        for length in np.unique(lengths[which]).tolist():
+            some, slots = which & (lengths == length), np.arange(length)
             there = signals[offsets[one[some]][:, None] + slots]
             state.signals[after.offsets[other[some]][:, None] + slots] = there
     structure, lost = state.conditions.structure, old.conditions.structure.lost[one[shares]]

@@ -28,6 +28,8 @@ from neurovis_spec.runtime.stages import taken_by
 _FEW = 16
 #: neurons of a dense population whose sums are kept beside each other
 _BESIDE = 4096
+#: the unit in which the length of a ring stands beside a continuous delay
+_LATE = 1 << 20
 #: neurons of any other population whose sums go on beside each other: an addition need not wait for the one before
 _LANES = 8
 
@@ -95,6 +97,7 @@ def incoming_of(network: Network, port: Port, count: int, fusible: bool = True) 
     ``fusible``: whether it may be formed where it arrives."""
     connections, incoming, slots = network.connections, port.incoming, port.slots
     delays, rules = connections.delays.some(incoming), connections.rules.some(incoming)
+    late = connections.lags is not None and not bool(np.isnan(connections.lags[incoming]).all())
     own, ends = np.empty_like(incoming), starts_of(slots, count)
     factors = None if port.factors is None else np.empty_like(port.factors)
     for some, places in sorting(slots, ends):
@@ -103,7 +106,7 @@ def incoming_of(network: Network, port: Port, count: int, fusible: bool = True) 
             factors[places] = port.factors[some]
     degrees = np.diff(ends)
     degree = int(degrees[0]) if (degrees == degrees[0]).all() else -1
-    full = port.combine == "sum" and degree > 1 and 1 < count <= _BESIDE and len(_different(delays)) == 1
+    full = port.combine == "sum" and degree > 1 and 1 < count <= _BESIDE and len(_different(delays)) == 1 and not late
     if full:
         rows, sent = own.reshape(count, degree), taken_by(network)[own].reshape(count, degree)
         regular = rows[0, 0] + np.arange(degree) * count + np.arange(count).reshape(-1, 1)
@@ -112,16 +115,17 @@ def incoming_of(network: Network, port: Port, count: int, fusible: bool = True) 
     if not 0 <= degree <= _FEW:
         beside, read = _in_lanes(ends)
         lanes = beside, read
-    fused = fusible and len(delays) > 0 and bool((delays == 1).all() and (rules < 0).all())
+    fused = fusible and not late and len(delays) > 0 and bool((delays == 1).all() and (rules < 0).all())
     return Incoming(own, ends, degree, fused, full, lanes, factors, port.combine)
 
 
 class Sent(NamedTuple):
     """An array of what connections without delay take, by its name, and where each of all connections (m,) finds it
-    there."""
+    there; and where in ``fl`` what arrives with continuous delays is, −1 for others (None: there are none)."""
 
     array: str
     places: Indices
+    late: Indices | None = None
 
 
 def taken(network: Network, code: Code, connections: Indices, place: Place) -> str:
@@ -149,6 +153,16 @@ def taken_at(network: Network, code: Code, index: Indices, place: Place) -> str:
         at = f"{where} - {parts[name]}" if parts[name] else where
         found = f"{where} < {parts[name] + sizes[name]} ? {name}[{at}] : {found}"
     return f"({found})"
+
+
+def _length(ring: int) -> int:
+    """How long a ring is."""
+    return ring // _LATE or ring
+
+
+def _now(ring: int) -> str:
+    """A step in whose slot of a ring that is which now arrives."""
+    return "k" if ring < _LATE else f"(k + {ring // _LATE - ring % _LATE})"
 
 
 def _different(delays: Indices) -> list[int]:
@@ -365,8 +379,10 @@ class Arrivals:
         2, ``weights[3]*signals[5 + r2]`` where it is shared, and a choice in a loop over connections of which some
         are of one kind and some of another."""
         code = self.code
-        delays = self.delays[column] if not isinstance(edge, int) else self.delays[column][edge : edge + 1]
-        kinds = _different(delays)
+        rings = self.rings[column] if not isinstance(edge, int) else self.rings[column][edge : edge + 1]
+        kinds = _different(rings)
+        if self._sent is not None and self._sent.late is not None:
+            return self._at_stage(self._sent.late[self.connections[column]], edge, column)
         if self.fused:
             end = self.begin + len(self.connections)
             places = np.arange(self.begin, end, dtype=width(0, end))[column]
@@ -379,16 +395,40 @@ class Arrivals:
         if len(kinds) == 1:
             return self._on_arrival(self._slot(kinds[0], self.offsets[column], edge), edge, column)
         offset = code.at(self.offsets[column], edge)
-        kind = code.at(np.searchsorted(kinds, delays).astype(np.int64), edge)
-        rests = "_".join(["r", *map(str, kinds)])
-        shifts = ", ".join("0" if delay < 2 else f"(int32_t)(k % {delay})" for delay in kinds)
+        kind = code.at(np.searchsorted(kinds, rings).astype(np.int64), edge)
+        rests = "_".join(["r", *(str(one) if one < _LATE else "{}of{}".format(*divmod(one, _LATE)) for one in kinds)])
+        shifts = ", ".join("0" if one < 2 else f"(int32_t)({_now(one)} % {_length(one)})" for one in kinds)
         code.head[rests] = f"const int32_t {rests}[{len(kinds)}] = {{{shifts}}};"
         arriving = self._on_arrival(f"signals[{offset} + {rests}[{kind}]]", edge, column)
         return f"({kind} ? {arriving} : {now})" if kinds[0] == 0 else arriving
 
-    def _slot(self, delay: int, offsets: Indices, edge: Place) -> str:
-        """What arrives in this step in the slots of a connection with this delay."""
-        shift = "" if delay == 1 else f" + {self.code.remainder(delay)}"
+    def _at_stage(self, late: Indices, edge: Place, column: slice) -> str:
+        """What a connection brings at a stage: what has come with a continuous delay, else what is sent now."""
+        code = self.code
+        own = late[edge : edge + 1] if isinstance(edge, int) else late
+        arrived = f"fl[{code.at(late, edge)}]"
+        if (own >= 0).all():
+            return arrived
+        now = f"weights[{code.at(self.connections[column], edge)}]*{self.sent(column, edge)}"
+        return f"({code.at(late, edge)} >= 0 ? {arrived} : {now})" if (own >= 0).any() else now
+
+    @cached_property
+    def rings(self) -> Indices:
+        """The delay of each connection; of a continuous one also how long its ring is."""
+        lags = self.network.connections.lags
+        held = None if lags is None else np.isnan(lags[self.connections])
+        if held is None or held.all():
+            return self.delays
+        delays = self.delays.astype(np.int64)
+        return np.where(held, delays, delays + _LATE * self._layout.lengths[self.connections])
+
+    def _slot(self, ring: int, offsets: Indices, edge: Place) -> str:
+        """What arrives in this step in the slots of a connection with such a ring."""
+        shift = "" if ring == 1 else f" + {self.code.remainder(ring)}"
+        if ring >= _LATE:
+            length, delay = divmod(ring, _LATE)
+            shift = f" + r{length}of{delay}"
+            self.code.head[shift[3:]] = f"const int32_t {shift[3:]} = (int32_t)({_now(ring)} % {length});"
         return f"signals[{self.code.at(offsets, edge)}{shift}]"
 
     def _on_arrival(self, sent: str, edge: Place, column: slice) -> str:

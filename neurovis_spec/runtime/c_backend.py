@@ -29,6 +29,7 @@ from neurovis_spec.runtime import c_flows, c_functions, c_library, c_plan
 from neurovis_spec.runtime.backend import Availability, BackendError, Capabilities
 from neurovis_spec.runtime.c_code import Code, Form, Table, Tables, function, state_name, words_of
 from neurovis_spec.runtime.c_step import StepCode, begins_otherwise, incoming_in
+from neurovis_spec.runtime.lags import ring_lengths
 from neurovis_spec.runtime.signals import SignalLayout, signal_layout
 from neurovis_spec.runtime.state import Conditions, Mask, State, Structure
 
@@ -77,7 +78,7 @@ typedef struct {
     const void *const *given;
     double *const *cells;
     double *before, *packed, *work;
-    int64_t k, form;
+    int64_t k, form, fresh;
 } nv_state;
 
 typedef struct {
@@ -283,6 +284,7 @@ def _pointer_lines(network: Network, plan: c_plan.Plan | None) -> dict[str, str]
     lines = {name: f"{kind} *restrict const {name} = p->{name};" for kind, names in kinds for name in names}
     names = [state_name(use.owner, i) for _, use in network.uses for i in range(len(use.definition.kept))]
     lines |= c_plan.pointer_lines(plan, "double", "restrict", "p->work")
+    lines["fresh"] = "const int fresh = (int)p->fresh;"
     return lines | {name: f"double *restrict const {name} = p->cells[{at}];" for at, name in enumerate(names)}
 
 
@@ -309,7 +311,10 @@ _POINTERS: Final = (
 class _State(ctypes.Structure):
     """``nv_state``: where the arrays of a State lie, and those of the stepper."""
 
-    _fields_ = [*((name, ctypes.c_void_p) for name in _POINTERS), ("k", ctypes.c_int64), ("form", ctypes.c_int64)]
+    _fields_ = [
+        *((name, ctypes.c_void_p) for name in _POINTERS),
+        *((name, ctypes.c_int64) for name in ("k", "form", "fresh")),
+    ]
 
 
 class _Course(ctypes.Structure):
@@ -469,6 +474,7 @@ class CStepper:
         pointers.x, pointers.parameters = now.variables.ctypes.data, now.parameters.ctypes.data
         self._cells = _addresses([array for own in state.cells.values() for array in own.values()])
         pointers.cells = ctypes.addressof(self._cells)
+        pointers.fresh = int(not state.continued)
         if now.holds is not self._holds or now.fixed is not self._fixed or now.structure is not self._structure:
             self._take_conditions(now)
         self._known_state = state  # what is kept alive cannot be mistaken for another array at the same address
@@ -482,7 +488,7 @@ class CStepper:
         plain = now.holds is None and now.fixed is None and now.structure.whole
         self._plain_from = 0 if plain else _NEVER
         if plain and now.structure.has_lost:
-            self._plain_from = int((now.structure.lost + self.network.connections.delays.compact()).max())
+            self._plain_from = int((now.structure.lost + ring_lengths(self.network)).max())
         self._held, self._holding = np.zeros(count, dtype=np.uint8), np.zeros(count)
         if now.fixed is not None:
             states = now.held.order >= 0

@@ -34,6 +34,7 @@ from neurovis_spec.runtime.c_settable import ExportError, fixed, formula, write_
 from neurovis_spec.runtime.c_step import StepCode, begins_otherwise, incoming_in, write_input
 from neurovis_spec.runtime.columns import probe_of
 from neurovis_spec.runtime.controls import Controls
+from neurovis_spec.runtime.lags import ring_lengths
 from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.state import NEVER_LOST, Mask, State, by_kind, initial_state, kept_as
 
@@ -314,6 +315,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             for name in ("activity", "weights", "signals", "history", "outlets")
         }
         pointer_lines |= c_plan.pointer_lines(self.plan, real, quick, "state->work")
+        pointer_lines["fresh"] = f"const int fresh = {int(not self.state.continued)};"
         pointer_lines["lesioned"] = f"const unsigned char *{quick} const lesioned = state->lesioned;"
         pointer_lines["x"] = f"{real} *{quick} const x = state->variables;"
         pointer_lines["s"] = f"const {real} *{quick} const s = state->vector;"
@@ -346,7 +348,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             if any(mask.any() for mask in masks):
                 found[name] = "unsigned char", [mask.astype(np.uint8) for mask in masks]
         if any((phase.lost > NEVER_LOST).any() for phase in phases):
-            first = -int(self.network.connections.delays.kept.max())  # nothing is read of before
+            first = -int(ring_lengths(self.network).max())  # nothing is read of before
             found["lost"] = "int64_t", [np.maximum(phase.lost, first) for phase in phases]
         return found
 
@@ -466,9 +468,10 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
 
     def _mend(self, code: Code, mended: Mask) -> None:
         """Nothing is under way on connections that are mended."""
-        delays, offsets = self.network.connections.delays.whole(), signal_layout(self.network, own=True).offsets
-        connections = np.flatnonzero(mended & (delays > 0))
-        slots = [np.arange(offsets[c], offsets[c] + delays[c]) for c in connections.tolist()]
+        layout = signal_layout(self.network, own=True)
+        connections = np.flatnonzero(mended & (layout.lengths > 0))
+        firsts, lengths = layout.offsets[connections].tolist(), layout.lengths[connections].tolist()
+        slots = [np.arange(first, first + length) for first, length in zip(firsts, lengths, strict=True)]
         if slots:
             places = np.concatenate(slots)
             code.line(code.loop("i", len(places)))

@@ -36,9 +36,10 @@ from neurovis_spec.language.expressions.tree import Name
 from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, Sent, taken_at
 from neurovis_spec.runtime.c_code import Place, plus, words_of
+from neurovis_spec.runtime.c_lags import write_arriving
 from neurovis_spec.runtime.c_plan import BEGIN, MIDDLE, STAGES, FlowState, Plan
 from neurovis_spec.runtime.c_step import StepCode, write, write_input
-from neurovis_spec.runtime.stages import INSIDE, Formulas, Part, Taken, formulas_of, given, taken_in_order
+from neurovis_spec.runtime.stages import INSIDE, PARTS, Formulas, Part, Taken, formulas_of, given, taken_in_order
 
 #: What a state changes by in a substep of the length h, by its derivative f and j = ∂f/∂x.
 _CHANGES: Mapping[Method, str] = {
@@ -137,7 +138,7 @@ class _Integration:
         def begins(place: Place) -> Value:
             return start if held is None else f"fh[{plus(held, place)}]"
 
-        arrivals = self.arrivals(anew, begins, Sent("fo", self.plan.takes))
+        arrivals = self.arrivals(anew, begins, self.plan.sent)
         arrivals.finished = held is None or len(anew.connections) > 0  # else what is held is
         return arrivals
 
@@ -146,10 +147,10 @@ class _Integration:
     def substep(self, h: float) -> None:
         """A substep of so many seconds."""
         code, stages = self.code, STAGES[self.method]
-        times = [self.time(one, h) for one in stages]
+        times, shares = ([made(one, h) for one in stages] for made in (self.time, self.share))
         if len(stages) == 1:
             with code.block(""):
-                self.stage(times[0], "sub == 0")
+                self.stage(times[0], shares[0], "sub == 0")
                 if self.method in _CHANGES:
                     self.changes(_CHANGES[self.method])
                 else:
@@ -157,11 +158,7 @@ class _Integration:
             return
         code.line(f"memcpy(fy, fx, {sum(one.size for one in self.plan.states)}*sizeof(fx[0]));")
         with code.block(code.loop("stage", len(stages))):
-            at = times[-1]
-            for number in range(len(stages) - 2, -1, -1):
-                if times[number] != times[number + 1]:
-                    at = f"stage <= {number} ? {times[number]} : {at}"
-            self.stage(at, "sub == 0 && stage == 0")
+            self.stage(_by_stage(times), _by_stage(shares), "sub == 0 && stage == 0")
             if self.method == "heun":
                 self.heun()
             else:
@@ -173,6 +170,13 @@ class _Integration:
         if when == BEGIN:
             return f"since + {inside}"
         return f"since + {code.text(h / 2.0)}" if when == MIDDLE else f"since + {code.text(h)} - {inside}"
+
+    def share(self, when: int, h: float) -> str:
+        """Which share of the step is over at a stage."""
+        code, part = self.code, PARTS[when]
+        if self.substeps == 1:
+            return code.text(part)
+        return f"(({code.real})sub + {code.text(part)})/{code.text(float(self.substeps))}"
 
     def changes(self, formula_: str) -> None:
         """x + the change; of all neurons state by state, since a branch within exprel then goes the same way in all."""
@@ -216,10 +220,12 @@ class _Integration:
         """h, a substep in units of which a second has so many."""
         return self.network.dt * per_second / self.substeps
 
-    def stage(self, at: str, first: str) -> None:
-        """The derivatives at a time, which has this code. Where ``first`` holds it is the first one of the step."""
+    def stage(self, at: str, share: str, first: str) -> None:
+        """The derivatives at a time, which has this code, and at which this share of the step is over. Where ``first``
+        holds it is the first one of the step."""
         with ExitStack() as clocks:
             clocks.enter_context(self.where_read("ts", at))
+            clocks.enter_context(self.where_read("share", share))
             for unit in sorted({one.use.definition.per_second for one in self.plan.states} - {1.0}):
                 clocks.enter_context(self.where_read(_clock(unit), f"ts*{self.code.text(unit)}"))
             self.derivatives(first)
@@ -227,6 +233,8 @@ class _Integration:
     def derivatives(self, first: str) -> None:
         """The inputs of a stage, what connections take at it, the derivatives."""
         self.inputs()
+        if self.step.lags is not None and len(self.plan.lagging):
+            write_arriving(self.step, self.step.lags, self.plan.lagging)
         parts = self.plan.of_stage
         for part, one in taken_in_order(parts):
             with self.unless_there(part, one, first):
@@ -345,6 +353,15 @@ class _Integration:
         for name, tree in part.spread.trees:
             value = self.code.text(self.code.value(tree, known, functions))
             self.code.line(f"fg[{plus(self.plan.starts[part.number, name], place)}] = {value};")
+
+
+def _by_stage(values: Sequence[str]) -> str:
+    """Of the codes of a value at each stage that of the stage."""
+    at = values[-1]
+    for number in range(len(values) - 2, -1, -1):
+        if values[number] != values[number + 1]:
+            at = f"stage <= {number} ? {values[number]} : {at}"
+    return at
 
 
 def _clock(per_second: float) -> str:

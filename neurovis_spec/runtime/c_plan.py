@@ -8,6 +8,7 @@ the ports that a stage reads, and what connections take there. The parts are
     fk  their derivatives there                            fv  the inputs and the noise of the step, inputs that are
     fj  how much these change with their own states            expressions as they are at a stage
     fs  sums of derivatives, over stages                   fg  what their noise is multiplied by
+    fl  what arrives at a stage with continuous delays
 """
 
 from __future__ import annotations
@@ -18,12 +19,15 @@ from functools import cached_property
 from itertools import chain
 from typing import NamedTuple
 
+import numpy as np
+
 from neurovis_spec.arrays import Indices, IntArray, width
 from neurovis_spec.compiler.flows import BY_SLOPE
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Diffuse, Integrate, Port, Use
 from neurovis_spec.language.words import Method
-from neurovis_spec.runtime.c_arrivals import Incoming, incoming_of
+from neurovis_spec.runtime.c_arrivals import Incoming, Sent, incoming_of
+from neurovis_spec.runtime.lags import lags_of
 from neurovis_spec.runtime.stages import Part, Taken, apart, parts_of, places_among_taken, taken_by, unfolded
 
 #: Of a substep of the length 1, when the stages of a method are: just behind the beginning, in the middle, just before
@@ -141,6 +145,23 @@ class Plan:
         """Where what each connection takes (m,) stands among that; −1 for none."""
         return self.places.astype(width(-1, len(self.places)))[taken_by(self.network)]
 
+    @cached_property
+    def lagging(self) -> Indices:
+        """The connections whose signals arrive at a stage with a continuous delay, ascending."""
+        lags, synapses = lags_of(self.network), self.network.synapses
+        anew = [one.anew.connections for one in self.reaching.values()]
+        found = np.unique(np.concatenate(anew)) if anew and lags is not None else np.zeros(0, dtype=np.int64)
+        return found if lags is None else found[lags.there[found] & (synapses.numbers[found] < 0)]
+
+    @cached_property
+    def sent(self) -> Sent:
+        """What connections bring at a stage."""
+        late = None
+        if len(self.lagging):
+            late = np.full(len(self.network.connections), -1, dtype=np.int64)
+            late[self.lagging] = np.arange(len(self.lagging))
+        return Sent("fo", self.takes, late)
+
     def lasts(self, part: Part, one: Taken) -> bool:
         """Whether what connections take at the first stage of a step is what was made at the end of the step before, if
         nothing has come between: it is made of states and parameters alone, and no episode's end changes these behind
@@ -165,6 +186,7 @@ class Plan:
             "fh": sum(len(self.network.populations[number].members) for number, _ in self.held),
             "fo": int(self.places.max(initial=-1)) + 1,
             "fv": self.network.vector_size if self.network.held_inputs else 0,
+            "fl": len(self.lagging),
         }
         starts, start = dict[str, int](), 0
         for name, size in sizes.items():

@@ -47,9 +47,10 @@ from neurovis_spec.language.expressions.tree import Name, Tree, names
 from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, incoming_of, taken, taken_at
 from neurovis_spec.runtime.c_code import Code, Form, Place, plus, state_name
 from neurovis_spec.runtime.c_plan import Plan
+from neurovis_spec.runtime.lags import Lags, lags_of
 from neurovis_spec.runtime.presynaptic import history_depth
-from neurovis_spec.runtime.signals import SharedSlots, SignalLayout
-from neurovis_spec.runtime.stages import unfolded
+from neurovis_spec.runtime.signals import DelayClass, SharedSlots, SignalLayout
+from neurovis_spec.runtime.stages import taken_by, unfolded
 from neurovis_spec.runtime.state import Mask
 
 _NONE: Mapping[str, Made] = {}
@@ -73,7 +74,7 @@ class StepCode:
         plan: Plan | None,
     ) -> None:
         self.network, self.code, self.form, self.layout, self.plan = network, code, form, layout, plan
-        self.depth = history_depth(network)
+        self.depth, self.lags = history_depth(network), lags_of(network)
         #: what ports have beside what arrives, by their names
         self.own = {name: _own(network, name) for name in network.port_names}
         #: the names that are read when a population is updated
@@ -91,6 +92,7 @@ class StepCode:
             number
             for number in (one.projection for one in learn if one.phases == PHASES)
             if _common_delay(network.connections.delays[network.projections[number].members]) > 0
+            and not (self.lags is not None and self.lags.there[network.projections[number].members].any())
         )
         for arrivals in chain(*self.arrivals):
             if arrivals.can_be_fused:
@@ -434,12 +436,22 @@ class StepCode:
         self.leave(which)
         for slots in self.layout.shared:
             self.store_each(len(slots.sent), partial(self.sharing, slots))
+        for one in (*self.layout.classes, *self.layout.shared):
+            self.fill(one)
         if self.depth:
             n, beside = len(self.network.neurons), self.network.outlet_count
             row = f"(size_t)(k % {self.depth})*{n + beside}"
             code.line(f"memcpy(history + {row}, activity, {n}*sizeof(activity[0]));")
             if beside:
                 code.line(f"memcpy(history + {row} + {n}, outlets, {beside}*sizeof(outlets[0]));")
+
+    def fill(self, slots: DelayClass | SharedSlots) -> None:
+        """With a continuous delay what comes before the first step is what is sent there."""
+        if slots.length != slots.delay and self.form.first:
+            code, start = self.code, slots.start
+            code.line("if (first)")
+            code.line(f"    {code.loop('i', slots.stop, start)}")
+            code.line(f"        signals[i] = signals[i - (i - {start}) % {slots.length}];")
 
     def leave(self, which: Mask) -> None:
         """The signals of some connections (m,) leave, as far as they have their own."""
@@ -452,18 +464,17 @@ class StepCode:
 
     def leaving(self, members: Indices, place: Place) -> tuple[str, Value]:
         """The signal of one of some connections, all of one delay: its slot, and what leaves."""
-        code, connections = self.code, self.network.connections
-        delay = int(connections.delays[members[0]])
+        code, length = self.code, int(self.layout.lengths[members[0]])
         slot = code.at(self.layout.offsets[members], place)
-        shift = "" if delay == 1 else f" + {code.remainder(delay)}"
+        shift = "" if length == 1 else f" + {code.remainder(length)}"
         signal = f"weights[{code.at(members, place)}]*{taken(self.network, code, members, place)}"
         return f"signals[{slot}{shift}]", signal
 
     def sharing(self, slots: SharedSlots, place: Place) -> tuple[str, Value]:
         """What is sent to all connections that share it: its slot, and what leaves."""
         code = self.code
-        slot = code.at(np.arange(slots.start, slots.stop, slots.delay), place)
-        shift = "" if slots.delay == 1 else f" + {code.remainder(slots.delay)}"
+        slot = code.at(np.arange(slots.start, slots.stop, slots.length), place)
+        shift = "" if slots.length == 1 else f" + {code.remainder(slots.length)}"
         return f"signals[{slot}{shift}]", taken_at(self.network, code, slots.sent, place)
 
     # ---- connections -------------------------------------------------------------------------------------------
@@ -577,11 +588,41 @@ class StepCode:
         own = delays if not isinstance(place, int) else delays[place : place + 1]
         if not own.any():
             return sent
+        if self.lags is not None and self.lags.there[projection.members].any():
+            return self.behind_step(projection, self.lags.some(projection.members), place)
         past = self.past(projection, delays, own, place)
         if not self.form.lost:
             return past
         lost = f"lost[{code.at(projection.members, place)}]"
         return code.let("a", f"k - ({code.at(delays, place)}) < {lost} ? {code.text(0.0)} : {past}")
+
+    def behind_step(self, projection: Projection, lags: Lags, place: Place) -> Value:
+        """What was taken as long ago as the delay is, of which some are continuous: between two steps."""
+        code, delays = self.code, self.network.connections.delays[projection.members]
+        whole, late = np.where(lags.there, lags.whole, delays), np.asarray(lags.part > 0)
+        next_ = code.let("a", self.remembered_at(projection, whole, lags, place))
+        some = late[place : place + 1] if isinstance(place, int) else late
+        if not some.any():
+            return next_
+        one = code.let("a", self.remembered_at(projection, whole + late, lags, place))
+        share = code.text(code.number(np.where(late, 1.0 - lags.part, 0.0), place))
+        between = f"{one} + {share}*({next_} - {one})"
+        return code.let("a", between if some.all() else f"{code.at(late.astype(np.int64), place)} ? {between} : {one}")
+
+    def remembered_at(self, projection: Projection, ago: IntArray, lags: Lags, place: Place) -> str:
+        """What was taken so many steps ago, 0 where that is lost; with a continuous delay what was taken at the first
+        step is what was before, too."""
+        code, network, members = self.code, self.network, projection.members
+        n, back = len(network.neurons) + network.outlet_count, code.at(ago, place)
+        code.head["now"] = f"const int32_t now = (int32_t)(k % {self.depth});"
+        row = f"(now + {self.depth} - ({back})) % {self.depth}"
+        some = lags.there[place : place + 1] if isinstance(place, int) else lags.there
+        if some.any():
+            late = "" if some.all() else f"{code.at(lags.there.astype(np.int64), place)} && "
+            row = f"({late}fresh && k < {back} ? 0 : {row})"
+        past = f"history[(size_t)({row})*{n} + {code.at(taken_by(network)[members], place)}]"
+        lost = f"lost[{code.at(members, place)}]"
+        return f"k - ({back}) < {lost} ? {code.text(0.0)} : {past}" if self.form.lost else past
 
     def past(self, projection: Projection, delays: IntArray, own: IntArray, place: Place) -> str:
         """a_j[t−d], from the history, whose rows have all activities and outlets."""

@@ -27,10 +27,10 @@ def lose(network: Network, state: State, connections: IntArray) -> None:
     """Nothing is under way on these connections: what they have sent so far never arrives."""
     if not len(connections):
         return
-    layout, delays = signal_layout(network, state.own_signals), network.connections.delays.whole()
+    layout = signal_layout(network, state.own_signals)
     for connection in connections[~layout.shares[connections]].tolist():
-        if layout.offsets[connection] >= 0:
-            state.signals[layout.offsets[connection] : layout.offsets[connection] + delays[connection]] = 0.0
+        if (first := int(layout.offsets[connection])) >= 0:
+            state.signals[first : first + int(layout.lengths[connection])] = 0.0
     # those that read past activities on arrival, or whose synapses or rules do
     read_later = connections[(layout.shares | remembering(network))[connections]]
     if len(read_later):

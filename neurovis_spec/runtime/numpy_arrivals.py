@@ -14,12 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import Indices, IntArray
+from neurovis_spec.arrays import BoolArray, Indices, IntArray
 from neurovis_spec.compiler.events.settable import CENTRES, bias_of
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Population, Port, Projection
+from neurovis_spec.runtime.lags import Lags
 from neurovis_spec.runtime.numpy_code import Code, any_given
-from neurovis_spec.runtime.signals import SharedSlots, SignalLayout
+from neurovis_spec.runtime.signals import DelayClass, SharedSlots, SignalLayout
 from neurovis_spec.runtime.stages import End, Formed, behind_flow, ends_of, formed_at, signal_of, taken_by, target_of
 from neurovis_spec.runtime.state import NEVER_LOST, Structure
 
@@ -37,6 +38,8 @@ class Step:
     layout: SignalLayout
     #: how many past activities are remembered
     depth: int
+    #: the continuous delays, where there are any
+    lags: Lags | None
     #: by populations and names of ports the identifiers of what was gathered there
     ports: dict[int, dict[str, str]]
     #: by populations and states, those of what their noise is multiplied by
@@ -130,21 +133,27 @@ def signals_at(step: Step, number: int, port: Port, places: Indices) -> str:
         weights = code.select("weights", incoming[undelayed], len(connections))
         parts.append((f"{weights} * {sent_by(step, incoming[undelayed])}", undelayed))
     for slots in step.layout.shared:
-        there = np.flatnonzero(shares & (delays == slots.delay))
+        there = np.flatnonzero(shares & _has(step, slots, incoming, delays))
         if len(there):
             parts.append((_shared(step, slots, incoming[there]), there))
     for delay_class in step.layout.classes:
         inside = np.flatnonzero(delay_class.populations == number)  # they lie next to each other
         if len(inside):
-            start, stop = (delay_class.start + delay_class.delay * int(i) for i in (inside[0], inside[-1] + 1))
-            own = slots_of(code, start, stop, delay_class.delay)
+            length = delay_class.length
+            start, stop = (delay_class.start + length * int(i) for i in (inside[0], inside[-1] + 1))
+            own = slots_of(code, start, stop, length, delay_class.delay % length)
             arriving = np.isin(delay_class.connections[inside], incoming)
             if not arriving.any():  # a lesion, or another port: what is under way there does not arrive here
                 continue
             if not arriving.all():
                 own = code.select(code.let("g", own), np.flatnonzero(arriving), len(arriving))
-            parts.append((own, np.flatnonzero(~shares & (delays == delay_class.delay))))
+            parts.append((own, np.flatnonzero(~shares & _has(step, delay_class, incoming, delays))))
     return with_factors(code, port, places, put_together(code, parts, len(delays)))
+
+
+def _has(step: Step, slots: DelayClass | SharedSlots, connections: Indices, delays: IntArray) -> BoolArray:
+    """Which of some connections have slots of this kind; ``delays`` are theirs."""
+    return np.asarray((delays == slots.delay) & (step.layout.lengths[connections] == slots.length))
 
 
 def put_together(code: Code, parts: list[tuple[str, IntArray]], count: int, prefix: str = "g") -> str:
@@ -252,8 +261,9 @@ def each(step: Step, projection: Projection, read: frozenset[str], value: str) -
 def _shared(step: Step, slots: SharedSlots, members: Indices) -> str:
     """What was sent, times the weights of some connections that share it; 0 where it is lost."""
     code, lost = step.code, step.structure.lost[members]
-    places = (step.layout.offsets[members] - slots.start) // slots.delay
-    past = code.select(slots_of(code, slots.start, slots.stop, slots.delay), places, len(slots.sent))
+    places = (step.layout.offsets[members] - slots.start) // slots.length
+    own = slots_of(code, slots.start, slots.stop, slots.length, slots.delay % slots.length)
+    past = code.select(own, places, len(slots.sent))
     arriving = f"{code.select('weights', members, len(step.network.connections))} * {past}"
     if not (lost > NEVER_LOST).any():
         return arriving
@@ -283,12 +293,12 @@ def sent_at(step: Step, taken: Indices, broadcast: bool = False) -> str:
     return code.select("np.concatenate((activity, outlets))", taken, n + outlets)
 
 
-def slots_of(code: Code, start: int, stop: int, delay: int) -> str:
-    """The slots of this step of connections that are stored next to each other: ``signals[4:8]`` with a delay of 1,
-    else every ``delay``-th, ``signals[4 + r3:16:3]`` with r3 = k % 3."""
-    if delay == 1:
+def slots_of(code: Code, start: int, stop: int, length: int, ago: int = 0) -> str:
+    """The slots of this step, or of one some steps ago, of connections that are stored next to each other:
+    ``signals[4:8]`` in rings of 1, else every ``length``-th, ``signals[4 + r3:16:3]`` with r3 = k % 3."""
+    if length == 1:
         return code.view("signals", f"{start}:{stop}")
-    return f"signals[{start} + {code.slot(delay)}:{stop}:{delay}]"
+    return f"signals[{start} + {code.slot(length, ago)}:{stop}:{length}]"
 
 
 def combined(step: Step, population: Population, port: Port, signals: str) -> str:

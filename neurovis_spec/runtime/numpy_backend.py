@@ -13,6 +13,7 @@ from neurovis_spec.arrays import FloatArray, subscript
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Population
 from neurovis_spec.runtime.backend import Availability, Capabilities
+from neurovis_spec.runtime.lags import lags_of
 from neurovis_spec.runtime.numpy_arrivals import Step
 from neurovis_spec.runtime.numpy_code import Code
 from neurovis_spec.runtime.numpy_operations import emit
@@ -86,7 +87,7 @@ def step_code(network: Network, structure: Structure, own_signals: bool = False)
         populations = tuple(_without(population, structure.gone) for population in network.populations)
         network = replace(network, populations=populations)
     code = Code(network.dt, network.settable.variables)
-    step = Step(code, whole, network, structure, layout, history_depth(network), {})
+    step = Step(code, whole, network, structure, layout, history_depth(network), lags_of(network), {})
     for operation in network.program:
         emit(operation, step)
     return code

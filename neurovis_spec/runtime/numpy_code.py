@@ -201,12 +201,13 @@ class Code:
         """The subscript that ``select`` reads, for writing."""
         return self.select("", indices, size) or "[:]"
 
-    def slot(self, delay: int) -> str:
-        """k mod delay."""
-        if delay == 1:
+    def slot(self, length: int, ago: int = 0) -> str:
+        """k mod a length, or a step some steps ago."""
+        if length == 1:
             return "0"
-        self.head_lines.add(f"r{delay} = k % {delay}")
-        return f"r{delay}"
+        name, step = (f"r{length}_{ago}", f"(k - {ago})") if ago else (f"r{length}", "k")
+        self.head_lines.add(f"{name} = {step} % {length}")
+        return name
 
     def expression(self, tree: Tree, known: Mapping[str, str], functions: Functions | None = None) -> str:
         """An expression as code."""

@@ -30,7 +30,7 @@ from typing import Final
 
 import numpy as np
 
-from neurovis_spec.arrays import Indices, IntArray
+from neurovis_spec.arrays import BoolArray, Indices, IntArray
 from neurovis_spec.compiler.program import Diffuse, Integrate, Key, Port, Projection, Use
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.expressions.tree import names
@@ -50,9 +50,11 @@ from neurovis_spec.runtime.numpy_arrivals import (
     with_step_values,
 )
 from neurovis_spec.runtime.numpy_code import FIRST, shared
+from neurovis_spec.runtime.numpy_lags import Around, at_stage, ends_around, signals_around
 from neurovis_spec.runtime.stages import (
     Contacts,
     Formulas,
+    Moment,
     Part,
     Through,
     apart,
@@ -115,6 +117,8 @@ class _Joined:
     held: dict[str, str] = field(default_factory=dict)
     #: what of each of them, by its name, is read anew at each stage: of which connections, and where that is taken
     anew: dict[str, tuple[IntArray, IntArray]] = field(default_factory=dict)
+    #: what of each of them is read between steps: of which connections, and what was sent then
+    between: dict[str, tuple[IntArray, Around]] = field(default_factory=dict)
 
     @property
     def use(self) -> Use:
@@ -155,6 +159,8 @@ class _Flow:
         #: is held over the step, else what arrives there and is held
         self.whole: dict[tuple[int, str], str] = {}
         self.held: dict[tuple[int, str], str] = {}
+        #: what arrives there with continuous delays
+        self.around: dict[tuple[int, str], Around] = {}
         #: matrices of weights, by population and port, and what fills those once a step that learn
         self.matrices: dict[tuple[int, str], str] = {}
         self.filled: list[str] = []
@@ -189,7 +195,8 @@ class _Flow:
                 for port in part.ports:
                     self.hold(part, port)
             spread = self.make_spread()
-            with code.function(stage, "t", *(("first=False",) if spread else ())):
+            arguments = [*(("share",) if self.step.lags is not None else ()), *(("first=False",) if spread else ())]
+            with code.function(stage, "t", *arguments):
                 _Stage(self).emit()
             for line in (*self.filled, f"t = (k - 1) * {self.network.dt!r}"):
                 code.line(line)
@@ -198,13 +205,14 @@ class _Flow:
                 code.line(f"for substep in range({substeps}):")
                 code.indent += 1
                 code.line(f"t = start + substep * {h!r}")
-            inside, is_first = times(0.0, h).first, ""
+            inside, is_first = times(0.0, h).first.t, ""
             if spread:
-                is_first = ", substep == 0" if substeps > 1 else ", True"
+                is_first = ", first=substep == 0" if substeps > 1 else ", first=True"
+            first, middle, last = map(self.share, times(0.0, h))
             calls = [
-                f"{stage}(t + {inside!r}{is_first})",
-                f"{stage}(t + {h / 2.0!r})",
-                f"{stage}(t + {h!r} - {inside!r})",
+                f"{stage}(t + {inside!r}{first}{is_first})",
+                f"{stage}(t + {h / 2.0!r}{middle})",
+                f"{stage}(t + {h!r} - {inside!r}{last})",
             ]
             for line in _METHODS[self.operation.method](self, *calls):
                 code.line(line)
@@ -212,6 +220,13 @@ class _Flow:
             code.indent -= substeps > 1
             for cell, place in zip(cells, self.places.values(), strict=True):
                 code.line(f"{cell if cell[-1] == ']' else f'{cell}[:]'} = {self.x}[{_text(place)}]")
+
+    def share(self, at: Moment) -> str:
+        """The argument of a stage that says which share of the step is over; ``at`` is that of a substep."""
+        if self.step.lags is None:
+            return ""
+        substeps = self.operation.substeps
+        return f", {at.share!r}" if substeps == 1 else f", (substep + {at.share!r}) / {substeps}"
 
     def emit_fixed(self) -> None:
         """Which of the flow states are held, and at what."""
@@ -236,10 +251,19 @@ class _Flow:
         if len(held):
             signals = signals_at(step, part.number, port, held)
             arriving = self.code.let("h", accumulated(step, part.population, port, held, signals))
+        lagging = self.lagging(port.incoming[staged])
+        if lagging.any() and step.lags is not None:
+            self.around[key] = signals_around(step, step.lags, port.incoming[staged[lagging]])
         if len(staged) or self.reads_formulas(part, port):
             self.held[key] = arriving
         else:
             self.whole[key] = self.given(part, port, arriving)
+
+    def lagging(self, connections: Indices) -> BoolArray:
+        """Which of some connections bring what is under way with a continuous delay."""
+        if self.step.lags is None:
+            return np.zeros(len(connections), dtype=np.bool_)
+        return np.asarray(self.step.lags.there[connections] & (self.network.synapses.numbers[connections] < 0))
 
     def hold_ends(self, joined: _Joined) -> None:
         """What connections read that stays over the stages: weights, and of both ends what was sent, and what does not
@@ -257,6 +281,10 @@ class _Flow:
                 continue
             if anew.any():
                 joined.anew[name] = np.flatnonzero(anew), self.taken[end.places[anew]]
+            if (lags := self.step.lags) is not None and (late := past & lags.there[members]).any():
+                around = ends_around(self.step, lags, members[late], end.places[late])
+                joined.between[name] = np.flatnonzero(late), around
+                anew |= late
             if not anew.all():
                 held = end_at(self.step, members, end)
                 if anew.any():  # of each connection: it is filled in at each stage
@@ -385,11 +413,12 @@ class _Stage:
             known |= self.code.parameters(joined.use, joined.some)
             unit = joined.use.definition.per_second
             known["t"] = "t" if unit == 1.0 else f"(t * {unit!r})"
-            known |= {name: held for name, held in joined.held.items() if name not in joined.anew}
+            varying = joined.anew.keys() | joined.between.keys()
+            known |= {name: held for name, held in joined.held.items() if name not in varying}
             for one in joined.use.definition.state:
                 now = self.flow.now.get(Key(joined.use.owner, one.name))
                 known[one.name] = now or cell_of(self.code, joined.projection, one.name, joined.some)
-        for name in joined.anew.keys() & formulas.names - known.keys():
+        for name in (joined.anew.keys() | joined.between.keys()) & formulas.names - known.keys():
             known[name] = self.read_anew(joined, name)
         for name, tree in formulas.let:
             if name not in known:
@@ -397,13 +426,19 @@ class _Stage:
         return {name: self.code.expression(tree, known) for name, tree in formulas.trees}
 
     def read_anew(self, joined: _Joined, name: str) -> str:
-        """What connections read of an end, of which something is taken at the stage."""
-        (some, taken), count = joined.anew[name], len(joined.projection.members)
-        values = self.code.select(self.flow.sent, taken, self.flow.taken_count)
+        """What connections read of an end, of which something is taken at the stage, or lies between steps."""
+        code, count, parts = self.code, len(joined.projection.members), list[tuple[str, IntArray]]()
+        if name in joined.anew:
+            some, taken = joined.anew[name]
+            parts.append((code.select(self.flow.sent, taken, self.flow.taken_count), some))
+        if name in joined.between:
+            some, around = joined.between[name]
+            parts.append((at_stage(code, around), some))
         if name not in joined.held:
-            return self.code.let("a", values)
-        made = self.code.let("a", f"{joined.held[name]}.copy()")
-        self.code.line(f"{made}{self.code.position(some, count)} = {values}")
+            return put_together(code, parts, count, "a")
+        made = code.let("a", f"{joined.held[name]}.copy()")
+        for values, some in parts:
+            code.line(f"{made}{code.position(some, count)} = {values}")
         return made
 
     def formed(self, number: int) -> str:
@@ -441,8 +476,8 @@ class _Stage:
         if len(staged):
             self.emit_taken()
             connections = port.incoming[staged]
-            if (self.network.synapses.numbers[connections] >= 0).any():
-                signals = with_factors(self.code, port, staged, self.mixed(connections))
+            if key in flow.around or (self.network.synapses.numbers[connections] >= 0).any():
+                signals = with_factors(self.code, port, staged, self.mixed(connections, flow.around.get(key)))
                 arriving = accumulated(self.step, part.population, port, staged, signals, arriving)
                 return flow.given(part, port, arriving, self.vector)
             weights, taken, signals = self.plain(connections)
@@ -459,13 +494,16 @@ class _Stage:
         taken = self.flow.taken[taken_by(self.network)[connections]]
         return weights, taken, f"{weights} * {self.code.select(self.flow.sent, taken, self.flow.taken_count)}"
 
-    def mixed(self, connections: Indices) -> str:
-        """The signals of connections of which some have a synapse."""
+    def mixed(self, connections: Indices, around: Around | None) -> str:
+        """The signals of connections of which some have a synapse, or bring what was sent ``around`` some time."""
         parts = [
             (some_of(self.step, one, self.formed(one.number)), one.places)
             for one in formed_at(self.network, connections)
         ]
-        plain = np.flatnonzero(self.network.synapses.numbers[connections] < 0)
+        lagging = self.flow.lagging(connections)
+        if around is not None:
+            parts.append((at_stage(self.code, around), np.flatnonzero(lagging)))
+        plain = np.flatnonzero((self.network.synapses.numbers[connections] < 0) & ~lagging)
         if len(plain):
             *_, signals = self.plain(connections[plain])
             parts.append((signals, plain))

@@ -55,6 +55,8 @@ from neurovis_spec.runtime.numpy_arrivals import (
 )
 from neurovis_spec.runtime.numpy_code import FIRST, Cell, Code, emit_change
 from neurovis_spec.runtime.numpy_flows import diffuse, integrate
+from neurovis_spec.runtime.numpy_lags import behind_lags
+from neurovis_spec.runtime.signals import DelayClass, SharedSlots
 from neurovis_spec.runtime.stages import formulas_of, given, unfolded
 
 
@@ -195,14 +197,27 @@ def _send(operation: Send, step: Step) -> None:
     for delay_class in step.layout.classes:
         weights = code.select("weights", delay_class.connections, len(connections))
         sent = sent_by(step, delay_class.connections)
-        slots = slots_of(code, delay_class.start, delay_class.stop, delay_class.delay)
-        code.line(f"multiply({weights}, {sent}, {slots})")
+        code.line(f"multiply({weights}, {sent}, {_leaving(step, delay_class)})")
+        _fill(step, delay_class)
     for shared in step.layout.shared:
-        slots = slots_of(code, shared.start, shared.stop, shared.delay)
-        code.line(f"{slots}[:] = {sent_at(step, shared.sent)}")
+        code.line(f"{_leaving(step, shared)}[:] = {sent_at(step, shared.sent)}")
+        _fill(step, shared)
     if step.depth:
         sent = "np.concatenate((activity, outlets))" if network.outlets else "activity"
         code.line(f"history[k % {step.depth}] = {sent}")
+
+
+def _leaving(step: Step, slots: DelayClass | SharedSlots) -> str:
+    """Where what is sent in a step is put."""
+    return slots_of(step.code, slots.start, slots.stop, slots.length)
+
+
+def _fill(step: Step, slots: DelayClass | SharedSlots) -> None:
+    """With a continuous delay what comes before the first step is what is sent there."""
+    if slots.length != slots.delay:
+        start, stop, length = slots.start, slots.stop, slots.length
+        rows = f"signals[{start}:{stop}].reshape(-1, {length})"
+        step.code.line(f"if {FIRST}: {rows}[:] = signals[{start}:{stop}:{length}, None]")
 
 
 @emit.register
@@ -241,7 +256,8 @@ def _bounded(code: Code, network: Network, projection: Projection, weight: str) 
 def seen_at(step: Step, projection: Projection) -> dict[str, str]:
     """Arrays for pre, sent, post and the signals; only what the definitions read is gathered."""
     code, network = step.code, step.network
-    seen = ends_at(step, projection, projection.read)
+    seen = behind_lags(step, projection)
+    seen |= ends_at(step, projection, projection.read - seen.keys())
     for signal, indices in projection.signals.items():
         if signal in projection.read:
             seen[signal] = code.let("a", _signal(code, indices, network))

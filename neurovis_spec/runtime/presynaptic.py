@@ -11,16 +11,22 @@ import numpy.typing as npt
 
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Projection
+from neurovis_spec.runtime.lags import lags_of
 from neurovis_spec.runtime.stages import ends_of
 
 
 def history_depth(network: Network) -> int:
-    """Rows of the history: a[t−d] … a[t] for the largest d of whatever reads ``pre``; 0 where none is delayed."""
-    deepest = max(
-        (int(network.connections.delays[reader.members].max(initial=0)) for reader in _readers_of_pre(network)),
-        default=0,
-    )
-    return deepest + 1 if deepest else 0
+    """Rows of the history: a[t−d] … a[t] for the largest d of whatever reads ``pre``, with a continuous delay also
+    what is before that; 0 where none is delayed."""
+    deepest, lags = 0, lags_of(network)
+    for reader in _readers_of_pre(network):
+        rows = network.connections.delays[reader.members]
+        rows += rows > 0
+        if lags is not None:
+            own = lags.some(reader.members)
+            rows = np.where(own.there, own.depth, rows)
+        deepest = max(deepest, int(rows.max(initial=0)))
+    return deepest
 
 
 def remembering(network: Network) -> npt.NDArray[np.bool_]:

@@ -191,12 +191,16 @@ class ReferenceStepper(Seen):
         """w[t]·a[t] of every delayed connection without a synapse leaves, or a[t] where it is shared; a[t] is
         remembered."""
         sent, layout = np.concatenate((state.activity, state.outlets)), self.layouts[state.own_signals]
-        for connection, delay in enumerate(self.delays.tolist()):
-            if layout.offsets[connection] >= 0:
-                leaving = float(sent[self.sending[connection]])
-                if not layout.shares[connection]:
-                    leaving = float(state.weights[connection]) * leaving
-                state.signals[layout.offsets[connection] + state.k % delay] = leaving
+        for connection, first in enumerate(layout.offsets.tolist()):
+            if first < 0:
+                continue
+            leaving = float(sent[self.sending[connection]])
+            if not layout.shares[connection]:
+                leaving = float(state.weights[connection]) * leaving
+            length = int(layout.lengths[connection])
+            state.signals[first + state.k % length] = leaving
+            if is_first(state) and self.lags is not None and self.lags.there[connection]:
+                state.signals[first : first + length] = leaving  # so it was before the first step
         if len(state.history):
             state.history[state.k % len(state.history)] = sent
 
@@ -222,7 +226,7 @@ class ReferenceStepper(Seen):
     ) -> None:
         """The weight and the states of one connection."""
         low, high = self.low.at(connection, state), self.high.at(connection, state)
-        seen = self.known(projection.rule, position, state) | self.seen(projection, position, state)
+        seen = self.known(projection.rule, position, state) | self.seen(projection, position, state, share=1.0)
         # as ``Projection.signals`` numbers them
         signals = (*state.activity.tolist(), *state.outlets.tolist(), *inputs.tolist())
         seen |= {signal: signals[indices[position]] for signal, indices in projection.signals.items()}

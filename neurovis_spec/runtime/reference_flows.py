@@ -20,10 +20,11 @@ from neurovis_spec.compiler.program import Integrate, Owner, Port
 from neurovis_spec.language.expressions.functions import FUNCTIONS, divide, minimum
 from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.inputs import at_stage
-from neurovis_spec.runtime.reference_seen import Seen, is_first
+from neurovis_spec.runtime.reference_seen import Seen, Sent, is_first
 from neurovis_spec.runtime.stages import (
     Contacts,
     Formulas,
+    Moment,
     Part,
     Through,
     Times,
@@ -52,20 +53,22 @@ Still: TypeAlias = Mapping[Place, Mapping[int, float]]
 
 @dataclass
 class Stage:
-    """What is known at a stage: the flow states ``x``, the seconds ``t``, all inputs; and what is made of them: what is
-    ``sent``, all activities and then the outlets, and the ports, by population and name."""
+    """What is known at a stage: the flow states ``x``, the seconds ``t``, which ``share`` of the step is over, all
+    inputs; and what is made of them: what is ``sent``, all activities and then the outlets, and the ports, by
+    population and name."""
 
     state: State
     still: Still
     x: Numbers
     t: float
+    share: float
     inputs: Sequence[float]
     sent: list[float]
     ports: dict[tuple[int, str], list[float]] = field(default_factory=dict)
 
 
-#: The stage of flow states, which are given, at a time (seconds).
-Look: TypeAlias = Callable[[Numbers, float], Stage]
+#: The stage of flow states, which are given, at a time.
+Look: TypeAlias = Callable[[Numbers, Moment], Stage]
 
 
 class Flow:
@@ -96,17 +99,18 @@ class Flow:
         x = fix({place: values.tolist() for place, values in cells.items()}, still)
         start, h = (state.k - 1) * self.network.dt, self.network.dt / self.operation.substeps
 
-        def look(x: Numbers, t: float) -> Stage:
-            return self.stage(state, still, x, t, inputs)
+        def look(x: Numbers, at: Moment) -> Stage:
+            return self.stage(state, still, x, at, inputs)
 
-        stage = look(x, times(start, h).first)
+        stage = look(x, times(start, h, 0, self.operation.substeps).first)
         self.spread = {
             Place(part.population.model.owner, name): values
             for part in self.parts
             for name, values in self.values(part, part.spread, stage).items()
         }
-        for substep in range(self.operation.substeps):
-            x = fix(METHODS[self.operation.method](self, x, times(start + substep * h, h), look), still)
+        substeps = self.operation.substeps
+        for substep in range(substeps):
+            x = fix(METHODS[self.operation.method](self, x, times(start, h, substep, substeps), look), still)
         for place, values in cells.items():
             values[:] = x[place]
 
@@ -136,10 +140,10 @@ class Flow:
                 found[place] = {position: float(cells[place][position]) for position in np.flatnonzero(idle).tolist()}
         return found
 
-    def stage(self, state: State, still: Still, x: Numbers, t: float, inputs: FloatArray) -> Stage:
+    def stage(self, state: State, still: Still, x: Numbers, at: Moment, inputs: FloatArray) -> Stage:
         """What is taken at a stage, population by population."""
         sent = [*state.activity.tolist(), *state.outlets.tolist()]
-        stage = Stage(state, still, x, t, at_stage(self.network, inputs, state, t), sent)
+        stage = Stage(state, still, x, *at, at_stage(self.network, inputs, state, at.t), sent)
         for part, taken in taken_in_order(self.parts):
             (values,) = self.values(part, taken.formulas, stage).values()
             for position, neuron in enumerate(part.population.members.tolist()):
@@ -212,7 +216,7 @@ class Flow:
 
         own = {name: float(values[position]) for name, values in state.cells[owner].items()}
         own |= {name: stage.x[Place(owner, name)][position] for name in contacts.flows}
-        own |= self.seen.seen(projection, position, state, now)
+        own |= self.seen.seen(projection, position, state, now, stage.share)
         return self.seen.values_at(projection, position, formulas, own, state, stage.t)
 
     def port(self, part: Part, port: Port, stage: Stage) -> list[float]:
@@ -228,7 +232,7 @@ class Flow:
             held, staged = apart(port)
             signals = [
                 *self.seen.signals(port, held, stage.state),
-                *self.seen.signals(port, staged, stage.state, stage.sent, formed),
+                *self.seen.signals(port, staged, stage.state, Sent(stage.sent, stage.share, formed)),
             ]
             made = self.seen.given(part.population, port, signals, stage.state, stage.inputs)
             stage.ports[part.number, port.name] = made

@@ -19,9 +19,10 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import SYNAPSE, Definition, Key, Population, Port, Projection, Use
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.tree import Tree
+from neurovis_spec.runtime.lags import Lags, lags_of
 from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.stages import Formulas, behind_flow, ends_of, signal_of, taken_by, target_of
-from neurovis_spec.runtime.state import State, constants
+from neurovis_spec.runtime.state import NEVER_LOST, State, constants
 
 #: What is now of activities and outlets, by the index among these.
 Now: TypeAlias = Callable[[int], float]
@@ -43,6 +44,15 @@ class NetworkArray(NamedTuple):
         if self.variable is None:
             return float(self.values[place])
         return float(state.conditions.variables[self.variable.start + (place if self.variable.size > 1 else 0)])
+
+
+class Sent(NamedTuple):
+    """What connections bring at a stage, where this ``share`` of the step is over: of what is ``sent`` now, all
+    activities and then the outlets, and what synapses have ``formed``."""
+
+    sent: Sequence[float]
+    share: float
+    formed: Forming
 
 
 class Signal(NamedTuple):
@@ -71,6 +81,7 @@ class Seen:
         }
         # one connection after the other is slow in columns
         self.targets, self.delays = connections.targets.whole(), connections.delays.whole()
+        self.lags = lags_of(network)
         #: what each connection takes: an index into the activities followed by the outlets
         self.sending = taken_by(network)
         #: by ports
@@ -88,27 +99,23 @@ class Seen:
         }
         self.centres = NetworkArray(connections.centres.whole(), variables.get(CENTRES))
 
-    def signals(
-        self,
-        port: Port,
-        places: Iterable[int],
-        state: State,
-        sent: Sequence[float] | None = None,
-        formed: Forming | None = None,
-    ) -> Iterator[Signal]:
-        """What some of the connections bring to a port, ``places`` of its ``incoming``: of what is ``sent`` now where
-        that is given, else by their delays; of synapses what is ``formed``, by default before the update."""
-        formed = formed or partial(self.formed, state)
+    def signals(self, port: Port, places: Iterable[int], state: State, now: Sent | None = None) -> Iterator[Signal]:
+        """What some of the connections bring to a port, ``places`` of its ``incoming``: at a stage what is sent
+        ``now``, or what was sent before by continuous delays; else by their delays, and of synapses what is formed
+        before the update."""
+        formed = partial(self.formed, state) if now is None else now.formed
         for place in places:
             connection = int(port.incoming[place])
             if not state.conditions.structure.gone[connection]:
                 synapse = int(self.synapses.numbers[connection])
                 if synapse >= 0:
                     value = formed(synapse, int(self.synapses.positions[connection]))
-                elif sent is None:
+                elif now is None:
                     value = self.arriving(connection, state)
+                elif self.lags is not None and self.lags.there[connection]:
+                    value = self.between(connection, self.lags, state, now.share)
                 else:
-                    value = float(state.weights[connection]) * sent[self.sending[connection]]
+                    value = float(state.weights[connection]) * now.sent[self.sending[connection]]
                 if port.factors is not None:
                     value *= float(port.factors[place])
                 yield Signal(int(port.slots[place]), value, self.centres.at(connection, state))
@@ -198,35 +205,56 @@ class Seen:
         known = {name: float(cells[own][member]) for name, own in states.items()}
         return self.seen(projection, position, state) | known
 
-    def seen(self, projection: Projection, position: int, state: State, now: Now | None = None) -> dict[str, float]:
+    def seen(
+        self, projection: Projection, position: int, state: State, now: Now | None = None, share: float | None = None
+    ) -> dict[str, float]:
         """What one of the connections reads of its ends: ``pre``, what is sent at t−d, 0 where that is lost, ``sent``,
         what is at t, ``post`` = a_i[t] of a connection from j to i, and of what else is there the same. ``now`` says
-        what is now, by default what was left there last."""
+        what is now, by default what was left there last. Continuous delays are read where this ``share`` of the step is
+        over, if it is said."""
         connection, found = int(projection.members[position]), dict[str, float]()
         for name, end in self.ends[projection.use.owner.number].items():
             index = int(end.places[position])
             if end.past and self.delays[connection] > 0:
-                found[name] = self.past(connection, index, state)
+                found[name] = self.past(connection, index, state, share)
             else:
                 found[name] = self.at(index, state) if now is None else now(index)
         return found
 
-    def past(self, connection: int, index: int, state: State) -> float:
-        """An activity or an outlet of d steps ago, 0 where that is lost."""
-        sent_at = state.k - int(self.delays[connection])
-        if sent_at < state.conditions.structure.lost[connection]:
-            return 0.0
-        return float(state.history[sent_at % len(state.history)][index])
+    def past(self, connection: int, index: int, state: State, share: float | None) -> float:
+        """An activity or an outlet of d steps ago, 0 where that is lost; or with a continuous delay as it was before
+        this share of the step was over, at the first step what it was before, too."""
+        if share is None or self.lags is None or not self.lags.there[connection]:
+            return self.remembered(connection, index, state.k - int(self.delays[connection]), state)
+        at, least = self.lags.at(connection, share), NEVER_LOST if state.continued else 0
+        first = state.k - 1 - int(self.lags.whole[connection]) + at.first
+        return at.of(*(self.remembered(connection, index, max(one, least), state) for one in (first, first + 1)))
+
+    def remembered(self, connection: int, index: int, step: int, state: State) -> float:
+        """An activity or an outlet as it was at a step, 0 where what left a connection then is lost."""
+        lost = step < state.conditions.structure.lost[connection]
+        return 0.0 if lost else float(state.history[step % len(state.history)][index])
 
     def arriving(self, connection: int, state: State) -> float:
         """w[t−d]·a[t−d]: of this step for d = 0, else what was sent d steps ago; 0 where that is lost."""
-        delay, layout = int(self.delays[connection]), self.layouts[state.own_signals]
+        delay = int(self.delays[connection])
         if delay == 0:
             return float(state.weights[connection]) * self.sent(connection, state)
-        left = float(state.signals[layout.offsets[connection] + state.k % delay])
+        return self.under_way(connection, state.k - delay, state)
+
+    def between(self, connection: int, lags: Lags, state: State, share: float) -> float:
+        """What arrives with a continuous delay where this share of the step is over."""
+        at = lags.at(connection, share)
+        first = state.k - 1 - int(lags.whole[connection]) + at.first
+        return at.of(self.under_way(connection, first, state), self.under_way(connection, first + 1, state))
+
+    def under_way(self, connection: int, step: int, state: State) -> float:
+        """w·a as it left at a step; 0 where that is lost."""
+        layout = self.layouts[state.own_signals]
+        left = float(state.signals[layout.offsets[connection] + step % int(layout.lengths[connection])])
         if not layout.shares[connection]:
             return left
-        lost = state.k - delay < state.conditions.structure.lost[connection]
+        lost = step < state.conditions.structure.lost[connection]
         return 0.0 if lost else float(state.weights[connection]) * left
 
     def sent(self, connection: int, state: State) -> float:

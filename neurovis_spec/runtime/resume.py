@@ -32,6 +32,7 @@ from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.controls import Controls, lose
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.fitting import of_table
+from neurovis_spec.runtime.lags import lags_of, ring_lengths
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.signals import SignalLayout, signal_layout
 from neurovis_spec.runtime.stages import taken_by
@@ -55,7 +56,7 @@ def resumed_state(
     controls = Controls(network, functions)
     _set_again(network, recording, state, controls)
     _lesion_again(network, recording, state, controls)
-    depth = int(network.connections.delays.kept.max(initial=1))
+    depth = int(ring_lengths(network).max(initial=1))
     theirs, ours = _same_connections(network, recording)
     kept = None if network.integration is None else _Kept(network, recording)
     state.weights[learned] = recording.weights_after[columns]
@@ -74,6 +75,7 @@ def resumed_state(
         activity = recording.activity[row][column_of]
         sent, known = (activity, np.True_) if kept is None else kept.sent(activity, row)
         _send(network, layout, state, -ago, sent, known, weights_at(row))
+    _prolong(network, layout, state, len(rows))
     lose(network, state, np.flatnonzero(state.conditions.structure.gone))
     if kept is not None:
         kept.restore(state)
@@ -198,9 +200,19 @@ def _send(
     with np.errstate(all="ignore"):
         signals = factors * sent[taken[under_way]]
     # a step is negative here; its remainder is a slot ≥ 0 all the same
-    state.signals[layout.offsets[under_way] + step % connections.delays[under_way]] = signals
+    state.signals[layout.offsets[under_way] + step % layout.lengths[under_way].astype(np.int64)] = signals
     if -step < len(state.history):
         state.history[step % len(state.history)] = np.where(known, sent, 0.0)
+
+
+def _prolong(network: Network, layout: SignalLayout, state: State, known: int) -> None:
+    """What was sent on connections with a continuous delay before the steps that are known, as many as these are, is
+    what was sent at the first of them, as it is before the first step of all."""
+    lags = lags_of(network)
+    for ago in range(known + 1, int(layout.lengths.max(initial=0)) + 1) if lags is not None else ():
+        members = np.flatnonzero(lags.there & (layout.lengths >= ago))
+        offsets, lengths = layout.offsets[members].astype(np.int64), layout.lengths[members].astype(np.int64)
+        state.signals[offsets + -ago % lengths] = state.signals[offsets + -known % lengths]
 
 
 def _matching_neurons(network: Network, recording: Recording) -> IntArray:

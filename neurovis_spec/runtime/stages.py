@@ -47,6 +47,8 @@ Let: TypeAlias = tuple[tuple[str, Tree], ...]
 
 #: how far inside a step its ends are seen from, of its length: what jumps on the grid jumps between two steps
 INSIDE: Final = 2.0**-20
+#: of a substep, how much of it is over at its stages
+PARTS: Final = (INSIDE, 0.5, 1.0 - INSIDE)
 
 
 class Unfolded(NamedTuple):
@@ -165,18 +167,26 @@ class Formed(NamedTuple):
     members: IntArray
 
 
+class Moment(NamedTuple):
+    """When a stage is: in seconds, and which share of the step is over."""
+
+    t: float
+    share: float
+
+
 class Times(NamedTuple):
-    """When the stages of a step, or of a part of one, are, in seconds."""
+    """When the stages of a step, or of a part of one, are."""
 
-    first: float
-    middle: float
-    last: float
+    first: Moment
+    middle: Moment
+    last: Moment
 
 
-def times(start: float, h: float) -> Times:
-    """The stages of ``h`` seconds from ``start`` on: the ends are seen from inside."""
-    inside = INSIDE * h
-    return Times(start + inside, start + h / 2.0, start + h - inside)
+def times(start: float, h: float, substep: int = 0, substeps: int = 1) -> Times:
+    """The stages of a substep of ``h`` seconds of the step that begins at ``start``: the ends are seen from inside."""
+    begin, inside = start + substep * h, INSIDE * h
+    seconds = (begin + inside, begin + h / 2.0, begin + h - inside)
+    return Times(*(Moment(t, (substep + part) / substeps) for t, part in zip(seconds, PARTS, strict=True)))
 
 
 def parts_of(network: Network, operation: Integrate, flows: BoolArray | None = None) -> tuple[Part, ...]:

@@ -232,11 +232,11 @@ def signals_of_each(network: Network, state: State) -> FloatArray:
     layout, own = signal_layout(network), signal_layout(network, own=True)
     lost, result = state.conditions.structure.lost, np.zeros(own.size)
     for each in own.classes:
-        slots, members = np.arange(each.delay), each.connections
-        sent_at = state.k - each.delay + (slots - state.k) % each.delay
+        slots, members = np.arange(each.length), each.connections
+        sent_at = state.k - each.length + (slots - state.k) % each.length
         first = np.where(layout.shares[members], lost[members], NEVER_LOST)
-        if not state.continued:
-            first = np.maximum(first, 0)
+        if not state.continued and (each.length == each.delay or state.k == 0):
+            first = np.maximum(first, 0)  # else what comes before the first step is what is sent there
         factors = np.where(layout.shares[members], state.weights[members], 1.0)
         with np.errstate(all="ignore"):
             signals = factors[:, None] * state.signals[layout.offsets[members][:, None] + slots]

@@ -95,6 +95,7 @@ class Connected:
             routes=tuple(one.route for one in bundles),
             synapses={number: one.synapse.definition for number, one in enumerate(bundles) if one.synapse is not None},
             rules={number: [own.rule for own in one.rules] for number, one in enumerate(bundles) if one.rules},
+            timed=None if self.exact is None else np.asarray(self.exact.whole() > 0),
         )
 
 

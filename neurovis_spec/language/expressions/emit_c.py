@@ -57,6 +57,20 @@ _OF_OPERATORS: Final = {
 {{
     return x * x;
 }}""",
+    # of a ring of slots, that of so many steps before now, or of one more where q is below 0; and the next one
+    "nv_slot": """static int32_t nv_slot(int32_t now, int32_t ago, int32_t length, {real} q)
+{{
+    ago += q < 0.0{s};
+    return now < ago ? now - ago + length : now - ago;
+}}""",
+    "nv_next": """static int32_t nv_next(int32_t slot, int32_t length)
+{{
+    return slot + 1 == length ? 0 : slot + 1;
+}}""",
+    "nv_between": """static {real} nv_between({real} first, {real} next, {real} q)
+{{
+    return first + (q < 0.0{s} ? q + 1.0{s} : q)*(next - first);
+}}""",
 }
 #: The order in which they stand in the files that are exported; what is not named here comes last.
 _ORDER = ("mod", "sign", "step", "min", "max", "from_zero", "square", "sigmoid")
