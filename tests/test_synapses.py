@@ -10,9 +10,15 @@ import numpy as np
 import pytest
 
 import neurovis_spec as nv
+from neurovis_spec.arguments import CodedWarning
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.runtime.backend import BackendError, Capabilities
+from neurovis_spec.runtime.columns import Keep
+from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.formed import signals_of
+from neurovis_spec.runtime.numpy_backend import NumpyBackend
+from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.simulation import Simulation
 
 BACKENDS = ["reference", "numpy"]
@@ -256,6 +262,27 @@ connections: {A -> B: {synapse: s}}
     simulation.clamp("B.v", 3.0)
     simulation.step()
     assert cell(simulation, "synapse", "q")[0] == pytest.approx(0.5 * 32, rel=1e-15)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_run_goes_on_from_a_recording_with_all_states(backend: str) -> None:
+    network, keep = network_of(EVENTS.replace("synapse: {s", "delay: 2, synapse: {s")), Keep(states=("all",))
+    whole = record(network, Course(20, backend=backend, keep=keep))
+    first = record(network, Course(12, backend=backend, keep=keep))
+    rest = record(network, Course(8, backend=backend, keep=keep, start=first))
+    np.testing.assert_array_equal(rest.states, whole.states[12:])
+    kept = Keep(states=("A.x", "B.v"))
+    with pytest.warns(CodedWarning, match=r"lacks states with a derivative, as of A -> B, which begin anew"):
+        record(network, Course(3, backend=backend, start=record(network, Course(12, backend=backend, keep=kept))))
+
+
+def test_a_backend_without_synapses_refuses_them() -> None:
+    class Plain(NumpyBackend):
+        name = "plain"
+        capabilities = Capabilities(flows=True)
+
+    with pytest.raises(BackendError, match=r"'plain' cannot run 'x': no synapses"):
+        Simulation(network_of(EVENTS), Plain())
 
 
 # ---- pictures -----------------------------------------------------------------------------------------------------

@@ -26,7 +26,7 @@ from neurovis_spec.arrays import BoolArray, FloatArray, IntArray
 from neurovis_spec.compiler.events.patch import PatchError
 from neurovis_spec.compiler.names.state_references import StateOf
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Holder, Key, Use
+from neurovis_spec.compiler.program import Holder, Key, Population, Use
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.controls import Controls, lose
@@ -140,17 +140,22 @@ class _Kept:
                 columns = self._columns_of(holder, use, one.name)
                 if (columns >= 0).all():
                     self.found[Key(use.owner, one.name)] = columns
-        #: the populations whose flow begins anew
+        #: the populations and projections whose flow begins anew
         self.anew = [
-            one
-            for one in network.populations
-            if not all(Key(one.model.owner, flow.name) in self.found for flow in one.model.definition.flows)
+            holder
+            for holder, use in network.uses
+            if not all(Key(use.owner, flow.name) in self.found for flow in use.definition.flows)
         ]
         if self.anew:
-            flows = sorted({network.neurons.names[int(one.members[0])] for one in self.anew})
+            flows = sorted({self._first_of(holder) for holder in self.anew})
             message = f"the recording lacks states with a derivative, as of {flows[0]}, which begin anew: record them "
             message += "(run --states all)"
             warnings.warn(CodedWarning("states-begin-anew", message), stacklevel=callers_level())
+
+    def _first_of(self, holder: Holder) -> str:
+        """The name of the first member."""
+        names = self.network.neurons.names if isinstance(holder, Population) else self.network.connection_names
+        return names[int(holder.members[0])]
 
     def _columns_of(self, holder: Holder, use: Use, state: str) -> IntArray:
         """The columns of a state of all members, −1 where it was not recorded."""
@@ -162,7 +167,8 @@ class _Kept:
         network, n = self.network, len(activity)
         sent, known = np.concatenate((activity, np.zeros(network.outlet_count))), np.ones(n, dtype=np.bool_)
         for one in self.anew:
-            known[one.members] = False
+            if isinstance(one, Population):
+                known[one.members] = False
         known = np.concatenate((known, np.zeros(network.outlet_count, dtype=np.bool_)))
         for outlet in network.outlets:
             population = network.populations[outlet.population]
