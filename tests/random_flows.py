@@ -109,7 +109,7 @@ METHODS = [*EXACT, "exponential"]
 
 
 @st.composite
-def flowing_specs(draw: st.DrawFn, exact: bool = False) -> Spec:
+def flowing_specs(draw: st.DrawFn, exact: bool = False, synapses: bool = True) -> Spec:
     """A spec as a mapping; it may hold a cycle without delay, which the compiler refuses. ``exact``: nothing in it is
     computed by functions whose last bits are those of a library."""
     chooser = random.Random(draw(st.integers(0, 2**32)))
@@ -118,16 +118,16 @@ def flowing_specs(draw: st.DrawFn, exact: bool = False) -> Spec:
     sizes = {name: chooser.choice([1, 2, 3]) for name in kinds}
     neurons: dict[str, Plain] = {name: _group(chooser, kind, sizes[name]) for name, kind in kinds.items()}
     connections: dict[str, Plain] = {}
-    synapses: dict[str, Plain] = {}
+    joined: dict[str, Plain] = {}
     for source in kinds:
         for target in kinds:
             if chooser.random() < 0.6:
                 body = _connection(chooser, kinds, sizes, source, target)
                 connections[f"{source} -> {target}"] = body
-                if _can_have_synapse(body) and chooser.random() < 0.5:
-                    name = f"s{len(synapses)}"
-                    synapses[name] = _synapse(chooser, kinds[source], kinds[target], exact)
-                    body["synapse"] = {name: {"E": "level"}} if "E" in str(synapses[name]) else name
+                if synapses and _can_have_synapse(body) and chooser.random() < 0.5:
+                    name = f"s{len(joined)}"
+                    joined[name] = _synapse(chooser, kinds[source], kinds[target], exact)
+                    body["synapse"] = {name: {"E": "level"}} if "E" in str(joined[name]) else name
     method = chooser.choice(EXACT if exact else METHODS)
     spec: Spec = {
         "neurovis": 1,
@@ -145,7 +145,7 @@ def flowing_specs(draw: st.DrawFn, exact: bool = False) -> Spec:
             "rows": {"values": [[0.1, -0.2, 0.3], [0.4, 0.1, 0]]},
         },
         "models": MODELS,
-        "synapses": synapses,
+        "synapses": joined,
         "neurons": neurons,
         "connections": connections,
         "events": [
