@@ -99,7 +99,7 @@ SYNAPSES: list[dict[str, Plain]] = [
 ]
 _PHASE: dict[str, Plain] = {"parameters": {"E": 0.3}, "signal": "0.5*weight*sin(pre.X - post.Y - E)"}
 #: a state of each of these models
-_STATES = {"leaky": "v", "rate": "v", "mixed": "x", "through": "z"}
+_STATES = {"leaky": "v", "rate": "v", "mixed": "x", "through": "z", "leaky_integrator": "v"}
 BIASES: list[Plain] = [0.2, 0.3, "level"]
 #: three of them are continuous where what is sent flows into a derivative
 DELAYS: list[Plain] = [None, None, None, 0, 1, 3, "0.3 s", "0.1 s", {"seconds": "0.13 + 0.05*i + 0.1*j"}, "i + 2*j"]
@@ -114,7 +114,7 @@ def flowing_specs(draw: st.DrawFn, exact: bool = False, synapses: bool = True) -
     computed by functions whose last bits are those of a library."""
     chooser = random.Random(draw(st.integers(0, 2**32)))
     kinds = {f"G{letter}": chooser.choice(list(SENT)) for letter in "abcd"[: draw(st.integers(1, 4))]}
-    kinds["Ga"] = chooser.choice(list(MODELS))
+    kinds["Ga"] = chooser.choice(list(_STATES))
     sizes = {name: chooser.choice([1, 2, 3]) for name in kinds}
     neurons: dict[str, Plain] = {name: _group(chooser, kind, sizes[name]) for name, kind in kinds.items()}
     connections: dict[str, Plain] = {}

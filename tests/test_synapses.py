@@ -173,6 +173,22 @@ def test_states_of_synapses_are_integrated_with_those_of_neurons(backend: str) -
     np.testing.assert_allclose(found, expected, rtol=1e-7)
 
 
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("integrate", ["exponential", "semi_implicit", "rk4"])
+def test_states_of_synapses_flow_where_no_model_has_a_derivative(backend: str, integrate: str) -> None:
+    """Towards what a static neuron sends, held over a step: the exponential method is exact."""
+    network = network_of(f"""
+time: {{dt: 0.5, integrate: {integrate}}}
+synapses: {{s: {{state: {{g: {{derivative: pre - 2*g}}}}, signal: g}}}}
+neurons: {{A: {{bias: 3}}, B: {{}}}}
+connections: {{A -> B: {{synapse: s, delay: 1}}}}
+""")
+    simulation = Simulation(network, backend)
+    steps(simulation, 4)
+    g = {"exponential": 1.5 * (1 - math.exp(-3)), "semi_implicit": 1.5 * (1 - 1 / 8), "rk4": 1.5 * (1 - 0.375**3)}
+    np.testing.assert_allclose(simulation.activity[1], g[integrate], rtol=1e-12)
+
+
 HELD = """
 time: {dt: 0.1, integrate: euler}
 models: {flow: {state: {v: {initial: INITIAL, derivative: drive}}, activity: v}}

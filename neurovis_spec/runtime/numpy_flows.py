@@ -31,6 +31,7 @@ from typing import Final
 import numpy as np
 
 from neurovis_spec.arrays import BoolArray, Indices, IntArray
+from neurovis_spec.compiler.flows import BY_SLOPE
 from neurovis_spec.compiler.program import Diffuse, Integrate, Key, Port, Projection, Use
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.expressions.tree import names
@@ -151,7 +152,7 @@ class _Flow:
         #: the states at the beginning of the step, those where a stage looks, the derivatives there, their slopes
         looked_at = np.empty(self.size)
         self.x, self.y, self.k = self.temporary(), self.code.array("f", looked_at), self.temporary()
-        self.j = self.temporary() if any(part.slopes.trees for part in self.parts) else ""
+        self.j = self.temporary() if operation.method in BY_SLOPE else ""
         self.sent = self.code.array("f", np.empty(self.taken_count)) if self.taken_count else ""
         #: each state where a stage looks
         self.now = {key: self.code.array("f", looked_at[place]) for key, place in self.places.items()}
