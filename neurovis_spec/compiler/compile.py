@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from neurovis_spec.compiler.canonical import content_hash
 from neurovis_spec.compiler.checks.compiled import Compiled
-from neurovis_spec.compiler.checks.definitions import check_dt, check_slopes, integrated
+from neurovis_spec.compiler.checks.definitions import check_dt, check_slopes, check_slopes_through, integrated
 from neurovis_spec.compiler.checks.warnings import warn
 from neurovis_spec.compiler.connections.connect import Connected, connect, join
 from neurovis_spec.compiler.connections.entries import Bundle
@@ -135,6 +135,7 @@ def _compile_sections(spec: Spec, request: Request, findings: Findings) -> _Sect
     check_dt(spec, files, used, findings)
     if declared.integration.method in BY_SLOPE:
         check_slopes(spec, files, used, findings)
+        check_slopes_through(spec, files, census.groups, connected.bundles, findings)
     finder = finder_of(census, connected, findings)
     render = render_settings(spec.render, finder, constants)
     outputs = make_outputs(spec, finder)

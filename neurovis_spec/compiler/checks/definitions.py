@@ -16,11 +16,11 @@ import numpy as np
 
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.connections.entries import Bundle
-from neurovis_spec.compiler.flows import jacobian, with_slope
+from neurovis_spec.compiler.flows import jacobian, slope_by, with_slope
 from neurovis_spec.compiler.names.references import key_of, key_span
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.groups import Built
-from neurovis_spec.compiler.program import ACTIVATION, MODEL, RULE, SYNAPSE, Definition, Kind
+from neurovis_spec.compiler.program import ACTIVATION, DRIVE, MODEL, RULE, SYNAPSE, Definition, EndName, Kind
 from neurovis_spec.compiler.values.builtin import installed
 from neurovis_spec.compiler.values.constants import value_of
 from neurovis_spec.compiler.values.definitions import Defined
@@ -189,15 +189,15 @@ class Integrated(NamedTuple):
     activation: Definition | None = None
 
     def place_of(self, derivative: str, libraries: Iterable[Library]) -> Span:
-        """Where the derivative of a state, or of what is given, stands, or where the definition is named, if it is a
-        built-in."""
+        """Where the derivative of a state, or that or the formula of what is given, stands, or where the definition is
+        named, if it is a built-in."""
         kind, name = self.definition.kind, self.definition.name
         own = next((made[name] for one in libraries if name in (made := one.definitions[kind.section])), None)
         if own is None:
             return self.named
         parts = own.parts()
         state = (parts.state or {}).get(derivative)
-        formula = parts.derivative if state is None else state.flow.derivative
+        formula = parts.derivative or parts.each_step if state is None else state.flow.derivative
         return self.named if formula is None else formula.span
 
 
@@ -246,12 +246,65 @@ def check_slopes(spec: Spec, included: Iterable[Library], used: Iterable[Integra
                 if one.activation is not None and one.definition.reads_activation:
                     with_slope(one.activation)
             except ExpressionError as error:
-                message = (
-                    f"how the derivative of '{state.name}' changes with it is too long to be told: {error.message}"
-                )
-                hint = f"{error.hint} (let), or take another method of time.integrate, such as rk4"
-                findings.error(error.code, one.place_of(state.name, (spec, *included)), message, hint)
+                what = f"the derivative of '{state.name}' changes with it"
+                _slope_too_long(what, error, one.place_of(state.name, (spec, *included)), findings)
                 break
+
+
+def _slope_too_long(what: str, error: ExpressionError, place: Span, findings: Findings) -> None:
+    message = f"how {what} is too long to be told: {error.message}"
+    hint = f"{error.hint} (let), or take another method of time.integrate, such as rk4"
+    findings.error(error.code, place, message, hint)
+
+
+class _Sloped(NamedTuple):
+    """A formula of a definition in use of which the integration needs the derivative by one of its names."""
+
+    used: Integrated
+    formula: str
+    tree: Tree
+    by: str
+    what: str
+
+
+def check_slopes_through(
+    spec: Spec, included: Iterable[Library], groups: Iterable[Built], bundles: Iterable[Bundle], findings: Findings
+) -> None:
+    """Report the same of what a synapse makes of a state of its target, and of what the target makes of that."""
+    groups, libraries, told = list(groups), (spec, *included), set[tuple[str, str, str]]()
+    for one in (sloped for bundle in bundles for sloped in _sloped_through(bundle, groups)):
+        key = one.used.definition.name, one.formula, one.by
+        if key in told:
+            continue
+        told.add(key)
+        try:
+            slope_by(one.used.definition, one.tree, one.by)
+        except ExpressionError as error:
+            _slope_too_long(one.what, error, one.used.place_of(one.formula, libraries), findings)
+
+
+def _sloped_through(bundle: Bundle, groups: Iterable[Built]) -> Iterator[_Sloped]:
+    """What a synapse of an entry brings, by the states of its targets that it reads; and the derivatives of these by
+    the ports where that arrives."""
+    made = (one.definition for use in bundle.uses for one in use.pieces if one.definition.kind == SYNAPSE)
+    synapse = next(made, None)  # what is a parameter at an end makes no difference here
+    if synapse is None or synapse.given.each_step is None:
+        return
+    for group in groups:
+        inside = (bundle.targets >= group.group.start) & (bundle.targets < group.group.start + group.group.count)
+        model, choice = group.kind.model.definition, group.model.model
+        combine = {DRIVE: group.group.combine} | {port.name: port.combine for port in model.ports}
+        for state in model.flows if inside.any() else ():
+            end = EndName("post", state.name).text
+            if end not in synapse.read or state.derivative is None:
+                continue
+            used = Integrated(synapse, bundle.key)
+            what = f"what '{synapse.name}' brings changes with {end}"
+            yield _Sloped(used, synapse.given.name, synapse.given.each_step, end, what)
+            used = Integrated(model, group.model.source.span if choice is None else choice.name.span)
+            for port in (name for name, _ in bundle.route.ports if combine[name] == "sum"):
+                what = f"the derivative of '{state.name}' changes with {port}"
+                yield _Sloped(used, state.name, state.derivative, port, what)
 
 
 # Weights that are replaced where a change is meant
