@@ -18,7 +18,7 @@ LAYOUTS = "neurovis.layouts"
 RENDERERS = "neurovis.renderers"
 BACKENDS = "neurovis.backends"
 FORMATS = "neurovis.formats"
-#: packages with YAML files of activations, models and rules
+#: packages with YAML files of definitions
 LIBRARIES = "neurovis.libraries"
 BODIES = "neurovis.bodies"
 

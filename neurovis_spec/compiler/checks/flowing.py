@@ -6,6 +6,7 @@ could be made anew at each stage, at noise that is held, and at a step that is t
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -19,11 +20,12 @@ from neurovis_spec.compiler.flows import plain_flow, ports_read_by
 from neurovis_spec.compiler.levels import Cycle, held_at, made_anew, order_of
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.groups import Built
-from neurovis_spec.compiler.program import Definition, EndName
+from neurovis_spec.compiler.program import SYNAPSE, Definition, EndName
 from neurovis_spec.compiler.stiffness import stiffest_at_begin
 from neurovis_spec.compiler.taken import Wired, read_at
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.derivative import as_derivative
+from neurovis_spec.language.library import StateModel
 from neurovis_spec.language.words import Method
 
 #: Methods of an order above 1.
@@ -137,18 +139,28 @@ def _steps_by_hand(compiled: Compiled, method: Method, findings: Findings) -> No
     groups: dict[str, list[Built]] = {}
     for one in compiled.census.groups:
         groups.setdefault(one.kind.model.definition.name, []).append(one)
+    synapses = {one.use.definition.name for one in compiled.network.projections if one.kind == SYNAPSE}
     for library in compiled.libraries:
         for name, model in library.models.items():
-            for state, written in model.state.items() if name in groups else ():
-                step = written.each_step
-                if step is None or not isinstance(step.value, str) or written.derivative is not None:
-                    continue
-                if (flow := as_derivative(state, step.value)) is not None:
-                    message = f"this is a step of the Euler method by hand, beside what is integrated by {method}"
-                    hint = f"write derivative: {flow}"
-                    if any(one.model.initial is None for one in groups[name]):
-                        hint += "; it does nothing at step 0 then, where 'each_step' makes a step"
-                    findings.warning("step-by-hand", step.span, message, hint)
+            if name in groups:
+                _tell_steps(model.state, method, any(one.model.initial is None for one in groups[name]), findings)
+        for name, synapse in library.synapses.items():
+            if name in synapses:
+                _tell_steps(synapse.state, method, False, findings)
+
+
+def _tell_steps(states: Mapping[str, StateModel], method: Method, begins: bool, findings: Findings) -> None:
+    """The same of some states; ``begins``: whether each_step makes the value of step 0."""
+    for state, written in states.items():
+        step = written.each_step
+        if step is None or not isinstance(step.value, str) or written.derivative is not None:
+            continue
+        if (flow := as_derivative(state, step.value)) is not None:
+            message = f"this is a step of the Euler method by hand, beside what is integrated by {method}"
+            hint = f"write derivative: {flow}"
+            if begins:
+                hint += "; it does nothing at step 0 then, where 'each_step' makes a step"
+            findings.warning("step-by-hand", step.span, message, hint)
 
 
 def _stiff(compiled: Compiled, findings: Findings) -> None:
