@@ -326,6 +326,12 @@ def test_what_fits_in_synapses_is_offered(at: str, there: list[str], missing: li
     assert found.keys().isdisjoint(missing)
 
 
+def test_a_rule_of_the_centre_is_offered_it_in_place_of_the_weight() -> None:
+    rule = "neurovis: 1\nname: x\nrules:\n  near: {let: {d: ¦}, centre: {each_step: centre + 0.1*(pre - centre)}}\n"
+    assert offered(rule).keys() >= {"centre", "pre", "sent"}
+    assert "weight" not in offered(rule)
+
+
 @pytest.mark.parametrize(
     ("at", "told"),
     [

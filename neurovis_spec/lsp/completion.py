@@ -295,8 +295,10 @@ def _formula(role: Role, scope: Scope, path: Path, index: Index, place: Place) -
         for name in index.locals(*scope.definition):
             if name.item.path[2] != "outputs":  # which formulas do not read
                 yield _Offer(name.text, "local", str(name.item.path[2]))
+    centred = scope.definition is not None and (*scope.definition, "centre") in index.keys  # a rule of the centre
     for given in (*role.sees, *ALWAYS):
-        yield _Offer(given, "constant", GIVEN[given])
+        told = "centre" if centred and given == "weight" else given
+        yield _Offer(told, "constant", GIVEN[told])
     for word in functions_of(role).values():
         yield _Offer(word.name, "function", word.usage, word.about)
 
