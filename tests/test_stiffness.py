@@ -114,3 +114,39 @@ def test_a_time_is_told_in_the_unit_of_dt() -> None:
     message, hint = Stiffest("A", "v", -33_000.0, 7).words(cell("0.1 ms").network)
     assert message == "dt·∂v'/∂v is -3.3 at 'A' at step 7; the limit of rk4 is -2.785"
     assert hint == "take a dt of at most 0.084 ms, or integrate: exponential"
+
+
+GIVING_WAY = """\
+neurovis: 1
+name: pair
+time: {dt: 1}
+models:
+  opening: {state: {s: {derivative: 0.1}}, activity: s}
+  cell:
+    parameters: {tau: 2}
+    ports: [excitatory]
+    state: {v: {initial: 1, derivative: (drive + 0.5*excitatory*v - v)/tau}}
+    activity: v
+synapses: {conductance: {let: {apart: 4 - post.v}, signal: weight*pre.s*apart}}
+neurons: {A: {model: opening}, B: {model: cell}, C: {model: cell}}
+connections:
+  A -> B: {synapse: conductance, weight: 0.5, port: {drive: 2, excitatory: 1}}
+  A -> C: {synapse: conductance, weight: 0.1}
+"""
+
+
+@pytest.mark.parametrize("backend", ["reference", "numpy"])
+def test_a_conductance_that_opens_makes_its_target_stiff(backend: str) -> None:
+    """∂v'/∂v with all that arrives: 2·w·s·(4 − v) at drive, and w·s·(4 − v), times v/2, at the other port."""
+    made = nv.compile_text(GIVING_WAY)
+    assert made.warnings == ()
+    assert stiffest_at_begin(made.network) is None
+    worst = stiffest_of_run(made.network, 60)
+    assert worst is not None
+    assert (worst.owner, worst.state, worst.step) == ("B", "v", 59)
+    text = GIVING_WAY.replace("dt: 1", "dt: 1, integrate: exponential")
+    run = nv.compile_text(text).run(60, backend=backend, states="all")
+    s, v = run.activity[-1, :2]
+    by_excitatory = 0.5 * s * (4 - v)
+    slope = (-1 + 0.5 * by_excitatory - 2 * 0.5 * s + 0.5 * v * -0.5 * s) / 2
+    np.testing.assert_allclose(worst.slope, slope, rtol=1e-9)

@@ -15,7 +15,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import SYNAPSE, Key, Projection
 from neurovis_spec.language.expressions.evaluate import Given, evaluate_array
 from neurovis_spec.language.expressions.functions import NUMPY, Library
-from neurovis_spec.runtime.stages import ends_of, signal_of, taken_by
+from neurovis_spec.runtime.stages import Formulas, ends_of, signal_of, taken_by
 from neurovis_spec.runtime.state import State, constants
 
 
@@ -27,16 +27,23 @@ def signals_of(network: Network, state: State, weights: FloatArray, by: Library 
         result: FloatArray = weights * sent[taken_by(network)]
         for projection in network.projections:
             if projection.kind == SYNAPSE:
-                result[projection.members] = _formed(network, projection, state, sent, weights, by)
+                result[projection.members] = _formed(network, projection, signal_of(projection), state, weights, by)
     result[state.conditions.structure.gone] = 0.0
     return result
 
 
+def formed(network: Network, projection: Projection, formulas: Formulas, state: State) -> FloatArray:
+    """A formula of the synapses of a projection as it is behind the step before ``state.k``; one number a member."""
+    with np.errstate(all="ignore"):
+        return _formed(network, projection, formulas, state, state.weights, NUMPY)
+
+
 def _formed(
-    network: Network, projection: Projection, state: State, sent: FloatArray, weights: FloatArray, by: Library
+    network: Network, projection: Projection, formulas: Formulas, state: State, weights: FloatArray, by: Library
 ) -> FloatArray:
-    """The signals of the synapses of a projection."""
+    """The same with these weights (m,)."""
     use, members, k = projection.use, projection.members, state.k - 1
+    sent = np.concatenate((state.activity, state.outlets))
     unit, delays = use.definition.per_second, network.connections.delays[members]
     known: dict[str, Given] = {**constants(network.dt * unit), "k": float(k), "t": k * network.dt * unit}
     known |= {name: _as_set(network, Key(use.owner, name), values, state) for name, values in use.parameters.items()}
@@ -48,7 +55,6 @@ def _formed(
         if end.past and delays.any():
             past = state.history[(k - delays) % len(state.history), end.places]
             known[name] = np.where(delays > 0, np.where(lost, 0.0, past), sent[end.places])
-    formulas = signal_of(projection)
     for name, tree in formulas.let:
         known[name] = evaluate_array(tree, known, by=by)
     ((_, tree),) = formulas.trees
