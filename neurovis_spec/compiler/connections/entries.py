@@ -493,7 +493,7 @@ class EntryBuilder:
         centre = self.body.centre
         if centre is None:
             return UNKNOWN if shape is UNKNOWN else np.broadcast_to(0.0, shape.i.shape)
-        if not self._measures_distance():
+        if self._measures_distance() is False:
             entry = self.body.source.entry("centre")
             span = self.key.span if entry is None else entry.key.span
             message = "'centre' has no effect: none of the targets combines by distance"
@@ -504,16 +504,19 @@ class EntryBuilder:
             return UNKNOWN
         return np.ascontiguousarray(grid.values[shape.i, shape.j])
 
-    def _measures_distance(self, unknown: bool = True) -> bool:
-        """Whether any of the targets combines what arrives by distance, or may (``unknown``), where what it says of
+    def _measures_distance(self) -> bool | Unknown:
+        """Whether any of the targets combines what arrives by distance; UNKNOWN where it may, since what it says of
         that is invalid."""
         if self.targets is UNKNOWN or self.route is UNKNOWN:
-            return unknown
-        census, ports = self.context.census, [name for name, _ in self.route.ports]
-        if DRIVE in ports and census.by_distance[self.targets].any():
+            return UNKNOWN
+        ports, groups = [name for name, _ in self.route.ports], self.context.census.groups_of(self.targets)
+        declared = (port for one in groups for port in one.kind.model.definition.ports)
+        at_drive = [one for one in groups if DRIVE in ports]
+        if any(port.combine == "distance" and port.name in ports for port in declared):
             return True
-        models = (one.kind.model.definition for one in census.groups_of(self.targets))
-        return any(port.combine == "distance" and port.name in ports for model in models for port in model.ports)
+        if any(one.group.combine == "distance" for one in at_drive):
+            return True
+        return UNKNOWN if any("combine" in one.model.unknown for one in at_drive) else False
 
     def _bounds(self, weights: FloatArray | Unknown) -> tuple[float, float] | Unknown:
         """The bounds of the weights. A bound that follows parameters is followed together with the other one, so that
@@ -569,7 +572,7 @@ class EntryBuilder:
         choice = self.body.synapse
         if choice is None:
             return None
-        if self._measures_distance(unknown=False):
+        if self._measures_distance() is True:
             message = "a synapse brings a signal, and there is nothing that a distance would be measured from"
             hint = "leave the synapse out, or let the targets combine by sum or product"
             self.constants.findings.error("synapse-at-distance", choice.name.span, message, hint)

@@ -97,11 +97,6 @@ class Census:
         return Assembled(self.neurons.position.ravel(), tuple(parts))
 
     @cached_property
-    def by_distance(self) -> npt.NDArray[np.bool_]:
-        """For each neuron whether it combines by distance, or may, where what the spec says of that is invalid."""
-        return self._each([one.group.combine == "distance" or "combine" in one.model.unknown for one in self.groups])
-
-    @cached_property
     def misplaced(self) -> npt.NDArray[np.bool_]:
         """For each neuron whether what the spec says of its position is invalid."""
         return self._each([one.position is UNKNOWN or "position" in one.model.unknown for one in self.groups])
