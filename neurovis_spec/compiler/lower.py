@@ -266,16 +266,18 @@ class _Alike(NamedTuple):
 
 
 class _Some(NamedTuple):
-    """Connections of an entry that are members of one projection: their indices in the network, and in the piece."""
+    """Connections of an entry that are members of one projection: their indices in the network, and which of the piece
+    they are."""
 
     use: InUse
     piece: Piece
     members: IntArray
-    inside: IntArray
+    inside: IntArray | slice
 
     def signal(self, name: str) -> Signal:
         """Where a signal of the rule comes from."""
-        return self.use.signals[name].some(self.piece.places[self.inside])
+        signal = self.use.signals[name]
+        return signal if len(signal.places) == len(self.members) else signal.some(self.piece.places[self.inside])
 
 
 def make_projections(made: Connected, populations: tuple[Population, ...]) -> Projected:
@@ -302,13 +304,15 @@ def make_projections(made: Connected, populations: tuple[Population, ...]) -> Pr
     return Projected(projections, tuple(_first_rules(made, projections)), targets)
 
 
-def _alike(use: InUse, piece: Piece, targets: Indices, population_of: IntArray) -> Iterator[tuple[_Alike, IntArray]]:
+def _alike(
+    use: InUse, piece: Piece, targets: Indices, population_of: IntArray
+) -> Iterator[tuple[_Alike, IntArray | slice]]:
     """The connections of a piece by what projections they are members of. ``targets``: of all of its entry."""
     definition = piece.definition
     read = {name.text for name in definition.end_names}
     names = definition.kind.name, definition.name, tuple(one for one in definition.parameters if one in read)
     if definition.kind == RULE:
-        yield _Alike(*names, use.place), np.arange(len(piece.places), dtype=np.int64)
+        yield _Alike(*names, use.place), slice(None)
         return
     populations = population_of[targets[piece.places]]
     for population in np.flatnonzero(np.bincount(populations)).tolist():
@@ -329,12 +333,15 @@ def _first_rules(made: Connected, projections: tuple[Projection, ...]) -> Iterat
     start = 0
     for bundle in made.bundles:
         size = len(bundle.sources)
-        found = np.full(size if bundle.rules else 0, -1, dtype=np.int64)
-        for number, one in firsts if bundle.rules else ():
-            inside = slice(*np.searchsorted(one.members, (start, start + size)))
-            found[one.members[inside] - start] = number
-        alike = not len(found) or (found == found[0]).all()
-        yield np.broadcast_to(found[:1] if len(found) else np.int64(-1), (size,)) if alike else found
+        inside = [slice(*np.searchsorted(one.members, (start, start + size)).tolist()) for _, one in firsts]
+        numbers = [number for (number, _), some in zip(firsts, inside, strict=True) if some.start < some.stop]
+        if len(numbers) < 2:
+            yield np.broadcast_to(np.int64(numbers[0] if numbers else -1), (size,))
+        else:
+            found = np.empty(size, dtype=np.int64)
+            for (number, one), some in zip(firsts, inside, strict=True):
+                found[one.members[some] - start] = number
+            yield found
         start += size
 
 

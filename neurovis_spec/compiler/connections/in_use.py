@@ -77,9 +77,10 @@ def in_use(settled: Settled, span: Span, at: Joined, findings: Findings) -> InUs
     parts = (*settled.parts, *(part for meaning in found for part in meaning.parts))
     pieces = []
     for is_parameter, places in _alike([meaning.is_parameter for meaning in found], count):
-        values = {name: array[places] for name, array in settled.parameters.items()}
+        inside = slice(None) if len(places) == count else places
+        values = {name: array[inside] for name, array in settled.parameters.items()}
         own = [meaning for meaning, one in zip(found, is_parameter, strict=True) if one]
-        values |= {meaning.name.text: meaning.values[places] for meaning in own}
+        values |= {meaning.name.text: meaning.values[inside] for meaning in own}
         grown = replace(definition, parameters=tuple(values)) if own else definition
         read = tuple(meaning.name for meaning, one in zip(found, is_parameter, strict=True) if not one)
         pieces.append(Piece(places, grown, values, read))
