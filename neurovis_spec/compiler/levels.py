@@ -116,10 +116,10 @@ class _Open(NamedTuple):
 
 
 def made_anew(models: Sequence[Definition], model: Indices, wired: Wired, held: Mapping[str, BoolArray]) -> BoolArray:
-    """For each connection whether what it brings flows and is made anew at each stage. The arguments are those of
-    ``order_of``."""
+    """For each connection whether it takes something that flows, and brings it anew at each stage. The arguments are
+    those of ``order_of``."""
     made = _Coupled(models, model, wired, held)
-    return made.making & made.flowing
+    return made.making & made.flowing & made.taken.waited_for
 
 
 def held_at(neurons: Neurons, inputs: Sequence[Input], noises: Sequence[Noise]) -> Mapping[str, BoolArray]:
