@@ -24,7 +24,7 @@ from neurovis_spec.compiler.events.bound import found_in, make_settable, own_wei
 from neurovis_spec.compiler.flows import BY_SLOPE, plain_flow, sent_by
 from neurovis_spec.compiler.levels import Cycle, Order, held_at, order_of
 from neurovis_spec.compiler.limits import MOST_SIGNALS, MOST_SUBSTEPS, Limits, amount
-from neurovis_spec.compiler.lower import Integration, make_populations, make_program, make_projections
+from neurovis_spec.compiler.lower import Integration, make_populations, make_program
 from neurovis_spec.compiler.names.expand import Expander, constants_of
 from neurovis_spec.compiler.names.finder import Finder, finder_of
 from neurovis_spec.compiler.names.modules import Library, library_of
@@ -34,6 +34,7 @@ from neurovis_spec.compiler.names.scope import Expansion, Scope, Surroundings
 from neurovis_spec.compiler.network import Input, Instance, Network, Noise, Output
 from neurovis_spec.compiler.neurons.noise import make_noises
 from neurovis_spec.compiler.neurons.populate import Census, populate, without_neurons
+from neurovis_spec.compiler.projections import make_projections
 from neurovis_spec.compiler.ros_settings import RosSettings
 from neurovis_spec.compiler.run_checks import with_checks
 from neurovis_spec.compiler.taken import Side, read_at
