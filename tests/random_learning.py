@@ -1,5 +1,5 @@
 """Random specs of what learns: groups whose models have states and outputs, connections of several rules, which see
-states and outputs of any group; always legal, never explosive."""
+states and outputs of any group and of both ends, and whose own flow; always legal, never explosive."""
 
 from __future__ import annotations
 
@@ -35,6 +35,20 @@ _RULES: dict[str, Plain] = {
         "state": {"mean": {"each_step": "mean + rate*(post - mean)"}},
         "weight": {"each_step": "weight - rate*weight", "each_episode": "weight + 0.01*mean"},
     },
+    "follow": {
+        "time": "ms",
+        "signals": ["of"],
+        "state": {
+            "a": {"initial": 0.2, "derivative": "(pre.v - a)/20 + pre/40"},
+            "b": {"derivative": "(tanh(post.twice) + 0.1*tanh(of) - b)/30", "each_episode": "b/2"},
+            "c": {"each_step": "0.5*c + pre.w"},
+        },
+        "weight": {"derivative": "0.001*(a*post.v - b*weight + tanh(c))"},
+    },
+    "near": {
+        "state": {"apart": {"derivative": "-10*apart + pre.twice - post"}},
+        "weight": {"each_step": "weight + 0.01*tanh(post.w - apart) - pre.keep/10000"},
+    },
     "grow": {
         "parameters": {"step": 0.01},
         "signals": ["by"],
@@ -60,7 +74,7 @@ def learning_specs(draw: st.DrawFn) -> Spec:
         }
         for name, size in sizes.items()
     }
-    connections: dict[str, Plain] = {}
+    connections: dict[str, Spec] = {}
     for source in sizes:
         for target in sizes:
             if chooser.random() < 0.6:
@@ -68,14 +82,27 @@ def learning_specs(draw: st.DrawFn) -> Spec:
     time: dict[str, Plain] = {"dt": 0.01, "episode": 4, "integrate": chooser.choice(["heun", "rk4", "exponential"])}
     return {
         "neurovis": 1, "name": "learning", "seed": chooser.randrange(100), "time": time, "inputs": {"wave": wave},
-        "models": _MODELS, "rules": _RULES, "neurons": neurons, "connections": connections,
+        "models": _MODELS, "rules": _RULES, "neurons": neurons, "connections": {**connections},
+        "events": _events(chooser, [*sizes], [name for name, body in connections.items() if "plasticity" in body]),
     }  # fmt: skip
+
+
+def _events(chooser: random.Random, groups: list[str], learning: list[str]) -> list[Plain]:
+    events: list[Plain] = []
+    if learning:
+        name = chooser.choice(learning)
+        events += [{"at": 2, "learning": {name: False}}, {"at": 5, "learning": {name: True}}]
+        events += [{"at": 3, "lesion": chooser.choice(learning)}] if chooser.random() < 0.5 else []
+    lost = chooser.choice(groups)
+    return [*events, {"at": 4, "lesion": lost}, {"at": 6, "mend": lost}, {"from": 5, "to": 7, "clamp": {lost: 0.3}}]
 
 
 def _body(chooser: random.Random, sizes: dict[str, int], source: str, target: str) -> Spec:
     body: Spec = {"weight": "uniform(-0.3, 0.3)", "pattern": "all_to_all", "self": True}
-    body["delay"] = chooser.choice([1, 1, 2, 3])
-    rules = chooser.sample([*_RULES], chooser.choice([0, 1, 2, 2, 3]))
+    body["delay"] = chooser.choice([1, 1, 2, 3, {"seconds": 0.023}])
+    if chooser.random() < 0.2:
+        del body["delay"]
+    rules = chooser.sample([*_RULES], chooser.choice([0, 1, 2, 2, 3, 4]))
     if rules:
         body["plasticity"] = [_used(chooser, rule, sizes, source, target) for rule in rules]
         if chooser.random() < 0.4:
@@ -86,7 +113,9 @@ def _body(chooser: random.Random, sizes: dict[str, int], source: str, target: st
 def _used(chooser: random.Random, rule: str, sizes: dict[str, int], source: str, target: str) -> Plain:
     if rule == "fade":
         return "fade" if chooser.random() < 0.5 else {"fade": {"rate": 0.02}}
-    signals = ["error", "gain"] if rule == "chase" else ["by"]
+    if rule == "near":
+        return "near"
+    signals = {"chase": ["error", "gain"], "grow": ["by"], "follow": ["of"]}[rule]
     return {rule: {name: _signal(chooser, sizes, source, target) for name in signals}}
 
 

@@ -1,4 +1,5 @@
-"""Rules that see states, several a connection: in every backend as the reference has them, and as loops by hand do."""
+"""Rules that see states, several a connection, and states of theirs that flow: in every backend as the reference has
+them."""
 
 from __future__ import annotations
 
@@ -6,20 +7,22 @@ import warnings
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import Phase, given, settings
 from random_learning import learning_specs
 from random_specs import Spec
 
 import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.runtime.backend import load
+from neurovis_spec.runtime import c_backend
+from neurovis_spec.runtime.backend import Backend
+from neurovis_spec.runtime.c_backend import CBackend
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.inputs import InputReader
+from neurovis_spec.runtime.numpy_backend import NumpyBackend
 from neurovis_spec.runtime.reference import ReferenceBackend
 from neurovis_spec.runtime.state import State, initial_state
 
 STEPS = 9
-BACKENDS = ["numpy", pytest.param("c", marks=pytest.mark.compiler)]
 
 
 def arrays(state: State) -> dict[str, FloatArray]:
@@ -28,14 +31,12 @@ def arrays(state: State) -> dict[str, FloatArray]:
     return {"activity": state.activity, "outlets": state.outlets, "weights": state.weights, **cells}
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
-@settings(max_examples=25, deadline=None)
-@given(spec=learning_specs())
-def test_each_step_begun_in_the_references_state_agrees(backend: str, spec: Spec) -> None:
+def follow(spec: Spec, backend: Backend) -> None:
+    """Each step of a backend, begun in the reference's state, is that of the reference, with all events."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         network = nv.compile(spec).network
-    plain, other, reader = ReferenceBackend().prepare(network), load(backend).prepare(network), InputReader(network)
+    plain, other, reader = ReferenceBackend().prepare(network), backend.prepare(network), InputReader(network)
     state, controls = initial_state(network), Controls(network)
     for k in range(STEPS):
         controls.begin(state)
@@ -44,4 +45,23 @@ def test_each_step_begun_in_the_references_state_agrees(backend: str, spec: Spec
         plain.step(state, reader.at(k))
         other.step(beside, reader.at(k))
         for (name, expected), found in zip(arrays(state).items(), arrays(beside).values(), strict=True):
-            np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12, err_msg=f"{name} at {k}")
+            if backend.capabilities.exactness == "bits":
+                assert found.tobytes() == expected.tobytes(), (name, k)
+            else:
+                np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12, err_msg=f"{name} at {k}")
+
+
+@settings(max_examples=40, deadline=None)
+@given(spec=learning_specs())
+def test_each_step_in_numpy_agrees(spec: Spec) -> None:
+    follow(spec, NumpyBackend())
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("size", [0, 600], ids=["loops", "written out"])
+@settings(max_examples=10, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(spec=learning_specs())
+def test_each_step_in_c_is_the_reference_bit_for_bit(spec: Spec, size: int) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(c_backend, "SMALL", size)
+        follow(spec, CBackend())

@@ -421,6 +421,9 @@ class Network:
             for population in map(self.populations.__getitem__, by.populations if by is not None else ())
             for port in population.ports
         ]
+        behind = len(self.neurons) + self.outlet_count
+        for projection in map(self.projections.__getitem__, by.projections if by is not None else ()):
+            fed += [signal[signal >= behind] - behind for signal in projection.signals.values()]
         reached = frozenset(np.concatenate(fed).tolist()) if fed else frozenset()
         formulas = [
             entry.name

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Final, Literal, NamedTuple, TypeAlias
 
 from neurovis_spec.arrays import FloatArray, Indices, IntArray
-from neurovis_spec.language.expressions.tree import Call, Number, Tree, names, walk
+from neurovis_spec.language.expressions.tree import Call, Chain, Name, Number, Tree, names, walk
 from neurovis_spec.language.words import Combine, Method
 
 _ZERO = Number(0.0)
@@ -170,6 +170,25 @@ class Definition:
     def lasting(self) -> tuple[Quantity, ...]:
         """What lasts from step to step, and is replaced all at once, from old values."""
         return (*self.state, *self.gives) if self.kind.lasting else self.state
+
+    @property
+    def steps(self) -> Mapping[str, Tree | None]:
+        """What becomes of all that lasts at a step, formulas by their names: what a rule changes by a derivative goes
+        along that for the length of the step."""
+        along = {
+            one.name: Chain(("+",), (Name(one.name), Chain(("*",), (Name("dt"), one.derivative))))
+            for one in self.lasting
+            if one.derivative is not None and one in self.gives
+        }
+        return {one.name: one.each_step for one in self.lasting} | along
+
+    @property
+    def staying(self) -> frozenset[str]:
+        """What of all that lasts stays as it is at the first step of all: of what has states with a derivative all of
+        it, of a rule, whose steps are taken there, what a derivative changes."""
+        if self.kind.lasting:
+            return frozenset(one.name for one in self.gives if one.derivative is not None)
+        return frozenset(one.name for one in self.lasting) if self.flows else frozenset()
 
     @property
     def fleeting(self) -> tuple[Quantity, ...]:

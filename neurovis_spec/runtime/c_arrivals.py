@@ -6,7 +6,7 @@ many connections, go on beside each other, since an addition need not wait for t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,6 +24,7 @@ from neurovis_spec.runtime.c_code import Code, Form, Place
 from neurovis_spec.runtime.signals import SignalLayout
 from neurovis_spec.runtime.stages import taken_by
 
+_NO_MORE: Mapping[str, int] = {}
 #: connections of a neuron that are written out one after the other
 _FEW = 16
 #: neurons of a dense population whose sums are kept beside each other
@@ -135,10 +136,10 @@ def taken(network: Network, code: Code, connections: Indices, place: Place) -> s
     return taken_at(network, code, network.sending[connections], place)
 
 
-def taken_at(network: Network, code: Code, index: Indices, place: Place) -> str:
+def taken_at(network: Network, code: Code, index: Indices, place: Place, more: Mapping[str, int] = _NO_MORE) -> str:
     """One of some numbers, by indices into all activities, followed by the outlets, as ``Network.sending`` numbers
-    them, followed by the inputs of a step, as signals of rules are numbered."""
-    sizes = {"activity": len(network.neurons), "outlets": network.outlet_count, "s": network.vector_size}
+    them, followed by the inputs of a step, as signals of rules are numbered, and by ``more`` arrays of such sizes."""
+    sizes = {"activity": len(network.neurons), "outlets": network.outlet_count, "s": network.vector_size, **more}
     own, start, parts = index if not isinstance(place, int) else index[place : place + 1], 0, dict[str, int]()
     for name, size in sizes.items():
         if ((own >= start) & (own < start + size)).any():

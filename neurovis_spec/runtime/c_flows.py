@@ -29,17 +29,28 @@ from functools import partial
 from itertools import groupby
 
 from neurovis_spec.arrays import IntArray
-from neurovis_spec.compiler.program import MODEL, Diffuse, Integrate, Port, SendAhead
+from neurovis_spec.compiler.program import MODEL, SYNAPSE, Diffuse, Integrate, Key, Port, SendAhead
 from neurovis_spec.language.expressions.emit_c import INEXACT, Made, Value
 from neurovis_spec.language.expressions.parser import formula
 from neurovis_spec.language.expressions.tree import Name
 from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, Sent, taken_at
 from neurovis_spec.runtime.c_code import Place, plus, words_of
-from neurovis_spec.runtime.c_lags import write_arriving
+from neurovis_spec.runtime.c_lags import read_between, write_arriving
 from neurovis_spec.runtime.c_plan import BEGIN, MIDDLE, STAGES, FlowState, Plan
 from neurovis_spec.runtime.c_step import StepCode, write, write_input
-from neurovis_spec.runtime.stages import INSIDE, PARTS, Formulas, Part, Taken, formulas_of, given, taken_in_order
+from neurovis_spec.runtime.stages import (
+    INSIDE,
+    PARTS,
+    Contacts,
+    End,
+    Formulas,
+    Part,
+    Taken,
+    formulas_of,
+    given,
+    taken_in_order,
+)
 
 #: What a state changes by in a substep of the length h, by its derivative f and j = ∂f/∂x.
 _CHANGES: Mapping[Method, str] = {
@@ -67,7 +78,7 @@ class _Integration:
         self.method, self.substeps = self.plan.operation.method, self.plan.operation.substeps
         #: the flow states of a stage
         self.now = "fy" if "fy" in self.plan.parts else "fx"
-        self.varying = {(one.part.number, one.name): one.varies for one in self.plan.states}
+        self.varying = {one.key: one.varies for one in self.plan.states}
 
     def write(self) -> None:
         """All of it."""
@@ -104,7 +115,8 @@ class _Integration:
 
             def copied(place: Place, totals: Mapping[int, str], one: FlowState = one) -> None:
                 now = cell = self.step.states(one.use, place)[one.name]
-                if held := self.step.held(one.part.number, one.name, place):
+                held = self.step.held(one.part.number, one.name, place) if isinstance(one.part, Part) else ""
+                if held:
                     now = f"held[{held}] ? holding[{held}] : {cell}"
                 self.code.line(line.format(cell=cell, now=now, at=plus(one.start, place)))
 
@@ -183,7 +195,7 @@ class _Integration:
         for one in self.plan.states:
             with self.code.block(self.code.loop("i", one.start + one.size, one.start)):
                 change: Value = "fk[i]"
-                if self.varying[one.part.number, one.name]:
+                if self.varying[one.key]:
                     h = self.length(one.use.definition.per_second)
                     change = self.code.value(formula(formula_), {"h": h, "f": "fk[i]", "j": "fj[i]"})
                 self.code.line(f"fx[i] = fx[i] + {self.code.text(change)};")
@@ -242,6 +254,9 @@ class _Integration:
         for part in parts:
             if part.flows:
                 self.neurons(part, part.derivatives, partial(self.slope, part))
+        for contacts in self.plan.contacts:
+            if contacts.flows:
+                self.step.each(len(contacts.projection.members), {}, partial(self.joined, contacts))
         noisy = [part for part in parts if part.spread.trees]
         if noisy and self.plan.diffuses:
             with self.code.block(f"if ({first})"):
@@ -300,16 +315,45 @@ class _Integration:
         """A number of the vector of the step, as it is at the stage."""
         return f"{'fv' if self.network.held_inputs else 's'}[{self.code.at(index_in_s, place)}]"
 
-    def known(self, part: Part, place: Place) -> dict[str, Value]:
-        """What formulas of the model of a neuron see at a stage beside its ports."""
-        use = part.population.model
+    def known(self, part: Part | Contacts, place: Place) -> dict[str, Value]:
+        """What formulas of the model of a neuron see at a stage beside its ports, and those of a synapse or a rule
+        beside both ends."""
+        use = part.population.model if isinstance(part, Part) else part.projection.use
         per_second = use.definition.per_second
         known: dict[str, Value] = {**self.code.parameters(use, place), **self.step.states(use, place)}
         for name in part.flows:
-            known[name] = f"{self.now}[{plus(self.plan.starts[part.number, name], place)}]"
+            known[name] = f"{self.now}[{plus(self.plan.starts[Key(use.owner, name)], place)}]"
         known["t"] = _clock(per_second)
         known["dt"] = self.network.dt * per_second
         return known
+
+    def joined(self, contacts: Contacts, place: Place, totals: Mapping[int, str]) -> None:
+        """The derivatives of the states of a connection, or what these change by."""
+        code, projection, derivatives = self.code, contacts.projection, contacts.derivatives
+        read = derivatives.names | contacts.slopes.names
+        known = self.known(contacts, place)
+        known |= {name: self.end(contacts, end, place) for name, end in contacts.ends.items() if name in read}
+        if "weight" in read:
+            known["weight"] = f"weights[{code.at(projection.members, place)}]"
+        trees = [tree for _, tree in derivatives.trees]
+        self.slope(contacts, place, self.step.let(derivatives.let, known, trees), {})
+
+    def end(self, contacts: Contacts, end: End, place: Place) -> Value:
+        """What a connection reads of an end at a stage: what is there now, or what was sent there d steps ago."""
+        network, code, projection = self.network, self.code, contacts.projection
+        more = {"fo": self.plan.parts_taken, "fv": network.vector_size if network.held_inputs else 0}
+        now = taken_at(network, code, self.plan.now(end.places), place, more)
+        delays = network.connections.delays[projection.members]
+        own = delays if not isinstance(place, int) else delays[place : place + 1]
+        if not end.past or not own.any():
+            return now
+        if self.step.lags is not None and self.step.lags.there[projection.members].any():
+            past = read_between(self.step, projection, end, place)
+        else:
+            past = self.step.remembered(projection, end, delays, now, place)
+        if own.all():
+            return past
+        return code.let("a", f"{code.at(delays, place)} > 0 ? {code.text(past)} : {now}")
 
     def give(
         self, part: Part, one: Taken, place: Place, known: Mapping[str, Value], functions: Mapping[str, Made]
@@ -324,35 +368,49 @@ class _Integration:
             value = f"lesioned[{neuron}] ? {code.text(0.0)} : {value}"
         code.line(f"fo[{code.at(self.plan.places[one.places], place)}] = {value};")
 
-    def slope(self, part: Part, place: Place, known: Mapping[str, Value], functions: Mapping[str, Made]) -> None:
-        """The derivatives of the states of a neuron, or what these change by."""
+    def idle(self, part: Part | Contacts, name: str, place: Place) -> str:
+        """The code of whether a flow state is held, or its connection does nothing; "" where it never is."""
+        if isinstance(part, Part):
+            held = self.step.held(part.number, name, place)
+            return f"held[{held}]" if held else ""
+        form, connection = self.step.form, self.code.at(part.projection.members, place)
+        if part.projection.kind == SYNAPSE:
+            return f"gone[{connection}]" if form.gone else ""
+        return f"still[{connection}]" if form.still else ""
+
+    def slope(
+        self, part: Part | Contacts, place: Place, known: Mapping[str, Value], functions: Mapping[str, Made]
+    ) -> None:
+        """The derivatives of the states of a neuron or a connection, or what these change by."""
         code, changes = self.code, _CHANGES.get(self.method)
-        made = part.population.model.definition
+        use = part.population.model if isinstance(part, Part) else part.projection.use
         diagonal = dict(part.slopes.trees)
         more = tuple((name, tree) for name, tree in part.slopes.let if name not in known)
         known = self.step.let(more, known, [*diagonal.values()], functions)
         for name, tree in part.derivatives.trees:
-            slope, at = code.value(tree, known, functions), plus(self.plan.starts[part.number, name], place)
-            held = self.step.held(part.number, name, place)
+            key = Key(use.owner, name)
+            slope, at = code.value(tree, known, functions), plus(self.plan.starts[key], place)
+            idle = self.idle(part, name, place)
             if changes is not None:
                 own_slope = code.value(diagonal[name], known, functions)
-                if self.varying[part.number, name]:
-                    if held:  # 0, so that the change is 0 even where this is NaN
-                        own_slope = f"held[{held}] ? {code.text(0.0)} : {code.text(own_slope)}"
+                if self.varying[key]:
+                    if idle:  # 0, so that the change is 0 even where this is NaN
+                        own_slope = f"{idle} ? {code.text(0.0)} : {code.text(own_slope)}"
                     code.line(f"fj[{at}] = {code.text(own_slope)};")
                 else:
-                    h = self.length(made.per_second)
+                    h = self.length(use.definition.per_second)
                     parts: dict[str, Value] = {"h": h, "f": code.let("n", slope), "j": own_slope}
                     slope = code.value(formula(changes), parts)
-            if held:
-                slope = f"held[{held}] ? {code.text(0.0)} : {code.text(slope)}"
+            if idle:
+                slope = f"{idle} ? {code.text(0.0)} : {code.text(slope)}"
             code.line(f"fk[{at}] = {code.text(slope)};")
 
     def spread(self, part: Part, place: Place, known: Mapping[str, Value], functions: Mapping[str, Made]) -> None:
         """What the noise of the states of a neuron is multiplied by."""
         for name, tree in part.spread.trees:
             value = self.code.text(self.code.value(tree, known, functions))
-            self.code.line(f"fg[{plus(self.plan.starts[part.number, name], place)}] = {value};")
+            key = Key(part.population.model.owner, name)
+            self.code.line(f"fg[{plus(self.plan.starts[key], place)}] = {value};")
 
 
 def _by_stage(values: Sequence[str]) -> str:
@@ -407,20 +465,22 @@ def _diffuse(operation: Diffuse, step: StepCode) -> None:
     assert plan is not None
     with step.unless_first():
         for one in plan.states:
-            if one.name not in dict(one.part.spread.trees):
+            part = one.part
+            if not isinstance(part, Part) or one.name not in dict(part.spread.trees):
                 continue
-            drawn = network.noise_of(state=one.name)[one.part.population.members]
+            drawn = network.noise_of(state=one.name)[part.population.members]
             root = code.text(math.sqrt(network.dt * one.use.definition.per_second))
 
             def disturb(
                 place: Place,
                 totals: Mapping[int, str],
                 one: FlowState = one,
+                number: int = part.number,
                 drawn: IntArray = drawn,
                 root: str = root,
             ) -> None:
                 cell, spread = step.states(one.use, place)[one.name], f"fg[{plus(one.start, place)}]"
-                if held := step.held(one.part.number, one.name, place):
+                if held := step.held(number, one.name, place):
                     code.line(f"if (!held[{held}])")
                 code.line(f"{cell} = {cell} + {spread}*{root}*s[{code.at(drawn, place)}];")
 

@@ -24,11 +24,22 @@ import numpy as np
 from neurovis_spec.arrays import Indices, IntArray, width
 from neurovis_spec.compiler.flows import BY_SLOPE
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Diffuse, Integrate, Port, Use
+from neurovis_spec.compiler.program import Diffuse, Integrate, Key, Port, Use
 from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.c_arrivals import Incoming, Sent, incoming_of
 from neurovis_spec.runtime.lags import lags_of
-from neurovis_spec.runtime.stages import Part, Taken, apart, parts_of, places_among_taken, taken_by, unfolded
+from neurovis_spec.runtime.stages import (
+    Contacts,
+    Part,
+    Taken,
+    apart,
+    contacts_of,
+    flowing,
+    parts_of,
+    places_among_taken,
+    taken_by,
+    unfolded,
+)
 
 #: Of a substep of the length 1, when the stages of a method are: just behind the beginning, in the middle, just before
 #: the end.
@@ -43,21 +54,27 @@ STAGES: Mapping[Method, tuple[int, ...]] = {
 
 
 class FlowState(NamedTuple):
-    """A flow state of a population: where its members stand among all flow states."""
+    """A flow state of a population, or of a projection: where its members stand among all flow states."""
 
-    part: Part
+    part: Part | Contacts
     name: str
     start: int
 
     @property
     def use(self) -> Use:
-        """The model that it is a state of."""
-        return self.part.population.model
+        """The model, the synapse or the rule that it is a state of."""
+        return self.part.population.model if isinstance(self.part, Part) else self.part.projection.use
+
+    @property
+    def key(self) -> Key:
+        """What it is called in the State."""
+        return Key(self.use.owner, self.name)
 
     @property
     def size(self) -> int:
         """How many numbers it is."""
-        return len(self.part.population.members)
+        holder = self.part.population if isinstance(self.part, Part) else self.part.projection
+        return len(holder.members)
 
     @property
     def varies(self) -> bool:
@@ -90,20 +107,26 @@ class Plan:
         return parts_of(self.network, self.operation)
 
     @cached_property
+    def contacts(self) -> tuple[Contacts, ...]:
+        """What is done at a stage, projection by projection."""
+        return contacts_of(self.network, self.operation)
+
+    @cached_property
     def states(self) -> tuple[FlowState, ...]:
-        """All flow states, population by population."""
+        """All flow states, population by population, then projection by projection."""
         found: list[FlowState] = []
+        parts: tuple[Part | Contacts, ...] = (*self.of_stage, *self.contacts)
         start = 0
-        for part in self.of_stage:
+        for part in parts:
             for name in part.flows:
                 found.append(FlowState(part, name, start))
                 start += found[-1].size
         return tuple(found)
 
     @cached_property
-    def starts(self) -> Mapping[tuple[int, str], int]:
-        """Where the members of a flow state of a population stand."""
-        return {(one.part.number, one.name): one.start for one in self.states}
+    def starts(self) -> Mapping[Key, int]:
+        """Where the members of a flow state stand."""
+        return {one.key: one.start for one in self.states}
 
     @cached_property
     def reaching(self) -> Mapping[tuple[int, str], Reaching]:
@@ -139,6 +162,24 @@ class Plan:
         """Where each activity and each outlet, as ``Network.sending`` has them, stands among what is taken at a stage;
         −1 for none."""
         return places_among_taken(self.network, self.of_stage)
+
+    def now(self, places: IntArray) -> IntArray:
+        """Where what connections read now, by its places among activities, outlets and inputs, is to be found at a
+        stage: behind all these stand what is taken at the stage, then the inputs as they are at it."""
+        network = self.network
+        neural = len(network.neurons) + network.outlet_count
+        behind = neural + network.vector_size
+        taken = np.append(np.where(flowing(network), self.places, -1), -1)[np.minimum(places, neural)]
+        formulas = np.zeros(len(places), dtype=np.bool_)
+        for entry in map(network.input_index.__getitem__, network.held_inputs):
+            formulas |= (places >= neural + entry.start) & (places < neural + entry.start + entry.size)
+        anew = np.where(formulas, behind + self.parts_taken + places - neural, places)
+        return np.where(taken >= 0, behind + taken, anew)
+
+    @cached_property
+    def parts_taken(self) -> int:
+        """How many numbers are taken at a stage."""
+        return int(self.places.max(initial=-1)) + 1
 
     @cached_property
     def takes(self) -> Indices:
@@ -184,7 +225,7 @@ class Plan:
             "fs": count if several else 0,
             "fg": count if self.diffuses else 0,
             "fh": sum(len(self.network.populations[number].members) for number, _ in self.held),
-            "fo": int(self.places.max(initial=-1)) + 1,
+            "fo": self.parts_taken,
             "fv": self.network.vector_size if self.network.held_inputs else 0,
             "fl": len(self.lagging),
         }

@@ -50,7 +50,7 @@ from neurovis_spec.runtime.c_plan import Plan
 from neurovis_spec.runtime.lags import Lags, lags_of
 from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import DelayClass, SharedSlots, SignalLayout
-from neurovis_spec.runtime.stages import taken_by, unfolded
+from neurovis_spec.runtime.stages import End, ends_of, unfolded
 from neurovis_spec.runtime.state import Mask
 
 _NONE: Mapping[str, Made] = {}
@@ -307,8 +307,8 @@ class StepCode:
             at = self.held(number, name, place)
             return code.let("n", f"held[{at}] ? holding[{at}] : {code.text(value)}") if at else value
 
-        begins = bool(made.flows) and self.form.first
-        new, given = self.change(made, seen, states, self.activation(population, place), fixed, begins)
+        functions = self.activation(population, place)
+        new, given = self.change(made, seen, states, functions, fixed, begins=self.form.first)
         self.store([(stored[name], value) for name, value in new.items()])
         self.store([(stored[one.name], given[one.name]) for one in made.outputs])
         self.store([(f"activity[{neuron}]", given["activity"])])
@@ -363,17 +363,18 @@ class StepCode:
     ) -> tuple[dict[str, Value], dict[str, Value]]:
         """What becomes of all that lasts of a definition, which is ``stored`` there, from old values at once, and once
         more at an episode's end, ``bounded``; and what does not last, made from the new states. Nothing is stored
-        yet. With ``begins`` all stays as it is at the first step."""
+        yet. With ``begins`` there is a first step, at which what stays as it is does."""
         code = self.code
-        steps = {one.name: one.each_step for one in made.lasting}
+        steps = made.steps
         ends = {one.name: one.each_episode for one in made.lasting}
         fleeting = {one.name: one.each_step for one in made.fleeting}
         readers = [*steps.values(), *fleeting.values()]
         known = self.let(made.let, {**seen, **stored}, readers, functions)
         new = self.values(steps, known, "n", functions)
         new = {name: bounded(name, value) for name, value in new.items()}
-        if begins:
-            new = {name: code.let("n", f"first ? {stored[name]} : {code.text(new[name])}") for name in new}
+        for name in new if begins else ():
+            if name in made.staying:
+                new[name] = code.let("n", f"first ? {stored[name]} : {code.text(new[name])}")
         given = self.values(fleeting, known | new, "y", functions)
         if self.network.episode is None or not any(tree is not None for tree in ends.values()):
             return new, given
@@ -548,13 +549,14 @@ class StepCode:
             else:
                 code.line(f"if (still[{connection}])")
                 code.line("    continue;")
-        seen = code.parameters(projection.rule, place) | self.seen(projection, place)
-        stored = {**self.states(projection.rule, place), "weight": f"weights[{connection}]"}
+        rule = projection.use
+        seen = code.parameters(rule, place) | self.clock(rule.definition) | self.seen(projection, place)
+        stored = {**self.states(rule, place), "weight": f"weights[{connection}]"}
 
         def bounded(name: str, value: Value) -> Value:
             return self.bounded(projection, place, value) if name == "weight" else value
 
-        new, _ = self.change(projection.rule.definition, seen, stored, bounded=bounded)
+        new, _ = self.change(rule.definition, seen, stored, bounded=bounded, begins=self.form.first)
         return [(stored[name], value) for name, value in new.items()]
 
     def bounded(self, projection: Projection, place: Place, weight: Value) -> Value:
@@ -571,65 +573,61 @@ class StepCode:
         return code.let("n", weight)
 
     def seen(self, projection: Projection, place: Place) -> dict[str, Value]:
-        """What a rule may read besides its own: pre, sent, post, the signals."""
-        code, connections, members = self.code, self.network.connections, projection.members
-        targets, read = connections.targets[members], projection.read
-        sent = taken(self.network, code, members, place)
-        seen: dict[str, Value] = {"sent": sent, "post": f"activity[{code.at(targets, place)}]", "pre": sent}
-        if self.depth and "pre" in read:
-            seen["pre"] = self.remembered(projection, sent, place)
-        for name, indices in projection.signals.items():
-            seen[name] = self.signal(indices, place)
-        return {name: value for name, value in seen.items() if name in read}
+        """What a rule may read besides its own: what there is at both ends, and the signals."""
+        delays, seen = self.network.connections.delays[projection.members], dict[str, Value]()
+        for name, end in ends_of(self.network, projection).items():
+            now = taken_at(self.network, self.code, end.places, place)
+            seen[name] = self.remembered(projection, end, delays, now, place) if end.past and self.depth else now
+        return seen
 
-    def remembered(self, projection: Projection, sent: str, place: Place) -> Value:
-        """What was taken d steps ago, 0 where that is lost; ``sent`` is what is taken now."""
-        code, delays = self.code, self.network.connections.delays[projection.members]
+    def remembered(self, projection: Projection, end: End, delays: IntArray, now: str, place: Place) -> Value:
+        """What was there d steps ago, 0 where that is lost; ``now`` is what is there now."""
+        code = self.code
         own = delays if not isinstance(place, int) else delays[place : place + 1]
         if not own.any():
-            return sent
+            return now
         if self.lags is not None and self.lags.there[projection.members].any():
-            return self.behind_step(projection, self.lags.some(projection.members), place)
-        past = self.past(projection, delays, own, place)
+            return self.behind_step(projection, end, self.lags.some(projection.members), place)
+        past = self.past(end, delays, own, place)
         if not self.form.lost:
             return past
         lost = f"lost[{code.at(projection.members, place)}]"
         return code.let("a", f"k - ({code.at(delays, place)}) < {lost} ? {code.text(0.0)} : {past}")
 
-    def behind_step(self, projection: Projection, lags: Lags, place: Place) -> Value:
-        """What was taken as long ago as the delay is, of which some are continuous: between two steps."""
+    def behind_step(self, projection: Projection, end: End, lags: Lags, place: Place) -> Value:
+        """What was there as long ago as the delay is, of which some are continuous: between two steps."""
         code, delays = self.code, self.network.connections.delays[projection.members]
         whole, late = np.where(lags.there, lags.whole, delays), np.asarray(lags.part > 0)
-        next_ = code.let("a", self.remembered_at(projection, whole, lags, place))
+        next_ = code.let("a", self.remembered_at(projection, end, code.at(whole, place), place))
         some = late[place : place + 1] if isinstance(place, int) else late
         if not some.any():
             return next_
-        one = code.let("a", self.remembered_at(projection, whole + late, lags, place))
+        one = code.let("a", self.remembered_at(projection, end, code.at(whole + late, place), place))
         share = code.text(code.number(np.where(late, 1.0 - lags.part, 0.0), place))
         between = f"{one} + {share}*({next_} - {one})"
         return code.let("a", between if some.all() else f"{code.at(late.astype(np.int64), place)} ? {between} : {one}")
 
-    def remembered_at(self, projection: Projection, ago: IntArray, lags: Lags, place: Place) -> str:
-        """What was taken so many steps ago, 0 where that is lost; with a continuous delay what was taken at the first
+    def remembered_at(self, projection: Projection, end: End, back: Place, place: Place) -> str:
+        """What was there so many steps back, 0 where that is lost; with a continuous delay what was taken at the first
         step is what was before, too."""
+        assert self.lags is not None
         code, network, members = self.code, self.network, projection.members
-        n, back = len(network.neurons) + network.outlet_count, code.at(ago, place)
+        n, lags = len(network.neurons) + network.outlet_count, self.lags.some(members)
         code.head["now"] = f"const int32_t now = (int32_t)(k % {self.depth});"
         row = f"(now + {self.depth} - ({back})) % {self.depth}"
         some = lags.there[place : place + 1] if isinstance(place, int) else lags.there
         if some.any():
             late = "" if some.all() else f"{code.at(lags.there.astype(np.int64), place)} && "
             row = f"({late}fresh && k < {back} ? 0 : {row})"
-        past = f"history[(size_t)({row})*{n} + {code.at(taken_by(network)[members], place)}]"
+        past = f"history[(size_t)({row})*{n} + {code.at(end.places, place)}]"
         lost = f"lost[{code.at(members, place)}]"
         return f"k - ({back}) < {lost} ? {code.text(0.0)} : {past}" if self.form.lost else past
 
-    def past(self, projection: Projection, delays: IntArray, own: IntArray, place: Place) -> str:
+    def past(self, end: End, delays: IntArray, own: IntArray, place: Place) -> str:
         """a_j[t−d], from the history, whose rows have all activities and outlets."""
         code, network = self.code, self.network
         n = len(network.neurons) + network.outlet_count
-        sending = network.connections.sources if network.sending is None else network.sending
-        source = code.at(sending[projection.members], place)
+        source = code.at(end.places, place)
         if (own == own[0]).all():
             name, row = f"h{own[0]}", f"(size_t)((k + {self.depth - own[0]}) % {self.depth})*{n}"
             code.head[name] = f"const {code.real} *const {name} = history + {row};"
@@ -637,10 +635,6 @@ class StepCode:
         code.head["now"] = f"const int32_t now = (int32_t)(k % {self.depth});"
         row = f"(now + {self.depth} - ({code.at(delays, place)})) % {self.depth}"
         return f"history[(size_t)({row})*{n} + {source}]"
-
-    def signal(self, indices: IntArray, place: Place) -> str:
-        """A signal of a rule: an activity, an outlet or an input."""
-        return taken_at(self.network, self.code, indices, place)
 
 
 class _Own(NamedTuple):
@@ -661,7 +655,7 @@ def _own(network: Network, port: str) -> _Own:
 def begins_otherwise(network: Network) -> bool:
     """Whether the first step of a run is another one than all others: of neurons with ``initial``, or where anything
     flows."""
-    flows = any(population.model.definition.flows for population in network.populations)
+    flows = any(use.definition.flows or use.definition.staying for _, use in network.uses)
     return flows or bool((~np.isnan(network.neurons.initial)).any())
 
 

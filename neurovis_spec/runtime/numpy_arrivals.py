@@ -283,14 +283,17 @@ def sent_by(step: Step, connections: Indices, broadcast: bool = False) -> str:
 
 
 def sent_at(step: Step, taken: Indices, broadcast: bool = False) -> str:
-    """Some activities, outlets, or both, as they are now; an index of n or more is an outlet's."""
+    """Some activities, outlets and, of signals of rules, inputs, as they are now, which are numbered in this order."""
     code, network = step.code, step.network
-    n, outlets = len(network.neurons), network.outlet_count
-    if (taken < n).all():
-        return code.select("activity", taken, n, broadcast)
-    if (taken >= n).all():
-        return code.select("outlets", taken - n, outlets, broadcast)
-    return code.select("np.concatenate((activity, outlets))", taken, n + outlets)
+    start, sizes = 0, {"activity": len(network.neurons), "outlets": network.outlet_count, "s": network.vector_size}
+    for array, size in sizes.items():
+        if ((taken >= start) & (taken < start + size)).all():
+            return code.select(array, taken - start if start else taken, size, broadcast)
+        start += size
+    if (taken < start - sizes["s"]).all():
+        del sizes["s"]
+    arrays = [array for array, size in sizes.items() if size]
+    return code.select(f"np.concatenate(({', '.join(arrays)}))", taken, sum(sizes.values()))
 
 
 def slots_of(code: Code, start: int, stop: int, length: int, ago: int = 0) -> str:

@@ -38,7 +38,7 @@ signals arrive, c7 the biases.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from typing import NamedTuple, TypeAlias
@@ -273,9 +273,7 @@ def emit_change(
     besides their own. What flows begins with its initial states: they stay at the first step."""
     change = _Change(code, definition, seen, cells, functions)
     fleeting_names = change.replace(
-        {one.name: one.each_step for one in definition.lasting},
-        {one.name: one.each_step for one in definition.fleeting},
-        FIRST if definition.flows else "",
+        definition.steps, {one.name: one.each_step for one in definition.fleeting}, definition.staying
     )
     ends = {one.name: one.each_episode for one in definition.lasting}
     if episode is not None and any(tree is not None for tree in ends.values()):
@@ -296,10 +294,13 @@ class _Change(NamedTuple):
     functions: Functions | None
 
     def replace(
-        self, trees: Mapping[str, Tree | None], fleeting: Mapping[str, Tree | None], stay: str = ""
+        self,
+        trees: Mapping[str, Tree | None],
+        fleeting: Mapping[str, Tree | None],
+        staying: Collection[str] = (),
     ) -> dict[str, str]:
-        """Emit all right-hand sides, then all changes; gives the identifiers of what is ``fleeting``. Where what
-        ``stay`` says is true what lasts keeps its value."""
+        """Emit all right-hand sides, then all changes; gives the identifiers of what is ``fleeting``. What is
+        ``staying`` keeps its value at the first step."""
         code, cells, functions = self.code, self.cells, self.functions
         known = dict(self.seen)
         known |= {
@@ -310,8 +311,9 @@ class _Change(NamedTuple):
         for name, value in unfolded(self.definition.let, [*trees.values(), *fleeting.values()]).let:
             known[name] = code.fresh("m", value, known, functions)
         new = {name: code.fresh("n", tree, known, functions) for name, tree in trees.items() if tree is not None}
-        if stay:
-            new = {n: code.let("n", f"np.array({known[n]}) if {stay} else {value}") for n, value in new.items()}
+        for name in new:
+            if name in staying:
+                new[name] = code.let("n", f"np.array({known[name]}) if {FIRST} else {new[name]}")
         for name, made in new.items():
             held = cells[name].held
             if held is not None:

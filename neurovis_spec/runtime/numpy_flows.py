@@ -26,7 +26,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -54,6 +54,7 @@ from neurovis_spec.runtime.numpy_code import FIRST, shared
 from neurovis_spec.runtime.numpy_lags import Around, at_stage, ends_around, signals_around
 from neurovis_spec.runtime.stages import (
     Contacts,
+    End,
     Formulas,
     Moment,
     Part,
@@ -106,6 +107,15 @@ def _unless_first(step: Step) -> Iterator[None]:
     step.code.indent -= 1
 
 
+class _Anew(NamedTuple):
+    """What some connections of a projection read anew at each stage: which, and where it stands, among what is taken at
+    the stage, or else in the vector of its inputs."""
+
+    some: IntArray
+    places: IntArray
+    is_input: bool
+
+
 @dataclass
 class _Joined:
     """The connections of a projection that take part in a stage: all that there is of it there, it with these alone,
@@ -116,8 +126,8 @@ class _Joined:
     some: IntArray | None
     #: identifiers of what they read that stays over the stages
     held: dict[str, str] = field(default_factory=dict)
-    #: what of each of them, by its name, is read anew at each stage: of which connections, and where that is taken
-    anew: dict[str, tuple[IntArray, IntArray]] = field(default_factory=dict)
+    #: what of each of them, by its name, is read anew at each stage
+    anew: dict[str, list[_Anew]] = field(default_factory=dict)
     #: what of each of them is read between steps: of which connections, and what was sent then
     between: dict[str, tuple[IntArray, Around]] = field(default_factory=dict)
 
@@ -180,6 +190,8 @@ class _Flow:
 
     def emit(self) -> None:
         """The whole integration, and what the noise behind it is multiplied by."""
+        if not self.size:  # rules alone flow, and none is carried out
+            return
         code, substeps, h = self.code, self.operation.substeps, self.network.dt / self.operation.substeps
         stage = code.name("stage")
         with _unless_first(self.step):
@@ -276,21 +288,35 @@ class _Flow:
         if "weight" in read:
             joined.held["weight"] = code.let("w", code.select("weights", members, len(connections)))
         for name, end in ends_of(self.network, joined.projection).items():
-            past = end.past & (connections.delays[members] > 0)
-            anew = np.asarray(~past & self.flowing[end.places] & (self.taken[end.places] >= 0))
             if name not in read:
                 continue
-            if anew.any():
-                joined.anew[name] = np.flatnonzero(anew), self.taken[end.places[anew]]
+            past = end.past & (connections.delays[members] > 0)
+            anew = list(self.anew(end, past))
+            if anew:
+                joined.anew[name] = anew
+            made = sum(len(one.some) for one in anew)
             if (lags := self.step.lags) is not None and (late := past & lags.there[members]).any():
                 around = ends_around(self.step, lags, members[late], end.places[late])
                 joined.between[name] = np.flatnonzero(late), around
-                anew |= late
-            if not anew.all():
+                made += int(late.sum())
+            if made < len(members):
                 held = end_at(self.step, members, end)
-                if anew.any():  # of each connection: it is filled in at each stage
+                if made:  # of each connection: it is filled in at each stage
                     held = f"np.array(np.broadcast_to({held}, ({len(members)},)))"
                 joined.held[name] = code.let("a", held)
+
+    def anew(self, end: End, past: BoolArray) -> Iterator[_Anew]:
+        """What connections read of an end that is made anew at each stage; ``past``: those that read what was sent."""
+        behind = len(self.flowing)
+        neural = np.minimum(end.places, behind - 1)
+        flows = (end.places < behind) & self.flowing[neural] & (self.taken[neural] >= 0)
+        formulas = np.zeros(len(past), dtype=np.bool_)
+        for entry in map(self.network.input_index.__getitem__, self.network.held_inputs):
+            formulas |= (end.places >= behind + entry.start) & (end.places < behind + entry.start + entry.size)
+        for which, places, is_input in ((flows, self.taken[neural], False), (formulas, end.places - behind, True)):
+            some = np.flatnonzero(which & ~past)
+            if len(some):
+                yield _Anew(some, places[some], is_input)
 
     def given(self, part: Part, port: Port, arriving: str, vector: str = "s") -> str:
         """All that is at a port, of what arrives there, "" for nothing."""
@@ -370,10 +396,14 @@ class _Stage:
         for part, taken in taken_in_order(self.flow.parts):
             begin = int(self.flow.taken[taken.places[0]])
             (value,) = self.values(part, taken.formulas).values()
-            self.code.line(f"{self.flow.sent}[{begin}:{begin + len(taken.places)}] = {value}")
+            place, held = f"{self.flow.sent}[{begin}:{begin + len(taken.places)}]", f"holds[{part.number}]"
+            self.code.line(f"{place} = {value}")
             if taken.is_activity:
-                held, positions = f"holds[{part.number}]", self.code.constant(self.flow.taken)
+                positions = self.code.constant(self.flow.taken)
                 self.code.line(f"if holds and {held}: {self.flow.sent}[{positions}[{held}[0]]] = {held}[1]")
+            else:  # where a lesioned neuron is a signal of a rule
+                members = self.code.constant(part.population.members)
+                self.code.line(f"if holds and {held}: {place}[state.conditions.lesioned_neurons[{members}]] = 0.0")
         self.taking = False
 
     def values(self, part: Part, formulas: Formulas) -> dict[str, str]:
@@ -419,7 +449,7 @@ class _Stage:
             for one in joined.use.definition.state:
                 now = self.flow.now.get(Key(joined.use.owner, one.name))
                 known[one.name] = now or cell_of(self.code, joined.projection, one.name, joined.some)
-        for name in (joined.anew.keys() | joined.between.keys()) & formulas.names - known.keys():
+        for name in sorted((joined.anew.keys() | joined.between.keys()) & formulas.names - known.keys()):
             known[name] = self.read_anew(joined, name)
         for name, tree in formulas.let:
             if name not in known:
@@ -427,14 +457,15 @@ class _Stage:
         return {name: self.code.expression(tree, known) for name, tree in formulas.trees}
 
     def read_anew(self, joined: _Joined, name: str) -> str:
-        """What connections read of an end, of which something is taken at the stage, or lies between steps."""
-        code, count, parts = self.code, len(joined.projection.members), list[tuple[str, IntArray]]()
-        if name in joined.anew:
-            some, taken = joined.anew[name]
-            parts.append((code.select(self.flow.sent, taken, self.flow.taken_count), some))
+        """What connections read of an end, of which something is made at the stage, or lies between steps."""
+        code, flow, parts = self.code, self.flow, list[tuple[str, IntArray]]()
+        for one in joined.anew.get(name, ()):
+            size = self.network.vector_size if one.is_input else flow.taken_count
+            parts.append((code.select(self.vector if one.is_input else flow.sent, one.places, size), one.some))
         if name in joined.between:
             some, around = joined.between[name]
             parts.append((at_stage(code, around), some))
+        count = len(joined.projection.members)
         if name not in joined.held:
             return put_together(code, parts, count, "a")
         made = code.let("a", f"{joined.held[name]}.copy()")

@@ -25,7 +25,6 @@ from functools import singledispatch
 
 import numpy as np
 
-from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.events.settable import HIGH, LOW
 from neurovis_spec.compiler.flows import ports_read_by
 from neurovis_spec.compiler.network import Network, Outlet
@@ -255,21 +254,5 @@ def _bounded(code: Code, network: Network, projection: Projection, weight: str) 
 
 def seen_at(step: Step, projection: Projection) -> dict[str, str]:
     """Arrays for pre, sent, post and the signals; only what the definitions read is gathered."""
-    code, network = step.code, step.network
     seen = behind_lags(step, projection)
-    seen |= ends_at(step, projection, projection.read - seen.keys())
-    for signal, indices in projection.signals.items():
-        if signal in projection.read:
-            seen[signal] = code.let("a", _signal(code, indices, network))
-    return seen
-
-
-def _signal(code: Code, indices: IntArray, network: Network) -> str:
-    """A signal of a rule: activities, outlets, inputs, or several of them, which are numbered in this order."""
-    start, sizes = 0, {"activity": len(network.neurons), "outlets": network.outlet_count, "s": network.vector_size}
-    for array, size in sizes.items():
-        if ((indices >= start) & (indices < start + size)).all():
-            return code.select(array, indices - start, size, broadcast=True)
-        start += size
-    arrays = ", ".join(array for array, size in sizes.items() if size)
-    return code.select(f"np.concatenate(({arrays}))", indices, start)
+    return seen | ends_at(step, projection, projection.read - seen.keys())

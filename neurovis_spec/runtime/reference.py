@@ -165,8 +165,8 @@ class ReferenceStepper(Seen):
         old = {one.name: float(cells[one.name][position]) for one in definition.state}
         old |= {name: bounded.value for name, bounded in lasting.items()}
         known = with_let({**seen, **old}, definition.let, functions)
-        begins = definition.flows and is_first(state)
-        steps = [] if begins else [(one.name, one.each_step) for one in definition.lasting]
+        stay = definition.staying if is_first(state) else ()
+        steps = [(name, tree) for name, tree in definition.steps.items() if name not in stay]
         new = changed(old, steps, known, lasting, functions) | fixed
         fleeting = [(one.name, one.each_step) for one in definition.fleeting]
         results = changed(new, fleeting, known | new, {}, functions) if fleeting else new
@@ -226,10 +226,12 @@ class ReferenceStepper(Seen):
     ) -> None:
         """The weight and the states of one connection."""
         low, high = self.low.at(connection, state), self.high.at(connection, state)
-        seen = self.known(projection.rule, position, state) | self.seen(projection, position, state, share=1.0)
-        # as ``Projection.signals`` numbers them
-        signals = (*state.activity.tolist(), *state.outlets.tolist(), *inputs.tolist())
-        seen |= {signal: signals[indices[position]] for signal, indices in projection.signals.items()}
+        behind = len(state.activity) + len(state.outlets)
+
+        def now(index: int) -> float:
+            return self.at(index, state) if index < behind else float(inputs[index - behind])
+
+        seen = self.known(projection.rule, position, state) | self.seen(projection, position, state, now, 1.0)
         weight = Bounded(float(state.weights[connection]), low, high)
         state.weights[connection] = self.change(projection.rule, position, seen, state, {"weight": weight})["weight"]
 

@@ -212,6 +212,8 @@ class Flow:
         owner = projection.use.owner
 
         def now(index: int) -> float:
+            if index >= len(self.flowing):
+                return stage.inputs[index - len(self.flowing)]
             return stage.sent[index] if self.flowing[index] else self.seen.at(index, state)
 
         own = {name: float(values[position]) for name, values in state.cells[owner].items()}

@@ -316,11 +316,12 @@ def _formulas(definition: Definition, trees: Iterable[tuple[str, Tree | None]], 
 
 def ends_of(network: Network, projection: Projection) -> dict[str, End]:
     """What a projection reads of the ends of its connections, by names: ``pre``, ``sent`` and ``post``, and those of
-    ``Projection.ends``."""
+    ``Projection.ends``; and its signals, which may be inputs: these stand behind the outlets."""
     members, read = projection.members, projection.read
     sent = np.asarray(taken_by(network)[members], dtype=np.int64)
     found = {"pre": End(sent, True), "sent": End(sent, False), "post": End(network.connections.targets[members], False)}
     found |= {name: End(places, name.startswith("pre.")) for name, places in projection.ends.items()}
+    found |= {name: End(places, False) for name, places in projection.signals.items()}
     return {name: end for name, end in found.items() if name in read}
 
 
@@ -456,6 +457,7 @@ def _taken(
         undelayed = network.connections.delays[one.projection.members] == 0
         for end in one.ends.values():
             now = end.places[undelayed] if end.past else end.places
+            now = now[now < len(flows)]  # no inputs
             asked[now[flows[now]]] = True
     return {
         (number, name): places
