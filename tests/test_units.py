@@ -80,10 +80,13 @@ models:
     state: {{v: {{derivative: (drive - v)/tau}}}}
     activity: v
 instances: {{left: {{module: leg, set: {{g: {g}}}}}}}
-neurons: {{A: {{bias: tau, model: {{leaky: {{tau: {tau}}}}}}}, B: {{count: 2, model: {{leaky: {{tau: [{tau}, 3]}}}}}}}}
+neurons:
+  A: {{bias: tau, model: {{leaky: {{tau: {tau}}}}}}}
+  B: {{count: 2, model: {{leaky: {{tau: [{tau}, 3]}}}}}}
+  C: {{count: 2}}
 connections:
-- A -> B: {{pattern: all_to_all, delay: {delay}}}
-- A -> B: {{edges: [[A, B1, 1, {delay}]]}}
+- A -> C: {{pattern: all_to_all, delay: {delay}}}
+- A -> C: {{edges: [[A, C1, 1, {delay}]]}}
 events:
 - {{at: {at}, set: {{tau: {tau}}}}}
 - {{from: {at}, to: {to}, clamp: {{A: 1}}}}

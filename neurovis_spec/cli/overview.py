@@ -162,7 +162,7 @@ def _entry(connections: Connections, index: int, route: Route, members: IntArray
         name,
         f"{len(members):,}",
         spread(connections.weights[members].tolist()),
-        _delays(connections.delays[members]),
+        _delays(connections, members),
         "" if route.ports == PLAIN_ROUTE.ports else ", ".join(map(_port, route.ports)),
         route.sends,
         (connections.synapses[index] if connections.synapses else None) or "",
@@ -171,9 +171,18 @@ def _entry(connections: Connections, index: int, route: Route, members: IntArray
     )
 
 
-def _delays(delays: IntArray) -> str:
+def _delays(connections: Connections, members: IntArray) -> str:
+    """Delays in steps, and those that are continuous as they are exactly."""
+    delays = connections.delays[members]
     low, high = int(delays.min()), int(delays.max())
-    return str(low) if low == high else f"{low} … {high}"
+    steps = str(low) if low == high else f"{low} … {high}"
+    lags = np.zeros(0) if connections.lags is None else connections.lags[members]
+    late = lags[~np.isnan(lags)]
+    if not len(late):
+        return steps
+    least, most = number(float(late.min())), number(float(late.max()))
+    exact = least if least == most else f"{least} … {most}"
+    return exact if len(late) == len(delays) else f"{steps}; between steps {exact}"
 
 
 def _port(of_route: tuple[str, float]) -> str:
@@ -194,7 +203,7 @@ def _program(network: Network) -> str:
     reached["delay 0 by default"] = {network.connections.entries[entry] for entry in network.connections.undelayed}
     told = [
         (how, ", ".join(name for name in network.connections.entries if name in reached[how]))
-        for how in (_ANEW, _FORMED, _HELD, "delay 0 by default")
+        for how in (_ANEW, _FORMED, _BETWEEN, _HELD, "delay 0 by default")
         if reached.get(how)
     ]
     return "\n".join(["program", table(rows), *([table(told)] if told else [])])
@@ -247,7 +256,12 @@ def _flows(definition: Definition, how: str) -> str:
 
 
 #: What becomes of what connections bring to derivatives.
-_ANEW, _FORMED, _HELD = "made anew at each stage", "formed at each stage, of what was sent before", "held over a step"
+_ANEW, _FORMED, _BETWEEN, _HELD = (
+    "made anew at each stage",
+    "formed at each stage, of what was sent before",
+    "read between steps",
+    "held over a step",
+)
 
 
 def _into_derivatives(network: Network, population: int) -> Iterator[tuple[str, str]]:
@@ -258,8 +272,11 @@ def _into_derivatives(network: Network, population: int) -> Iterator[tuple[str, 
     for port in (port for port in one.ports if port.name in read):
         anew = np.zeros(len(port.incoming), dtype=np.bool_)
         anew[[] if port.staged is None else port.staged] = True
-        delayed = connections.delays[port.incoming] > 0
-        for how, some in ((_ANEW, anew & ~delayed), (_FORMED, anew & delayed), (_HELD, ~anew)):
+        delayed, late = connections.delays[port.incoming] > 0, np.zeros(len(anew), dtype=np.bool_)
+        if connections.lags is not None:
+            late = ~np.isnan(connections.lags[port.incoming])
+        before = anew & delayed & ~late
+        for how, some in ((_ANEW, anew & ~delayed), (_FORMED, before), (_BETWEEN, anew & late), (_HELD, ~anew)):
             for entry in np.unique(connections.entry[port.incoming[some]]).tolist():
                 yield connections.entries[entry], how
 

@@ -168,8 +168,8 @@ def command(spec: str, running: Running, keeping: Keeping, checking: Checking, o
 
     With --check-step nothing is recorded. The run is made again with half and a quarter of the step, in which all that
     is counted in steps (delays, events, rows of tables) takes as long as before. Of a method of order p the difference
-    between two of the runs falls by 2^p. What is per step or random (each_step, noise, learning, a delay of a step or
-    more between what flows), and what it reaches, has no order.
+    between two of the runs falls by 2^p. What is per step or random (each_step, noise, learning, a delay in steps
+    between what flows), and what it reaches, has no order.
     """
     checking.check(keeping, output)
     network = _network(spec, running, keeping, output)

@@ -437,7 +437,7 @@ class StepCode:
         self.leave(which)
         for slots in self.layout.shared:
             self.store_each(len(slots.sent), partial(self.sharing, slots))
-        for one in (*self.layout.classes, *self.layout.shared):
+        for one in self.layout.rings:
             self.fill(one)
         if self.depth:
             n, beside = len(self.network.neurons), self.network.outlet_count

@@ -199,15 +199,14 @@ def _send(
 ) -> None:
     """Send what was sent at a step before 0, as far as it is known, and has not arrived by then: −1 was the last step
     before the run."""
-    connections, taken = network.connections, taken_by(network)
-    arriving = (connections.delays.whole() >= -step) & (layout.offsets >= 0)
-    under_way = np.flatnonzero(arriving & np.broadcast_to(known, sent.shape)[taken])
+    taken, between = taken_by(network), network.connections.lags is not None
+    under_way = np.flatnonzero((layout.lengths >= -step) & np.broadcast_to(known, sent.shape)[taken])
     factors = np.where(layout.shares[under_way], 1.0, weights[under_way])
     with np.errstate(all="ignore"):
         signals = factors * sent[taken[under_way]]
     # a step is negative here; its remainder is a slot ≥ 0 all the same
     state.signals[layout.offsets[under_way] + step % layout.lengths[under_way].astype(np.int64)] = signals
-    if -step < len(state.history):
+    if -step < len(state.history) + between:  # the last one is read before what is sent next takes its place
         state.history[step % len(state.history)] = np.where(known, sent, 0.0)
 
 
@@ -215,7 +214,9 @@ def _prolong(network: Network, layout: SignalLayout, state: State, known: int) -
     """What was sent on connections with a continuous delay before the steps that are known, as many as these are, is
     what was sent at the first of them, as it is before the first step of all."""
     lags = lags_of(network)
-    for ago in range(known + 1, int(layout.lengths.max(initial=0)) + 1) if lags is not None else ():
+    if lags is None:
+        return
+    for ago in range(known + 1, int(layout.lengths.max(initial=0)) + 1):
         members = np.flatnonzero(lags.there & (layout.lengths >= ago))
         offsets, lengths = layout.offsets[members].astype(np.int64), layout.lengths[members].astype(np.int64)
         state.signals[offsets + -ago % lengths] = state.signals[offsets + -known % lengths]

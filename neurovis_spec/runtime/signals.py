@@ -75,6 +75,11 @@ class SignalLayout:
     shared: tuple[SharedSlots, ...]
     shares: BoolArray
 
+    @property
+    def rings(self) -> tuple[DelayClass | SharedSlots, ...]:
+        """All slots, by what they are of."""
+        return *self.classes, *self.shared
+
 
 def signal_layout(network: Network, own: bool = False) -> SignalLayout:
     """Lay the slots out by delay, then by population of the target, then in the order of the connections. With ``own``

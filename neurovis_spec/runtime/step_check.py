@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.arrays import FloatArray, integers
+from neurovis_spec.arrays import FloatArray, integers, reals
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Definition
 from neurovis_spec.language.expressions.tree import names
@@ -81,13 +81,15 @@ def stretched(network: Network, parts: int) -> Network:
     """The network with so many steps in place of one. What happens at a step happens to the time that ends with it, and
     so from the first of these on."""
     changes = tuple(change._replace(at=_begins(change.at, parts)) for change in network.changes)
-    delays = integers(network.connections.delays.whole() * parts)
+    made = network.connections
+    lags = None if made.lags is None else reals(made.lags.whole() * parts)
+    connections = replace(made, delays=integers(made.delays.whole() * parts), lags=lags)
     return replace(
         network,
         dt=network.dt / parts,
         steps=_begins(network.steps, parts),
         episode=None if network.episode is None else network.episode * parts,
-        connections=replace(network.connections, delays=delays),
+        connections=connections,
         changes=changes,
     )
 
@@ -160,7 +162,10 @@ def _without_order(network: Network, models: Mapping[int, Definition]) -> dict[i
         fed = np.flatnonzero(np.isin(network.neurons.input_at(port), list(stepped)))
         why.update(dict.fromkeys(fed.tolist(), "an input that reads k"))
     following: dict[int, list[int]] = {}
-    rows = zip(sources, targets, connections.delays.tolist(), connections.rules.tolist(), strict=True)
+    delays = connections.delays.whole()
+    if connections.lags is not None:  # what is read between steps follows their length
+        delays = np.where(np.isnan(connections.lags.whole()), delays, 0)
+    rows = zip(sources, targets, delays.tolist(), connections.rules.tolist(), strict=True)
     for source, target, delay, rule in rows:
         following.setdefault(source, []).append(target)
         if rule >= 0:

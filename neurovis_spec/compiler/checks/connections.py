@@ -106,7 +106,9 @@ def check_beyond_run(compiled: Compiled, findings: Findings) -> None:
         if longest >= steps:
             # where there are edges, these may have delays of their own: the finding stands at the key
             span = key.span if body.delay is None or body.edges is not None else body.delay.span
-            message = f"after a delay of {plural(longest, 'step')} nothing arrives in a run of {steps} ('steps')"
+            late = compiled.network.connections.lags is not None and any(bundle.timing for bundle in bundles)
+            what = "nothing but what there is at first" if late else "nothing"
+            message = f"after a delay of {plural(longest, 'step')} {what} arrives in a run of {steps} ('steps')"
             findings.warning("beyond-steps", span, message, hint.format(longest + 1))
 
 
