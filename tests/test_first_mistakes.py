@@ -227,17 +227,6 @@ STATE = "models: {m: {state: {v: {initial: 0, each_step: v + drive}}, activity: 
             "5:15",
             "'B' is no instance, nothing",
         ),
-        (
-            STATE + "neurons: {A: {model: m}, B: {}}\nconnections: {A -> B: {plasticity: {delta: {target: A.v}}}}\n",
-            "5:53",
-            "v is a state of 'A', and only activities are sent and are signals: write 'A'",
-        ),
-        (
-            STATE + "modules: {leg: {neurons: {K: {count: 2, model: m}}}}\ninstances: {left: {module: leg}}\n"
-            "neurons: {A: {bias: 1}}\nconnections: {A -> left.K: {plasticity: {delta: {target: left.K2.v}}}}\n",
-            "7:58",
-            "v is a state of 'left.K2', and only activities are sent and are signals: write 'left.K2'",
-        ),
         (STATE + "neurons: {A: {model: m}, B: {input: A.v}}\n", "4:37", "an input is declared under 'inputs'"),
         (
             "neurons: {A: {input: 1}}\n",
