@@ -99,7 +99,8 @@ def _events(chooser: random.Random, groups: list[str], learning: list[str]) -> l
 
 def _body(chooser: random.Random, sizes: dict[str, int], source: str, target: str) -> Spec:
     body: Spec = {"weight": "uniform(-0.3, 0.3)", "pattern": "all_to_all", "self": True}
-    body["delay"] = chooser.choice([1, 1, 2, 3, {"seconds": 0.023}])
+    delays: list[Plain] = [1, 1, 2, 3, {"seconds": 0.023}]
+    body["delay"] = chooser.choice(delays)
     if chooser.random() < 0.2:
         del body["delay"]
     rules = chooser.sample([*_RULES], chooser.choice([0, 1, 2, 2, 3, 4]))

@@ -329,7 +329,9 @@ def test_a_network_says_what_its_synapses_do() -> None:
         "  held over a step                               S -> B",
         "  delay 0 by default                             A -> B",
     ]
-    described = [one.get("synapse") for one in compiled.describe()["connections"]]
+    entries = compiled.describe()["connections"]
+    assert isinstance(entries, list)
+    described = [one.get("synapse") for one in entries]
     assert described == ["scaled", "scaled", None, None, "low", "low", "map"]
 
 
@@ -422,5 +424,5 @@ def test_nor_where_states_flow(method: str, ends: list[str], delays: list[int], 
             nv.compile_text(_weighted(text))
         return
     other = nv.compile_text(_weighted(text))
-    made = (each.run(12, backend="reference").activity for each in (one, other))
-    np.testing.assert_allclose(*made, rtol=1e-12, atol=1e-13)
+    first, second = (each.run(12, backend="reference").activity for each in (one, other))
+    np.testing.assert_allclose(first, second, rtol=1e-12, atol=1e-13)
