@@ -211,6 +211,28 @@ def test_a_delay_of_steps_holds_what_was_sent_and_of_before_there_is_nothing(bac
         assert simulation.activity.tolist() == pytest.approx([a[-1], b], rel=1e-14)
 
 
+TOGETHER = """
+time: {dt: 0.1}
+models:
+  m: {state: {z: {initial: 0.5, derivative: drive - z}}, activity: f(drive)}
+  n: {state: {z: {initial: 0.5, derivative: drive - z}}, activity: f(drive)}
+synapses: {now: {signal: weight*sent}}
+inputs: {wave: {expression: 1 + t^2}}
+neurons: {C: {model: m, input: wave}, A: {model: MODEL}}
+connections: {C -> A: {weight: 2, synapse: now, delay: 1}}
+"""
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_what_is_taken_of_a_neuron_reaches_one_that_is_updated_with_it(backend: str) -> None:
+    """Whether they are of the same population or not."""
+    networks = [network_of(TOGETHER.replace("MODEL", model)) for model in "mn"]
+    assert len(networks[0].populations) < len(networks[1].populations)
+    one, other = (record(network, Course(20, backend=backend, keep=Keep(states=("A.z",)))) for network in networks)
+    np.testing.assert_array_equal(one.states, other.states)
+    assert np.ptp(one.states) > 1
+
+
 # ---- what events do -----------------------------------------------------------------------------------------------
 
 EVENTS = """

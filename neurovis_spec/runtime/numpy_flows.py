@@ -343,11 +343,14 @@ class _Stage:
         #: the same of projections
         self.joined: dict[int, dict[str, str]] = {}
         self.vector = self.emit_inputs()
-        self.sent = self.taking = False
+        self.taking = False
+        #: what is taken, as far as it is written
+        self.done = np.zeros(flow.taken_count, dtype=np.bool_)
 
     def emit(self) -> None:
         """The derivatives of all flow states, and how much they change with these, where the method looks at that; at
         the first stage of a step what their noise is multiplied by, too."""
+        self.emit_taken()
         for part in self.flow.parts:
             for array, formulas in ((self.flow.k, part.derivatives), (self.flow.j, part.slopes)):
                 for name, value in self.values(part, formulas).items():
@@ -357,8 +360,6 @@ class _Stage:
                 back, j = self.back(part, through), self.place(self.flow.j, part.population.model, through.state)
                 self.code.line(f"{j} += ({value}) * {back}")
         for joined in self.flow.contacts.values():
-            if joined.at.flows:
-                self.emit_taken()
             for array, formulas in ((self.flow.k, joined.at.derivatives), (self.flow.j, joined.at.slopes)):
                 for name, value in self.values_of(joined, formulas).items():
                     self.code.line(f"{self.place(array, joined.use, name)} = {value}")
@@ -389,10 +390,8 @@ class _Stage:
         return vector
 
     def emit_taken(self) -> None:
-        """What connections take at the stage, population by population, once."""
-        if self.sent:
-            return
-        self.sent = self.taking = True
+        """What connections take at the stage."""
+        self.taking = True
         for part, taken in taken_in_order(self.flow.parts):
             begin = int(self.flow.taken[taken.places[0]])
             (value,) = self.values(part, taken.formulas).values()
@@ -404,11 +403,14 @@ class _Stage:
             else:  # where a lesioned neuron is a signal of a rule
                 members = self.code.constant(part.population.members)
                 self.code.line(f"if holds and {held}: {place}[state.conditions.lesioned_neurons[{members}]] = 0.0")
+            self.done[begin : begin + len(taken.places)] = True
         self.taking = False
 
     def values(self, part: Part, formulas: Formulas) -> dict[str, str]:
         """The code of formulas by their names; the intermediate values and ports that they need are written once."""
         known, functions = self.seen(part), self.functions[part.number]
+        if self.taking and not all(map(self.is_complete, formulas.ports)):
+            known = dict(known)  # what arrives at members of which nothing is taken yet may be taken later
         for port in formulas.ports:
             if port.name not in known:
                 known[port.name] = self.port(part, port)
@@ -416,6 +418,15 @@ class _Stage:
             if name not in known:
                 known[name] = self.code.let("m", self.code.expression(tree, known, functions))
         return {name: self.code.expression(tree, known, functions) for name, tree in formulas.trees}
+
+    def is_complete(self, port: Port) -> bool:
+        """Whether all that arrives at a port at the stage has been taken by now."""
+        connections = port.incoming[apart(port)[1]]
+        plain = connections[self.network.synapses.numbers[connections] < 0]
+        read = [self.flow.taken[taken_by(self.network)[plain]]]
+        for one in formed_at(self.network, connections):
+            read += (taken for _, taken in self.flow.contacts[one.number].anew.values())
+        return all(bool(self.done[taken[taken >= 0]].all()) for taken in read)
 
     def seen(self, part: Part) -> dict[str, str]:
         """What all formulas of a population see: parameters, the time, states."""
@@ -506,7 +517,6 @@ class _Stage:
             return flow.whole[key]
         arriving, (_, staged) = flow.held[key], apart(port)
         if len(staged):
-            self.emit_taken()
             connections = port.incoming[staged]
             if key in flow.around or (self.network.synapses.numbers[connections] >= 0).any():
                 signals = with_factors(self.code, port, staged, self.mixed(connections, flow.around.get(key)))

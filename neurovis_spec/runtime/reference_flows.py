@@ -150,6 +150,7 @@ class Flow:
                 held = state.conditions.held_at(neuron) if taken.is_activity else None
                 value = values[position] if held is None else held
                 sent[taken.places[position]] = 0.0 if state.conditions.lesioned_neurons[neuron] else value
+        stage.ports.clear()  # what arrives at members of which nothing is taken may have been taken later
         return stage
 
     def derivatives(self, stage: Stage) -> Numbers:

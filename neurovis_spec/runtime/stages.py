@@ -23,7 +23,6 @@ from neurovis_spec.compiler.flows import (
     Jacobian,
     flows_by,
     jacobian,
-    reads,
     signal_flows,
     slope_by,
     with_slope,
@@ -40,7 +39,6 @@ from neurovis_spec.compiler.program import (
     Port,
     Projection,
 )
-from neurovis_spec.compiler.values.definitions import sorted_by_need
 from neurovis_spec.language.expressions.tree import Name, Tree, names
 
 Let: TypeAlias = tuple[tuple[str, Tree], ...]
@@ -203,14 +201,14 @@ def parts_of(network: Network, operation: Integrate, flows: BoolArray | None = N
             if model.reads_activation:
                 activation = replace(activation, definition=with_slope(activation.definition))
                 population = replace(population, activation=activation)
-        own = {name: places for (owner, name), places in taken.items() if owner == number}
+        own = [(name, places) for (owner, name), places in taken.items() if owner == number]
         parts.append(
             Part(
                 number,
                 population,
                 tuple(
-                    Taken(formulas_of(population, [(name, given(model, name))]), own[name], name == MODEL.gives)
-                    for name in _in_order(network, population, own, contacts)
+                    Taken(formulas_of(population, [(name, given(model, name))]), places, name == MODEL.gives)
+                    for name, places in own
                 ),
                 formulas_of(population, [(one.name, one.derivative) for one in model.flows]),
                 formulas_of(population, slopes.diagonal.items(), slopes.let),
@@ -465,18 +463,3 @@ def _taken(
         for name, places in _names_of(network, number)
         if asked[places].any()
     }
-
-
-def _in_order(
-    network: Network, population: Population, own: Mapping[str, IntArray], contacts: Mapping[int, Contacts]
-) -> list[str]:
-    """The names of what is taken of a population, each behind what synapses at the ports that it reads take of it."""
-    model = population.model.definition
-    needs: dict[str, set[str]] = {}
-    for name in own:
-        read = reads(model, [given(model, name)])
-        ports = [_staged(port) for port in population.ports if port.name in read]
-        joined = [contacts[one.number].ends for incoming in ports for one in formed_at(network, incoming)]
-        taken = [end.places for ends in joined for text, end in ends.items() if text.partition(".")[0] == "post"]
-        needs[name] = {other for other, places in own.items() if any(np.isin(places, one).any() for one in taken)}
-    return sorted_by_need(needs)[0]
