@@ -221,7 +221,11 @@ STATE = "models: {m: {state: {v: {initial: 0, each_step: v + drive}}, activity: 
         (G + AB + "connections: {A -> B: {weight: 2*g}}\n", "5:34", "(combine: product), or a rule"),
         (G + "neurons: {A: {bias: g}}\n", "4:21", "neurons take in with input: g"),
         ("neurons: {A: {bias: 1}, B: {bias: A}}\n", "3:35", "what 'A' does arrives by a connection"),
-        (STATE + "neurons: {A: {model: m}, B: {}}\nconnections: {A.v -> B: 1}\n", "5:15", "write 'A'; what of v its"),
+        (
+            STATE + "neurons: {A: {model: m}, B: {}}\nconnections: {A.v -> B: 1}\n",
+            "5:15",
+            "write 'A', and at a connection that takes v of it send: v",
+        ),
         (
             STATE + "neurons: {A: {model: m}, B: {}}\nconnections: {B.v -> A: 1}\n",
             "5:15",

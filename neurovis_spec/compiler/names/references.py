@@ -111,8 +111,8 @@ class Directory:
         """What ``head`` in ``head.rest`` may be meant for."""
         if self.holds(head):
             if rest in self._states_of(head):
-                seen = f"write '{head}'; what of {rest} its activity shows is for its model to say"
-                return f"{rest} is a state of '{head}', and only activities are sent and are signals: {seen}"
+                seen = f"write '{head}', and at a connection that takes {rest} of it send: {rest}"
+                return f"{rest} is a state of '{head}', and neurons are named here: {seen}"
             return f"'{head}' is no instance, nothing is in it"
         if not self.instances:
             return "there are no instances here"
