@@ -49,6 +49,7 @@ _RULES: dict[str, Plain] = {
         "state": {"apart": {"derivative": "-10*apart + pre.twice - post"}},
         "weight": {"each_step": "weight + 0.01*tanh(post.w - apart) - pre.keep/10000"},
     },
+    "move": {"centre": {"each_step": "centre + 0.1*tanh(pre - centre)", "each_episode": "0.9*centre"}},
     "grow": {
         "parameters": {"step": 0.01},
         "signals": ["by"],
@@ -64,11 +65,12 @@ def learning_specs(draw: st.DrawFn) -> Spec:
     chooser = random.Random(draw(st.integers(0, 2**32)))
     sizes = {f"G{letter}": chooser.choice([1, 2, 3]) for letter in "abcd"[: draw(st.integers(1, 4))]}
     wave: dict[str, Plain] = {"expression": "sin(k/3)"}
-    neurons: dict[str, Plain] = {
+    neurons: dict[str, Spec] = {
         name: {
             "count": size,
             "model": chooser.choice([*_MODELS, "stepping"]),
             "bias": round(chooser.uniform(-0.5, 0.5), 2),
+            "combine": "distance" if chooser.random() < 0.3 else "sum",
             "activation": chooser.choice(["tanh", "sigmoid"]),
             **({"input": "wave"} if chooser.random() < 0.5 else {}),
         }
@@ -78,11 +80,12 @@ def learning_specs(draw: st.DrawFn) -> Spec:
     for source in sizes:
         for target in sizes:
             if chooser.random() < 0.6:
-                connections[f"{source} -> {target}"] = _body(chooser, sizes, source, target)
+                by_distance = neurons[target]["combine"] == "distance"
+                connections[f"{source} -> {target}"] = _body(chooser, sizes, source, target, by_distance)
     time: dict[str, Plain] = {"dt": 0.01, "episode": 4, "integrate": chooser.choice(["heun", "rk4", "exponential"])}
     return {
         "neurovis": 1, "name": "learning", "seed": chooser.randrange(100), "time": time, "inputs": {"wave": wave},
-        "models": _MODELS, "rules": _RULES, "neurons": neurons, "connections": {**connections},
+        "models": _MODELS, "rules": _RULES, "neurons": {**neurons}, "connections": {**connections},
         "events": _events(chooser, [*sizes], [name for name, body in connections.items() if "plasticity" in body]),
     }  # fmt: skip
 
@@ -97,16 +100,20 @@ def _events(chooser: random.Random, groups: list[str], learning: list[str]) -> l
     return [*events, {"at": 4, "lesion": lost}, {"at": 6, "mend": lost}, {"from": 5, "to": 7, "clamp": {lost: 0.3}}]
 
 
-def _body(chooser: random.Random, sizes: dict[str, int], source: str, target: str) -> Spec:
+def _body(chooser: random.Random, sizes: dict[str, int], source: str, target: str, by_distance: bool) -> Spec:
     body: Spec = {"weight": "uniform(-0.3, 0.3)", "pattern": "all_to_all", "self": True}
     delays: list[Plain] = [1, 1, 2, 3, {"seconds": 0.023}]
     body["delay"] = chooser.choice(delays)
     if chooser.random() < 0.2:
         del body["delay"]
     rules = chooser.sample([*_RULES], chooser.choice([0, 1, 2, 2, 3, 4]))
+    if by_distance:
+        body["centre"] = "uniform(-1, 1)"
+    elif "move" in rules:
+        rules.remove("move")
     if rules:
         body["plasticity"] = [_used(chooser, rule, sizes, source, target) for rule in rules]
-        if chooser.random() < 0.4:
+        if chooser.random() < 0.4 and rules != ["move"]:
             body["bounds"] = [-0.31, 0.31]
     return body
 
@@ -114,8 +121,8 @@ def _body(chooser: random.Random, sizes: dict[str, int], source: str, target: st
 def _used(chooser: random.Random, rule: str, sizes: dict[str, int], source: str, target: str) -> Plain:
     if rule == "fade":
         return "fade" if chooser.random() < 0.5 else {"fade": {"rate": 0.02}}
-    if rule == "near":
-        return "near"
+    if rule in ("near", "move"):
+        return rule
     signals = {"chase": ["error", "gain"], "grow": ["by"], "follow": ["of"]}[rule]
     return {rule: {name: _signal(chooser, sizes, source, target) for name in signals}}
 

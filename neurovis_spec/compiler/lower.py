@@ -98,7 +98,9 @@ def _learning(projections: tuple[Projection, ...]) -> Iterator[Operation]:
         return
     for phase in PHASES:
         for number in sorted(rules, key=lambda number: projections[number].place):
-            if any(getattr(one, phase) is not None for one in projections[number].use.definition.lasting):
+            definition = projections[number].use.definition
+            ends = [one.each_episode for one in definition.lasting]
+            if any(tree is not None for tree in (definition.steps.values() if phase == "each_step" else ends)):
                 yield Learn(number, (phase,))
 
 

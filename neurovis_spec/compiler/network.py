@@ -23,6 +23,7 @@ from neurovis_spec.compiler.events.settable import Binding, ParameterFormula, Pa
 from neurovis_spec.compiler.names.state_references import StateOf
 from neurovis_spec.compiler.program import (
     DRIVE,
+    RULE,
     SYNAPSE,
     Check,
     Definition,
@@ -464,6 +465,11 @@ class Network:
         return sum(len(self.populations[one.population].members) for one in self.outlets)
 
     @cached_property
+    def moving_centres(self) -> Located:
+        """The projections of the rules that change centres, and the connections of these."""
+        return self.located("connection", lambda definition: definition.moves_centre)
+
+    @cached_property
     def neuron_of(self) -> IntArray:
         """The neuron of each activity, and behind these of each outlet."""
         members = [self.populations[one.population].members for one in self.outlets]
@@ -548,7 +554,10 @@ class Network:
     @cached_property
     def changing(self) -> IntArray:
         """Indices of the connections whose weight can change in a run, by a rule or by an event (reached or not)."""
-        can = self.connections.rules.whole() >= 0
+        can = np.zeros(len(self.connections), dtype=np.bool_)
+        for one in self.projections:
+            if one.kind == RULE and not one.use.definition.moves_centre:
+                can[one.members] = True
         for binding in self.set_by_events:
             if binding.weights:
                 can[binding.indices] = True

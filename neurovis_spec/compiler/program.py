@@ -90,6 +90,8 @@ UNDEFINED_F = "f is undefined"
 SLOPE_F = "slope of f"
 #: The port that all neurons have.
 DRIVE = "drive"
+#: What a rule may change in place of a weight.
+CENTRE = "centre"
 
 
 class EndName(NamedTuple):
@@ -148,8 +150,13 @@ class Definition:
 
     @property
     def kept(self) -> tuple[Quantity, ...]:
-        """Whatever has a cell in ``State.cells``: states, then outputs."""
-        return (*self.state, *self.outputs)
+        """Whatever has a cell in ``State.cells``: states, then outputs, and the centre that a rule changes."""
+        return (*self.state, *self.outputs, *(self.gives if self.moves_centre else ()))
+
+    @property
+    def moves_centre(self) -> bool:
+        """Whether it is a rule that changes the centre of a connection, in place of the weight."""
+        return self.kind.lasting and self.given.name == CENTRE
 
     @property
     def flows(self) -> tuple[Quantity, ...]:

@@ -17,10 +17,10 @@ import numpy as np
 from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray, sorting, starts_of, width
 from neurovis_spec.compiler.events.settable import CENTRES
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Port
+from neurovis_spec.compiler.program import CENTRE, Port
 from neurovis_spec.language.expressions.emit_c import Value
 from neurovis_spec.language.words import Combine
-from neurovis_spec.runtime.c_code import Code, Form, Place
+from neurovis_spec.runtime.c_code import Code, Form, Place, state_name
 from neurovis_spec.runtime.signals import SignalLayout
 from neurovis_spec.runtime.stages import taken_by
 
@@ -343,13 +343,32 @@ class Arrivals:
             case "product":
                 code.line(f"{total} *= {term};")
             case "distance":
-                centres = self.network.connections.centres.whole()
-                centre = code.settable(CENTRES, centres, self.connections[column], edge)
+                centre = self._centre(self.connections[column], edge)
                 difference = code.let("d", f"{term} - {self._operand(centre)}" if centre != 0.0 else term)
                 code.line(f"{total} += {difference}*{difference};")
         if self.form.gone:
             code.indent -= 1
             code.line("}")
+
+    def _centre(self, connections: Indices, edge: Place) -> Value:
+        """What the signal of one of some connections is compared with: a centre that a rule moves, or one that
+        stays."""
+        code, (holders, numbers, positions) = self.code, self.network.moving_centres
+        own = numbers[connections]
+        here, found = own[edge : edge + 1] if isinstance(edge, int) else own, code.text(0.0)
+        if (here < 0).all():
+            return code.settable(CENTRES, self.network.connections.centres.whole(), connections, edge)
+        if (here < 0).any():
+            found = code.text(code.settable(CENTRES, self.network.connections.centres.whole(), connections, edge))
+        for number in np.flatnonzero(np.bincount(here[here >= 0])).tolist():
+            (use,) = holders[number].uses
+            place = next(place for place, one in enumerate(use.definition.kept) if one.name == CENTRE)
+            at = code.at(np.where(own == number, positions[connections], 0), edge)
+            moving = f"{state_name(use.owner, place)}[{at}]"
+            if (here == number).all():
+                return moving
+            found = f"({code.at((own == number).astype(np.int64), edge)} ? {moving} : {found})"
+        return found
 
     def _operand(self, value: Value) -> str:
         """A value as it may stand behind a minus."""

@@ -551,7 +551,9 @@ class StepCode:
                 code.line("    continue;")
         rule = projection.use
         seen = code.parameters(rule, place) | self.clock(rule.definition) | self.seen(projection, place)
-        stored = {**self.states(rule, place), "weight": f"weights[{connection}]"}
+        stored = self.states(rule, place)
+        if not rule.definition.moves_centre:
+            stored["weight"] = f"weights[{connection}]"
 
         def bounded(name: str, value: Value) -> Value:
             return self.bounded(projection, place, value) if name == "weight" else value

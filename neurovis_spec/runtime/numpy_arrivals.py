@@ -17,7 +17,7 @@ import numpy as np
 from neurovis_spec.arrays import BoolArray, Indices, IntArray
 from neurovis_spec.compiler.events.settable import CENTRES, bias_of
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Population, Port, Projection
+from neurovis_spec.compiler.program import CENTRE, Population, Port, Projection
 from neurovis_spec.runtime.lags import Lags
 from neurovis_spec.runtime.numpy_code import Code, any_given
 from neurovis_spec.runtime.signals import DelayClass, SharedSlots, SignalLayout
@@ -304,6 +304,23 @@ def slots_of(code: Code, start: int, stop: int, length: int, ago: int = 0) -> st
     return f"signals[{start} + {code.slot(length, ago)}:{stop}:{length}]"
 
 
+def _centres(step: Step, connections: Indices) -> str:
+    """What the signals of some connections are compared with, "" for 0."""
+    code, network = step.code, step.network
+    centres, (holders, numbers, positions) = network.connections.centres.whole(), network.moving_centres
+    own, parts = numbers[connections], list[tuple[str, IntArray]]()
+    for number in np.flatnonzero(np.bincount(own + 1)).tolist():
+        places = np.flatnonzero(own == number - 1)
+        some = connections[places]
+        if number:
+            holder = holders[number - 1]
+            (use,) = holder.uses
+            parts.append((code.select(code.state(use, CENTRE), positions[some], len(holder.members)), places))
+        elif code.is_set(CENTRES) or any_given(centres[some]) or len(places) < len(own):
+            parts.append((code.numbers(CENTRES, centres, some, share=False), places))
+    return put_together(code, parts, len(own), "c") if len(parts) > 1 else "".join(values for values, _ in parts)
+
+
 def combined(step: Step, population: Population, port: Port, signals: str) -> str:
     """What arrives at each member from all connections as one number."""
     return finished(port, accumulated(step, population, port, np.arange(len(port.incoming)), signals))
@@ -317,12 +334,11 @@ def finished(port: Port, arrived: str) -> str:
 def accumulated(step: Step, population: Population, port: Port, places: Indices, signals: str, held: str = "") -> str:
     """The sum, the product, or the sum of the squares of signals, of the connections at these places, at each member;
     ``held`` is that of the connections before them."""
-    code, network, count = step.code, step.network, len(population.members)
+    code, count = step.code, len(population.members)
     slots = port.slots[places]
     if port.combine == "distance":
-        centres = network.connections.centres.whole()
-        if code.is_set(CENTRES) or any_given(centres[port.incoming[places]]):
-            centre = code.numbers(CENTRES, centres, port.incoming[places], share=False)
+        centre = _centres(step, port.incoming[places])
+        if centre:
             signals = code.let("g", f"{signals} - {centre}")
         signals = f"{signals} * {signals}"
     if held:

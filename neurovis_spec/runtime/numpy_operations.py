@@ -230,14 +230,15 @@ def _learn(operation: Learn, step: Step) -> None:
         return
     rule, place = projection.rule, "" if learning is None else f"[{code.constant(learning)}]"
     seen = code.parameters(rule, learning) | seen_at(step, projection)
-    states = {one.name: code.state(rule, one.name) for one in rule.definition.state}
+    states = {one.name: code.state(rule, one.name) for one in rule.definition.kept}
     cells = {name: Cell(f"{state}{place}", f"{state}{place or '[:]'}") for name, state in states.items()}
     count = len(network.connections)
-    cells["weight"] = Cell(
-        code.select("weights", projection.members, count),
-        f"weights{code.position(projection.members, count)}",
-        lambda weight: _bounded(code, network, projection, weight),
-    )
+    if not rule.definition.moves_centre:
+        cells["weight"] = Cell(
+            code.select("weights", projection.members, count),
+            f"weights{code.position(projection.members, count)}",
+            lambda weight: _bounded(code, network, projection, weight),
+        )
     emit_change(code, rule.definition, seen, cells, network.episode)
 
 

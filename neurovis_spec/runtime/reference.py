@@ -17,6 +17,7 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.events.settable import HIGH, LOW
 from neurovis_spec.compiler.network import Network, Outlet
 from neurovis_spec.compiler.program import (
+    CENTRE,
     MODEL,
     Diffuse,
     Gather,
@@ -232,8 +233,13 @@ class ReferenceStepper(Seen):
             return self.at(index, state) if index < behind else float(inputs[index - behind])
 
         seen = self.known(projection.rule, position, state) | self.seen(projection, position, state, now, 1.0)
-        weight = Bounded(float(state.weights[connection]), low, high)
-        state.weights[connection] = self.change(projection.rule, position, seen, state, {"weight": weight})["weight"]
+        if projection.rule.definition.moves_centre:
+            centre = Bounded(self.centre(connection, state), -math.inf, math.inf)
+            self.change(projection.rule, position, seen, state, {CENTRE: centre})
+        else:
+            weight = Bounded(float(state.weights[connection]), low, high)
+            results = self.change(projection.rule, position, seen, state, {"weight": weight})
+            state.weights[connection] = results["weight"]
 
     def ends_episode(self, state: State) -> bool:
         """Whether (t + 1) mod m = 0."""

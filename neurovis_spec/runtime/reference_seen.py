@@ -16,7 +16,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.events.settable import CENTRES, Variable, bias_of
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import SYNAPSE, Definition, Key, Population, Port, Projection, Use
+from neurovis_spec.compiler.program import CENTRE, SYNAPSE, Definition, Key, Population, Port, Projection, Use
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.lags import Lags, lags_of
@@ -118,7 +118,15 @@ class Seen:
                     value = float(state.weights[connection]) * now.sent[self.sending[connection]]
                 if port.factors is not None:
                     value *= float(port.factors[place])
-                yield Signal(int(port.slots[place]), value, self.centres.at(connection, state))
+                yield Signal(int(port.slots[place]), value, self.centre(connection, state))
+
+    def centre(self, connection: int, state: State) -> float:
+        """What the signal of a connection is compared with where its target combines by distance."""
+        holders, numbers, positions = self.network.moving_centres
+        if numbers[connection] < 0:
+            return self.centres.at(connection, state)
+        (use,) = holders[numbers[connection]].uses
+        return float(state.cells[use.owner][CENTRE][positions[connection]])
 
     def given(
         self, population: Population, port: Port, signals: Iterable[Signal], state: State, inputs: Sequence[float]

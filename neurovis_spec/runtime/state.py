@@ -18,7 +18,7 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.changes import Held
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.initial_states import initial_states
-from neurovis_spec.compiler.program import SYNAPSE, Key, Owner, Projection
+from neurovis_spec.compiler.program import CENTRE, SYNAPSE, Definition, Key, Owner, Projection
 from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import signal_layout
 
@@ -207,7 +207,7 @@ class State:
 def initial_state(network: Network, own_signals: bool = False) -> State:
     """The state before step 0: nothing is under way, weights are w[0], states have their initials."""
     layout = signal_layout(network, own_signals)
-    n, given_states = len(network.neurons), {"neuron": network.neurons.starts, "connection": {}}
+    n = len(network.neurons)
     return State(
         k=0,
         activity=np.zeros(n),
@@ -216,13 +216,20 @@ def initial_state(network: Network, own_signals: bool = False) -> State:
         signals=np.zeros(layout.size),
         history=np.zeros((history_depth(network), n + network.outlet_count)),
         cells={
-            use.owner: initial_states(use, holder.members, network.dt, given_states[use.definition.kind.each])
+            use.owner: initial_states(use, holder.members, network.dt, _given(network, use.definition))
             for holder, use in network.uses
         },
         conditions=first_conditions(network),
         network=network.mark,
         own_signals=not layout.shared,
     )
+
+
+def _given(network: Network, definition: Definition) -> Mapping[str, FloatArray]:
+    """What the network says of what states of a definition begin with, for all neurons or connections."""
+    if definition.moves_centre:
+        return {CENTRE: network.connections.centres.whole()}
+    return network.neurons.starts if definition.kind.each == "neuron" else {}
 
 
 def signals_of_each(network: Network, state: State) -> FloatArray:

@@ -195,6 +195,7 @@ class EntryBuilder:
         uses = self._uses(rules, synapse, Joined(sources, targets, self.context.census))
         if uses is UNKNOWN:
             return UNKNOWN
+        learns = {name: any(one.rule.given.name == name for one in rules) for name in ("weight", "centre")}
         return Bundle(
             name=self.context.scope.called(self.name),
             key=self.key.span,
@@ -209,8 +210,8 @@ class EntryBuilder:
             description=None if body.description is None else body.description.value,
             ends_disjoint=body.self is not None and not np.isin(self.sources, self.targets).any(),
             parts=(
-                *(part._replace(field="initial_weights" if rules else "weights") for part in weight_parts),
-                *(part._replace(field="centres") for part in centre_parts),
+                *(part._replace(field="initial_weights" if learns["weight"] else "weights") for part in weight_parts),
+                *(part._replace(field="initial_centres" if learns["centre"] else "centres") for part in centre_parts),
                 *bound_parts,
                 *(part for use in uses for part in use.parts),
             ),
@@ -558,7 +559,22 @@ class EntryBuilder:
             directory=self.context.directory,
             census=self.context.census,
         )
-        return rules_of(self.body.plasticity, place)
+        rules = rules_of(self.body.plasticity, place)
+        if rules is not UNKNOWN:
+            self._check_centres(rules)
+        return rules
+
+    def _check_centres(self, rules: tuple[Learning, ...]) -> None:
+        """That what rules change has an effect, and that bounds have something to hold."""
+        findings, moving = self.constants.findings, [one.rule.moves_centre for one in rules]
+        for choice, learning in zip(self.body.plasticity, rules, strict=True):
+            if learning.rule.moves_centre and self._measures_distance() is False:
+                message = f"'{learning.rule.name}' changes centres, and none of the targets combines by distance"
+                findings.error("useless-key", choice.name.span, message, "give the targets combine: distance")
+        if rules and all(moving) and self.body.bounds is not None:
+            message = "'bounds' hold plastic weights, and what learns here are centres"
+            hint = "bounds of a centre stand in its rule, as in clip(centre + …, 0, 1)"
+            findings.error("useless-key", self.body.bounds.span, message, hint)
 
     def _connection_ends(self, shape: _Shape | Unknown) -> ConnectionEnds | Unknown:
         """Which of both ends the connections join, for the settings of rules and synapses."""

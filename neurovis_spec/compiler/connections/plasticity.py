@@ -60,10 +60,12 @@ def _are_apart(choices: tuple[Choice, ...], found: list[Learning | Unknown], fin
             message = f"the rule '{shorten(name)}' is here already: a connection has a rule once"
             findings.error("duplicate-name", choice.name.span, message, "leave it out here")
             continue
-        for state in () if learning is UNKNOWN else learning.rule.state:
+        rule = None if learning is UNKNOWN else learning.rule
+        for state in () if rule is None else rule.kept:
             other = owners.setdefault(state.name, name)
-            if other != name:
-                message = f"the rules '{shorten(other)}' and '{shorten(name)}' both have a state '{state.name}'"
+            if other != name and rule is not None:
+                what = "change the" if state in rule.gives else "have a state"
+                message = f"the rules '{shorten(other)}' and '{shorten(name)}' both {what} '{state.name}'"
                 hint = "states of a connection have different names: rename it in one of them"
                 findings.error("duplicate-name", choice.name.span, message, hint)
     return findings.errors == before

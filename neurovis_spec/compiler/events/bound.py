@@ -36,8 +36,8 @@ from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.program import Key, Owner
 from neurovis_spec.language.expressions.tree import Number
 
-#: Fields that are no numbers of a network: the first weights of what learns, and positions.
-_ELSEWHERE = ("initial_weights", "position")
+#: Fields that are no numbers of a network: the first weights and centres of what learns, and positions.
+_ELSEWHERE = ("initial_weights", "initial_centres", "position")
 
 
 class LocatedPart(NamedTuple):

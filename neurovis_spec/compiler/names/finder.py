@@ -143,7 +143,7 @@ def finder_of(census: Census, made: Connected, findings: Findings) -> Finder:
     for bundle in made.bundles:
         first, start = start, start + len(bundle.sources)
         members = np.arange(first, start)
-        rules += [_holder(members, learning.rule.name, learning.rule.state) for learning in bundle.rules]
+        rules += [_holder(members, learning.rule.name, learning.rule.kept) for learning in bundle.rules]
         if bundle.synapse is not None:
             synapse = bundle.synapse.definition
             synapses.append(_holder(members, synapse.name, synapse.state))
