@@ -245,6 +245,43 @@ def test_a_lesion_loses_what_is_under_way(w: str, backend: str, monkeypatch: pyt
     np.testing.assert_allclose(found.activity, expected, rtol=1e-13)
 
 
+VARIED = """\
+neurovis: 1
+name: varied
+time: {dt: 0.1, integrate: heun}
+models: {m: {state: {x: {initial: 1, derivative: drive - 0.2*x}}, activity: x, outputs: {seen: drive}}}
+neurons: {A: {count: 6, model: m, initial: {x: cos(i)}}, S: {count: 4, activation: tanh, bias: 0.3 - 0.1*i}}
+parameters: {w: 0.1}
+connections:
+- A -> A: {weight: 0.2*sin(i - j), pattern: all_to_all, delay: {seconds: "uniform(0.1, 1)"}}
+- A -> S: {weight: w*(i - j), pattern: all_to_all, delay: "uniform(1, 5)"}
+- S -> A: {weight: 0.1*(1 + i - j), pattern: all_to_all, delay: 1 + i + j}
+- S -> S: {weight: 0.2, pattern: all_to_all, delay: 1 + i, plasticity: {oja: {rate: 0.01}}}
+events: [{at: 7, lesion: A1}, {at: 9, set: {w: -0.2}}, {at: 12, mend: A1}]
+"""
+
+
+@pytest.mark.parametrize("least", [1, 1 << 15])
+def test_many_different_delays_give_the_same_bits(least: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Read and sent one by one, all at once, and each connection by itself."""
+    monkeypatch.setattr("neurovis_spec.runtime.signals.LEAST_SAVED", least)
+    network = nv.compile_text(VARIED)
+    runs = [record(network.network, Course(30, backend="reference"))]
+    for many in (0, 1000):
+        monkeypatch.setattr("neurovis_spec.runtime.signals.MANY", many)
+        runs.append(record(network.network, Course(30, backend="numpy")))
+    for one in runs[1:]:
+        np.testing.assert_allclose(one.activity, runs[0].activity, rtol=1e-13, atol=1e-15)
+    np.testing.assert_array_equal(runs[1].activity, runs[2].activity)
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("least", [1, 1 << 15])
+def test_many_different_delays_in_c(least: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("neurovis_spec.runtime.signals.LEAST_SAVED", least)
+    same_bits(nv.compile_text(VARIED), 20)
+
+
 @pytest.mark.parametrize("backend", ["numpy", pytest.param("c", marks=pytest.mark.compiler)])
 @pytest.mark.parametrize("cut", [1, 3, 9])
 def test_a_run_goes_on_from_a_recording(cut: int, backend: str, tmp_path: Path) -> None:

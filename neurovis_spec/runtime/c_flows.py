@@ -246,7 +246,9 @@ class _Integration:
         """The inputs of a stage, what connections take at it, the derivatives."""
         self.inputs()
         if self.step.lags is not None and len(self.plan.lagging):
-            write_arriving(self.step, self.step.lags, self.plan.lagging)
+            # the second stage in the middle sees what the first one does
+            with self.code.block("if (stage != 2)" if self.method == "rk4" else ""):
+                write_arriving(self.step, self.step.lags, self.plan.lagging)
         parts = self.plan.of_stage
         for part, one in taken_in_order(parts):
             with self.unless_there(part, one, first):

@@ -132,11 +132,17 @@ def signals_at(step: Step, number: int, port: Port, places: Indices) -> str:
     if len(undelayed):
         weights = code.select("weights", incoming[undelayed], len(connections))
         parts.append((f"{weights} * {sent_by(step, incoming[undelayed])}", undelayed))
-    for slots in step.layout.shared:
+    rings = step.layout.rings
+    if step.layout.many:
+        delayed = np.flatnonzero(delays > 0)
+        if len(delayed):
+            parts.append((signals_of(step, incoming[delayed], delays[delayed]), delayed))
+        rings = ()
+    for slots in (one for one in rings if isinstance(one, SharedSlots)):
         there = np.flatnonzero(shares & _has(step, slots, incoming, delays))
         if len(there):
             parts.append((_shared(step, slots, incoming[there]), there))
-    for delay_class in step.layout.classes:
+    for delay_class in (one for one in rings if isinstance(one, DelayClass)):
         inside = np.flatnonzero(delay_class.populations == number)  # they lie next to each other
         if len(inside):
             length = delay_class.length
@@ -149,6 +155,39 @@ def signals_at(step: Step, number: int, port: Port, places: Indices) -> str:
                 own = code.select(code.let("g", own), np.flatnonzero(arriving), len(arriving))
             parts.append((own, np.flatnonzero(~shares & _has(step, delay_class, incoming, delays))))
     return with_factors(code, port, places, put_together(code, parts, len(delays)))
+
+
+def signals_of(step: Step, connections: Indices, ago: IntArray) -> str:
+    """The signals of connections that were sent so many steps ago, of each another number."""
+    code, layout = step.code, step.layout
+    shares = layout.shares[connections]
+    parts: list[tuple[str, IntArray]] = []
+    for is_shared in (True, False):
+        places = np.flatnonzero(shares == is_shared)
+        if not len(places):
+            continue
+        some = connections[places]
+        sent = slots_at(code, layout.offsets[some], layout.lengths[some], ago[places])
+        if is_shared:
+            sent = f"{code.select('weights', some, len(step.network.connections))} * {sent}"
+            lost = step.structure.lost[some]
+            if (lost > NEVER_LOST).any():
+                sent = f"np.where(k < {code.constant(lost + ago[places])}, 0.0, {sent})"
+        parts.append((sent, places))
+    return put_together(code, parts, len(connections))
+
+
+def slots_at(code: Code, offsets: Indices, lengths: Indices, ago: IntArray) -> str:
+    """The slots of so many steps ago of rings that begin at these places and are so long."""
+    firsts, sizes = offsets.astype(np.int64), lengths.astype(np.int64)
+    length, count, first = int(sizes[0]), len(firsts), int(firsts[0])
+    if (sizes != length).any() or (ago != ago[0]).any():
+        step = "k" if (ago % sizes == 0).all() else f"(k - {code.constant(ago)})"
+        return f"signals[{code.constant(firsts)} + {step} % {code.constant(sizes)}]"
+    slot = code.slot(length, int(ago[0]) % length)
+    if np.array_equal(firsts, first + length * np.arange(count)):
+        return f"signals[{first} + {slot}:{first + length * count}:{length}]"
+    return f"signals[{code.constant(firsts)} + {slot}]"
 
 
 def _has(step: Step, slots: DelayClass | SharedSlots, connections: Indices, delays: IntArray) -> BoolArray:

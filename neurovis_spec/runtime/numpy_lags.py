@@ -13,7 +13,7 @@ import numpy as np
 from neurovis_spec.arrays import Indices, IntArray
 from neurovis_spec.compiler.program import Projection
 from neurovis_spec.runtime.lags import Lags
-from neurovis_spec.runtime.numpy_arrivals import Step, end_at, put_together
+from neurovis_spec.runtime.numpy_arrivals import Step, end_at, put_together, signals_of
 from neurovis_spec.runtime.numpy_code import Code
 from neurovis_spec.runtime.stages import End, ends_of
 from neurovis_spec.runtime.state import NEVER_LOST
@@ -29,40 +29,9 @@ class Around(NamedTuple):
 
 def signals_around(step: Step, lags: Lags, connections: Indices) -> Around:
     """The signals of connections that were sent around the time at which those left that arrive in a step."""
-    first, second, third = (_signals(step, lags.some(connections), connections, after) for after in (-1, 0, 1))
+    whole = lags.whole[connections]
+    first, second, third = (signals_of(step, connections, whole + ago) for ago in (2, 1, 0))
     return Around((first, second, third), step.code.constant(lags.part[connections]))
-
-
-def _signals(step: Step, lags: Lags, connections: Indices, after: int) -> str:
-    """The signals that were sent so many steps after k − 1 − W."""
-    code, layout = step.code, step.layout
-    ago, shares = lags.whole + 1 - after, layout.shares[connections]
-    parts: list[tuple[str, IntArray]] = []
-    for which in (shares, ~shares):
-        places = np.flatnonzero(which)
-        if not len(places):
-            continue
-        some = connections[places]
-        sent = _slots(code, layout.offsets[some].astype(np.int64), layout.lengths[some].astype(np.int64), ago[places])
-        if which is shares:
-            sent = f"{code.select('weights', some, len(step.network.connections))} * {sent}"
-            lost = step.structure.lost[some]
-            if (lost > NEVER_LOST).any():
-                sent = f"np.where(k < {code.constant(lost + ago[places])}, 0.0, {sent})"
-        parts.append((sent, places))
-    return put_together(code, parts, len(connections))
-
-
-def _slots(code: Code, offsets: IntArray, lengths: IntArray, ago: IntArray) -> str:
-    """What is in the slots of so many steps ago."""
-    length, count = int(lengths[0]), len(offsets)
-    if (lengths != length).any() or (ago != ago[0]).any():
-        return f"signals[{code.constant(offsets)} + (k - {code.constant(ago)}) % {code.constant(lengths)}]"
-    slot = f"(k - {ago[0]}) % {length}"
-    first = int(offsets[0])
-    if np.array_equal(offsets, first + length * np.arange(count)):
-        return f"signals[{first} + {slot}:{first + length * count}:{length}]"
-    return f"signals[{code.constant(offsets)} + {slot}]"
 
 
 def ends_around(step: Step, lags: Lags, members: IntArray, places: IntArray) -> Around:

@@ -50,12 +50,13 @@ from neurovis_spec.runtime.numpy_arrivals import (
     seen_before_update,
     sent_at,
     sent_by,
+    slots_at,
     slots_of,
 )
 from neurovis_spec.runtime.numpy_code import FIRST, Cell, Code, emit_change
 from neurovis_spec.runtime.numpy_flows import diffuse, integrate
 from neurovis_spec.runtime.numpy_lags import behind_lags
-from neurovis_spec.runtime.signals import DelayClass, SharedSlots
+from neurovis_spec.runtime.signals import SharedSlots
 from neurovis_spec.runtime.stages import formulas_of, given, unfolded
 
 
@@ -193,30 +194,39 @@ def _send(operation: Send, step: Step) -> None:
     ``pre``."""
     code, network = step.code, step.network
     connections = network.connections
-    for delay_class in step.layout.classes:
-        weights = code.select("weights", delay_class.connections, len(connections))
-        sent = sent_by(step, delay_class.connections)
-        code.line(f"multiply({weights}, {sent}, {_leaving(step, delay_class)})")
-        _fill(step, delay_class)
-    for shared in step.layout.shared:
-        code.line(f"{_leaving(step, shared)}[:] = {sent_at(step, shared.sent)}")
-        _fill(step, shared)
+    if step.layout.many:
+        _send_all(step)
+    for slots in () if step.layout.many else step.layout.rings:
+        there = slots_of(code, slots.start, slots.stop, slots.length)
+        if isinstance(slots, SharedSlots):
+            code.line(f"{there}[:] = {sent_at(step, slots.sent)}")
+        else:
+            weights = code.select("weights", slots.connections, len(connections))
+            code.line(f"multiply({weights}, {sent_by(step, slots.connections)}, {there})")
+    if late := [slots for slots in step.layout.rings if slots.length != slots.delay]:
+        code.line(f"if {FIRST}:")  # with a continuous delay what comes before the first step is what is sent there
+        for slots in late:
+            rows = f"signals[{slots.start}:{slots.stop}].reshape(-1, {slots.length})"
+            code.line(f"    {rows}[:] = signals[{slots.start}:{slots.stop}:{slots.length}, None]")
     if step.depth:
         sent = "np.concatenate((activity, outlets))" if network.outlets else "activity"
         code.line(f"history[k % {step.depth}] = {sent}")
 
 
-def _leaving(step: Step, slots: DelayClass | SharedSlots) -> str:
-    """Where what is sent in a step is put."""
-    return slots_of(step.code, slots.start, slots.stop, slots.length)
-
-
-def _fill(step: Step, slots: DelayClass | SharedSlots) -> None:
-    """With a continuous delay what comes before the first step is what is sent there."""
-    if slots.length != slots.delay:
-        start, stop, length = slots.start, slots.stop, slots.length
-        rows = f"signals[{start}:{stop}].reshape(-1, {length})"
-        step.code.line(f"if {FIRST}: {rows}[:] = signals[{start}:{stop}:{length}, None]")
+def _send_all(step: Step) -> None:
+    """What is sent leaves, whatever the delays."""
+    code, layout = step.code, step.layout
+    own = np.concatenate([np.zeros(0, dtype=np.int64), *(one.connections for one in layout.classes)])
+    if len(own):
+        slots = slots_at(code, layout.offsets[own], layout.lengths[own], np.zeros(len(own), dtype=np.int64))
+        weights = code.select("weights", own, len(step.network.connections))
+        code.line(f"{slots} = {weights} * {sent_by(step, own)}")
+    if layout.shared:
+        sent = np.concatenate([one.sent for one in layout.shared])
+        firsts = np.concatenate([np.arange(one.start, one.stop, one.length) for one in layout.shared])
+        lengths = np.repeat([one.length for one in layout.shared], [len(one.sent) for one in layout.shared])
+        slots = slots_at(code, firsts, lengths, np.zeros(len(sent), dtype=np.int64))
+        code.line(f"{slots} = {sent_at(step, sent)}")
 
 
 @emit.register

@@ -28,6 +28,10 @@ from neurovis_spec.runtime.stages import taken_by
 LEAST_SAVED = 1 << 15
 
 
+#: more delays are not read and sent one by one
+MANY = 96
+
+
 @dataclass(frozen=True, slots=True)
 class DelayClass:
     """All connections of one delay ≥ 1 with signals of their own, as they are stored: the i-th has its slots from
@@ -74,6 +78,11 @@ class SignalLayout:
     classes: tuple[DelayClass, ...]
     shared: tuple[SharedSlots, ...]
     shares: BoolArray
+
+    @property
+    def many(self) -> bool:
+        """Whether there are so many delays that what is under way is read and sent all at once, not delay by delay."""
+        return len(self.classes) + len(self.shared) > MANY
 
     @property
     def rings(self) -> tuple[DelayClass | SharedSlots, ...]:
