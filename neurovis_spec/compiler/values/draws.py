@@ -102,8 +102,8 @@ def _word(part: Indices) -> LongArray:
 class Stream:
     """The numbers of one purpose and name under a seed.
 
-    The purpose is one of ``weight``, ``centre``, ``edges``, ``bias``, ``initial``, ``noise``; the name that of the
-    group with the path of its instance (``left1.K``), or that of the entry behind the path of the instance that
+    The purpose is one of ``weight``, ``centre``, ``edges``, ``delay``, ``bias``, ``initial``, ``noise``; the name that
+    of the group with the path of its instance (``left1.K``), or that of the entry behind the path of the instance that
     declares it (``left1/K -> O``; an entry ``left1.K -> O`` around the instance draws by itself).
 
     >>> Stream(7, "weight", "K -> O").uniform(0, np.arange(3), 0, 0).round(6)
