@@ -25,7 +25,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -425,7 +425,8 @@ class _Stage:
         plain = connections[self.network.synapses.numbers[connections] < 0]
         read = [self.flow.taken[taken_by(self.network)[plain]]]
         for one in formed_at(self.network, connections):
-            read += (taken for _, taken in self.flow.contacts[one.number].anew.values())
+            ends = chain.from_iterable(self.flow.contacts[one.number].anew.values())
+            read += (anew.places for anew in ends if not anew.is_input)
         return all(bool(self.done[taken[taken >= 0]].all()) for taken in read)
 
     def seen(self, part: Part) -> dict[str, str]:
