@@ -116,7 +116,8 @@ class Census:
     def groups_of(self, neurons: Indices) -> list[Built]:
         """The groups that these neurons belong to."""
         starts = [one.group.start for one in self.groups]
-        return [self.groups[number] for number in np.unique(np.searchsorted(starts, neurons, side="right") - 1)]
+        numbers = np.searchsorted(starts, neurons, side="right") - 1
+        return [self.groups[number] for number in np.flatnonzero(np.bincount(numbers))]  # np.unique loads numpy.ma
 
     def groups_at(self, neurons: Indices) -> list[Inside]:
         """The groups of some neurons, each with the places among these where its own stand."""

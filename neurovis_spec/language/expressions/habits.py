@@ -77,7 +77,7 @@ def unit_of(text: str) -> tuple[str, str] | None:
 def unit_hint(number: str, unit: str, key: str | None = None) -> str | None:
     """The help line for a number with a unit behind it; ``key`` is the key that it is the value of.
 
-    >>> unit_hint("5", "ms")[24:]
+    >>> unit_hint("5", "ms")[23:]
     'write 0.005 where seconds are wanted, 0.005/dt where steps are, 5 in a model with time: ms'
     >>> unit_hint("-65", "mV"), unit_hint("2", "feet")
     ('numbers have no units: write -65', None)
