@@ -500,13 +500,20 @@ class Network:
         return frozen(np.flatnonzero(taken).astype(np.int64))
 
     @cached_property
+    def joined(self) -> IntArray:
+        """The connections that have a synapse, ascending."""
+        return frozen(np.flatnonzero(self.synapses.numbers >= 0))
+
+    @cached_property
     def sent(self) -> tuple[StateOf, ...]:
-        """What these are: states and outputs of neurons, in the same order."""
+        """What a picture of the connections needs beside activities and weights: what these take, states and outputs of
+        neurons in the same order, and behind them the signals of synapses, those of ``joined``."""
         found: list[StateOf] = []
         for outlet in self.outlets:
             members = self.populations[outlet.population].members
             places = self.taken[(self.taken >= outlet.start) & (self.taken < outlet.start + len(members))]
             found.append(StateOf.of("neuron", outlet.name, members[places - outlet.start]))
+        found.append(StateOf.of("connection", SYNAPSE.gives, self.joined))
         return tuple(one for one in found if one.size)
 
     @cached_property

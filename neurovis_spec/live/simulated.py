@@ -69,6 +69,7 @@ class SimulatedSource:
         self._simulation, self._room = simulation, room
         self._probe = columns_of(self.network).probe
         self._shown, self._signals = ShownStates(self.network), Signals(self.network)
+        self._signals.follow(simulation)
         self._origin = simulation.state() if origin is None else origin
         self._begin(self._origin if begin is None else begin, turned, fed or {})
         self.body = drawn(simulation.skeleton, tuple(simulation.sensors), self._seen.snapshot.pose)

@@ -7,7 +7,7 @@ Recording of the rows that were kept.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Protocol
 
@@ -17,7 +17,7 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.body import Skeleton
 from neurovis_spec.compiler.names.state_references import StateOf, singles
 from neurovis_spec.compiler.network import Located, Network
-from neurovis_spec.compiler.program import Definition, Each, Owner
+from neurovis_spec.compiler.program import SYNAPSE, Definition, Each, Owner
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.references import find_neurons, find_states
@@ -46,6 +46,8 @@ class Keep:
     spec: str = ""
     #: of the steps that would be recorded the last alone
     last: bool = False
+    #: whether what a picture of the connections needs beside (``Network.sent``) is, where all else that it needs is
+    sent: bool = True
 
 
 #: Everything but states that nobody asks for.
@@ -63,30 +65,47 @@ class _Read:
     columns: IntArray
 
 
+def _none() -> IntArray:
+    return np.zeros(0, dtype=np.int64)
+
+
 @dataclass(frozen=True, eq=False)
 class Probe:
-    """Reads states, each into its column."""
+    """Reads states, each into its column, and signals of synapses, which are no states: whoever reads these has to form
+    them (``runtime/formed.py``)."""
 
     names: tuple[str, ...]
     reads: tuple[_Read, ...]
+    #: the connections whose signals it reads, and the columns of these
+    joined: IntArray = field(default_factory=_none)
+    signals: IntArray = field(default_factory=_none)
 
-    def read(self, state: State, row: FloatArray) -> None:
-        """The states as they are now, (columns,)."""
+    @property
+    def forms(self) -> bool:
+        """Whether it reads signals."""
+        return len(self.joined) > 0
+
+    def read(self, state: State, row: FloatArray, signals: FloatArray | None = None) -> None:
+        """The states as they are now, (columns,), and of the ``signals`` of all connections (m,) those that are asked
+        for, NaN where they are not known."""
         for read in self.reads:
             row[read.columns] = state.cells[read.owner][read.state][read.members]
+        if self.forms:
+            row[self.signals] = np.nan if signals is None else signals[self.joined]
 
     def addresses(self, state: State) -> IntArray:
-        """Where in memory each number lies (columns,), as long as the arrays of a state are the same ones."""
+        """Where in memory each number lies (columns,), as long as the arrays of a state are the same ones; signals lie
+        nowhere."""
         found = np.empty(len(self.names), np.int64)
         for read in self.reads:
             array = state.cells[read.owner][read.state]
             found[read.columns] = array.ctypes.data + array.strides[0] * read.members
         return found
 
-    def now(self, state: State) -> FloatArray:
-        """The same as an array of its own."""
+    def now(self, state: State, signals: FloatArray | None = None) -> FloatArray:
+        """What ``read`` gives as an array of its own."""
         row = np.empty(len(self.names))
-        self.read(state, row)
+        self.read(state, row, signals)
         return row
 
 
@@ -128,8 +147,9 @@ def columns_of(network: Network, keep: Keep = ALL, body: Sensing | None = None) 
             outputs[output.name] = tuple(list(states).index(one) for one in of_output), output.scalar
     shown = (StateOf.of("neuron", one.state, one.indices) for one in network.render.show)
     states.update(dict.fromkeys(singles(shown)))
-    if not keep.neurons and (keep.weights or not len(network.changing)):
-        states.update(dict.fromkeys(singles(network.sent)))
+    if keep.sent and not keep.neurons and (keep.weights or not len(network.changing)):
+        of_connections = keep.weights  # which are as many as weights
+        states.update(dict.fromkeys(singles(one for one in network.sent if of_connections or len(one.neurons))))
     for reference in keep.states:
         states.update(dict.fromkeys(singles(find_states(network, reference, names))))
     return Columns(
@@ -160,7 +180,12 @@ def _probe(network: Network, wanted: list[tuple[str, Each, int]]) -> Probe:
     """A probe of single states: the name, what has it ("neuron", "connection"), and the index of that."""
     places: dict[tuple[Owner, str], tuple[list[int], list[int]]] = {}
     located: dict[tuple[str, Each], Located] = {}
+    signals: dict[int, int] = {}
+    synapses = network.synapses.numbers
     for column, (state, what, index) in enumerate(wanted):
+        if (what, state) == (SYNAPSE.each, SYNAPSE.gives) and synapses[index] >= 0:
+            signals[column] = index
+            continue
         key = state, what
         if key not in located:
             located[key] = network.located(what, partial(_keeps, state))
@@ -177,7 +202,8 @@ def _probe(network: Network, wanted: list[tuple[str, Each, int]]) -> Probe:
     names: list[str] = []
     for state, what, index in wanted:
         names += network.state_names([StateOf.of(what, state, np.array([index], dtype=np.int64))])
-    return Probe(tuple(names), reads)
+    joined, of = (np.array([*some], dtype=np.int64) for some in (signals.values(), signals))
+    return Probe(tuple(names), reads, joined, of)
 
 
 def _keeps(state: str, definition: Definition) -> bool:

@@ -8,57 +8,88 @@ of whose ends is, there is none.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import cached_property
+from typing import NamedTuple
+
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import SYNAPSE, Key, Projection
 from neurovis_spec.language.expressions.evaluate import Given, evaluate_array
 from neurovis_spec.language.expressions.functions import NUMPY, Library
-from neurovis_spec.runtime.stages import Formulas, ends_of, signal_of, taken_by
+from neurovis_spec.runtime.stages import End, Formulas, ends_of, signal_of, taken_by
 from neurovis_spec.runtime.state import State, constants
 
 
 def signals_of(network: Network, state: State, weights: FloatArray, by: Library = NUMPY) -> FloatArray:
     """The signals (m,) of the step before ``state.k``, in which the weights (m,) were these; functions are computed
     ``by`` a library."""
-    sent = np.concatenate((state.activity, state.outlets))
-    with np.errstate(all="ignore"):
-        result: FloatArray = weights * sent[taken_by(network)]
-        for projection in network.projections:
-            if projection.kind == SYNAPSE:
-                result[projection.members] = _formed(network, projection, signal_of(projection), state, weights, by)
-    result[state.conditions.structure.gone] = 0.0
-    return result
+    return Forming(network, by).signals(state, weights)
 
 
 def formed(network: Network, projection: Projection, formulas: Formulas, state: State) -> FloatArray:
     """A formula of the synapses of a projection as it is behind the step before ``state.k``; one number a member."""
+    of = _Synapses.of(network, projection)._replace(formulas=formulas)
     with np.errstate(all="ignore"):
-        return _formed(network, projection, formulas, state, state.weights, NUMPY)
+        return Forming(network).formed(of, state, np.concatenate((state.activity, state.outlets)), state.weights)
 
 
-def _formed(
-    network: Network, projection: Projection, formulas: Formulas, state: State, weights: FloatArray, by: Library
-) -> FloatArray:
-    """The same with these weights (m,)."""
-    use, members, k = projection.use, projection.members, state.k - 1
-    sent = np.concatenate((state.activity, state.outlets))
-    unit, delays = use.definition.per_second, network.connections.delays[members]
-    known: dict[str, Given] = {**constants(network.dt * unit), "k": float(k), "t": k * network.dt * unit}
-    known |= {name: _as_set(network, Key(use.owner, name), values, state) for name, values in use.parameters.items()}
-    known |= state.cells[use.owner]
-    known["weight"] = weights[members]
-    lost = k - delays < state.conditions.structure.lost[members]
-    for name, end in ends_of(network, projection).items():
-        known[name] = sent[end.places]
-        if end.past and delays.any():
-            past = state.history[(k - delays) % len(state.history), end.places]
-            known[name] = np.where(delays > 0, np.where(lost, 0.0, past), sent[end.places])
-    for name, tree in formulas.let:
-        known[name] = evaluate_array(tree, known, by=by)
-    ((_, tree),) = formulas.trees
-    return np.broadcast_to(evaluate_array(tree, known, by=by), members.shape)
+class _Synapses(NamedTuple):
+    """A projection whose members (k,) have a synapse: what is formed of what, and the delays of these."""
+
+    projection: Projection
+    formulas: Formulas
+    ends: Mapping[str, End]
+    delays: IntArray
+
+    @classmethod
+    def of(cls, network: Network, projection: Projection) -> _Synapses:
+        """The signals of a projection."""
+        delays = network.connections.delays[projection.members]
+        return cls(projection, signal_of(projection), ends_of(network, projection), delays)
+
+
+class Forming:
+    """Forms the signals of a network, step by step."""
+
+    def __init__(self, network: Network, by: Library = NUMPY) -> None:
+        self._network, self._by = network, by
+
+    @cached_property
+    def _synapses(self) -> tuple[_Synapses, ...]:
+        network = self._network
+        return tuple(_Synapses.of(network, one) for one in network.projections if one.kind == SYNAPSE)
+
+    def signals(self, state: State, weights: FloatArray) -> FloatArray:
+        """The signals (m,) of the step before ``state.k``, in which the weights (m,) were these."""
+        sent = np.concatenate((state.activity, state.outlets))
+        with np.errstate(all="ignore"):
+            result: FloatArray = weights * sent[taken_by(self._network)]
+            for one in self._synapses:
+                result[one.projection.members] = self.formed(one, state, sent, weights)
+        result[state.conditions.structure.gone] = 0.0
+        return result
+
+    def formed(self, of: _Synapses, state: State, sent: FloatArray, weights: FloatArray) -> FloatArray:
+        """A formula of the synapses of a projection; ``sent`` are the activities and the outlets."""
+        network, use, members, delays = self._network, of.projection.use, of.projection.members, of.delays
+        unit, k = use.definition.per_second, state.k - 1
+        known: dict[str, Given] = {**constants(network.dt * unit), "k": float(k), "t": k * network.dt * unit}
+        known |= {name: _as_set(network, Key(use.owner, name), values, state) for name, values in use.parameters.items()}
+        known |= state.cells[use.owner]
+        known["weight"] = weights[members]
+        lost = k - delays < state.conditions.structure.lost[members]
+        for name, end in of.ends.items():
+            known[name] = sent[end.places]
+            if end.past and delays.any():
+                past = state.history[(k - delays) % len(state.history), end.places]
+                known[name] = np.where(delays > 0, np.where(lost, 0.0, past), sent[end.places])
+        for name, tree in of.formulas.let:
+            known[name] = evaluate_array(tree, known, by=self._by)
+        ((_, tree),) = of.formulas.trees
+        return np.broadcast_to(evaluate_array(tree, known, by=self._by), members.shape)
 
 
 def _as_set(network: Network, key: Key, values: FloatArray, state: State) -> FloatArray:

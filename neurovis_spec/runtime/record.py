@@ -28,6 +28,7 @@ from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.embodied import Embodied
 from neurovis_spec.runtime.errors import RecordingError
+from neurovis_spec.runtime.formed import Forming
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.memory import check_room
 from neurovis_spec.runtime.recording import Recording
@@ -202,11 +203,13 @@ def run_steps(network: Network, state: State, course: Course, rows: RowSink, pro
     backend = ready(network, course.backend)
     reader, stepper = InputReader(network, course.inputs, watch.take_inputs, backend.functions), backend.stepper
     hands = _Hands(course.every, rows, reader, watch)
-    make: _Make = _OneByOne(hands, columns, stepper, body, frozenset(course.inputs or ()))
+    forming = Forming(network, backend.functions) if columns.probe.forms else None
+    make: _Make = _OneByOne(hands, columns, stepper, body, frozenset(course.inputs or ()), forming)
     pace = _Pace(STRETCH, STRETCH)
-    # a runner gives the activities of all neurons and all changing weights, and states only where it is a probing one
+    # a runner gives the activities of all neurons and all changing weights, states only where it is a probing one, and
+    # no signals
     plain = columns.neurons is None and len(columns.weights) == len(network.changing)
-    plain = plain and (not columns.probe.names or isinstance(stepper, Probing))
+    plain = plain and (not columns.probe.names or (isinstance(stepper, Probing) and not columns.probe.forms))
     if (
         isinstance(stepper, Runner)
         and plain
@@ -287,12 +290,15 @@ class _OneByOne:
     body: Embodied | None = None
     #: the inputs that are given, and not sensed
     given: frozenset[str] = frozenset()
+    #: what forms the signals that are recorded, where any are
+    forming: Forming | None = None
 
     def steps(self, state: State, first: int, stop: int) -> bool:
         every, rows, reader, watch = self.hands
         step, check, due, columns = self.stepper.step, watch.check, rows.due, self.columns
         changing, recorded = subscript(columns.weights), columns.neurons
-        probe = columns.probe if columns.probe.names else None
+        probe, forming = columns.probe if columns.probe.names else None, self.forming
+        before = np.zeros(0)
         rows_left = _rows_between(first, stop, every)
         activity, weights, states, sensors, poses = rows.begin(rows_left)
         row, body = 0, self.body
@@ -300,6 +306,8 @@ class _OneByOne:
             keep = k % every == 0
             if keep and changing is not None:
                 weights[row] = state.weights[changing]
+            if keep and forming is not None:
+                before = state.weights.copy()
             if body is not None:
                 vector = body.sense(vector, self.given)
                 watch.take_inputs_at(k, vector, body.inputs)
@@ -310,7 +318,7 @@ class _OneByOne:
             if keep:
                 activity[row] = state.activity if recorded is None else state.activity[recorded]
                 if probe is not None:
-                    probe.read(state, states[row])
+                    probe.read(state, states[row], None if forming is None else forming.signals(state, before))
                 row += 1
             if body is not None:
                 try:

@@ -18,10 +18,12 @@ import numpy as np
 from neurovis_spec.arrays import subscript
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.real_paths import real_path
+from neurovis_spec.runtime.backend import ready
 from neurovis_spec.runtime.columns import Numbers, columns_of, recording_of
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.formats import StreamingFormat, load, take_over_parts
+from neurovis_spec.runtime.formed import Forming
 from neurovis_spec.runtime.parts import files_beside
 from neurovis_spec.runtime.recording import Recording, for_path
 from neurovis_spec.runtime.rows import STRETCH, After, Rows, RowWriter, Steps
@@ -42,6 +44,11 @@ class Recorder:
     ) -> None:
         self._network, self._body, self._path, self._end_values = network, course.body, path, end_values
         self._columns = columns_of(network, course.keep, course.body)
+        #: what forms the signals that are recorded, where any are, and the weights that they are formed of
+        self._forming: Forming | None = None
+        if self._columns.probe.forms:
+            self._forming = Forming(network, ready(network, course.backend, state.backend).functions)
+        self._weights = state.weights
         self._steps = Steps(_ENDLESS, course.every, state.k)
         self._changing = subscript(self._columns.weights)
         #: the state after the last step, and the row that the step going on fills, −1 for none
@@ -81,6 +88,8 @@ class Recorder:
         self._row = self._filled
         if self._changing is not None:
             self._room.weights[self._row] = state.weights[self._changing]
+        if self._forming is not None:
+            self._weights = state.weights.copy()
         if self._body is not None:
             self._body.show(self._room.sensors[self._row], self._room.pose[self._row])
 
@@ -91,7 +100,8 @@ class Recorder:
             recorded = self._columns.neurons
             self._room.activity[self._row] = state.activity if recorded is None else state.activity[recorded]
             if self._columns.probe.names:
-                self._columns.probe.read(state, self._room.states[self._row])
+                signals = None if self._forming is None else self._forming.signals(state, self._weights)
+                self._columns.probe.read(state, self._room.states[self._row], signals)
             self._filled += 1
         if self._writer is not None and monotonic() >= self._due:
             self._hand_on()

@@ -179,7 +179,7 @@ class Recording:
                 if states is None and "->" in name:
                     raise UnknownNameError(
                         f"'{name}' is no neuron, group or output: weight('A -> B') gives the weight of a connection, "
-                        "'(A -> B).x' is the state x of its rule"
+                        "'(A -> B).x' is the state x of its rule or its synapse"
                     )
                 raise UnknownNameError(states or found)
             return self.states, states

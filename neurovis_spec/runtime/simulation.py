@@ -35,6 +35,7 @@ from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.embodied import Embodied, embodied
 from neurovis_spec.runtime.errors import RecordingError, UnknownNameError, unknown
+from neurovis_spec.runtime.formed import Forming
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.record import end_values
@@ -84,6 +85,9 @@ class Simulation:
         self._backend.take(self._begin)
         self._apply(self._begin)
         self._recorder: Recorder | None = None
+        #: what forms the signals of each step, where somebody follows them, and those of the last one
+        self._forming: Forming | None = None
+        self._signals: FloatArray | None = None
         #: what was true after the last step, where events of the step to come have changed something (``ended``)
         self._ended: After | None = None
         self.reset()
@@ -111,7 +115,7 @@ class Simulation:
             raise RecordingError("this simulation is recorded already")
         place = None if path is None else arguments.path("path", path)
         step = arguments.integer("every", every, 1, arguments.MOST_STEPS)
-        course = Course(every=step, keep=keep, body=self._body)
+        course = Course(every=step, backend=self._backend, keep=keep, body=self._body)
         self._recorder = Recorder(self.network, self._state, course, place, lambda: self._ended or self.after())
 
     @property
@@ -275,10 +279,13 @@ class Simulation:
         recorder = self._recorder if self._recorder is not None and self._recorder.going else None
         if recorder is not None:
             recorder.begin(state)
+        before = None if self._forming is None else state.weights.copy()
         odd = self._stepper.advance(state, vector, reader.left_beside(inputs) if inputs else reader.left)
         if (odd or watch.waiting) and not watch.warned:
             watch.take_inputs_at(k, self._stepper.vector, inputs if body is None else body.inputs.union(inputs))
             watch.check(state)
+        if before is not None and self._forming is not None:
+            self._signals = self._forming.signals(state, before)
         due = self._eventful and self._controls.due(state)
         self._ended = self.after() if due else None
         if recorder is not None:
@@ -306,9 +313,20 @@ class Simulation:
         """What connections take of the last step beside activities, as ``Network.outlets`` lays it out; a copy."""
         return self._state.outlets.copy()
 
+    def follow_signals(self) -> None:
+        """Form the signals of each step to come, of what is true behind it and before events of the next one."""
+        self._forming = Forming(self.network, self._backend.functions)
+
+    @property
+    def signals(self) -> FloatArray | None:
+        """What each connection brought at the last step, (m,), a copy; None where nobody follows it, and before the
+        first step (``follow_signals``)."""
+        return None if self._signals is None else self._signals.copy()
+
     def probed(self, probe: Probe) -> FloatArray | None:
-        """The states of models and rules that a probe reads, (columns,); None where it reads none."""
-        return probe.now(self._state) if probe.names else None
+        """The states that a probe reads, (columns,); None where it reads none. Signals are known where they are
+        followed."""
+        return probe.now(self._state, self._signals) if probe.names else None
 
     @property
     def outputs(self) -> Mapping[str, np.float64 | FloatArray]:
@@ -426,8 +444,10 @@ class Simulation:
         """Go on from this state, with its backend unless another is asked for."""
         if state.backend not in ("", self._backend.name):
             self._use_backend(state.backend)
+            if self._forming is not None:
+                self.follow_signals()
         self._backend.take(state)
-        self._state, self._ended = state, None
+        self._state, self._ended, self._signals = state, None, None
         self._reader.use(state)
 
     def state(self) -> State:

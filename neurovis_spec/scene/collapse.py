@@ -26,7 +26,7 @@ from neurovis_spec.compiler.drawing.drawing_settings import (
 from neurovis_spec.compiler.events.changes import Change
 from neurovis_spec.compiler.events.settable import Settable
 from neurovis_spec.compiler.network import Connections, Group, Instance, Network, Neurons
-from neurovis_spec.compiler.program import Projection
+from neurovis_spec.compiler.program import RULE, Projection
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.lesions import lesions_of
 from neurovis_spec.scene.reached import Reached, largest_signals, reached, reached_by
@@ -340,6 +340,8 @@ class _Gatherer:
         count, result = len(self.whole.neurons), []
         targets = self.whole.connections.targets.whole()
         for one in self.whole.projections:
+            if one.kind != RULE:
+                continue
             ends = [targets[one.members], *one.signals.values()]
             drawn = all(
                 (index < count).all() and not any(unit in self.glyphs for unit in self.unit[index].tolist())

@@ -26,8 +26,8 @@ _HEAD, _STROKE, _STROKE_GAP = 9.0, 36.0, 10.0
 class Contents:
     """What a picture holds that needs to be explained."""
 
-    #: what lines send, times their weight, '' without any
-    sends: str
+    #: what is said of signals (``Signals.called``); None without lines
+    signals: str | None
     learns: bool
     #: what the dotted lines are, '' without any
     teaches: str
@@ -45,8 +45,8 @@ def entries(contents: Contents, gains: Gains, theme: Theme, *, brief: bool = Fal
     """The entries that this picture needs; a ``brief`` legend has the first scale of each sort alone."""
     if brief:
         gains = gains.brief
-    result = legend_scales.colour(gains, contents.sends, theme)
-    if contents.sends:
+    result = legend_scales.colour(gains, contents.signals, theme)
+    if contents.signals is not None:
         result += legend_scales.thickness(gains, theme)
     if contents.inhibits and theme.ends == "signs":
         result.append(_ends_in(theme))

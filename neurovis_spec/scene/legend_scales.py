@@ -60,19 +60,20 @@ def stroke(x: float, length: float, colour: str, width: float, y: float = SAMPLE
     return Spline(((x, y), (x + length / 3, y), (x + length * 2 / 3, y), (x + length, y)), colour, width)
 
 
-def colour(gains: Gains, sent: str, theme: Theme) -> list[LegendEntry]:
-    """The scales of activities and, if there are lines, of signals, w times what is ``sent``: in one entry, or two
-    where one has several."""
+def colour(gains: Gains, signals: str | None, theme: Theme) -> list[LegendEntry]:
+    """The scales of activities and of signals, with what is said of these beside (None: there are no lines): in one
+    entry, or two where one has several."""
     states = {scale.state for scale in gains.activity_scales}
     word = "activity" if states <= {""} else "" if "" in states or len(states) > 1 else next(iter(states))
     neurons = _rows(f"neuron: {word or 'activity'}", gains.activity_scales)
-    signals = _rows(f"line: signal w·{sent}", gains.signal_scales) if sent else []
-    if len(neurons) <= 1 and len(signals) <= 1:
-        return [_ramp("Colour", [*neurons, *signals], theme)]
+    said = f"signal {signals or ''}".rstrip()
+    lines = _rows(f"line: {said}", gains.signal_scales) if signals is not None else []
+    if len(neurons) <= 1 and len(lines) <= 1:
+        return [_ramp("Colour", [*neurons, *lines], theme)]
     told = gains.activity_scales if word else [_with_state(scale) for scale in gains.activity_scales]
     result = [_ramp(f"Neurons: {word}" if word else "Neurons", _rows("", told), theme)]
-    if signals:
-        result.append(_ramp(f"Lines: signal w·{sent}", _rows("", gains.signal_scales), theme))
+    if lines:
+        result.append(_ramp(f"Lines: {said}", _rows("", gains.signal_scales), theme))
     return result
 
 

@@ -173,8 +173,8 @@ class _Content:
     #: who has a dotted line to whom
     teachers: Sequence[Teacher]
     lesions: Lesions
-    #: what connections send, times their weight
-    sends: str
+    #: what the legend says of signals
+    signals: str
     notes: tuple[str, ...]
     extent: Rect
 
@@ -191,9 +191,9 @@ def _content(drawn: Gathered, layout: Layout, settings: RenderSettings, weights:
     beside = room_beside(network, RADIUS * UNIT) if settings.labels else []
     beside = [(index, reach) for index, reach in beside if index not in rooms]
     extent = _extent(positions, radii, routes, boxes, beside, rooms.values())
-    lesions, sends = lesions_of(network), Signals(drawn.whole).called
+    lesions, signals = lesions_of(network), Signals(drawn.whole).called
     return _Content(
-        network, positions, routes, seen, radii, rooms, sides, boxes, teachers, lesions, sends, notes, extent
+        network, positions, routes, seen, radii, rooms, sides, boxes, teachers, lesions, signals, notes, extent
     )
 
 
@@ -454,7 +454,7 @@ def _frame(wanted: _Wanted, gains: Gains, delayed: str, margin: float) -> tuple[
     items: list[LegendEntry] = []
     if settings.legend:
         contents = legend.Contents(
-            sends=content.sends if len(network.connections) else "",
+            signals=content.signals if len(network.connections) else None,
             learns=len(network.changing) > 0,
             teaches=label_of(content.teachers) if content.teachers else "",
             delays=delayed,

@@ -97,6 +97,7 @@ def snapshots_of_run(run: Simulation, look: Look) -> Iterator[Snapshot]:
     """Those of the frames of a film, of a run that is made while they are asked for."""
     network, start = run.network, look.first or 0
     fading, states, signals, seen = Fading(network), ShownStates(network), Signals(network), None
+    signals.follow(run)
     before, weights = None, run.connection_weights
     for step in range(start + look.count):
         pose = run.pose

@@ -1,8 +1,8 @@
 """Signals: what each connection sends, which colours its line (Eq. 3).
 
 In: a network; a step of a run, or rows of a recording. Out: what is sent along each connection. Connections that take
-a state or an output of their source (``send``) need more than activities and weights tell: a Snapshot has it as
-``sent``, a recording among its states.
+a state or an output of their source (``send``), and those whose signal is formed at a synapse, need more than
+activities and weights tell: a Snapshot has it as ``sent``, a recording among its states.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ _CHUNK = 64
 
 
 class Signal(NamedTuple):
-    """What leaves the source of each connection, (…, m): ``weight`` times what it takes there, ``sent``."""
+    """What each connection brings, (…, m): ``weight`` times what it takes of its source, ``sent``; of a synapse the
+    signal that it forms, with a weight of 1."""
 
     sent: FloatArray
     weight: FloatArray
@@ -54,8 +55,8 @@ class Lesion(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RecordedSent:
-    """What is sent beside activities by the rows of a recording: states (k,) in these columns, but 0 by neurons that
-    are lesioned, whose states go on; those that were lesioned by hand from a row on (k,)."""
+    """What is sent beside activities by the rows of a recording: states and signals (k,) in these columns, but 0 by
+    neurons that are lesioned, whose states go on; those that were lesioned by hand from a row on (k,)."""
 
     recording: Recording
     columns: IntArray
@@ -75,22 +76,27 @@ class RecordedSent:
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """The signals of a network of n neurons and m connections, which take k numbers beside activities."""
+    """The signals of a network of n neurons and m connections, which are known by k numbers beside activities."""
 
     network: Network
 
     def __bool__(self) -> bool:
-        """Whether a connection takes anything beside activities."""
-        return len(self.network.taken) > 0
+        """Whether a connection takes anything beside activities, or has a synapse."""
+        return len(self.network.sent) > 0
 
     @property
     def called(self) -> str:
-        """What connections take, for a legend: ``a``, the activity, or the one state or output that all take."""
-        names = {one.state for one in self.network.sent}
-        if not names:
-            return "a"
+        """What a legend calls signals: ``w·a`` where connections take the activity, ``w·v`` where all take the one
+        state or output v; of synapses it says nothing more."""
+        names = {one.state for one in self.network.sent if len(one.neurons)}
+        synapses = len(self.network.joined)
+        if not synapses and not names:
+            return "w·a"
+        if synapses == len(self.network.connections):
+            return ""
         alone = len(names) == 1 and bool((self._sources >= len(self.network.neurons)).all())
-        return names.pop() if alone else "what is sent"
+        plain = f"w·{names.pop() if alone else 'what is sent' if names else 'a'}"
+        return f"{plain}, or of a synapse" if synapses else plain
 
     @cached_property
     def _probe(self) -> Probe:
@@ -99,23 +105,35 @@ class Signals:
 
     @cached_property
     def _neurons(self) -> IntArray:
-        """The neurons (k,) whose states these are."""
-        return np.concatenate([np.zeros(0, np.int64), *(one.neurons for one in self.network.sent)])
+        """The neurons (k,) whose states these are, −1 for the signals of synapses, which are 0 where an end is
+        lesioned."""
+        of_synapses = np.full(len(self.network.joined), -1, np.int64)
+        return np.concatenate([np.zeros(0, np.int64), *(one.neurons for one in self.network.sent), of_synapses])
 
     @cached_property
     def _sources(self) -> IntArray:
-        """Where what each connection takes (m,) stands among n activities and k further numbers."""
-        sending, n = self.network.sending, len(self.network.neurons)
-        if sending is None:
-            return self.network.connections.sources.whole()
-        return np.where(sending < n, sending, n + np.searchsorted(self.network.taken, sending - n))
+        """Where what each connection takes, or its synapse forms (m,), stands among n activities and k further
+        numbers."""
+        sending, n, taken = self.network.sending, len(self.network.neurons), self.network.taken
+        result = self.network.connections.sources.whole()
+        if sending is not None:
+            result = np.where(sending < n, sending, n + np.searchsorted(taken, sending - n))
+        joined = self.network.joined
+        if len(joined):
+            result = result.copy()
+            result[joined] = n + len(taken) + np.arange(len(joined))
+        return result
 
     def _of(self, activity: FloatArray, sent: FloatArray | None, weights: FloatArray) -> Signal:
         """Signals by activities (…, n), what is sent beside them (…, k), and weights (…, m)."""
         if self:
+            joined = self.network.joined
             if sent is None:
-                sent = np.full((*activity.shape[:-1], len(self.network.taken)), np.nan)
+                sent = np.full((*activity.shape[:-1], len(self._neurons)), np.nan)
             activity = np.concatenate([activity, sent], axis=-1)
+            if len(joined):
+                weights = weights.copy()
+                weights[..., joined] = 1.0
         return Signal(activity[..., self._sources], weights)
 
     def at(self, snapshot: Snapshot) -> Signal:
@@ -123,9 +141,17 @@ class Signals:
         seen = snapshot.activity if snapshot.seen is None else snapshot.seen
         return self._of(seen, snapshot.sent, snapshot.weights)
 
+    def follow(self, run: Simulation) -> None:
+        """Have a run form what a picture of its steps needs (``of_run``)."""
+        if len(self.network.joined):
+            run.follow_signals()
+
     def of_run(self, run: Simulation) -> FloatArray | None:
-        """``Snapshot.sent`` of the last step of a run."""
-        return run.outlets[self.network.taken] if self else None
+        """``Snapshot.sent`` of the last step of a run that is followed."""
+        if not self:
+            return None
+        taken, formed, joined = run.outlets[self.network.taken], run.signals, self.network.joined
+        return np.concatenate([taken, np.full(len(joined), np.nan) if formed is None else formed[joined]])
 
     def recorded(self, recording: Recording) -> RecordedSent | None:
         """What a recording holds of what is sent beside activities. None where that is nothing, and where it lacks some

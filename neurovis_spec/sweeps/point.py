@@ -114,7 +114,8 @@ def failed(job: Job, code: str, message: str) -> Result:
 def _measured(job: Job, network: Network) -> tuple[float, ...]:
     meters = tuple(Meter(measure) for measure in measures(job, network))
     state = initial_state(network)
-    keep = Keep(states=tuple(dict.fromkeys(name for meter in meters for name in meter.measure.probe.names)))
+    states = tuple(dict.fromkeys(name for meter in meters for name in meter.measure.probe.names))
+    keep = Keep(states=states, sent=False)
     course = replace(job.course, keep=keep).embodied(network)
     rows = _Metered(network, state, meters, columns_of(network, keep, course.body))
     run_steps(network, state, course, rows)

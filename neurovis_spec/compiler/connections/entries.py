@@ -615,6 +615,9 @@ class EntryBuilder:
                 message = f"the synapse and the rule '{taken[state]}' both have a state '{state}'"
                 hint = "states of a connection have different names: rename it in one of them"
                 findings.error("duplicate-name", span, message, hint)
+            if SYNAPSE.gives in taken:
+                message = f"the rule '{taken[SYNAPSE.gives]}' has a state '{SYNAPSE.gives}', which the synapse gives"
+                findings.error("duplicate-name", span, message, "rename it in the rule")
         known = tuple(one for one in found if one is not UNKNOWN)
         return known if len(known) == len(found) else UNKNOWN
 

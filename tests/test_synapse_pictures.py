@@ -1,0 +1,196 @@
+"""Pictures and recordings of synapses: lines have the colour of what a synapse forms, at the end of the step."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenes import scene_of
+from small_specs import compiled
+
+import neurovis_spec as nv
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.live.recorded import RecordedSource
+from neurovis_spec.live.simulated import SimulatedSource
+from neurovis_spec.live.view import LEVELS, view_of
+from neurovis_spec.runtime.columns import Keep, columns_of
+from neurovis_spec.runtime.formats import load
+from neurovis_spec.runtime.formed import signals_of
+from neurovis_spec.runtime.recording import Recording, Snapshot
+from neurovis_spec.runtime.simulation import Simulation
+from neurovis_spec.scene.encode import looks
+from neurovis_spec.scene.fading import snapshots_of
+from neurovis_spec.scene.look import Look
+from neurovis_spec.scene.model import Text
+from neurovis_spec.scene.reached import largest_signals
+from neurovis_spec.scene.shots import snapshots_of_run
+from neurovis_spec.scene.signals import Signals
+
+#: gap junctions, a synapse with a state, a delay and a parameter that is set, one that learns, a plain connection
+TEXT = """time: {dt: 0.01, steps: 60}
+parameters: {E: 2}
+models:
+  cell: {state: {v: {initial: 1, derivative: drive - v}}, activity: v}
+synapses:
+  gap: {signal: weight*(pre.v - post.v)}
+  slow: {parameters: {E: 1}, state: {g: {derivative: pre.v - g}}, signal: weight*g*(E - post.v)}
+neurons: {A: {count: 2, model: cell, initial: {v: i + 2}}, B: {count: 2, model: cell}}
+connections:
+  - A -> B: {pattern: one_to_one, weight: 0.5, synapse: gap}
+  - A1 -> B2: {weight: -1, synapse: {slow: {E: E}}, delay: 3}
+  - B1 -> A2: {synapse: gap, plasticity: {hebbian: {rate: 0.1}}, delay: 1}
+  - B1 -> B2: 3
+"""
+EVENTS = "events: [{at: 10, set: {E: 5}}, {at: 20, lesion: A1}, {at: 30, mend: A1}]\n"
+
+
+def at(network: CompiledNetwork, made: Recording, step: int) -> Snapshot:
+    """A step of a recording."""
+    (snapshot,) = snapshots_of(network.network, made, [step])
+    return snapshot
+
+
+def formed(network: CompiledNetwork, steps: int, backend: str = "numpy", turned: bool = False) -> list[FloatArray]:
+    """What each connection brings, step by step; ``turned`` by hand as EVENTS do it."""
+    simulation, found = Simulation(network.network, backend), []
+    for step in range(steps):
+        if turned and step == 10:
+            simulation.set(E=5)
+        if turned and step in (20, 30):
+            (simulation.lesion if step == 20 else simulation.mend)("A1")
+        weights = simulation.connection_weights
+        simulation.step()
+        found.append(signals_of(network.network, simulation.state(), weights))
+    return found
+
+
+def test_lines_have_the_colour_of_what_a_synapse_forms() -> None:
+    network = compiled(TEXT)
+    made = network.run(states=["A.v", "B.v", "(A1 -> B2).g"])
+    names = [f"({name}).signal" for name in ("A1 -> B1", "A2 -> B2", "A1 -> B2", "B1 -> A2")]
+    assert set(made.state_names) == {*names, "A1.v", "A2.v", "B1.v", "B2.v", "(A1 -> B2).g"}
+    for row in (0, 20, 59):
+        v = {name: made[f"{name}.v"][row] for name in ("A1", "A2", "B1", "B2")}
+        before = made["B1.v"][row - 1] if row else 0.0
+        wanted = [
+            0.5 * (v["A1"] - v["B1"]),
+            0.5 * (v["A2"] - v["B2"]),
+            -made["(A1 -> B2).g"][row] * (2 - v["B2"]),
+            made.weight("B1 -> A2")[row] * (before - v["A2"]),
+            3 * made["B1"][row],
+        ]
+        snapshot = at(network, made, row)
+        assert Signals(network.network).at(snapshot).value == pytest.approx(wanted, rel=1e-12)
+        seen = looks(network.network, snapshot, replace(network.gains, signal=np.full(5, 0.3)), 10.0)
+        assert seen.lines == pytest.approx(np.clip(0.3 * np.array(wanted), -1, 1))
+    assert abs(made[names[2]][40]) > 0.1
+
+
+@pytest.mark.parametrize("backend", ["reference", "numpy"])
+def test_a_run_a_recording_a_simulator_and_the_live_page_agree(backend: str, tmp_path: Path) -> None:
+    wanted = formed(compiled(TEXT), 40, backend, turned=True)
+    network = compiled(TEXT + EVENTS)
+    made = network.run(40, backend=backend)
+    signals, steps = Signals(network.network), range(40)
+    simulation = Simulation(network.network, backend=backend)
+    in_run = list(snapshots_of_run(simulation, Look(network.network.render, first=0, count=40)))
+    recorded = list(snapshots_of(network.network, made, steps))
+    assert [signals.at(one).value.tolist() for one in in_run] == [one.tolist() for one in wanted]
+    assert [signals.at(one).value.tolist() for one in recorded] == [one.tolist() for one in wanted]
+    simulator = network.simulator(backend)
+    simulator.record(tmp_path / "a.npz")
+    with simulator:
+        for _ in steps:
+            simulator.step()
+    assert load(tmp_path / "a.npz").states.tolist() == made.states.tolist()
+    view = view_of(network, network.gains)
+    source, replayed = SimulatedSource(network.simulator(backend)), RecordedSource(network.network, made)
+    for step in (0, 9, 10, 19, 20, 39, 12):
+        for one in (source, replayed):
+            while one.step < step:
+                one.advance()
+            one.go(step)
+            levels = view.glance(one.seen()).lines
+            colours = np.clip(view.gains.signal * wanted[step], -1, 1)
+            assert np.abs(levels / LEVELS - colours).max() < 1 / LEVELS
+            states = one.seen().states
+            assert states is not None
+            assert states.tolist() == made.states[step].tolist()
+    assert wanted[25][0] == wanted[25][2] == 0 != wanted[35][0]
+
+
+def test_gains_are_those_of_what_is_formed() -> None:
+    network = compiled(TEXT)
+    made = network.run()
+    wanted = np.abs(formed(network, 60)).max(axis=0)
+    assert largest_signals(network.network, made) == pytest.approx(wanted)
+    assert network.gains.signal.tolist() == network.gains_for(made).signal.tolist()
+
+
+def test_glyphs_add_up_what_is_formed() -> None:
+    network = compiled(TEXT + "render: {collapse: [A, B]}\n")
+    made = network.run()
+    view = view_of(network, network.gains_for(made))
+    signals = view.drawn.signals(at(network, made, 20)).value
+    formed_then = formed(network, 21)[20]
+    assert signals == pytest.approx([formed_then[:3].sum(), formed_then[3]])
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".csv", ".mcap"])
+def test_files_keep_it(tmp_path: Path, suffix: str) -> None:
+    network = compiled(TEXT)
+    made = network.run(30)
+    path = tmp_path / f"a{suffix}"
+    made.save(path)
+    network.render(tmp_path / "one.svg", recording=made, step=20)
+    network.render(tmp_path / "other.svg", recording=load(path), step=20)
+    assert (tmp_path / "one.svg").read_text() == (tmp_path / "other.svg").read_text()
+
+
+def test_a_recording_that_lacks_it_says_so_and_has_no_colours() -> None:
+    network = compiled(TEXT)
+    made = network.run(30)
+    lacking = replace(made, states=made.states[:, :3], state_names=made.state_names[:3])
+    with pytest.warns(RuntimeWarning, match=r"does not hold \(B1 -> A2\)\.signal, which connections send"):
+        snapshot = at(network, lacking, 20)
+    lines = looks(network.network, snapshot, network.gains, 10.0).lines
+    assert lines[:4].tolist() == [0, 0, 0, 0]
+    assert lines[4]
+
+
+def test_a_partial_recording_a_sweep_and_plain_networks_hold_none() -> None:
+    network = compiled(TEXT)
+    assert network.run(3, neurons=["A"]).state_names == network.run(3, weights="none").state_names == ()
+    assert columns_of(network.network, Keep(sent=False)).probe.names == ()
+    fixed = compiled(TEXT.replace(", plasticity: {hebbian: {rate: 0.1}}", ""))
+    assert fixed.run(3, weights="none").state_names == ()
+    plain = compiled("neurons: {A: {}, B: {}}\nconnections: {A -> B: 2}\n")
+    assert plain.run(3).state_names == ()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert Signals(plain.network).at(at(plain, plain.run(3), 2)).value.tolist() == [2 * plain.run(3)["A"][2]]
+
+
+def test_the_legend_says_of_what_signals_are() -> None:
+    def words(connections: str) -> str:
+        network = compiled(TEXT.partition("connections:")[0] + f"connections: {connections}\n")
+        shapes = scene_of(network, at(network, network.run(3), 2)).shapes()
+        (found,) = [shape.text for shape in shapes if isinstance(shape, Text) and "signal" in shape.text]
+        return found.partition(" (up to")[0].partition(": ")[2]
+
+    gap = "A -> B: {pattern: one_to_one, synapse: gap}"
+    assert words(f"[{gap}]") == "signal"
+    assert words(f"[{gap}, B1 -> A1: 1]") == "signal w·a, or of a synapse"
+    assert words(f"[{gap}, B1 -> A1: {{send: v}}]") == "signal w·v, or of a synapse"
+    assert words("[B1 -> A1: 1]") == "signal w·a"
+
+
+def test_a_state_of_a_rule_is_not_called_signal_where_a_synapse_gives_one() -> None:
+    rule = "rules: {odd: {state: {signal: {each_step: pre}}, weight: {each_step: weight + signal}}}\n"
+    with pytest.raises(nv.SpecError, match="the rule 'odd' has a state 'signal', which the synapse gives"):
+        compiled(TEXT.replace("{hebbian: {rate: 0.1}}", "odd") + rule)
+    assert compiled(TEXT.replace("synapse: gap, plasticity: {hebbian: {rate: 0.1}}", "plasticity: odd") + rule)
