@@ -53,7 +53,7 @@ def activation_table(_: str) -> str:
 
 
 def definitions(kind: str) -> str:
-    """The built-in models or rules: a line each, then all of them as they ship."""
+    """The built-in models, rules or synapses: a line each, then all of them as they ship."""
     chosen = ours(kind)
     settings = [", ".join(filter(None, (_settings(one), *one.signals))) for one in chosen]
     head = (kind, "parameters, signals" if kind == "rule" else "parameters", "meaning")

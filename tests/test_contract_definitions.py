@@ -10,10 +10,11 @@ from click.testing import CliRunner
 from small_specs import codes, compiled
 
 from neurovis_spec.cli.commands import neurovis
-from neurovis_spec.compiler.program import ACTIVATION, MODEL, RULE
-from neurovis_spec.compiler.values.builtin import builtin_definitions, libraries
+from neurovis_spec.compiler.program import ACTIVATION, MODEL, RULE, SYNAPSE
+from neurovis_spec.compiler.values.builtin import builtin_definitions
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.unknown import UNKNOWN
+from neurovis_spec.manual.builtins import Builtin, builtins
 
 PRINTED = """\
 activations:
@@ -93,11 +94,26 @@ DEFAULTS = {
     "jansen_rit": {"A": 3.25, "B": 22, "a": 100, "b": 50, "C": 135, "e0": 2.5, "v0": 6, "r": 0.56},
     "phase_oscillator": {"nu": 1}, "amplitude_oscillator": {"nu": 1, "R": 1, "a": 20},
     "ornstein_uhlenbeck": {"tau": 0.05, "mean": 0, "sigma": 1}, "cfc": {"ts": 1},
+    "hodgkin_huxley": {"C": 1, "gNa": 120, "gK": 36, "gL": 0.3, "ENa": 50, "EK": -77, "EL": -54.387},
+    "morris_lecar": {
+        "C": 20, "gCa": 4.4, "gK": 8, "gL": 2, "ECa": 120, "EK": -84, "EL": -60,
+        "V1": -1.2, "V2": 18, "V3": 2, "V4": 30, "phi": 0.04,
+    },
+    "graded": {"C": 1, "g": 10, "E": -35, "threshold": -35, "beta": 0.125, "up": 1, "down": 5},
+    "danner": {
+        "C": 10, "gNaP": 4.5, "gL": 4.5, "gE": 10, "gI": 10, "ENa": 50, "EL": -62.5, "EE": -10, "EI": -75,
+        "threshold": -50, "top": 0,
+    },
+    "ltc": {"C": 1, "g": 1, "E": 0},
     "delta": {"rate": 0.01}, "hebbian": {"rate": 0.01}, "anti_hebbian": {"rate": 0.01}, "oja": {"rate": 0.01},
     "bcm": {"rate": 0.01, "threshold_rate": 0.01}, "covariance": {"rate": 0.01, "average_rate": 0.01},
     "input_correlation": {"rate": 0.01}, "differential_hebbian": {"rate": 0.01},
     "reward_modulated": {"rate": 0.01, "smoothing": 0.9}, "policy_gradient": {"rate": 0.01, "smoothing": 0.9},
     "decay": {"rate": 0.01},
+}  # fmt: skip
+SYNAPSES = {
+    "gap_junction": {}, "diffusive": {}, "graded": {"E": 0, "rest": -40}, "phase": {"lag": 0}, "amplitude_phase": {"lag": 0},
+    "sigmoidal_conductance": {"E": 0, "threshold": -44, "slope": 2, "rest": -40},
 }  # fmt: skip
 SIGNALS = {
     "delta": ("target",), "input_correlation": ("reflex",),
@@ -108,35 +124,24 @@ SIGNALS = {
 def test_the_built_in_ones_are_those_of_the_tables_with_their_parameters_and_signals() -> None:
     """No more and no fewer, with these defaults."""
     known = builtin_definitions()
-    found: dict[str, dict[str, float]] = {}
-    for kind in (ACTIVATION, MODEL, RULE):
-        for name, (_, defaults) in known.of(kind).known().items():
-            found[name] = {
-                default.name: evaluate(default.value, {}) for default in defaults if default.value is not UNKNOWN
-            }
-    assert found == DEFAULTS
+    found: dict[str, dict[str, dict[str, float]]] = {}
+    for kind in (ACTIVATION, MODEL, RULE, SYNAPSE):
+        found[kind.name] = {
+            name: {default.name: evaluate(default.value, {}) for default in defaults if default.value is not UNKNOWN}
+            for name, (_, defaults) in known.of(kind).known().items()
+        }
+    assert {**found["activation"], **found["model"], **found["rule"]} == DEFAULTS
+    assert found["synapse"] == SYNAPSES
     assert {name: rule.signals for name, (rule, _) in known.of(RULE).known().items() if rule.signals} == SIGNALS
 
 
-def described() -> dict[str, str]:
-    """What each built-in definition says of itself."""
-    result = {}
-    for library in libraries():
-        for section in (library.activations, library.models, library.rules):
-            for name, definition in section.items():
-                assert definition.description is not None
-                result[name] = definition.description.value
-    return result
-
-
-@pytest.mark.parametrize("name", DEFAULTS)
-def test_a_description_holds_the_equation_and_the_source_and_docs_shows_it(name: str) -> None:
+@pytest.mark.parametrize("one", builtins(), ids=lambda one: f"{one.kind} {one.name}")
+def test_a_description_holds_the_equation_and_the_source_and_docs_shows_it(one: Builtin) -> None:
     """An equation has an ``=``; a source a year, or the number of one of the paper's equations."""
-    text = described()[name]
-    assert re.search(r"[\w\])] = ", text), text
-    assert re.search(r"\b(1[89]|20)\d\d\b|\bEqs?\. \d", text), text
-    shown = CliRunner().invoke(neurovis, ["docs", name]).stdout
-    assert " ".join(text.split()) in " ".join(shown.split())
+    assert re.search(r"[\w\])] = ", one.about), one.about
+    assert re.search(r"\b(1[89]|20)\d\d\b|\bEqs?\. \d", one.about), one.about
+    shown = CliRunner().invoke(neurovis, ["docs", one.name]).stdout
+    assert one.about in " ".join(shown.split())
 
 
 @pytest.mark.parametrize(

@@ -214,7 +214,7 @@ def test_cfc_is_the_closed_form_of_its_paper() -> None:
 
 def test_each_names_its_source_and_what_its_parameters_are() -> None:
     models = [one for one in builtins() if one.kind == "model" and (one.time or one.name == "cfc")]
-    assert len(models) == 11
+    assert len(models) == 16
     for one in models:
         assert any(
             f" {year} " in one.about or f"{year})" in one.about or f" {year}," in one.about

@@ -12,8 +12,8 @@ from importlib.resources import files
 from typing import Literal, TypeAlias, get_args
 
 from neurovis_spec import plugins
-from neurovis_spec.compiler.program import DRIVE
-from neurovis_spec.compiler.values.builtin import libraries
+from neurovis_spec.compiler.program import DRIVE, MODEL, SYNAPSE
+from neurovis_spec.compiler.values.builtin import builtin_definitions, libraries
 from neurovis_spec.language.library import ActivationModel, Library, ModelModel, RuleModel, SynapseModel, TimedModel
 from neurovis_spec.language.values import ParameterModel
 from neurovis_spec.language.yaml.source import Entry, Mapping
@@ -47,9 +47,21 @@ class Builtin:
         choice = f"{{{self.name}: {{{', '.join(settings)}}}}}" if settings else self.name
         time = f"time: {{{self.time}}}\n" if self.time else ""
         if self.kind in ("rule", "synapse"):
-            key = "plasticity" if self.kind == "rule" else "synapse"
-            return f"{time}connections: {{K -> O: {{weight: 0.1, {key}: {choice}}}}}"
+            key, neurons = ("plasticity", "") if self.kind == "rule" else ("synapse", _joined(self.name))
+            return f"{time}{neurons}connections: {{K -> O: {{weight: 0.1, {key}: {choice}}}}}"
         return f"{time}neurons: {{K: {{{self.kind}: {choice}}}}}"
+
+
+def _joined(synapse: str) -> str:
+    """The neurons that a synapse joins where it is shown in use, if it reads more of them than what they send: of the
+    first model that flows and has all of that."""
+    known = builtin_definitions()
+    needed = {end.name for end in known.of(SYNAPSE).known()[synapse].definition.end_names}
+    for name, (model, _) in known.of(MODEL).known().items() if needed else ():
+        there = {MODEL.gives, *model.parameters, *(one.name for one in model.kept)}
+        if model.flows and needed <= there:
+            return f"time: {{dt: 0.001}}\nneurons: {{K: {{model: {name}}}, O: {{model: {name}}}}}\n"
+    return ""
 
 
 @cache
@@ -97,7 +109,7 @@ def _builtin(
 def _time(model: _Definition) -> str:
     """What it needs that ``time`` says."""
     if isinstance(model, TimedModel) and _flows(model):
-        return "dt: 0.001"
+        return "dt: 0.001" if model.unit_of_time == "s" else "dt: 0.01 ms"
     parts = model.parts()
     return "episode: 100" if parts.each_step is None and parts.each_episode is not None else ""
 
