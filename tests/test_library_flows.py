@@ -212,6 +212,83 @@ def test_cfc_is_the_closed_form_of_its_paper() -> None:
         assert np.abs(now - x).max() < 1e-14
 
 
+def test_cfc_with_a_weight_by_formula_to_the_last_bit() -> None:
+    """Four neurons and 64 connections. What each begins with is its activity, which is what the first step sends: a
+    state that begins with it is made anew at step 0, of nothing, and so is 0."""
+    weights = {"g": "sin(1 + i + 3*j)", "h": "cos(2*i + j)", "time_a": "sin(i*j)", "time_b": "cos(i - j)"}
+    spec = "neurons: {N: {count: 4, model: cfc, initial: 0.1*i - 0.2}}\nconnections:" + "".join(
+        f"\n  - N -> N: {{weight: {weight}, pattern: all_to_all, self: true, port: {port}}}"
+        for port, weight in weights.items()
+    )
+    activity, _ = run(spec, 0.1, 100)
+    i, j = np.arange(4.0)[:, None], np.arange(4.0)[None, :]
+    g, h, a, b = np.sin(1 + i + 3 * j), np.cos(2 * i + j), np.sin(i * j), np.cos(i - j)
+    x = 0.1 * np.arange(4) - 0.2
+    for now in activity[1:]:
+        to_g, to_h, to_a, to_b = (sum(x[k] * weight[k] for k in range(4)) for weight in (g, h, a, b))
+        gate = sigmoid(to_b - to_a)
+        x = np.tanh(to_g) * (1 - gate) + gate * np.tanh(to_h)
+        assert np.abs(now - x).max() <= 4e-17
+    assert (run(spec.replace("0.1*i - 0.2", "{x: 0.1*i - 0.2}"), 0.1, 10)[0] == 0).all()
+
+
+def test_the_squid_fires_where_it_is_driven() -> None:
+    activity, _ = run("neurons: {N: {model: hodgkin_huxley, bias: 10}, R: {model: hodgkin_huxley}}", 1e-5, 2000)
+
+    def exprel(x: float) -> float:
+        return float(np.expm1(x)) / x if x else 1.0
+
+    def flow(t: float, x: FloatArray) -> list[float]:
+        v, m, h, n = x
+        current = 10 - 120 * m**3 * h * (v - 50) - 36 * n**4 * (v + 77) - 0.3 * (v + 54.387)
+        return [
+            1e3 * current,
+            1e3 * ((1 - m) / exprel(-(v + 40) / 10) - m * 4 * np.exp(-(v + 65) / 18)),
+            1e3 * (0.07 * (1 - h) * np.exp(-(v + 65) / 20) - h / (1 + np.exp(-(v + 35) / 10))),
+            1e3 * (0.1 * (1 - n) / exprel(-(v + 55) / 10) - n * 0.125 * np.exp(-(v + 65) / 80)),
+        ]
+
+    expected = solved(flow, [-65, 0.0529, 0.5961, 0.3177], 0.02, 2001)[:, 0]
+    assert np.abs(activity[:, 0] - expected).max() < 2e-4
+    assert expected.max() > 30
+    assert np.abs(activity[:, 1] + 65).max() < 0.01  # at rest
+
+
+def test_the_barnacles_fibre_oscillates_where_it_is_driven() -> None:
+    activity, _ = run("neurons: {N: {model: morris_lecar, bias: 100}, R: {model: morris_lecar}}", 1e-4, 3000)
+
+    def flow(t: float, x: FloatArray) -> list[float]:
+        v, w = x
+        opened, limit = ((1 + np.tanh((v - at) / wide)) / 2 for at, wide in ((-1.2, 18), (2, 30)))
+        current = 100 - 4.4 * opened * (v - 120) - 8 * w * (v + 84) - 2 * (v + 60)
+        return [1e3 * current / 20, 1e3 * 0.04 * np.cosh((v - 2) / 60) * (limit - w)]
+
+    expected = solved(flow, [-60.855, 0.0149], 0.3, 3001)[:, 0]
+    assert np.abs(activity[:, 0] - expected).max() < 1e-4
+    assert np.ptp(expected[2000:]) > 60
+    assert np.abs(activity[:, 1] + 60.855).max() < 0.01  # at rest
+
+
+def test_two_of_danners_that_inhibit_each_other_take_turns() -> None:
+    """With persistent sodium, and the drive of the brain stem as excitation."""
+    spec = """neurons: {N: {count: 2, model: danner, bias: {excitatory: 0.04}, initial: {v: [-60, -50]}}}
+connections: {N -> N: {weight: 0.3, pattern: all_to_all, port: inhibitory}}"""
+    activity, (v,) = run(spec, 2e-4, 3000, "N.v")
+
+    def flow(t: float, x: FloatArray) -> FloatArray:
+        v, h = x[:2], x[2:]
+        f = np.clip((v + 50) / 50, 0, 1)
+        opened, limit = 1 / (1 + np.exp(-(v + 40) / 6)), 1 / (1 + np.exp((v + 45) / 4))
+        inward = 4.5 * opened * h * (50 - v) + 4.5 * (-62.5 - v) + 10 * 0.04 * (-10 - v) + 10 * 0.3 * f[::-1] * (-75 - v)
+        return 1e3 * np.concatenate((inward / 10, (limit - h) / (80 + 80 / np.cosh((v + 35) / 15))))
+
+    expected = solved(flow, [-60.0, -50.0, 0.5, 0.5], 0.6, 3001)[:, :2]
+    assert np.abs(v - expected).max() < 0.01  # of second order where one begins to be active, or is so most
+    leads = activity[:, 0] > activity[:, 1]
+    assert np.count_nonzero(leads[1:] != leads[:-1]) >= 2
+    assert ((activity > 0.2).any(axis=0) & (activity == 0).any(axis=0)).all()
+
+
 def test_each_names_its_source_and_what_its_parameters_are() -> None:
     models = [one for one in builtins() if one.kind == "model" and (one.time or one.name == "cfc")]
     assert len(models) == 16
