@@ -268,6 +268,33 @@ def test_the_states_of_what_is_lesioned_stay_and_it_brings_nothing(backend: str,
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("flows", [True, False])
+def test_what_a_lesion_has_lost_never_arrives(backend: str, flows: bool) -> None:
+    """At stages as before an update: ``pre`` and ``pre.x`` are 0 until something arrives that was sent since."""
+    target = "{state: {v: {derivative: 10*drive}}, activity: v}" if flows else "{activity: drive}"
+    network = network_of(f"""
+time: {{dt: 0.1, integrate: euler}}
+models:
+  source: {{state: {{x: {{each_step: x + 1}}}}, activity: 100*x}}
+  target: {target}
+synapses: {{s: {{signal: pre + pre.x}}}}
+neurons: {{A: {{model: source}}, B: {{model: target}}}}
+connections: {{A -> B: {{synapse: s, delay: 3}}}}
+""")
+    simulation = Simulation(network, backend)
+    arrived, before = [], 0.0
+    for k in range(16):
+        if k in (6, 8):
+            (simulation.lesion if k == 6 else simulation.mend)("A -> B")
+        simulation.step()
+        arrived.append(simulation.activity[1] - before if flows else simulation.activity[1])
+        before = simulation.activity[1]
+    x = [0.0] * 3 + [float(k - 2) for k in range(3, 16)]  # x is 1 at step 0
+    expected = [0.0 if 6 <= k < 11 else 101 * x[k] for k in range(16)]
+    assert arrived == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
 def test_parameters_of_a_synapse_and_of_an_end_of_it_are_set(backend: str) -> None:
     simulation = Simulation(network_of(EVENTS), backend)
     x, g, u, v = 1.0, 0.0, 0.0, 0.0
