@@ -1,30 +1,35 @@
 """What arrives at the neurons of a population, as C: sums of terms, each in the order of its connections.
 
 In: a Network, a port of one of its populations. Out: lines of C. The sums of a full matrix, and those of neurons with
-many connections, go on beside each other, since an addition need not wait for the one before in another sum.
+many connections, go on beside each other, since an addition need not wait for the one before in another sum. Where
+synapses bring something, neurons of many connections are gone through one after the other, and of each the connections
+of a kind in a loop.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray, sorting, starts_of, width
 from neurovis_spec.compiler.events.settable import CENTRES
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import CENTRE, Port
+from neurovis_spec.compiler.program import CENTRE, SYNAPSE, Port
 from neurovis_spec.language.expressions.emit_c import Value
 from neurovis_spec.language.words import Combine
 from neurovis_spec.runtime.c_code import Code, Form, Place, state_name
+from neurovis_spec.runtime.c_connections import Forming, Some, taken
 from neurovis_spec.runtime.signals import SignalLayout
 from neurovis_spec.runtime.stages import taken_by
 
-_NO_MORE: Mapping[str, int] = {}
+#: which of all connections that arrive a place is one of
+_Column: TypeAlias = slice | Indices
+_NONE = np.zeros(0, dtype=np.int64)
 #: connections of a neuron that are written out one after the other
 _FEW = 16
 #: neurons of a dense population whose sums are kept beside each other
@@ -72,6 +77,30 @@ def _in_lanes(ends: IntArray) -> tuple[_Lanes, Indices]:
     return _Lanes(neurons, begins, rests.astype(np.int64)), order
 
 
+class _Run(NamedTuple):
+    """Connections of neurons that are gone through in a loop of their own: of which synapses they are (−1: of none),
+    which they are of all that arrive, neuron by neuron, those of the i-th neuron up to ``ends[i + 1]``."""
+
+    kinds: tuple[int, ...]
+    edges: Indices
+    ends: IntArray
+
+
+def _runs(kinds: IntArray, connections: Indices, ends: IntArray) -> tuple[_Run, ...]:
+    """What arrives at some neurons, neuron by neuron, as a run for each kind, in which all of their sums keep their
+    order; one for all where there is no such order."""
+    found, owner = np.unique(kinds).tolist(), np.repeat(np.arange(len(ends) - 1), np.diff(ends))
+    found.sort(key=lambda kind: int(connections[kinds == kind].min()))
+    ranks = np.array(found).argsort()[np.searchsorted(np.sort(found), kinds)]
+    if bool(((np.diff(ranks) < 0) & (np.diff(owner) == 0)).any()):
+        return (_Run(tuple(found), np.arange(len(kinds)), ends),)
+    of_kind = [np.flatnonzero(kinds == kind) for kind in found]
+    return tuple(
+        _Run((kind,), edges, np.searchsorted(owner[edges], np.arange(len(ends))).astype(np.int64))
+        for kind, edges in zip(found, of_kind, strict=True)
+    )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Incoming:
     """The connections that arrive at a port of the neurons of a population, whatever is made of them: neuron by neuron,
@@ -91,6 +120,10 @@ class Incoming:
     factors: FloatArray | None
     #: how what arrives at a neuron is put together
     combine: Combine
+    #: where any has a synapse, of each of them which projection that is, −1 for none; else None
+    kinds: IntArray | None = None
+    #: where so many arrive that they are not written out, in which order
+    runs: tuple[_Run, ...] = ()
 
 
 def incoming_of(network: Network, port: Port, count: int, fusible: bool = True) -> Incoming:
@@ -107,6 +140,11 @@ def incoming_of(network: Network, port: Port, count: int, fusible: bool = True) 
             factors[places] = port.factors[some]
     degrees = np.diff(ends)
     degree = int(degrees[0]) if (degrees == degrees[0]).all() else -1
+    kinds = network.synapses.numbers[own] if any(one.kind == SYNAPSE for one in network.projections) else _NONE
+    if (kinds >= 0).any():
+        few = 0 <= degree <= _FEW
+        runs = () if few else _runs(kinds, own, ends)
+        return Incoming(own, ends, degree, False, False, None, factors, port.combine, kinds, runs)
     full = port.combine == "sum" and degree > 1 and 1 < count <= _BESIDE and len(_different(delays)) == 1 and not late
     if full:
         rows, sent = own.reshape(count, degree), taken_by(network)[own].reshape(count, degree)
@@ -129,31 +167,12 @@ class Sent(NamedTuple):
     late: Indices | None = None
 
 
-def taken(network: Network, code: Code, connections: Indices, place: Place) -> str:
-    """What one of some connections takes: the activity of its source, or an outlet."""
-    if network.sending is None:
-        return taken_at(network, code, network.connections.sources.some(connections), place)
-    return taken_at(network, code, network.sending[connections], place)
+class _Target(NamedTuple):
+    """A neuron at which something arrives: its place in the population, and what synapses of projections read of it,
+    by the numbers of these."""
 
-
-def taken_at(network: Network, code: Code, index: Indices, place: Place, more: Mapping[str, int] = _NO_MORE) -> str:
-    """One of some numbers, by indices into all activities, followed by the outlets, as ``Network.sending`` numbers
-    them, followed by the inputs of a step, as signals of rules are numbered, and by ``more`` arrays of such sizes."""
-    sizes = {"activity": len(network.neurons), "outlets": network.outlet_count, "s": network.vector_size, **more}
-    own, start, parts = index if not isinstance(place, int) else index[place : place + 1], 0, dict[str, int]()
-    for name, size in sizes.items():
-        if ((own >= start) & (own < start + size)).any():
-            parts[name] = start
-        start += size
-    *others, last = parts
-    if not others:
-        return f"{last}[{code.at(index - parts[last] if parts[last] else index, place)}]"
-    where = code.at(index, place)
-    found = f"{last}[{where} - {parts[last]}]"
-    for name in reversed(others):
-        at = f"{where} - {parts[name]}" if parts[name] else where
-        found = f"{where} < {parts[name] + sizes[name]} ? {name}[{at}] : {found}"
-    return f"({found})"
+    place: Place
+    known: Mapping[int, Mapping[str, Value]]
 
 
 def _length(ring: int) -> int:
@@ -181,7 +200,7 @@ class Arrivals:
     """What arrives at a port of the neurons of a population: their connections, in the order in which they are read:
     neuron by neuron, or as ``lanes`` says. What arrives at one neuron is put together in the order of its connections.
     ``begins`` gives the code of what the sum of a neuron begins with, by its place, and ``sent`` is what connections
-    without delay take; left out, they are nothing and the activities."""
+    without delay take; left out, they are nothing and the activities. ``forming`` makes what synapses bring."""
 
     def __init__(
         self,
@@ -190,10 +209,11 @@ class Arrivals:
         code: Code,
         form: Form,
         layout: SignalLayout,
+        forming: Forming,
         begins: Callable[[Place], Value] | None = None,
         sent: Sent | None = None,
     ) -> None:
-        self.network, self.code, self.form = network, code, form
+        self.network, self.code, self.form, self.forming = network, code, form, forming
         self.combine, self.count = incoming.combine, len(incoming.ends) - 1
         #: where the weights begin among those packed
         self.begin = 0
@@ -211,8 +231,14 @@ class Arrivals:
             self.lanes, read = incoming.lanes
             self.connections = self.connections[read]
             self.factors = None if self.factors is None else self.factors[read]
-        self.sources = network.connections.sources.some(self.connections)
-        self.delays = network.connections.delays.some(self.connections)
+        self.kinds, self.runs = incoming.kinds, () if form.written_out else incoming.runs
+        #: the connections, in the place of those with a synapse some other one
+        self.plain = self.connections
+        if self.kinds is not None:
+            others = self.connections[self.kinds < 0]
+            self.plain = np.where(self.kinds < 0, self.connections, others[0] if len(others) else self.connections)
+        self.sources = network.connections.sources.some(self.plain)
+        self.delays = network.connections.delays.some(self.plain)
         self._layout = layout
 
     def start(self, place: Place) -> Value:
@@ -221,27 +247,27 @@ class Arrivals:
             return self._begins(place)
         return 1.0 if self.combine == "product" else 0.0
 
-    def sent(self, column: slice, edge: Place) -> str:
+    def sent(self, column: _Column, edge: Place) -> str:
         """What a connection without delay takes."""
         if self._sent is None:
-            return taken(self.network, self.code, self.connections[column], edge)
+            return taken(self.network, self.code, self.plain[column], edge)
         return f"{self._sent.array}[{self.code.at(self.sent_places[column], edge)}]"
 
     @cached_property
     def sent_places(self) -> Indices:
         """Where each connection finds what it takes, in the array of ``sent``."""
         assert self._sent is not None
-        return self._sent.places[self.connections]
+        return self._sent.places[self.plain]
 
     @cached_property
     def offsets(self) -> Indices:
         """The first slot of each connection."""
-        return self._layout.offsets[self.connections]
+        return self._layout.offsets[self.plain]
 
     @cached_property
     def shares(self) -> BoolArray:
         """Which connections weigh on arrival what was sent."""
-        return self._layout.shares[self.connections]
+        return self._layout.shares[self.plain]
 
     @property
     def packed(self) -> Indices:
@@ -315,28 +341,46 @@ class Arrivals:
             edges: list[Place] = list(range(int(self.ends[place]), int(self.ends[place + 1])))
             if not edges:
                 return start if isinstance(start, float) else self._finished(start)
-            return self._terms(start, edges, [slice(None)] * len(edges))
+            return self._terms(start, edges, [slice(None)] * len(edges), place)
+        if self.runs:
+            return self._in_runs(start, place)
         assert 0 <= self.degree <= _FEW, "others go on in lanes"
         columns = [slice(column, None, self.degree) for column in range(self.degree)]
-        return self._terms(start, [place] * self.degree, columns)
+        return self._terms(start, [place] * self.degree, columns, place)
 
-    def _terms(self, start: Value, edges: list[Place], columns: list[slice]) -> Value:
-        """The terms of some connections, one after the other, combined."""
+    def _terms(self, start: Value, edges: list[Place], columns: list[slice], target: Place) -> Value:
+        """The terms of some connections of a neuron, one after the other, combined."""
         if not self.form.gone and self.combine == "sum":
-            terms = [self.term(edge, column) for edge, column in zip(edges, columns, strict=True)]
+            terms = [self.term(edge, column, self._at(target)) for edge, column in zip(edges, columns, strict=True)]
             return " + ".join([self.code.text(start), *terms])
         total = self.code.variable("u", start)
         for edge, column in zip(edges, columns, strict=True):
-            self._add(total, edge, column)
+            self._add(total, edge, column, self._at(target))
         return self._finished(total)
 
-    def _add(self, total: str, edge: Place, column: slice) -> None:
+    def _in_runs(self, start: Value, target: Place) -> Value:
+        """The terms of all connections of a neuron, combined, run by run. What synapses read of the neuron is read
+        before."""
+        code, total = self.code, self.code.variable("u", start)
+        for run in self.runs:
+            at = self._at(target, run.kinds)
+            begin, end = (code.at(run.ends, where) for where in (target, f"({target} + 1)"))
+            with code.block(code.loop("e", str(end), begin)):
+                self._add(total, "e", run.edges, at)
+        return self._finished(total)
+
+    def _at(self, target: Place, kinds: Iterable[int] = ()) -> _Target:
+        """A neuron at which something arrives, with what synapses of some projections read of it."""
+        some = ((kind, Some(kind, _NONE, 0, target)) for kind in kinds if kind >= 0)
+        return _Target(target, {kind: self.forming.of_target(one) for kind, one in some})
+
+    def _add(self, total: str, edge: Place, column: _Column, target: _Target | None = None) -> None:
         """Lines that add (multiply) one connection's term to a variable, if the connection is not gone."""
         code = self.code
         if self.form.gone:
             code.line(f"if (!gone[{code.at(self.connections[column], edge)}]) {{")
             code.indent += 1
-        term = self.term(edge, column)
+        term = self.term(edge, column, target)
         match self.combine:
             case "sum":
                 code.line(f"{total} += {term};")
@@ -387,14 +431,41 @@ class Arrivals:
         index = f"({_LANES}*g + {lane} < {last} ? {_LANES}*g + {lane} : {last})"
         return self.start(str(self.code.at(lanes.neurons, index)))
 
-    def term(self, edge: Place, column: slice) -> str:
+    def term(self, edge: Place, column: _Column, target: _Target | None = None) -> str:
         """What a connection brings: its signal, times its factor."""
-        signal = self._signal(edge, column)
+        signal = self._signal(edge, column) if target is None else self._of_kind(edge, column, target)
         if self.factors is None:
             return signal
         return f"{signal}*{self._operand(self.code.number(self.factors[column], edge))}"
 
-    def _signal(self, edge: Place, column: slice) -> str:
+    def _of_kind(self, edge: Place, column: _Column, target: _Target) -> str:
+        """The signal of a connection, whether a synapse forms it or not; a choice in a loop over connections of
+        several synapses."""
+        code = self.code
+        if self.kinds is None:
+            return self._signal(edge, column)
+        kinds = self.kinds[column]
+        found = np.unique(kinds if not isinstance(edge, int) else kinds[edge : edge + 1]).tolist()
+        if len(found) == 1:
+            return self._of(found[0], edge, column, target)
+        name, which = code.name("y"), code.at(np.searchsorted(found, kinds).astype(np.int64), edge)
+        code.line(f"{code.real} {name};")
+        for number, kind in enumerate(found):
+            test = f"if ({which} == {number})" if number < len(found) - 1 else ""
+            with code.block(" ".join(filter(None, ("else" if number else "", test)))):
+                code.line(f"{name} = {self._of(kind, edge, column, target)};")
+        return name
+
+    def _of(self, kind: int, edge: Place, column: _Column, target: _Target) -> str:
+        """The signal of a connection of a kind."""
+        if kind < 0:
+            return self._signal(edge, column)
+        assert self.kinds is not None
+        members = np.where(self.kinds == kind, self.network.synapses.positions[self.connections], 0)
+        some = Some(kind, members[column], edge, target.place)
+        return self.code.text(self.forming.value(some, target.known.get(kind, {})))
+
+    def _signal(self, edge: Place, column: _Column) -> str:
         """w[t−d]·a[t−d] of a connection: ``weights[3]*activity[1]`` without a delay, ``signals[5 + r2]`` with one of
         2, ``weights[3]*signals[5 + r2]`` where it is shared, and a choice in a loop over connections of which some
         are of one kind and some of another."""
@@ -402,14 +473,14 @@ class Arrivals:
         rings = self.rings[column] if not isinstance(edge, int) else self.rings[column][edge : edge + 1]
         kinds = _different(rings)
         if self._sent is not None and self._sent.late is not None:
-            return self._at_stage(self._sent.late[self.connections[column]], edge, column)
+            return self._at_stage(self._sent.late[self.plain[column]], edge, column)
         if self.fused:
             end = self.begin + len(self.connections)
             places = np.arange(self.begin, end, dtype=width(0, end))[column]
             return f"packed[{code.at(places, edge)}]*before[{code.at(self.sources[column], edge)}]"
         now = ""
         if kinds[0] == 0:
-            now = f"weights[{code.at(self.connections[column], edge)}]*{self.sent(column, edge)}"
+            now = f"weights[{code.at(self.plain[column], edge)}]*{self.sent(column, edge)}"
         if kinds == [0]:
             return now
         if len(kinds) == 1:
@@ -422,25 +493,25 @@ class Arrivals:
         arriving = self._on_arrival(f"signals[{offset} + {rests}[{kind}]]", edge, column)
         return f"({kind} ? {arriving} : {now})" if kinds[0] == 0 else arriving
 
-    def _at_stage(self, late: Indices, edge: Place, column: slice) -> str:
+    def _at_stage(self, late: Indices, edge: Place, column: _Column) -> str:
         """What a connection brings at a stage: what has come with a continuous delay, else what is sent now."""
         code = self.code
         own = late[edge : edge + 1] if isinstance(edge, int) else late
         arrived = f"fl[{code.at(late, edge)}]"
         if (own >= 0).all():
             return arrived
-        now = f"weights[{code.at(self.connections[column], edge)}]*{self.sent(column, edge)}"
+        now = f"weights[{code.at(self.plain[column], edge)}]*{self.sent(column, edge)}"
         return f"({code.at(late, edge)} >= 0 ? {arrived} : {now})" if (own >= 0).any() else now
 
     @cached_property
     def rings(self) -> Indices:
         """The delay of each connection; of a continuous one also how long its ring is."""
         lags = self.network.connections.lags
-        held = None if lags is None else np.isnan(lags[self.connections])
+        held = None if lags is None else np.isnan(lags[self.plain])
         if held is None or held.all():
             return self.delays
         delays = self.delays.astype(np.int64)
-        return np.where(held, delays, delays + _LATE * self._layout.lengths[self.connections])
+        return np.where(held, delays, delays + _LATE * self._layout.lengths[self.plain])
 
     def _slot(self, ring: int, offsets: Indices, edge: Place) -> str:
         """What arrives in this step in the slots of a connection with such a ring."""
@@ -451,9 +522,9 @@ class Arrivals:
             self.code.head[shift[3:]] = f"const int32_t {shift[3:]} = (int32_t)({_now(ring)} % {length});"
         return f"signals[{self.code.at(offsets, edge)}{shift}]"
 
-    def _on_arrival(self, sent: str, edge: Place, column: slice) -> str:
+    def _on_arrival(self, sent: str, edge: Place, column: _Column) -> str:
         """What is made of the content of a slot: what is shared is weighted, and 0 where it is lost."""
-        code, connections = self.code, self.connections[column]
+        code, connections = self.code, self.plain[column]
         delays, shares = self.delays[column], self.shares[column]
         some = slice(edge, edge + 1) if isinstance(edge, int) else slice(None)
         if not shares[some].any():

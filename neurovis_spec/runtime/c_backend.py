@@ -23,6 +23,7 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import RULE
 from neurovis_spec.language.expressions.emit_c import Emitter
 from neurovis_spec.language.expressions.functions import Library
 from neurovis_spec.runtime import c_flows, c_functions, c_library, c_plan
@@ -217,7 +218,9 @@ def _write(network: Network, layout: SignalLayout) -> Written:
     small = len(network.neurons) + len(network.connections) <= c_plan.written_out(plan, SMALL)
     bodies: list[str] = []
     pointers = _pointer_lines(network, plan)
-    watched = bool(network.projections) and not small
+    # loops over connections that store something in other operations are not watched
+    rules = all(one.kind == RULE and not one.use.definition.flows for one in network.projections)
+    watched = bool(network.projections) and rules and not small
     # a network that is written out is in registers, and nothing is gained
     incoming = incoming_in(network)
     whole = StepCode(network, Code(emitter, tables, network.dt, {}), Form(), incoming, layout, plan)
@@ -526,7 +529,7 @@ class CBackend:
     """C made from the update program, compiled for this machine."""
 
     name = "c"
-    capabilities = Capabilities(noise=True, flows=True, clamped_states=True, exactness="bits")
+    capabilities = Capabilities(noise=True, flows=True, synapses=True, clamped_states=True, exactness="bits")
 
     def availability(self) -> Availability:
         """Whether there is a compiler."""

@@ -68,7 +68,7 @@ class Member:
 
 
 #: What the members of the struct that hold states are of.
-_STATES = {"cells": "states of models", "traces": "states of rules"}
+_STATES = {"cells": "states of models", "traces": "states of rules", "synapse": "states of synapses"}
 
 
 class Exported:

@@ -25,18 +25,32 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
 
+import numpy as np
+
 from neurovis_spec.arrays import IntArray
-from neurovis_spec.compiler.program import MODEL, SYNAPSE, Diffuse, Integrate, Key, Port, SendAhead
+from neurovis_spec.compiler.program import (
+    MODEL,
+    SYNAPSE,
+    Definition,
+    Diffuse,
+    Integrate,
+    Key,
+    Port,
+    Projection,
+    SendAhead,
+)
 from neurovis_spec.language.expressions.emit_c import INEXACT, Made, Value
 from neurovis_spec.language.expressions.parser import formula
 from neurovis_spec.language.expressions.tree import Name
 from neurovis_spec.language.words import Method
-from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, Sent, taken_at
+from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, Sent
 from neurovis_spec.runtime.c_code import Place, plus, words_of
-from neurovis_spec.runtime.c_lags import read_between, write_arriving
+from neurovis_spec.runtime.c_connections import Forming, Sight, Some, own_of, taken_at
+from neurovis_spec.runtime.c_lags import write_arriving
 from neurovis_spec.runtime.c_plan import BEGIN, MIDDLE, STAGES, FlowState, Plan
 from neurovis_spec.runtime.c_step import StepCode, write, write_input
 from neurovis_spec.runtime.stages import (
@@ -47,6 +61,7 @@ from neurovis_spec.runtime.stages import (
     Formulas,
     Part,
     Taken,
+    Through,
     formulas_of,
     given,
     taken_in_order,
@@ -79,6 +94,9 @@ class _Integration:
         #: the flow states of a stage
         self.now = "fy" if "fy" in self.plan.parts else "fx"
         self.varying = {one.key: one.varies for one in self.plan.states}
+        #: what formulas of connections see at a stage
+        self.sight = _StageSight(self.network, self.code, step.form, plan=self.plan)
+        self.forming = Forming(self.sight, {one.number: one.signal for one in self.plan.contacts})
 
     def write(self) -> None:
         """All of it."""
@@ -96,7 +114,7 @@ class _Integration:
             begin = f"(kd - {code.text(1.0)})*{code.text(network.dt)} + ({code.real})sub*{code.text(h)}"
             with self.where_read("since", begin):
                 self.substep(h)
-        self.copy("{cell} = fx[{at}];")
+        self.copy("{cell} = fx[{at}];", back=True)
 
     @contextmanager
     def where_read(self, name: str, value: str) -> Iterator[None]:
@@ -109,8 +127,9 @@ class _Integration:
             code.line(f"const {code.real} {name} = {value};")
         code.lines += body
 
-    def copy(self, line: str) -> None:
-        """A line for each flow state, which is ``cell`` in the State, ``now`` with what is held, and ``at`` here."""
+    def copy(self, line: str, back: bool = False) -> None:
+        """A line for each flow state, which is ``cell`` in the State, ``now`` with what is held, and ``at`` here. Those
+        of connections that do nothing are not copied ``back``."""
         for one in self.plan.states:
 
             def copied(place: Place, totals: Mapping[int, str], one: FlowState = one) -> None:
@@ -118,6 +137,8 @@ class _Integration:
                 held = self.step.held(one.part.number, one.name, place) if isinstance(one.part, Part) else ""
                 if held:
                     now = f"held[{held}] ? holding[{held}] : {cell}"
+                if back and isinstance(one.part, Contacts) and (idle := self.idle(one.part, one.name, place)):
+                    self.code.line(f"if (!{idle})")
                 self.code.line(line.format(cell=cell, now=now, at=plus(one.start, place)))
 
             self.step.each(one.size, {}, copied)
@@ -140,7 +161,7 @@ class _Integration:
         self, incoming: Incoming, begins: Callable[[Place], Value] | None = None, sent: Sent | None = None
     ) -> Arrivals:
         """What arrives at a port of a population."""
-        return Arrivals(self.network, incoming, self.code, self.step.form, self.step.layout, begins, sent)
+        return Arrivals(self.network, incoming, self.code, self.step.form, self.step.layout, self.forming, begins, sent)
 
     def at_stage(self, part: Part, port: Port) -> Arrivals:
         """What arrives at a port at a stage: what is held, and on top of it what flows."""
@@ -238,17 +259,18 @@ class _Integration:
         with ExitStack() as clocks:
             clocks.enter_context(self.where_read("ts", at))
             clocks.enter_context(self.where_read("share", share))
-            for unit in sorted({one.use.definition.per_second for one in self.plan.states} - {1.0}):
+            used = [one.use for one in self.plan.states] + [one.projection.use for one in self.plan.contacts]
+            for unit in sorted({one.definition.per_second for one in used} - {1.0}):
                 clocks.enter_context(self.where_read(_clock(unit), f"ts*{self.code.text(unit)}"))
             self.derivatives(first)
 
     def derivatives(self, first: str) -> None:
         """The inputs of a stage, what connections take at it, the derivatives."""
         self.inputs()
-        if self.step.lags is not None and len(self.plan.lagging):
+        if self.sight.lags is not None and len(self.plan.lagging):
             # the second stage in the middle sees what the first one does
             with self.code.block("if (stage != 2)" if self.method == "rk4" else ""):
-                write_arriving(self.step, self.step.lags, self.plan.lagging)
+                write_arriving(self.step, self.sight.lags, self.plan.lagging)
         parts = self.plan.of_stage
         for part, one in taken_in_order(parts):
             with self.unless_there(part, one, first):
@@ -329,34 +351,6 @@ class _Integration:
         known["dt"] = self.network.dt * per_second
         return known
 
-    def joined(self, contacts: Contacts, place: Place, totals: Mapping[int, str]) -> None:
-        """The derivatives of the states of a connection, or what these change by."""
-        code, projection, derivatives = self.code, contacts.projection, contacts.derivatives
-        read = derivatives.names | contacts.slopes.names
-        known = self.known(contacts, place)
-        known |= {name: self.end(contacts, end, place) for name, end in contacts.ends.items() if name in read}
-        if "weight" in read:
-            known["weight"] = f"weights[{code.at(projection.members, place)}]"
-        trees = [tree for _, tree in derivatives.trees]
-        self.slope(contacts, place, self.step.let(derivatives.let, known, trees), {})
-
-    def end(self, contacts: Contacts, end: End, place: Place) -> Value:
-        """What a connection reads of an end at a stage: what is there now, or what was sent there d steps ago."""
-        network, code, projection = self.network, self.code, contacts.projection
-        more = {"fo": self.plan.parts_taken, "fv": network.vector_size if network.held_inputs else 0}
-        now = taken_at(network, code, self.plan.now(end.places), place, more)
-        delays = network.connections.delays[projection.members]
-        own = delays if not isinstance(place, int) else delays[place : place + 1]
-        if not end.past or not own.any():
-            return now
-        if self.step.lags is not None and self.step.lags.there[projection.members].any():
-            past = read_between(self.step, projection, end, place)
-        else:
-            past = self.step.remembered(projection, end, delays, now, place)
-        if own.all():
-            return past
-        return code.let("a", f"{code.at(delays, place)} > 0 ? {code.text(past)} : {now}")
-
     def give(
         self, part: Part, one: Taken, place: Place, known: Mapping[str, Value], functions: Mapping[str, Made]
     ) -> None:
@@ -380,6 +374,37 @@ class _Integration:
             return f"gone[{connection}]" if form.gone else ""
         return f"still[{connection}]" if form.still else ""
 
+    def joined(self, contacts: Contacts, place: Place, totals: Mapping[int, str]) -> None:
+        """The derivatives of the states of a connection, or what these change by."""
+        derivatives = contacts.derivatives
+        some = Some(contacts.number, np.arange(len(contacts.projection.members)), place)
+        seen = self.sight.known(some, derivatives.names | contacts.slopes.names)
+        self.slope(contacts, place, self.step.let(derivatives.let, seen, [tree for _, tree in derivatives.trees]), {})
+
+    def through(
+        self, part: Part, place: Place, known: Mapping[str, Value], functions: Mapping[str, Made]
+    ) -> dict[str, str]:
+        """What is added to the slopes of the states of a neuron for what synapses bring to its ports."""
+        found = dict[str, str]()
+        for one in part.through:
+            ((_, tree),) = one.slope.trees
+            further = tuple((name, between) for name, between in one.slope.let if name not in known)
+            seen = self.step.let(further, known, [tree], functions)
+            by = self.code.text(self.code.let("n", self.code.value(tree, seen, functions)))
+            found[one.state] = f"{found.get(one.state, '')} + {by}*{self.back(part, one, place)}"
+        return found
+
+    def back(self, part: Part, through: Through, place: Place) -> str:
+        """How much what synapses bring to a port of a neuron changes with one of its states."""
+        slopes = {one.number: one.back for one in self.plan.contacts if through.state in dict(one.back.trees)}
+        formulas = {
+            number: one._replace(trees=((through.state, dict(one.trees)[through.state]),))
+            for number, one in slopes.items()
+        }
+        step, forming = self.step, Forming(self.sight, formulas)
+        arrivals = Arrivals(self.network, self.plan.back(part, through), self.code, step.form, step.layout, forming)
+        return self.code.text(self.code.let("u", arrivals.combined(place)))
+
     def slope(
         self, part: Part | Contacts, place: Place, known: Mapping[str, Value], functions: Mapping[str, Made]
     ) -> None:
@@ -389,12 +414,15 @@ class _Integration:
         diagonal = dict(part.slopes.trees)
         more = tuple((name, tree) for name, tree in part.slopes.let if name not in known)
         known = self.step.let(more, known, [*diagonal.values()], functions)
+        through = self.through(part, place, known, functions) if isinstance(part, Part) else {}
         for name, tree in part.derivatives.trees:
             key = Key(use.owner, name)
             slope, at = code.value(tree, known, functions), plus(self.plan.starts[key], place)
             idle = self.idle(part, name, place)
             if changes is not None:
                 own_slope = code.value(diagonal[name], known, functions)
+                if name in through:
+                    own_slope = f"{code.text(code.let('n', own_slope))}{through[name]}"
                 if self.varying[key]:
                     if idle:  # 0, so that the change is 0 even where this is NaN
                         own_slope = f"{idle} ? {code.text(0.0)} : {code.text(own_slope)}"
@@ -413,6 +441,55 @@ class _Integration:
             value = self.code.text(self.code.value(tree, known, functions))
             key = Key(part.population.model.owner, name)
             self.code.line(f"fg[{plus(self.plan.starts[key], place)}] = {value};")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _StageSight(Sight):
+    """What formulas of connections see at a stage: of what flows, at both ends and of their own, what it is there."""
+
+    plan: Plan
+
+    def now(self, index: IntArray, place: Place) -> str:
+        """An activity, an outlet or an input, as it is at the stage where it flows, else as it was left."""
+        network, plan = self.network, self.plan
+        more = {"fo": plan.parts_taken, "fv": network.vector_size if network.held_inputs else 0}
+        return taken_at(network, self.code, plan.now(index), place, more)
+
+    def states(self, some: Some) -> dict[str, str]:
+        """The states of a synapse or a rule at one connection; those that flow as they are at the stage."""
+        found, use = super().states(some), self.network.projections[some.number].use
+        place, stage = self.code.at(some.which, some.place), "fy" if "fy" in self.plan.parts else "fx"
+        for name in found:
+            if (start := self.plan.starts.get(Key(use.owner, name))) is not None:
+                found[name] = f"{stage}[{plus(start, place)}]"
+        return found
+
+    def clock(self, made: Definition) -> dict[str, Value]:
+        """The time of the stage, and how long a step is, in the unit of a definition."""
+        return {"t": _clock(made.per_second), "dt": self.network.dt * made.per_second}
+
+    def behind(self, projection: Projection) -> dict[str, str]:
+        """None: all is that of the stage."""
+        return {}
+
+    def past_or_now(self, some: Some, end: End) -> Value:
+        """What was sent as long ago as the delay is: with a continuous one before this share of the step was over."""
+        connections, place = self.network.projections[some.number].members[some.which], some.place
+        if self.lags is None or not own_of(self.late(connections), place).any():
+            return super().past_or_now(some, end)
+        code, lags, index = self.code, self.lags.some(connections), end.places[some.which]
+        q, back = code.let("q", f"share - {code.text(code.number(lags.part, place))}"), code.at(lags.whole + 1, place)
+        slot, ago = code.name("i"), code.name("i")
+        code.head["now"] = f"const int32_t now = (int32_t)(k % {self.depth});"
+        code.line(f"const int32_t {slot} = nv_slot(now, {back}, {self.depth}, {q});")
+        code.line(f"const int32_t {ago} = {back} + ({q} < {code.text(0.0)});")
+        steps = [(ago, slot), (f"{ago} - 1", f"nv_next({slot}, {self.depth})")]
+        sent = [self.remembered(connections, index, place, *one) for one in steps]
+        between = f"nv_between({', '.join(sent)}, {q})"
+        if own_of(self.late(connections), place).all():
+            return code.let("a", between)
+        late = code.at(lags.there.astype(np.int64), place)
+        return code.let("a", f"{late} ? {between} : {code.text(super().past_or_now(some, end))}")
 
 
 def _by_stage(values: Sequence[str]) -> str:
@@ -446,7 +523,7 @@ def _send_ahead(operation: SendAhead, step: StepCode) -> None:
         step.hold_states(number, place)
         neuron, functions = code.at(population.members, place), step.activation(population, place)
         seen: Mapping[str, Value] = {
-            **code.parameters(use, place), **step.clock(use.definition), **step.states(use, place),
+            **code.parameters(use, place), **step.sight.clock(use.definition), **step.states(use, place),
         }  # fmt: skip
         for name in operation.names:
             formulas = formulas_of(population, [(name, given(use.definition, name))])

@@ -17,12 +17,9 @@ from itertools import count
 import numpy as np
 
 from neurovis_spec.arrays import Indices, IntArray
-from neurovis_spec.compiler.program import Projection
-from neurovis_spec.language.expressions.emit_c import Value
 from neurovis_spec.runtime.c_code import Code, Place
 from neurovis_spec.runtime.c_step import StepCode
 from neurovis_spec.runtime.lags import Lags
-from neurovis_spec.runtime.stages import End
 
 #: remainders of so many lengths have a name made of these
 _FEW = 8
@@ -61,28 +58,6 @@ def _arriving(step: StepCode, lags: Lags, connections: Indices, place: Place) ->
             weighted = f"({code.at(shares.astype(np.int64), place)} ? {weighted} : {signal})"
         signals[number] = weighted
     code.line(f"fl[{place}] = nv_between({', '.join(signals)}, {q});")
-
-
-def read_between(step: StepCode, projection: Projection, end: End, place: Place) -> Value:
-    """What a connection reads at a stage of an end as it was as long ago as its delay is, of which some are
-    continuous."""
-    assert step.lags is not None
-    code, delays = step.code, step.network.connections.delays[projection.members]
-    lags = step.lags.some(projection.members)
-    q, back = code.let("q", f"share - {code.text(code.number(lags.part, place))}"), code.name("i")
-    late = f"({q} < {code.text(0.0)})"
-    own = lags.there[place : place + 1] if isinstance(place, int) else lags.there
-    ago, there = code.at(np.where(lags.there, lags.whole + 1, delays), place), "1"
-    if not own.all():
-        there = str(code.at(lags.there.astype(np.int64), place))
-        late = f"({there} && {late})"
-    code.line(f"const int32_t {back} = {ago} + {late};")
-    one = code.let("a", step.remembered_at(projection, end, back, place))
-    if not own.any():
-        return one
-    next_ = code.let("a", step.remembered_at(projection, end, f"({back} - 1)", place))
-    between = f"nv_between({one}, {next_}, {q})"
-    return code.let("a", between if own.all() else f"{there} ? {between} : {one}")
 
 
 def _rest(code: Code, lengths: IntArray, place: Place) -> str:

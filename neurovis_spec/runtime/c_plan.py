@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import Indices, IntArray, width
+from neurovis_spec.arrays import BoolArray, Indices, IntArray, width
 from neurovis_spec.compiler.flows import BY_SLOPE
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Diffuse, Integrate, Key, Port, Use
@@ -32,6 +32,7 @@ from neurovis_spec.runtime.stages import (
     Contacts,
     Part,
     Taken,
+    Through,
     apart,
     contacts_of,
     flowing,
@@ -61,14 +62,14 @@ class FlowState(NamedTuple):
     start: int
 
     @property
+    def key(self) -> Key:
+        """Whose it is, and its name."""
+        return Key(self.use.owner, self.name)
+
+    @property
     def use(self) -> Use:
         """The model, the synapse or the rule that it is a state of."""
         return self.part.population.model if isinstance(self.part, Part) else self.part.projection.use
-
-    @property
-    def key(self) -> Key:
-        """What it is called in the State."""
-        return Key(self.use.owner, self.name)
 
     @property
     def size(self) -> int:
@@ -82,6 +83,8 @@ class FlowState(NamedTuple):
         let, diagonal = self.part.slopes.let, dict(self.part.slopes.trees)
         if self.name not in diagonal:  # the method does not look at that
             return False
+        if isinstance(self.part, Part) and any(one.state == self.name for one in self.part.through):
+            return True
         return not unfolded(let, [diagonal[self.name]]).names <= {*self.use.parameters, *dict(let)}
 
 
@@ -137,6 +140,13 @@ class Plan:
             for port in part.ports
         }
 
+    def back(self, part: Part, through: Through) -> Incoming:
+        """The signals of a port that change with a state of the neuron itself."""
+        found = [one.number for one in self.contacts if through.state in dict(one.back.trees)]
+        positions = apart(through.port)[1]
+        kinds = self.network.synapses.numbers[through.port.incoming[positions]]
+        return self._incoming(part, through.port, positions[np.isin(kinds, found)])
+
     def _incoming(self, part: Part, port: Port, positions: IntArray) -> Incoming:
         """Some of the signals of a port."""
         factors = None if port.factors is None else port.factors[positions]
@@ -163,13 +173,18 @@ class Plan:
         −1 for none."""
         return places_among_taken(self.network, self.of_stage)
 
+    @cached_property
+    def flows(self) -> BoolArray:
+        """Which activities and outlets flow."""
+        return flowing(self.network)
+
     def now(self, places: IntArray) -> IntArray:
         """Where what connections read now, by its places among activities, outlets and inputs, is to be found at a
         stage: behind all these stand what is taken at the stage, then the inputs as they are at it."""
         network = self.network
         neural = len(network.neurons) + network.outlet_count
         behind = neural + network.vector_size
-        taken = np.append(np.where(flowing(network), self.places, -1), -1)[np.minimum(places, neural)]
+        taken = np.append(np.where(self.flows, self.places, -1), -1)[np.minimum(places, neural)]
         formulas = np.zeros(len(places), dtype=np.bool_)
         for entry in map(network.input_index.__getitem__, network.held_inputs):
             formulas |= (places >= neural + entry.start) & (places < neural + entry.start + entry.size)

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from functools import partial, singledispatch
 from itertools import chain
 from typing import NamedTuple
@@ -29,6 +30,7 @@ from neurovis_spec.compiler.events.settable import HIGH, LOW, bias_of
 from neurovis_spec.compiler.network import Input, Network, Outlet
 from neurovis_spec.compiler.program import (
     PHASES,
+    SYNAPSE,
     Definition,
     Gather,
     Key,
@@ -38,23 +40,24 @@ from neurovis_spec.compiler.program import (
     Port,
     Projection,
     ReadInputs,
+    Receive,
     Send,
     Update,
     Use,
 )
 from neurovis_spec.language.expressions.emit_c import Made, Value
-from neurovis_spec.language.expressions.tree import Name, Tree, names
-from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, incoming_of, taken, taken_at
+from neurovis_spec.language.expressions.tree import Tree, names
+from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, incoming_of
 from neurovis_spec.runtime.c_code import Code, Form, Place, plus, state_name
+from neurovis_spec.runtime.c_connections import Forming, Sight, Some, taken, taken_at
 from neurovis_spec.runtime.c_plan import Plan
-from neurovis_spec.runtime.lags import Lags, lags_of
-from neurovis_spec.runtime.presynaptic import history_depth
 from neurovis_spec.runtime.signals import DelayClass, SharedSlots, SignalLayout
-from neurovis_spec.runtime.stages import End, ends_of, unfolded
+from neurovis_spec.runtime.stages import signal_of, target_of, unfolded
 from neurovis_spec.runtime.state import Mask
 
 _NONE: Mapping[str, Made] = {}
 _NO_TOTALS: Mapping[int, str] = {}
+_NO_ARRIVALS: Mapping[int, Arrivals] = {}
 _NO_CLOCK: Mapping[str, Value] = {}
 #: connections whose rule is written side by side in a loop: a compiler makes vectors of them
 _RULES_SIDE_BY_SIDE = 4
@@ -74,13 +77,17 @@ class StepCode:
         plan: Plan | None,
     ) -> None:
         self.network, self.code, self.form, self.layout, self.plan = network, code, form, layout, plan
-        self.depth, self.lags = history_depth(network), lags_of(network)
+        #: what formulas of synapses see before their targets are updated, and those of rules behind all
+        self.sight, self.behind = Sight(network, code, form), Sight(network, code, form, sent=True)
+        synapses = ((number, one) for number, one in enumerate(network.projections) if one.kind == SYNAPSE)
+        forming = Forming(self.sight, {number: signal_of(one) for number, one in synapses})
         #: what ports have beside what arrives, by their names
         self.own = {name: _own(network, name) for name in network.port_names}
         #: the names that are read when a population is updated
         self.read_at_update = [self._read_at_update(one.model.definition) for one in network.populations]
         self.arrivals = [
-            [Arrivals(network, one, code, form, self.layout) for one in of_population] for of_population in incoming
+            [Arrivals(network, one, code, form, self.layout, forming) for one in of_population]
+            for of_population in incoming
         ]
         #: connections that are fused, (m,)
         self.fuses = np.zeros(len(network.connections), dtype=np.bool_)
@@ -92,13 +99,19 @@ class StepCode:
             number
             for number in (one.projection for one in learn if one.phases == PHASES)
             if _common_delay(network.connections.delays[network.projections[number].members]) > 0
-            and not (self.lags is not None and self.lags.there[network.projections[number].members].any())
+            and self.all_send(network.projections[number].members)
         )
         for arrivals in chain(*self.arrivals):
             if arrivals.can_be_fused:
                 self.fuses[arrivals.connections] = True
                 arrivals.begin = self.count
                 self.count += len(arrivals.packed)
+
+    def all_send(self, connections: Indices) -> bool:
+        """Whether signals of all of these leave, and none has a continuous delay."""
+        lags = self.network.connections.lags
+        whole = lags is None or bool(np.isnan(lags[connections]).all())
+        return whole and bool((self.layout.offsets[connections] >= 0).all())
 
     def pack(self) -> None:
         """The weights of fused populations in the order in which they are read, where they do not lie so."""
@@ -137,7 +150,48 @@ class StepCode:
             for one, (port, own) in enumerate(zip(population.ports, self.arrivals[number], strict=True))
             if port.name in read
         }
-        self.each(len(population.members), arrivals, partial(self.neuron, number))
+        if any(own.kinds is not None for own in arrivals.values()):
+            self.hold_ahead(number)
+        ahead = {one: own for one, own in arrivals.items() if self.reads_within(population, own)}
+        with self.code.block("") if ahead else nullcontext():
+            gathered = {one: self.gathered(own, len(population.members)) for one, own in ahead.items()}
+
+            def updated(place: Place, totals: Mapping[int, str]) -> None:
+                self.neuron(number, place, {**totals, **{one: f"{name}[{place}]" for one, name in gathered.items()}})
+
+            others = {one: own for one, own in arrivals.items() if one not in ahead}
+            self.each(len(population.members), others, updated)
+
+    def reads_within(self, population: Population, arrivals: Arrivals) -> bool:
+        """Whether synapses that lead to a population read, before any of it is updated, what is there of others of its
+        neurons."""
+        network = self.network
+        for number in [] if arrivals.kinds is None else np.unique(arrivals.kinds[arrivals.kinds >= 0]).tolist():
+            undelayed = network.connections.delays[network.projections[number].members] == 0
+            for name, end in self.sight.ends[number].items():
+                places = end.places[undelayed] if end.past else end.places
+                if not name.startswith("post") and np.isin(network.neuron_of[places], population.members).any():
+                    return True
+        return False
+
+    def gathered(self, arrivals: Arrivals, count: int) -> str:
+        """What arrives at a port of all neurons of a population, before any of them is updated: the name of an
+        array."""
+        code, name = self.code, self.code.name("u")
+        code.line(f"{code.real} {name}[{count}];")
+
+        def gather(place: Place, totals: Mapping[int, str]) -> None:
+            code.line(f"{name}[{place}] = {code.text(arrivals.combined(place))};")
+
+        self.each(count, _NO_ARRIVALS, gather)
+        return name
+
+    def hold_ahead(self, number: int) -> None:
+        """The states of a population that are held, before synapses read them."""
+        model = self.network.populations[number].model.definition
+        if self.form.fixed and model.flows:
+            members = self.network.populations[number].members
+            self.each(len(members), _NO_ARRIVALS, lambda place, totals: self.hold_states(number, place))
 
     def each(
         self, count: int, arrivals: Mapping[int, Arrivals], body: Callable[[Place, Mapping[int, str]], None]
@@ -299,7 +353,7 @@ class StepCode:
         episode's end. Those of a model with derivatives stay as they are at the first step."""
         code, population = self.code, self.network.populations[number]
         made, stored = population.model.definition, self.states(population.model, place)
-        seen: Mapping[str, Value] = {**code.parameters(population.model, place), **self.clock(made), **ports}
+        seen: Mapping[str, Value] = {**code.parameters(population.model, place), **self.sight.clock(made), **ports}
         states = {one.name: stored[one.name] for one in made.state}
         self.hold_states(number, place)
 
@@ -338,15 +392,6 @@ class StepCode:
 
         known = population.activation.definition.functions
         return {name: partial(called, formula=tree) for name, tree in known.items()}
-
-    def clock(self, made: Definition) -> dict[str, Value]:
-        """``t`` and ``dt`` where they are in another unit than seconds."""
-        if made.per_second == 1.0:
-            return {}
-        code = self.code
-        code.value(Name("t"), {})  # ``tu`` reads td
-        code.head["tu"] = f"const {code.real} tu = td * {code.text(made.per_second)};"
-        return {"t": "tu", "dt": self.network.dt * made.per_second}
 
     def states(self, use: Use, place: Place) -> dict[str, str]:
         """The states of a definition in use, and its outputs, of one member."""
@@ -439,9 +484,9 @@ class StepCode:
             self.store_each(len(slots.sent), partial(self.sharing, slots))
         for one in self.layout.rings:
             self.fill(one)
-        if self.depth:
+        if depth := self.sight.depth:
             n, beside = len(self.network.neurons), self.network.outlet_count
-            row = f"(size_t)(k % {self.depth})*{n + beside}"
+            row = f"(size_t)(k % {depth})*{n + beside}"
             code.line(f"memcpy(history + {row}, activity, {n}*sizeof(activity[0]));")
             if beside:
                 code.line(f"memcpy(history + {row} + {n}, outlets, {beside}*sizeof(outlets[0]));")
@@ -479,6 +524,25 @@ class StepCode:
         return f"signals[{slot}{shift}]", taken_at(self.network, code, slots.sent, place)
 
     # ---- connections -------------------------------------------------------------------------------------------
+
+    def receive(self, operation: Receive) -> None:
+        """The states of synapses from old values; of connections that are left out they stay."""
+        code, number = self.code, operation.projection
+        projection = self.network.projections[number].during(operation.phases)
+        made, members = replace(projection.use.definition, gives=()), projection.members
+        changes = [tree for one in made.state for tree in (one.each_step, one.each_episode)]
+        read = unfolded(made.let, changes).names
+        self.hold_ahead(target_of(self.network, projection))
+
+        def received(place: Place, totals: Mapping[int, str]) -> None:
+            some = Some(number, np.arange(len(members)), place)
+            left_out = f"if (!gone[{code.at(members, place)}])" if self.form.gone else ""
+            with code.block(left_out) if left_out else nullcontext():
+                stored, seen = self.sight.states(some), self.sight.known(some, read)
+                new, _ = self.change(made, seen, stored, begins=self.form.first)
+                self.store([(stored[name], value) for name, value in new.items()])
+
+        self.each(len(members), _NO_ARRIVALS, received)
 
     def learn(self, operation: Learn) -> None:
         """The rule of a projection: in a loop several connections side by side, then one by one those that are left.
@@ -550,7 +614,7 @@ class StepCode:
                 code.line(f"if (still[{connection}])")
                 code.line("    continue;")
         rule = projection.use
-        seen = code.parameters(rule, place) | self.clock(rule.definition) | self.seen(projection, place)
+        seen = code.parameters(rule, place) | self.behind.clock(rule.definition) | self.seen(projection, place)
         stored = self.states(rule, place)
         if not rule.definition.moves_centre:
             stored["weight"] = f"weights[{connection}]"
@@ -576,67 +640,8 @@ class StepCode:
 
     def seen(self, projection: Projection, place: Place) -> dict[str, Value]:
         """What a rule may read besides its own: what there is at both ends, and the signals."""
-        delays, seen = self.network.connections.delays[projection.members], dict[str, Value]()
-        for name, end in ends_of(self.network, projection).items():
-            now = taken_at(self.network, self.code, end.places, place)
-            seen[name] = self.remembered(projection, end, delays, now, place) if end.past and self.depth else now
-        return seen
-
-    def remembered(self, projection: Projection, end: End, delays: IntArray, now: str, place: Place) -> Value:
-        """What was there d steps ago, 0 where that is lost; ``now`` is what is there now."""
-        code = self.code
-        own = delays if not isinstance(place, int) else delays[place : place + 1]
-        if not own.any():
-            return now
-        if self.lags is not None and self.lags.there[projection.members].any():
-            return self.behind_step(projection, end, self.lags.some(projection.members), place)
-        past = self.past(end, delays, own, place)
-        if not self.form.lost:
-            return past
-        lost = f"lost[{code.at(projection.members, place)}]"
-        return code.let("a", f"k - ({code.at(delays, place)}) < {lost} ? {code.text(0.0)} : {past}")
-
-    def behind_step(self, projection: Projection, end: End, lags: Lags, place: Place) -> Value:
-        """What was there as long ago as the delay is, of which some are continuous: between two steps."""
-        code, delays = self.code, self.network.connections.delays[projection.members]
-        whole, late = np.where(lags.there, lags.whole, delays), np.asarray(lags.part > 0)
-        next_ = code.let("a", self.remembered_at(projection, end, code.at(whole, place), place))
-        some = late[place : place + 1] if isinstance(place, int) else late
-        if not some.any():
-            return next_
-        one = code.let("a", self.remembered_at(projection, end, code.at(whole + late, place), place))
-        share = code.text(code.number(np.where(late, 1.0 - lags.part, 0.0), place))
-        between = f"{one} + {share}*({next_} - {one})"
-        return code.let("a", between if some.all() else f"{code.at(late.astype(np.int64), place)} ? {between} : {one}")
-
-    def remembered_at(self, projection: Projection, end: End, back: Place, place: Place) -> str:
-        """What was there so many steps back, 0 where that is lost; with a continuous delay what was taken at the first
-        step is what was before, too."""
-        assert self.lags is not None
-        code, network, members = self.code, self.network, projection.members
-        n, lags = len(network.neurons) + network.outlet_count, self.lags.some(members)
-        code.head["now"] = f"const int32_t now = (int32_t)(k % {self.depth});"
-        row = f"(now + {self.depth} - ({back})) % {self.depth}"
-        some = lags.there[place : place + 1] if isinstance(place, int) else lags.there
-        if some.any():
-            late = "" if some.all() else f"{code.at(lags.there.astype(np.int64), place)} && "
-            row = f"({late}fresh && k < {back} ? 0 : {row})"
-        past = f"history[(size_t)({row})*{n} + {code.at(end.places, place)}]"
-        lost = f"lost[{code.at(members, place)}]"
-        return f"k - ({back}) < {lost} ? {code.text(0.0)} : {past}" if self.form.lost else past
-
-    def past(self, end: End, delays: IntArray, own: IntArray, place: Place) -> str:
-        """a_j[t−d], from the history, whose rows have all activities and outlets."""
-        code, network = self.code, self.network
-        n = len(network.neurons) + network.outlet_count
-        source = code.at(end.places, place)
-        if (own == own[0]).all():
-            name, row = f"h{own[0]}", f"(size_t)((k + {self.depth - own[0]}) % {self.depth})*{n}"
-            code.head[name] = f"const {code.real} *const {name} = history + {row};"
-            return f"{name}[{source}]"
-        code.head["now"] = f"const int32_t now = (int32_t)(k % {self.depth});"
-        row = f"(now + {self.depth} - ({code.at(delays, place)})) % {self.depth}"
-        return f"history[(size_t)({row})*{n} + {source}]"
+        some = Some(projection.use.owner.number, np.arange(len(projection.members)), place)
+        return self.behind.at_ends(some, projection.read)
 
 
 class _Own(NamedTuple):
@@ -709,6 +714,11 @@ def _together(operation: ReadInputs | Gather, step: StepCode) -> None:
 @write.register
 def _update(operation: Update, step: StepCode) -> None:
     step.population(operation.population)
+
+
+@write.register
+def _receive(operation: Receive, step: StepCode) -> None:
+    step.receive(operation)
 
 
 @write.register
