@@ -111,6 +111,8 @@ def test_drawn_delays_are_rounded_and_draw_for_themselves() -> None:
     assert len(set(drawn.tolist())) > 2
     assert drawn.min() >= 1
     assert delays('delay: {seconds: "normal(9, 2)*dt"}') == drawn.tolist()
+    cells = [["normal(9, 2)"] * 2] * 3
+    assert delays(f"delay: {{matrix: {cells}}}") == drawn.tolist()
     network = compiled('pattern: all_to_all, weight: "normal(9, 2)", delay: "normal(9, 2)"')
     assert network.connections.delays.tolist() == drawn.tolist()
     assert np.rint(network.connections.weights.whole()).tolist() != drawn.tolist()

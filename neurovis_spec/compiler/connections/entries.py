@@ -40,7 +40,7 @@ from neurovis_spec.compiler.program import DRIVE, MODEL, SYNAPSE
 from neurovis_spec.compiler.values.arguments import Each, Settled, check_initials, settled_of
 from neurovis_spec.compiler.values.constants import Constants, Randomness, Value
 from neurovis_spec.compiler.values.draws import Stream
-from neurovis_spec.compiler.values.matrices import Grid, grid_of
+from neurovis_spec.compiler.values.matrices import Grid, draws_any, grid_of
 from neurovis_spec.diagnostics import Home, Span, Undeclared, shorten
 from neurovis_spec.language.expressions.tree import Name, draws, names, walk
 from neurovis_spec.language.grammar import Role
@@ -358,7 +358,7 @@ class EntryBuilder:
             self._go_by_ends(names(tree))
             values = self._values(written.value, shape, "delay", _DELAY)
         else:
-            grid = self._grid(written.value, "delay")
+            grid, drawn = self._grid(written.value, "delay"), draws_any(written.value)
             values = UNKNOWN if grid is UNKNOWN or shape is UNKNOWN else grid.values[shape.i, shape.j]
         if values is UNKNOWN or shape is UNKNOWN or self.sources is UNKNOWN or self.targets is UNKNOWN:
             return UNKNOWN

@@ -17,6 +17,7 @@ from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.language.expressions.functions import DRAWS
 from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
 from neurovis_spec.language.values import FileReference, Matrix, MatrixRows
 from neurovis_spec.language.yaml.source import NULL
@@ -37,6 +38,12 @@ class Grid(NamedTuple):
     def transposed(self) -> Grid:
         """Rows become columns."""
         return Grid(self.values.T, self.present.T, self.span)
+
+
+def draws_any(matrix: Matrix) -> bool:
+    """Whether a formula in any cell draws."""
+    cells = UNKNOWN if isinstance(matrix, FileReference) else cells_of(matrix.node, Findings(), "")
+    return cells is not UNKNOWN and any(f"{name}(" in text.replace(" ", "") for name in DRAWS for text in cells.texts)
 
 
 def grid_of(
