@@ -116,6 +116,39 @@ def test_the_reservoir_learns() -> None:
     assert error[-200:].mean() < 0.2 * np.abs(run["T"]).mean()
 
 
+def test_the_force_network_learns_its_sine() -> None:
+    network = nv.compile_text(example("force"))
+    run = network.run()
+    assert np.sqrt(np.mean(run["e"][3000:] ** 2)) < 0.02
+    assert np.std(run["z"][3000:]) > 0.6
+    simulation = network.simulator()
+    rates = []
+    for _ in range(50):
+        simulation.step()
+        rates.append(simulation.activity[:100].copy())
+    entry = network.network.connections.entries.index("R -> K")
+    made = simulation.state().weights[network.network.connections.entry.whole() == entry].reshape(100, 100)
+    np.testing.assert_allclose(np.linalg.inv(made), np.eye(100) + np.array(rates).T @ np.array(rates), atol=1e-9)
+
+
+def test_sangers_rule_finds_principal_components_in_their_order() -> None:
+    run = nv.compile_text(example("sanger")).run()
+    found = run.weights[-1].reshape(4, 4)[[0, 2]]
+    mixing = np.array([[1, 0.5, 0, 0.3], [0, 0.6, -0.6, 0.2], [0.1, 0, 0.1, -0.3]])
+    wanted = np.linalg.eigh(mixing.T @ mixing)[1][:, :1:-1].T
+    for own, one in zip(found, wanted, strict=True):
+        assert abs(own @ one) > 0.99
+        assert 0.95 < np.linalg.norm(own) < 1.05
+
+
+def test_the_map_orders_itself() -> None:
+    places = nv.compile_text(example("kohonen")).run(states=["all"])["places"]
+    order = np.sign(np.diff(places[-1]))
+    assert abs(order.sum()) == 11
+    assert np.sort(places[-1])[[0, -1]] == pytest.approx([0.1, 0.9], abs=0.08)
+    assert abs(np.sign(np.diff(places[0])).sum()) < 11
+
+
 def test_the_hopfield_network_mends_two_mistakes() -> None:
     assert nv.compile_text(example("hopfield")).run()["N"][-1].tolist() == [1, 1, 1, 1, -1, -1, -1, -1]
 
