@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from exported import exported
 
 import neurovis_spec as nv
 
@@ -94,3 +97,16 @@ def test_a_connection_that_does_not_learn_stays_as_it_is(backend: str) -> None:
     simulation.learning("K -> O", True)
     simulation.step()
     assert simulation.state().cells[fill]["a"][0] > before.cells[fill]["a"][0]
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("method", ["rk4", "semi_implicit"])
+def test_rules_flow_in_exported_c(method: str, tmp_path: Path) -> None:
+    events = "events: [{at: 20, learning: {K -> O: false}}, {at: 2.5 ms, learning: {K -> O: true}}]\n"
+    network = nv.compile_text(SPEC.replace("METHOD", method) + events)
+    recording = network.run(backend="reference")
+    controller = exported(network, tmp_path / "c")
+    for k in range(49):
+        controller.step()
+        np.testing.assert_array_equal(controller.activity, recording.activity[k])
+        np.testing.assert_array_equal(controller.weights, recording.weights[k + 1])

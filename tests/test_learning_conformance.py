@@ -8,11 +8,15 @@ import warnings
 import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
 from random_learning import learning_specs
 from random_specs import Spec
 
 import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.live.carry import carried
+from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.runtime import c_backend
 from neurovis_spec.runtime.backend import Backend
 from neurovis_spec.runtime.c_backend import CBackend
@@ -20,9 +24,16 @@ from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.numpy_backend import NumpyBackend
 from neurovis_spec.runtime.reference import ReferenceBackend
+from neurovis_spec.runtime.simulation import Simulation
 from neurovis_spec.runtime.state import State, initial_state
 
 STEPS = 9
+
+
+def compiled(spec: Spec) -> Network:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return nv.compile(spec).network
 
 
 def arrays(state: State) -> dict[str, FloatArray]:
@@ -33,9 +44,7 @@ def arrays(state: State) -> dict[str, FloatArray]:
 
 def follow(spec: Spec, backend: Backend) -> None:
     """Each step of a backend, begun in the reference's state, is that of the reference, with all events."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        network = nv.compile(spec).network
+    network = compiled(spec)
     plain, other, reader = ReferenceBackend().prepare(network), backend.prepare(network), InputReader(network)
     state, controls = initial_state(network), Controls(network)
     for k in range(STEPS):
@@ -65,3 +74,29 @@ def test_each_step_in_c_is_the_reference_bit_for_bit(spec: Spec, size: int) -> N
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(c_backend, "SMALL", size)
         follow(spec, CBackend())
+
+
+@settings(max_examples=10, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(spec=learning_specs(), cut=st.integers(0, STEPS - 1))
+def test_a_run_in_pieces_is_the_whole_one_and_an_edit_of_nothing_changes_nothing(
+    spec: Spec, cut: int, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    network, checkpoint = compiled(spec), tmp_path_factory.mktemp("pieces") / "state"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        whole, restored = Simulation(network, "numpy"), Simulation(network, "numpy")
+        plain, edited = (SimulatedSource(Simulation(network, "numpy")) for _ in range(2))
+        for k in range(STEPS):
+            if k == cut:
+                whole.save_state(checkpoint)
+                restored.restore(checkpoint)
+                edited = carried(edited, Simulation(network, "numpy"))
+            if k >= cut:
+                restored.step()
+            whole.step()
+            for one in (plain, edited):
+                one.advance()
+            np.testing.assert_array_equal(edited.seen().snapshot.weights, plain.seen().snapshot.weights)
+            np.testing.assert_array_equal(edited.seen().snapshot.activity, plain.seen().snapshot.activity)
+        for found, expected in zip(arrays(restored.state()).values(), arrays(whole.state()).values(), strict=True):
+            np.testing.assert_array_equal(found, expected)

@@ -279,7 +279,9 @@ connections: {N -> N: {weight: 0.3, pattern: all_to_all, port: inhibitory}}"""
         v, h = x[:2], x[2:]
         f = np.clip((v + 50) / 50, 0, 1)
         opened, limit = 1 / (1 + np.exp(-(v + 40) / 6)), 1 / (1 + np.exp((v + 45) / 4))
-        inward = 4.5 * opened * h * (50 - v) + 4.5 * (-62.5 - v) + 10 * 0.04 * (-10 - v) + 10 * 0.3 * f[::-1] * (-75 - v)
+        inward = (
+            4.5 * opened * h * (50 - v) + 4.5 * (-62.5 - v) + 10 * 0.04 * (-10 - v) + 10 * 0.3 * f[::-1] * (-75 - v)
+        )
         return 1e3 * np.concatenate((inward / 10, (limit - h) / (80 + 80 / np.cosh((v + 35) / 15))))
 
     expected = solved(flow, [-60.0, -50.0, 0.5, 0.5], 0.6, 3001)[:, :2]

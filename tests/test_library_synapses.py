@@ -114,7 +114,9 @@ connections:
     def flow(t: float, x: FloatArray) -> FloatArray:
         theta, r, speed = x[:16], x[16:32], x[32:]
         pull = weights * r[:, None] * np.sin(theta[:, None] - theta[None, :] - lags)
-        return np.concatenate((2 * np.pi * (1 + 0.05 * segment) + pull.sum(axis=0), speed, 20 * (5 * (most - r) - speed)))
+        return np.concatenate(
+            (2 * np.pi * (1 + 0.05 * segment) + pull.sum(axis=0), speed, 20 * (5 * (most - r) - speed))
+        )
 
     start = np.concatenate((0.2 * np.arange(8), np.sin(np.arange(8)), np.zeros(32)))
     expected = solved(flow, start, 10.0, 1001)[:, :16]
