@@ -12,7 +12,7 @@ from pathlib import Path
 
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Definition, is_activation
+from neurovis_spec.compiler.program import RULE, Definition, is_activation
 from neurovis_spec.language.expressions.emit_c import INEXACT
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.expressions.tree import Call, Tree, walk
@@ -21,7 +21,7 @@ from neurovis_spec.runtime.c_names import words
 from neurovis_spec.runtime.c_plan import STAGES
 from neurovis_spec.runtime.c_settable import ExportError
 from neurovis_spec.runtime.files import replacing
-from neurovis_spec.runtime.stages import Part, apart, parts_of
+from neurovis_spec.runtime.stages import Formulas, Part, apart, contacts_of, parts_of
 from neurovis_spec.runtime.state import State
 
 #: What gcc and clang are told, so that the bits are those of the backend c: no operation is joined to another, and no
@@ -121,13 +121,18 @@ def _calls(trees: Iterable[Tree | None]) -> int:
 def _calls_a_step(definition: Definition) -> int:
     """The functions of the library that a definition calls at a step."""
     given = (*definition.gives[:1], *definition.outputs)  # without what checks an activation
-    return _calls([*(tree for _, tree in definition.let), *(one.each_step for one in (*definition.state, *given))])
+    made = () if definition.kind.lasting else (one.each_step for one in given)
+    return _calls([*(tree for _, tree in definition.let), *definition.steps.values(), *made])
+
+
+def _trees_of(*made: Formulas) -> list[Tree]:
+    """All trees of some formulas."""
+    return [tree for formulas in made for _, tree in (*formulas.let, *formulas.trees)]
 
 
 def _calls_a_stage(part: Part) -> int:
     """The functions of the library that a neuron calls at a stage of the integration."""
-    made = (*(taken.formulas for taken in part.taken), part.derivatives, part.slopes)
-    trees = [tree for formulas in made for _, tree in (*formulas.let, *formulas.trees)]
+    trees = _trees_of(*(taken.formulas for taken in part.taken), part.derivatives, part.slopes)
     activations = sum(is_activation(node) for tree in trees for node in walk(tree))
     return _calls(trees) + activations * _calls_a_step(part.population.activation.definition)
 
@@ -139,9 +144,12 @@ def _integration(exported: Exported) -> tuple[int, list[str]]:
     if by is None:
         return 0, []
     parts, stages = parts_of(network, by), len(STAGES[by.method]) * by.substeps
+    joined = [(one, len(one.projection.members)) for one in contacts_of(network, by)]
     states = sum(len(part.flows) * len(part.population.members) for part in parts)
+    states += sum(len(one.flows) * count for one, count in joined)
     signals = sum(len(apart(port)[1]) for part in parts for port in part.ports)
     functions = stages * sum(_calls_a_stage(part) * len(part.population.members) for part in parts)
+    functions += stages * sum(_calls(_trees_of(one.derivatives, one.slopes)) * count for one, count in joined)
     how = f"{by.method}, {plural(by.substeps, 'substep')}" if by.substeps > 1 else by.method
     anew = f", and {plural(signals, 'signal')} made anew" if signals else ""
     kept = sum(len(member.begin) for member in exported.members if member.name == "work")
@@ -149,6 +157,13 @@ def _integration(exported: Exported) -> tuple[int, list[str]]:
     if kept:
         lines.append(f"- {plural(kept, 'number')} kept between stages, in the struct (`state.work`)")
     return functions, lines
+
+
+def _learning(network: Network, centres: bool) -> int:
+    """How many connections have a rule that changes their weights, or their centres."""
+    rules = (one for one in network.projections if one.kind == RULE)
+    changed = {number for one in rules if one.use.definition.moves_centre == centres for number in one.members.tolist()}
+    return len(changed)
 
 
 def _cost(exported: Exported) -> str:
@@ -160,9 +175,7 @@ def _cost(exported: Exported) -> str:
         if population.model.definition.reads_activation:
             each += _calls_a_step(population.activation.definition)
         functions += each * len(population.members)
-    learning = 0
     for projection in network.projections:
-        learning += len(projection.members)
         functions += _calls_a_step(projection.rule.definition) * len(projection.members)
     functions += _calls(entry.expression for entry in network.inputs)
     at_stages, stages = _integration(exported)
@@ -172,8 +185,11 @@ def _cost(exported: Exported) -> str:
         *stages,
         f"- {functions + at_stages} calls of functions such as exp and tanh",
     ]
-    if learning:
-        lines.append(f"- {learning} weights that learn")
+    weights, centres = (_learning(network, centres) for centres in (False, True))
+    if weights:
+        lines.append(f"- {weights} weights that learn")
+    if centres:
+        lines.append(f"- {centres} centres that learn")
     if drawn:
         lines.append(f"- {drawn} random numbers")
     return "\n".join(lines)
