@@ -96,6 +96,8 @@ def _flows(network: Network, places: IntArray) -> Iterator[tuple[object, ...]]:
     yield from (("noise", one.name, one.port, one.state) for one in network.noises if one.port != DRIVE)
     if network.connections.lags is not None:
         yield "lags", network.connections.lags
+    if network.connections.twins is not None:
+        yield "twins", network.connections.twins
     if (by := network.integration) is not None:
         yield "integrate", by.method, by.substeps
         if held := sorted(one.name for one in network.inputs if one.hold):

@@ -181,6 +181,21 @@ class Connections:
     def __len__(self) -> int:
         return len(self.sources)
 
+    def with_twins(self, some: IntArray) -> IntArray:
+        """Some connections, and the twins of those that have one, ascending where there are any."""
+        if self.twins is None or not len(some):
+            return some
+        twins = self.twins[some]
+        return np.union1d(some, twins[twins >= 0])
+
+    @property
+    def second(self) -> IntArray:
+        """The connections that follow their twins, with which they are drawn as one line named by these."""
+        if self.twins is None:
+            return np.zeros(0, dtype=np.int64)
+        twins = self.twins.whole()
+        return np.flatnonzero((twins >= 0) & (twins < np.arange(len(twins))))
+
     @property
     def each_route(self) -> tuple[Route, ...]:
         """The route of every entry."""

@@ -343,6 +343,11 @@ class ConnectionModel(Model):
     synapse: SynapseField | None = Field(
         None, description="What it brings to its port, in place of weight times what is sent: name, or {name: {…}}."
     )
+    symmetric: BoolField | None = Field(
+        None,
+        description="Whether each connection is followed by one back with the same numbers, drawn as one line with it "
+        "(default false).",
+    )
     plasticity: RulesField = Field(
         default=(), description="A rule: name, or {name: {parameter: value, signal: …}}; or several, in their order."
     )
@@ -355,8 +360,6 @@ class ConnectionModel(Model):
 
     @classmethod
     def _foreign(cls, name: str) -> tuple[str, str] | None:
-        if (later := not_yet(name, "symmetric")) is not None:
-            return later
         taken_by = [one.name for one in PATTERNS.values() if name in one.settings]
         if name in ("rate", "target", "learning_rate", "eta"):
             return f"'{name}' belongs to a rule, and stands with it", f"write plasticity: {{RULE: {{{name}: …}}}}"

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import compress
 from typing import cast
 
 import numpy as np
@@ -212,14 +213,19 @@ def problem_of(network: Network, memory: Layout | None = None) -> LayoutProblem:
     def named(indices: Iterable[int]) -> list[str]:
         return [names[i] for i in indices]
 
+    drawn = np.ones(len(connections), dtype=np.bool_)
+    drawn[connections.second] = False  # a symmetric pair is one line
     boxes = [(name, named(members)) for name, members in settings.boxes]
     boxes += [(group.box, named(group.indices)) for group in network.neurons.groups if group.box is not None]
-    edges = zip(
-        network.connection_names,
-        named(connections.sources.tolist()),
-        named(connections.targets.tolist()),
-        connections.delays.tolist(),
-        strict=True,
+    edges = compress(
+        zip(
+            network.connection_names,
+            named(connections.sources.tolist()),
+            named(connections.targets.tolist()),
+            connections.delays.tolist(),
+            strict=True,
+        ),
+        drawn.tolist(),
     )
     return NamedProblem(
         network=network.name,

@@ -99,9 +99,9 @@ class Controls:
             self.set(now, weights, values)
 
     def lesion(self, state: State, neurons: IntArray, connections: IntArray) -> None:
-        """Neurons and connections are silent from now on."""
+        """Neurons and connections, with their twins, are silent from now on."""
         state.conditions.lesioned_neurons[neurons] = True
-        state.conditions.lesioned_connections[connections] = True
+        state.conditions.lesioned_connections[self.network.connections.with_twins(connections)] = True
         self.restructure(state)
 
     def mend(self, state: State, neurons: IntArray, connections: IntArray) -> None:
@@ -109,7 +109,7 @@ class Controls:
         under way: it has lost that, and sent nothing meanwhile. A lesion that is mended before a step is none."""
         now = state.conditions
         now.lesioned_neurons[neurons] = False
-        now.lesioned_connections[connections] = False
+        now.lesioned_connections[self.network.connections.with_twins(connections)] = False
         before = now.structure
         self.restructure(state)
         lose(self.network, state, np.flatnonzero(before.gone & (before.since < state.k) & ~now.structure.gone))

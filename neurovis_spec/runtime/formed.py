@@ -77,7 +77,9 @@ class Forming:
         network, use, members, delays = self._network, of.projection.use, of.projection.members, of.delays
         unit, k = use.definition.per_second, state.k - 1
         known: dict[str, Given] = {**constants(network.dt * unit), "k": float(k), "t": k * network.dt * unit}
-        known |= {name: _as_set(network, Key(use.owner, name), values, state) for name, values in use.parameters.items()}
+        known |= {
+            name: _as_set(network, Key(use.owner, name), values, state) for name, values in use.parameters.items()
+        }
         known |= state.cells[use.owner]
         known["weight"] = weights[members]
         lost = k - delays < state.conditions.structure.lost[members]

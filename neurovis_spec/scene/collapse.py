@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, IntArray, integers, reals
+from neurovis_spec.arrays import FloatArray, IntArray, IntColumn, integers, reals
 from neurovis_spec.compiler.drawing.drawing_settings import (
     LayoutSettings,
     Mirror,
@@ -333,7 +333,21 @@ class _Gatherer:
             tuple(descriptions),
             tuple(learns),
             (*old.labels, *(None for _ in entries[len(old.labels) :])),
+            twins=self._twins(),
         )
+
+    def _twins(self) -> IntColumn | None:
+        """Which lines are there in both directions by symmetric pairs alone, so that each two of them are one."""
+        twins, count = self.whole.connections.twins, len(self.bundles)
+        if twins is None:
+            return None
+        result = np.full(count, -1, np.int64)
+        for place, own in enumerate(self.bundles):
+            back = np.sort(twins[np.array(own, np.int64)])
+            other = int(self.bundle[back[0]]) if back[0] >= 0 else -1
+            if other >= 0 and np.array_equal(back, self.bundles[other]):
+                result[place] = other
+        return integers(result) if (result >= 0).any() else None
 
     def _projections(self) -> tuple[Projection, ...]:
         """Rules whose signals and targets are neurons that are drawn: these are taught, and have an error."""

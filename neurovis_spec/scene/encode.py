@@ -197,10 +197,11 @@ def tooltips(network: Network, gains: Gains, activity: FloatArray, weights: Floa
     of_connections = []
     scaled = _gains_of(network, gains)
     lows, highs = weights.min(axis=0).tolist(), weights.max(axis=0).tolist()
+    twins = None if connections.twins is None else connections.twins.tolist()
     rows = zip(connections.delays.tolist(), connections.entry.tolist(), strict=True)
     for index, (delay, entry) in enumerate(rows):
         parts = [
-            network.connection_names[index].replace("->", "→")
+            network.connection_names[index].replace("->", "→" if twins is None or twins[index] < 0 else "↔")
             + (f": {called}" if (called := connections.labels[entry]) else ""),
             f"weight {_range(lows[index], highs[index])}",
             connections.learns[entry] or "",

@@ -108,11 +108,11 @@ def choose_gains(network: Network, settings: RenderSettings, run: Reached) -> Ga
     stated = [*_of_states(settings.show, run.shares, names), *_named(settings.activity, names)]
     activity = _chosen(groups, colours, stated, run.highest, run.lowest, ShownStates(network).called)
     signals = _shared([_full(run.signals[m]) for m in entries.members], least=True)
-    signal = _chosen(entries, signals, _named(settings.signal, names), run.signals)
+    signal = _chosen(entries, signals, _of_lines(settings.signal, names, network), run.signals)
     widths = _widths(entries, run.weights, network.changing)
-    thickness = _chosen(entries, widths, _named(settings.thickness, names), run.weights)
+    thickness = _chosen(entries, widths, _of_lines(settings.thickness, names, network), run.weights)
     changes = _shared([_middle(_known(run.changes[m])) for m in entries.members])
-    change = _chosen(entries, changes, _named(settings.change, names), run.changes)
+    change = _chosen(entries, changes, _of_lines(settings.change, names, network), run.changes)
     return Gains(
         activity=activity.gains,
         centre=activity.centres,
@@ -174,6 +174,15 @@ def _units(names: tuple[str, ...], numbers: IntArray) -> _Units:
 def _named(stated: Sequence[StatedGain], names: Names) -> list[StatedGain]:
     """The gains of the author in the words of the picture."""
     return [replace(one, name=names.reference(one.name)) for one in stated]
+
+
+def _of_lines(stated: Sequence[StatedGain], names: Names, network: Network) -> list[StatedGain]:
+    """The same of connections: what is said of one of a symmetric pair is said of the line that both are."""
+    paired = network.connections.with_twins
+    return [
+        one if one.members is None else replace(one, members=tuple(paired(np.array(one.members, np.int64)).tolist()))
+        for one in _named(stated, names)
+    ]
 
 
 def _of_states(shown: Sequence[ShownState], shares: FloatArray | None, names: Names) -> Iterator[StatedGain]:

@@ -341,7 +341,12 @@ def _in_units(network: Network, layout: Layout) -> tuple[FloatArray, list[FloatA
         (names[source], names[target])
         for source, target in zip(connections.sources.tolist(), connections.targets.tolist(), strict=True)
     ]
-    return positions, routes_of(network.connection_names, ends, layout)
+    routes = routes_of(network.connection_names, ends, layout)
+    second, twins = connections.second, connections.twins
+    if twins is not None:  # which run as their twins do
+        for index, twin in zip(second.tolist(), twins[second].tolist(), strict=True):
+            routes[index] = routes[twin][::-1]
+    return positions, routes
 
 
 def _rooms(network: Network, layout: Layout, scale: float = UNIT) -> dict[int, Rect]:

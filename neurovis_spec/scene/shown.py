@@ -66,6 +66,7 @@ def shown(network: Network, settings: RenderSettings, weights: FloatArray, lengt
         name, sources, targets = settings.path
         lines, focus, words = _paths(network, name, np.array(sources, np.int64), np.array(targets, np.int64))
         notes.append(words)
+    lines = _once(network, lines)
     if settings.min_weight is not None:
         few = lines & (weights < settings.min_weight)
         if few.any():
@@ -78,6 +79,16 @@ def shown(network: Network, settings: RenderSettings, weights: FloatArray, lengt
         why = "to keep the file below 5 MB" if settings.most is not None else "to keep the rest readable"
         notes += _thinned_out(network, before, lines, why)
     return Shown(lines, focus, tuple(notes))
+
+
+def _once(network: Network, lines: BoolArray) -> BoolArray:
+    """Symmetric pairs of which either is to be drawn, by the first of both."""
+    second, twins = network.connections.second, network.connections.twins
+    if twins is not None:
+        lines = lines.copy()
+        lines[twins[second]] |= lines[second]
+        lines[second] = False
+    return lines
 
 
 def check_path(network: Network, settings: RenderSettings) -> None:
@@ -95,7 +106,7 @@ def _most(network: Network, settings: RenderSettings) -> int | None:
         return settings.most
     return (
         None
-        if len(network.connections) <= _ALL
+        if len(network.connections) - len(network.connections.second) <= _ALL
         else min(max(_MOST_LINES, _LINES_EACH * len(network.neurons)), _MOST_OF_ALL)
     )
 

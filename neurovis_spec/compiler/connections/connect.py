@@ -167,5 +167,20 @@ def join(made: Connected, rules: Sequence[Indices], lagging: BoolArray | None = 
         routes=() if all(route == PLAIN_ROUTE for route in made.wired.routes) else tuple(made.wired.routes),
         undelayed=tuple(number for number, bundle in enumerate(bundles) if bundle.undelayed),
         lags=lags,
+        twins=_twins(bundles),
         synapses=synapses if any(synapses) else (),
     )
+
+
+def _twins(bundles: Sequence[Bundle]) -> IntColumn | None:
+    """The twin of every connection, −1 without; None where no entry is symmetric."""
+    if not any(one.symmetric for one in bundles):
+        return None
+    found: list[IntArray] = []
+    start = 0
+    for bundle in bundles:
+        size = len(bundle.sources)
+        numbers = np.arange(start, start + size, dtype=np.int64)
+        found.append(numbers.reshape(-1, 2)[:, ::-1].ravel() if bundle.symmetric else np.broadcast_to(-1, (size,)))
+        start += size
+    return integers(*found)

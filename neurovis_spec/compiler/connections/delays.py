@@ -42,6 +42,14 @@ class Delays(NamedTuple):
     exact: FloatArray | None = None
     timed: tuple[Timed, ...] = ()
 
+    def at(self, places: IntArray) -> Delays:
+        """Those of some connections, in this order."""
+        if self.exact is None:
+            return Delays(self.steps[places])
+        count = len(self.steps)
+        timed = (one._replace(places=_taken(one, places, count)) for one in self.timed)
+        return Delays(self.steps[places], self.exact[places], tuple(timed))
+
     def over(self, otherwise: Delays) -> Delays:
         """These, and others where none is given here."""
         missing = np.asarray(self.steps < 0)
@@ -56,6 +64,15 @@ class Delays(NamedTuple):
         one, other = (nothing if exact is None else exact for exact in (self.exact, otherwise.exact))
         rest = tuple(timed._replace(places=_some(timed, missing)) for timed in otherwise.timed)
         return Delays(steps, np.where(missing, other, one), (*self.timed, *rest))
+
+
+def _taken(timed: Timed, places: IntArray, count: int) -> IntArray | None:
+    """Where the connections of a time stand among those at some places."""
+    if timed.places is None:
+        return None
+    has = np.zeros(count, dtype=np.bool_)
+    has[timed.places] = True
+    return np.flatnonzero(has[places])
 
 
 def _some(timed: Timed, which: BoolArray) -> IntArray:

@@ -23,10 +23,11 @@ from neurovis_spec.compiler.connections.delays import DelayReader, Delays, Timed
 from neurovis_spec.compiler.connections.edges import EdgeReader, End
 from neurovis_spec.compiler.connections.ends import Ends, counted
 from neurovis_spec.compiler.connections.in_use import InUse, Joined, in_use
-from neurovis_spec.compiler.connections.patterns import all_to_all, empty_reason, pairs_of
+from neurovis_spec.compiler.connections.patterns import all_to_all, drawn_alone, empty_reason, pairs_of
 from neurovis_spec.compiler.connections.plasticity import Learning, rules_of
 from neurovis_spec.compiler.connections.routes import default_delays, route_of
 from neurovis_spec.compiler.connections.signals import ConnectionEnds, Place
+from neurovis_spec.compiler.connections.twins import both_ways, doubled, in_turn, one_of_each
 from neurovis_spec.compiler.connections.weight_scale import Scaled, check_scale, scaled
 from neurovis_spec.compiler.events.settable import Assembled, Distance, Part
 from neurovis_spec.compiler.limits import Limits, amount
@@ -36,7 +37,7 @@ from neurovis_spec.compiler.network import PLAIN_ROUTE, Route
 from neurovis_spec.compiler.neurons.groups import is_written
 from neurovis_spec.compiler.neurons.labels import check_length
 from neurovis_spec.compiler.neurons.populate import Census
-from neurovis_spec.compiler.program import DRIVE, MODEL, SYNAPSE
+from neurovis_spec.compiler.program import DRIVE, MODEL, SYNAPSE, Definition
 from neurovis_spec.compiler.values.arguments import Each, Settled, check_initials, settled_of
 from neurovis_spec.compiler.values.constants import Constants, Randomness, Value
 from neurovis_spec.compiler.values.draws import Stream
@@ -56,6 +57,15 @@ from neurovis_spec.likeness import suggest
 _SHAPING = frozenset({"matrix", "edges", "pattern", "centre", "rows", "self"})
 _WEIGHT, _DELAY = (formula_at(ConnectionModel, key) for key in ("weight", "delay"))
 _SETTING = formula_at(ConnectionModel, "synapse", "SYNAPSE", "SETTING")
+#: Keys that a symmetric entry cannot have, why, and what to do.
+_UNLIKE_TWINS = (
+    (
+        "plasticity",
+        "a rule at a symmetric entry would give the two connections of a pair different weights",
+        "write two entries, one each way, without 'symmetric'",
+    ),
+    ("scale", "the weights of a symmetric entry are not scaled together", "put the factor into the 'weight'"),
+)
 
 
 class Bundle(NamedTuple):
@@ -86,9 +96,31 @@ class Bundle(NamedTuple):
     undelayed: bool = False
     #: its delays, where any is in seconds
     timing: Delays | None = None
+    #: whether each connection is directly followed by its twin, which leads back
+    symmetric: bool = False
     synapse: Settled | None = None
     #: the rules and the synapse, with what they read of both ends
     uses: tuple[InUse, ...] = ()
+
+    def twinned(self) -> Bundle:
+        """The same with each connection directly followed by its twin, which has its numbers."""
+        count = len(self.sources)
+        each = np.repeat(np.arange(count, dtype=np.int64), 2)
+        synapse = self.synapse
+        if synapse is not None:
+            values = {name: array[each] for name, array in synapse.parameters.items()}
+            synapse = synapse._replace(parameters=values, parts=tuple(doubled(one, count) for one in synapse.parts))
+        return self._replace(
+            sources=in_turn(self.sources, self.targets),
+            targets=in_turn(self.targets, self.sources),
+            weights=self.weights[each],
+            centres=self.centres[each],
+            delays=self.delays[each],
+            parts=tuple(doubled(one, count) for one in self.parts),
+            timing=None if self.timing is None else self.timing.at(each),
+            synapse=synapse,
+            symmetric=True,
+        )
 
 
 class _Shape(NamedTuple):
@@ -102,6 +134,15 @@ class _Shape(NamedTuple):
     delays: Delays | None = None
     #: which of its weights follow parameters
     parts: tuple[Part, ...] = ()
+
+    def some(self, kept: IntArray) -> _Shape:
+        """Some of its pairs."""
+        weights = None if self.weights is None else self.weights[kept]
+        delays = None if self.delays is None else self.delays.at(kept)
+        place_of = np.full(len(self.i), -1, dtype=np.int64)
+        place_of[kept] = np.arange(len(kept))
+        parts = tuple(_moved_to(part, place_of[part.within(len(self.i))]) for part in self.parts)
+        return _Shape(self.i[kept], self.j[kept], weights, delays, parts)
 
 
 class EntryContext(NamedTuple):
@@ -137,7 +178,22 @@ class EntryBuilder:
     @cached_property
     def route(self) -> Route | Unknown:
         """What its connections take, and where they bring it."""
-        return route_of(self.body, self.sources, self.targets, self.context.census, self.constants)
+        return route_of(self.body, self._starts, self._aims, self.context.census, self.constants)
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether each connection is followed by its twin."""
+        return self.body.symmetric is not None and self.body.symmetric.value
+
+    @property
+    def _starts(self) -> Indices | Unknown:
+        """The neurons that connections may come from: of a symmetric entry those of both ends."""
+        return _of_both(self.sources, self.targets) if self.symmetric else self.sources
+
+    @property
+    def _aims(self) -> Indices | Unknown:
+        """The neurons that they may lead to."""
+        return _of_both(self.sources, self.targets) if self.symmetric else self.targets
 
     def _stream(self, purpose: str) -> Stream:
         return Stream(self.context.seed, purpose, self.context.scope.declares(self.name))
@@ -158,6 +214,8 @@ class EntryBuilder:
         with self.constants.following() as centre_cell_parts:
             centre = self._grid(body.centre, "centre") if isinstance(body.centre, (MatrixRows, FileReference)) else None
         shape = self._shape(centre)
+        if self.symmetric:
+            shape = self._once(shape)
         if shape is not UNKNOWN and findings.errors == errors_before_shape and not len(shape.i):
             self._report_empty()
         if findings.errors > errors_before_shape or (shape is not UNKNOWN and not self._fits(len(shape.i))):
@@ -184,19 +242,18 @@ class EntryBuilder:
         ):
             return UNKNOWN
         sources, targets = self.sources[shape.i], self.targets[shape.j]
-        models = self.context.census.models
         made = None if synapse is None else synapse.definition
-        unsaid = default_delays(sources, targets, route, models, made)
+        unsaid = self._default_delays(sources, targets, route, made)
         delays = _delays(shape, written, unsaid)
+        models = self.context.census.models
         into_flow = models.into_flow(targets, route) | (made is not None and bool(made.flows))
+        if self.symmetric:
+            into_flow = into_flow | models.into_flow(sources, route)
         check_below_step(delays, into_flow, self.constants)
         if not len(shape.i):  # without connections there is nothing that they would do
             rules, synapse = (), None
-        uses = self._uses(rules, synapse, Joined(sources, targets, self.context.census))
-        if uses is UNKNOWN:
-            return UNKNOWN
         learns = {name: any(one.rule.given.name == name for one in rules) for name in ("weight", "centre")}
-        return Bundle(
+        bundle = Bundle(
             name=self.context.scope.called(self.name),
             key=self.key.span,
             sources=sources,
@@ -213,7 +270,6 @@ class EntryBuilder:
                 *(part._replace(field="initial_weights" if learns["weight"] else "weights") for part in weight_parts),
                 *(part._replace(field="initial_centres" if learns["centre"] else "centres") for part in centre_parts),
                 *bound_parts,
-                *(part for use in uses for part in use.parts),
             ),
             label=None if body.label is None else body.label.value,
             empty=None if len(shape.i) else (self.sources, self.targets),
@@ -221,8 +277,59 @@ class EntryBuilder:
             undelayed=written is None and not np.all(unsaid),
             timing=None if delays.exact is None else delays,
             synapse=synapse,
-            uses=uses,
         )
+        return self._in_use(bundle.twinned() if self.symmetric else bundle)
+
+    def _default_delays(
+        self, sources: Indices, targets: Indices, route: Route, synapse: Definition | None
+    ) -> int | Indices:
+        """The delays of connections that name none; twins have the same, the longer one of both."""
+        models = self.context.census.models
+        there = default_delays(sources, targets, route, models, synapse)
+        if not self.symmetric:
+            return there
+        longer = np.maximum(there, default_delays(targets, sources, route, models, synapse))
+        return narrow(np.broadcast_to(longer, sources.shape))
+
+    def _in_use(self, bundle: Bundle) -> Bundle | Unknown:
+        """A bundle with its rules and its synapse in use, and what of these follows parameters."""
+        uses = self._uses(bundle.rules, bundle.synapse, Joined(bundle.sources, bundle.targets, self.context.census))
+        if uses is UNKNOWN:
+            return UNKNOWN
+        parts = *bundle.parts, *(part for use in uses for part in use.parts)
+        return bundle._replace(uses=uses, parts=parts)
+
+    def _once(self, shape: _Shape | Unknown) -> _Shape | Unknown:
+        """The pairs of a symmetric entry, each once and none of a neuron with itself. A finding for those that are
+        written both ways, and for what has different numbers there."""
+        for key, why, hint in _UNLIKE_TWINS:
+            entry = self.body.source.entry(key)
+            if entry is not None:
+                self.constants.findings.error("conflicting-keys", entry.key.span, why, hint)
+        if shape is UNKNOWN or self.sources is UNKNOWN or self.targets is UNKNOWN:
+            return UNKNOWN
+        made = self.body.matrix is None and self.body.edges is None
+        if made and shape.weights is None and np.array_equal(self.sources, self.targets):
+            pattern = self.body.pattern
+            return _Shape(*one_of_each(shape.i, shape.j, pattern is not None and drawn_alone(pattern)))
+        sources, targets = self.sources[shape.i], self.targets[shape.j]
+        kept = np.flatnonzero(sources != targets)
+        both = both_ways(sources[kept], targets[kept])
+        if both is None:
+            return shape if len(kept) == len(shape.i) else shape.some(kept)
+        called = self.context.census.neurons.names
+        first = kept[both.first]
+        ends = called[sources[first]], called[targets[first]]
+        many = f" ({both.count:,} of {len(kept):,} connections do)" if both.count > 2 else ""
+        message = f"symmetric: true, and both '{' -> '.join(ends)}' and '{' -> '.join(ends[::-1])}' are there{many}"
+        hint = "leave 'symmetric' out, or give one connection of each pair"
+        self.constants.findings.error("both-ways", self._symmetric_span, message, hint)
+        return UNKNOWN
+
+    @property
+    def _symmetric_span(self) -> Span:
+        entry = self.body.source.entry("symmetric")
+        return self.key.span if entry is None else entry.key.span
 
     def _report_empty(self) -> None:
         """Say that there are no connections: an error, but for those that are drawn or counted, as validity depends on
@@ -237,6 +344,7 @@ class EntryBuilder:
     def _fits(self, count: int) -> bool:
         """Whether there is room for so many connections; a finding where there is not."""
         room, limit = self.context.room, self.context.limits.connections
+        count *= 1 + self.symmetric
         if count <= room:
             return True
         message = f"this makes {amount(limit - room + count)} connections; the limit is {limit:,}"
@@ -508,9 +616,10 @@ class EntryBuilder:
     def _measures_distance(self) -> bool | Unknown:
         """Whether any of the targets combines what arrives by distance; UNKNOWN where it may, since what it says of
         that is invalid."""
-        if self.targets is UNKNOWN or self.route is UNKNOWN:
+        aims = self._aims
+        if aims is UNKNOWN or self.route is UNKNOWN:
             return UNKNOWN
-        ports, groups = [name for name, _ in self.route.ports], self.context.census.groups_of(self.targets)
+        ports, groups = [name for name, _ in self.route.ports], self.context.census.groups_of(aims)
         declared = (port for one in groups for port in one.kind.model.definition.ports)
         at_drive = [one for one in groups if DRIVE in ports]
         if any(port.combine == "distance" and port.name in ports for port in declared):
@@ -620,6 +729,11 @@ class EntryBuilder:
                 findings.error("duplicate-name", span, message, "rename it in the rule")
         known = tuple(one for one in found if one is not UNKNOWN)
         return known if len(known) == len(found) else UNKNOWN
+
+
+def _of_both(one: Indices | Unknown, other: Indices | Unknown) -> Indices | Unknown:
+    """The neurons of both ends."""
+    return UNKNOWN if one is UNKNOWN or other is UNKNOWN else np.union1d(one, other)
 
 
 def _delays(shape: _Shape, written: Delays | Unknown | None, unsaid: int | Indices) -> Delays:

@@ -72,12 +72,13 @@ class _Misfit(NamedTuple):
 class _Recipe(NamedTuple):
     """How a pattern is made: at ``least`` how many pairs it has of n sources and m targets (some of which may connect a
     neuron to itself), the pairs themselves, whether its settings fit the ends, and whether these are ``equal`` in
-    size."""
+    size, and whether each pair is drawn by itself, so that of a symmetric entry one direction counts alone."""
 
     least: Callable[[int, int, Values], int]
     make: Callable[[Ends, Values, Stream], Pairs]
     misfit: Callable[[Ends, Values], _Misfit | None] = lambda ends, values: None
     equal: bool = False
+    alone: bool = False
 
 
 def _least_random(n: int, m: int, values: Values) -> int:
@@ -120,16 +121,20 @@ RECIPES: Final[Mapping[str, _Recipe]] = {
     "one_to_one": _Recipe(lambda n, m, values: n, lambda ends, values, stream: one_to_one(ends), equal=True),
     "chain": _Recipe(lambda n, m, values: n, lambda ends, values, stream: chain(ends), equal=True),
     "ring": _Recipe(lambda n, m, values: n, lambda ends, values, stream: ring(ends), equal=True),
-    "random": _Recipe(_least_random, lambda ends, values, stream: random(ends, values["probability"], stream)),
+    "random": _Recipe(
+        _least_random, lambda ends, values, stream: random(ends, values["probability"], stream), alone=True
+    ),
     "fixed_indegree": _Recipe(
         lambda n, m, values: int(values["count"]) * m,
         lambda ends, values, stream: fixed_indegree(ends, int(values["count"]), stream),
         lambda ends, values: _count_misfit(ends.reversed(), values, "target", "source"),
+        alone=True,
     ),
     "fixed_outdegree": _Recipe(
         lambda n, m, values: int(values["count"]) * n,
         lambda ends, values, stream: fixed_outdegree(ends, int(values["count"]), stream),
         lambda ends, values: _count_misfit(ends, values, "source", "target"),
+        alone=True,
     ),
     "nearest": _Recipe(
         lambda n, m, values: int(values["count"]) * n,
@@ -141,6 +146,7 @@ RECIPES: Final[Mapping[str, _Recipe]] = {
         lambda ends, values, stream: small_world(ends, int(values["degree"]), values["rewire"], stream),
         _degree_misfit,
         equal=True,
+        alone=True,
     ),
     "band": _Recipe(
         lambda n, m, values: max(0, in_band(n, m, _width(n, m, values)) - min(n, m)),
@@ -196,6 +202,12 @@ def pairs_of(
     if values.get("count") == 0:
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     return recipe.make(ends, values, stream) if fits(recipe.least(n, m, values)) else UNKNOWN
+
+
+def drawn_alone(choice: Choice) -> bool:
+    """Whether a pattern draws each of its pairs by itself."""
+    recipe = RECIPES.get(choice.name.value)
+    return recipe is not None and recipe.alone
 
 
 def empty_reason(choice: Choice, constants: Constants) -> tuple[str, str] | None:

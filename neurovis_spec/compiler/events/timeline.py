@@ -84,16 +84,16 @@ def _change(network: Network, step: int, starting: dict[int, Event], ending: lis
             order, places = _clamp_order(index, index_in_event), network.clamp_places(what)
             clamps.append(Clamp(order, event=index, neurons=places, value=_formula(formula, constants)))
         learning += event.learning
-    events = starting.values()
+    events, with_twins = starting.values(), network.connections.with_twins
     return Change(
         step,
         parameters=tuple(values.items()),
         clamps=tuple(clamps),
         released=tuple(ending),
         lesioned_neurons=_union([neurons for event in events for neurons in event.lesioned_neurons]),
-        lesioned_connections=_union([members for event in events for members in event.lesioned_connections]),
+        lesioned_connections=with_twins(_union([some for event in events for some in event.lesioned_connections])),
         mended_neurons=_union([neurons for event in events for neurons in event.mended_neurons]),
-        mended_connections=_union([members for event in events for members in event.mended_connections]),
+        mended_connections=with_twins(_union([some for event in events for some in event.mended_connections])),
         learning=tuple(learning),
     )
 
