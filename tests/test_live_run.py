@@ -209,7 +209,7 @@ def test_a_look_is_the_picture_of_its_step(driven: Driven) -> None:
         assert np.abs(look.lines / LEVELS - wanted.lines).max() <= 0.5 / LEVELS
         assert np.abs(look.widths / FINENESS - wanted.widths).max() <= 0.5 / FINENESS
         assert np.abs(look.glows / FINENESS - wanted.glows).max() <= 0.5 / FINENESS
-        assert (look.kinds[: len(wanted.bars)] & BAR > 0).tolist() == wanted.bars.tolist()
+        assert (look.kinds[: len(wanted.ends)] & BAR > 0).tolist() == (wanted.ends < 0).tolist()
         faint = (look.kinds & FAINT > 0).tolist()
         gone = step >= 30
         assert faint == [False, gone, False, False, gone, False, False, gone, False, False]

@@ -69,7 +69,7 @@ def test_a_bar_means_less_than_nothing() -> None:
 def test_a_bar_is_flat_where_an_arrow_is_pointed(length: float, width: float) -> None:
     """Near its tip a bar is wider than its line by a pixel and more, and an arrow next to nothing."""
     head = Arrowhead((100.0, 50.0), (0.0, 1.0), length, 0.0, "#000000")
-    arrow, bar = (np.array(ended(head, width, "#123456", bar).points) for bar in (False, True))
+    arrow, bar = (np.array(ended(head, width, "#123456", end).points) for end in (1, -1))
     for corners in (arrow, bar):
         assert corners[:, 1].max() == pytest.approx(50)
     at_tip = [corners[np.isclose(corners[:, 1], 50)][:, 0] for corners in (arrow, bar)]

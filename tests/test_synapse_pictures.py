@@ -8,7 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scenes import scene_of
+from neurovis_renderers.animated_svg import AnimatedSvgRenderer
+from neurovis_renderers.canvas import paint
+from neurovis_renderers.moving import Moving, Painter
+from scenes import film_of, scene_of
 from small_specs import compiled
 
 import neurovis_spec as nv
@@ -16,16 +19,19 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.simulated import SimulatedSource
-from neurovis_spec.live.view import LEVELS, view_of
+from neurovis_spec.live.view import BAR, LEVELS, NEGATIVE, view_of
 from neurovis_spec.runtime.columns import Keep, columns_of
 from neurovis_spec.runtime.formats import load
 from neurovis_spec.runtime.formed import signals_of
 from neurovis_spec.runtime.recording import Recording, Snapshot
 from neurovis_spec.runtime.simulation import Simulation
+from neurovis_spec.scene.collapse import gathered
 from neurovis_spec.scene.encode import looks
+from neurovis_spec.scene.ends import effects_of, ends_of
 from neurovis_spec.scene.fading import snapshots_of
+from neurovis_spec.scene.film import still
 from neurovis_spec.scene.look import Look
-from neurovis_spec.scene.model import Text
+from neurovis_spec.scene.model import Arrowhead, Scene, Text
 from neurovis_spec.scene.reached import largest_signals
 from neurovis_spec.scene.shots import snapshots_of_run
 from neurovis_spec.scene.signals import Signals
@@ -194,3 +200,87 @@ def test_a_state_of_a_rule_is_not_called_signal_where_a_synapse_gives_one() -> N
     with pytest.raises(nv.SpecError, match="the rule 'odd' has a state 'signal', which the synapse gives"):
         compiled(TEXT.replace("{hebbian: {rate: 0.1}}", "odd") + rule)
     assert compiled(TEXT.replace("synapse: gap, plasticity: {hebbian: {rate: 0.1}}", "plasticity: odd") + rule)
+
+
+#: an arrow, a bar, none by a sign; by weights alone a bar and an arrow
+SIGNS = """time: {dt: 0.1, steps: 10}
+models: {cell: {parameters: {rest: -60}, state: {v: {derivative: drive - v}}, activity: v}}
+synapses:
+  gap: {signal: weight*(pre.v - post.v), sign: 0}
+  graded: {parameters: {E: 0}, signal: weight*pre.v*(E - post.v), sign: E - post.rest}
+  turning: {signal: weight*pre.v, sign: 0.5 - weight}
+neurons: {A: {model: cell}, B: {count: 2, model: {cell: {rest: [-60, 10]}}}, C: {model: cell}}
+connections:
+  - A -> B: {synapse: graded}
+  - B1 -> C: {weight: -1, synapse: gap}
+  - A -> C: -2
+  - B2 -> C: 3
+  - C -> A: {weight: 0.2, synapse: turning, plasticity: {hebbian: {rate: 0}}}
+  - C -> B1: {weight: 0.5, synapse: turning}
+"""
+WANTED = {"A -> B1": 1, "A -> B2": -1, "B1 -> C": 0, "A -> C": -1, "B2 -> C": 1, "C -> A": 1, "C -> B1": 0}
+
+
+def test_lines_end_as_the_sign_of_their_synapse_says() -> None:
+    network = compiled(SIGNS)
+    weights = network.network.connections.weights.whole()
+    assert (
+        dict(zip(network.network.connection_names, ends_of(network.network, weights).tolist(), strict=True)) == WANTED
+    )
+    later = np.stack([weights, np.full(7, 0.75)])
+    assert ends_of(network.network, later)[1].tolist() == [1, -1, 0, 1, 1, -1, -1]
+    assert effects_of(network.network, weights).tolist() == [1, -1, 1, -2, 3, 0.2, 0.5]
+
+
+def heads(scene: Scene) -> dict[str, Arrowhead]:
+    found = ((group, shape) for group in scene.groups for shape in group.shapes if isinstance(shape, Arrowhead))
+    return {group.data["connection"]: shape for group, shape in found if "connection" in group.data}
+
+
+@pytest.mark.parametrize("suffix", [".svg", ".png"])
+def test_stills_films_glances_and_legends_show_ends(suffix: str, tmp_path: Path) -> None:
+    network = compiled(SIGNS)
+    made = network.run()
+    kinds = {1: "arrow", 0: "none", -1: "bar"}
+    scene = scene_of(network, at(network, made, 3))
+    assert {name: shape.kind for name, shape in heads(scene).items()} == {
+        one: kinds[end] for one, end in WANTED.items()
+    }
+    plain = heads(scene)["B1 -> C"]
+    assert plain.half_width == plain.width / 2
+    assert {shape.text for shape in scene.shapes() if isinstance(shape, Text)} >= {"excites", "inhibits", "neither"}
+    themed = compiled(SIGNS + "render: {theme: {ends: arrows}}\n")
+    assert {shape.kind for shape in heads(scene_of(themed, at(themed, made, 3))).values()} == {"arrow"}
+    view = view_of(network, network.gains)
+    glance = view.glance(RecordedSource(network.network, made).seen())
+    in_page = [(bool(kind & BAR), bool(kind & NEGATIVE)) for kind in glance.kinds[:7].tolist()]
+    of_ends = {1: (False, False), 0: (True, False), -1: (True, True)}
+    assert in_page == [of_ends[end] for end in WANTED.values()]
+    network.render(tmp_path / f"a{suffix}", recording=made, view=["network", "matrix"])
+    assert (tmp_path / f"a{suffix}").stat().st_size > 1000
+
+
+def test_glyphs_end_as_what_they_hold_does() -> None:
+    drawn = gathered(compiled(SIGNS).network, [("B", (1, 2))])
+    found = drawn.ends(drawn.whole.connections.weights.whole()).tolist()
+    ends = dict(zip(drawn.network.connection_names, found, strict=True))
+    assert ends == {"A -> B": 1, "B -> C": 1, "A -> C": -1, "C -> A": 1, "C -> B": 0}
+
+
+def test_a_line_that_loses_its_end_is_drawn_so_in_films() -> None:
+    """From a bar to nothing to an arrow, as its weight changes: as a raster, and as an SVG that is animated."""
+    rule = "rules: {growing: {weight: {each_step: weight - 0.25}}}\n"
+    text = (
+        SIGNS.partition("connections:")[0]
+        + "connections: {C -> A: {weight: 1, synapse: turning, plasticity: growing}}\n"
+    )
+    network = compiled(text.replace("0.5 - weight", "'clip(weight, 0.4, 0.6) - 0.5'") + rule)
+    made = film_of(network, list(snapshots_of(network.network, network.run(), range(5))))
+    assert made.line_ends[:, 0].tolist() == [1, 1, 0, -1, -1]
+    text = AnimatedSvgRenderer().animate(made, ".svg").decode()
+    assert 'class="none" display="none"' in text
+    assert ".nil>.both>.none{display:inline}" in text
+    painter = Painter(Moving(made))
+    for frame in range(5):
+        alone = paint(still(made, frame))
+        assert np.abs(painter.paint(frame).astype(int) - alone.astype(int)).max() <= 2

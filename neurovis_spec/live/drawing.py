@@ -43,6 +43,8 @@ from neurovis_spec.scene.lesions import FAINT
 from neurovis_spec.scene.matrix import Order
 from neurovis_spec.scene.plan import Plan, rerouted
 
+#: How a line ends, as the page has it.
+ENDS = {"arrow": 1, "none": 0, "bar": -1}
 #: A line: its points one after the other, the tip of its head, and the direction of this.
 Run = tuple[list[float], list[float], list[float]]
 
@@ -105,7 +107,7 @@ def _shape(shape: Shape) -> dict[str, object]:
                 "length": _short(shape.length),
                 "half": _short(shape.half_width),
             }
-            return {**what, **more, "bar": shape.kind == "bar", "width": shape.width}
+            return {**what, **more, "end": ENDS[shape.kind], "width": shape.width}
         case Rectangle():
             what = {"kind": "box", "at": _points([shape.corner]), "size": _points([(shape.width, shape.height)])}
             more = {"radius": _short(shape.radius), "fill": shape.fill, "stroke": shape.stroke}

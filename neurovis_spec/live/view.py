@@ -40,8 +40,8 @@ LEVELS = 127
 _NO_LEVEL = -LEVELS - 1
 #: Widths are counted in these parts of a user unit, up to what 16 bits hold.
 FINENESS, _WIDEST = 16, (1 << 16) - 1
-#: Bits of a kind: a line that ends in a bar, what is lesioned, a connection whose weight is negative, a clamped neuron,
-#: a neuron whose activity is no finite number.
+#: Bits of a kind: a line that ends in no arrow, what is lesioned, a connection that inhibits, as its synapse or its
+#: negative weight says, a clamped neuron, a neuron whose activity is no finite number.
 BAR, FAINT, NEGATIVE, CLAMPED, UNDEFINED = 1, 2, 4, 4, 8
 #: The higher bits of the kind of a line hold the size of its weight, from 0 to SHARES, the largest of its scale.
 SHARES, _SHARE = 31, 8
@@ -50,8 +50,9 @@ SHARES, _SHARE = 31, 8
 @dataclass(frozen=True, slots=True, eq=False)
 class Glance:
     """What a step looks like: colour values of discs (n,) and lines (m,); widths and glow widths (m,); and ``kinds``
-    (m + n,): of each connection, then of each neuron, BAR where its line ends in a bar, FAINT where it is lesioned,
-    of a line NEGATIVE where its weight is, and in the higher bits how large it is; of a neuron CLAMPED where it is, and
+    (m + n,): of each connection, then of each neuron, BAR where its line ends in a bar, or, where it is not NEGATIVE,
+    in nothing, FAINT where it is lesioned, of a line NEGATIVE where its weight is, or its synapse says so, and in the
+    higher bits how large the weight is; of a neuron CLAMPED where it is, and
     UNDEFINED where its activity is no finite number. ``pose`` is that of the body, no numbers where there is none."""
 
     step: int
@@ -86,11 +87,12 @@ class View:
         """What a step looks like."""
         whole, drawn = seen.snapshot, self.drawn
         snapshot = drawn.snapshot(whole)
-        shown = looks(drawn.network, snapshot, self.gains, self.plan.frame.widest, drawn.signals(whole))
+        ends = drawn.ends(whole.weights)
+        shown = looks(drawn.network, snapshot, self.gains, self.plan.frame.widest, drawn.signals(whole), ends)
         words = self.plan.caption_shape(caption(drawn.whole, whole.step, whole.activity))
         neurons, lines = self.lesioned(seen)
-        bars = shown.bars & (self.plan.theme.ends == "signs")
-        of_lines = bars * BAR + lines * FAINT + shown.bars * NEGATIVE + self._shares(snapshot.weights) * _SHARE
+        headless = self.plan.theme_ends(ends) <= 0  # a bar, or nothing, which is a bar of what is not negative
+        of_lines = headless * BAR + lines * FAINT + (ends < 0) * NEGATIVE + self._shares(snapshot.weights) * _SHARE
         clamped, undefined = self._all(seen.clamped), ~np.isfinite(snapshot.told)
         of_neurons = neurons * FAINT + clamped * CLAMPED + undefined * UNDEFINED
         return Glance(

@@ -28,6 +28,7 @@ from neurovis_spec.compiler.events.settable import Settable
 from neurovis_spec.compiler.network import Connections, Group, Instance, Network, Neurons
 from neurovis_spec.compiler.program import RULE, Projection
 from neurovis_spec.scene import texts
+from neurovis_spec.scene.ends import EndArray, ends_of
 from neurovis_spec.scene.lesions import lesions_of
 from neurovis_spec.scene.reached import Reached, largest_signals, reached, reached_by
 from neurovis_spec.scene.shown_states import ShownStates
@@ -113,6 +114,17 @@ class Gathered:
         with np.errstate(over="ignore", invalid="ignore"):
             total = self.total(sent.value)
         return Signal(total, np.ones_like(total))
+
+    def ends(self, weights: FloatArray) -> EndArray:
+        """How the lines that are drawn end where the weights of the whole are these: of what is added up as its sum
+        does, in which each counts by how it ends."""
+        own = ends_of(self.whole, weights)
+        if not self.any:
+            return own
+        with np.errstate(over="ignore", invalid="ignore"):
+            negative = self.total(own.astype(np.float64) * np.abs(weights)) < 0
+        some = self.total(np.abs(own).astype(np.float64)) > 0
+        return np.where(some, np.where(negative, np.int8(-1), np.int8(1)), np.int8(0))
 
     @cached_property
     def _signals(self) -> Signals:

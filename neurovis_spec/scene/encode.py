@@ -17,6 +17,7 @@ import numpy.typing as npt
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.scene import encoding, texts
+from neurovis_spec.scene.ends import EndArray, ends_of
 from neurovis_spec.scene.fading import seconds_of
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.lesions import FAINT
@@ -43,19 +44,26 @@ _QUARTER = 0.5522847498
 
 @dataclass(frozen=True, slots=True)
 class Looks:
-    """Eqs. 2–5 at one step: colour values (n,) and (m,) in −1…1, widths and glow widths (m,) in user units; and which
-    lines end in a bar, for their weight is negative."""
+    """Eqs. 2–5 at one step: colour values (n,) and (m,) in −1…1, widths and glow widths (m,) in user units; and how
+    lines end (``scene/ends.py``)."""
 
     discs: FloatArray
     lines: FloatArray
     widths: FloatArray
     glows: FloatArray
-    bars: npt.NDArray[np.bool_]
+    ends: EndArray
 
 
-def looks(network: Network, snapshot: Snapshot, gains: Gains, widest: float, signals: Signal | None = None) -> Looks:
-    """What a step looks like, with lines of at most this width; ``signals`` are what is sent along each, by default
-    what the network sends."""
+def looks(
+    network: Network,
+    snapshot: Snapshot,
+    gains: Gains,
+    widest: float,
+    signals: Signal | None = None,
+    ends: EndArray | None = None,
+) -> Looks:
+    """What a step looks like, with lines of at most this width; ``signals`` are what is sent along each, and ``ends``
+    how they end, by default what the network sends, and as its connections do."""
     widths = encoding.line_width(snapshot.weights, gains.thickness, widest)
     changes = encoding.glow(snapshot.weights, snapshot.previous_weights, gains.change)
     seen = snapshot.activity if snapshot.seen is None else snapshot.seen
@@ -69,7 +77,7 @@ def looks(network: Network, snapshot: Snapshot, gains: Gains, widest: float, sig
         lines=lines,
         widths=widths,
         glows=encoding.glow_width(widths, changes),
-        bars=snapshot.weights < 0,
+        ends=ends_of(network, snapshot.weights) if ends is None else ends,
     )
 
 
@@ -144,14 +152,14 @@ def _neurons(planned: Plan, seen: Looks, titles: list[str]) -> list[Group]:
 def _connections(planned: Plan, seen: Looks, glowing: npt.NDArray[np.bool_], titles: list[str]) -> list[Group]:
     strokes = colours(planned.theme, seen.lines)
     widths, glows = seen.widths.tolist(), seen.glows.tolist()
-    bars = (seen.bars & (planned.theme.ends == "signs")).tolist()
+    ends = planned.theme_ends(seen.ends).tolist()
     attributes = data_attributes(planned.network)
     for index, count in planned.counts.items():
         attributes[index]["size"] = str(count)
     groups = []
     for index in planned.order:
         line, width = planned.lines[index], widths[index]
-        head = ended(line.end, width, strokes[index], bars[index])
+        head = ended(line.end, width, strokes[index], ends[index])
         shapes: tuple[Shape, ...] = (Spline(line.points, strokes[index], width), head)
         if glowing[index]:
             shapes = (Spline(line.points, planned.theme.glow, glows[index], glow=True), *shapes)

@@ -96,13 +96,13 @@ def filmed(drawn: Gathered, planned: Plan, snapshots: Collection[Snapshot], gain
     neurons, connections = len(network.neurons), len(network.connections)
     fill_values, line_values = np.empty((frames, neurons)), np.empty((frames, connections))
     widths, glows = np.empty((2, frames, connections))
-    bars = np.empty((frames, connections), np.bool_)
+    ends = np.empty((frames, connections), np.int8)
     captions, titles, steps, low, high = list[str](), list[str](), list[int](), None, None
     for frame, step in enumerate(snapshots):
         snapshot = drawn.snapshot(step)
-        seen = looks(network, snapshot, gains, planned.frame.widest, drawn.signals(step))
+        seen = looks(network, snapshot, gains, planned.frame.widest, drawn.signals(step), drawn.ends(step.weights))
         fill_values[frame], line_values[frame] = seen.discs, seen.lines
-        widths[frame], glows[frame], bars[frame] = seen.widths, seen.glows, seen.bars
+        widths[frame], glows[frame], ends[frame] = seen.widths, seen.glows, seen.ends
         steps.append(snapshot.step)
         words = caption(whole, step.step, step.activity)
         shape = planned.caption_shape(words)
@@ -114,7 +114,7 @@ def filmed(drawn: Gathered, planned: Plan, snapshots: Collection[Snapshot], gain
     assert low is not None
     assert high is not None
     glowing: npt.NDArray[np.bool_] = glows.max(axis=0) > 0
-    first = Looks(fill_values[0], line_values[0], widths[0], glows[0], bars[0])
+    first = Looks(fill_values[0], line_values[0], widths[0], glows[0], ends[0])
     tips = tooltips(network, gains, np.stack([low[0], high[0]]), np.stack([low[1], high[1]]))
     return Film(
         scene=paint(planned, first, glowing, captions[0], tips, steps[0]),
@@ -125,7 +125,7 @@ def filmed(drawn: Gathered, planned: Plan, snapshots: Collection[Snapshot], gain
         line_values=line_values,
         line_widths=widths,
         glow_widths=glows,
-        line_bars=bars & (planned.theme.ends == "signs"),
+        line_ends=planned.theme_ends(ends),
         caption=CAPTION,
         captions=tuple(captions),
         titles=tuple(titles),
@@ -152,13 +152,13 @@ def still(film: Film, frame: int) -> Scene:
     if film.shifts:
         shifts = {name: (x, y) for name, (x, y) in zip(film.shifts, film.shift_values[frame].tolist(), strict=True)}
     lines = {
-        name: (colour, width, glow, bar)
-        for name, colour, width, glow, bar in zip(
+        name: (colour, width, glow, end)
+        for name, colour, width, glow, end in zip(
             film.lines,
             colours(theme, film.line_values[frame]),
             film.line_widths[frame].tolist(),
             film.glow_widths[frame].tolist(),
-            film.line_bars[frame].tolist(),
+            film.line_ends[frame].tolist(),
             strict=True,
         )
     }
@@ -184,8 +184,8 @@ def still(film: Film, frame: int) -> Scene:
                 case Spline() if group.id in lines:
                     shapes.append(replace(shape, stroke=lines[group.id][0], width=lines[group.id][1]))
                 case Arrowhead() if group.id in lines:
-                    colour, width, _, bar = lines[group.id]
-                    shapes.append(ended(shape, width, colour, bar))
+                    colour, width, _, end = lines[group.id]
+                    shapes.append(ended(shape, width, colour, end))
                 case _:
                     shapes.append(shape)
         faint = group.id in film.faint and frame >= film.faint[group.id]
@@ -211,7 +211,7 @@ def part(film: Film, names: Collection[str]) -> Film:
         line_values=film.line_values[:, lines],
         line_widths=film.line_widths[:, lines],
         glow_widths=film.glow_widths[:, lines],
-        line_bars=film.line_bars[:, lines],
+        line_ends=film.line_ends[:, lines],
         shifts=tuple(film.shifts[number] for number in shifts),
         shift_values=film.shift_values[:, shifts] if shifts else film.shift_values[:, :0],
         redrawn={name: shapes for name, shapes in film.redrawn.items() if name in names},

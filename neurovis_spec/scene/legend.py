@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from neurovis_spec.scene import legend_scales, texts
 from neurovis_spec.scene.delays import bead
@@ -20,6 +21,14 @@ from neurovis_spec.scene.themes import colours
 
 _ROW_GAP, _ENTRY_GAP = 10.0, 24.0
 _HEAD, _STROKE, _STROKE_GAP = 9.0, 36.0, 10.0
+
+
+class Ends(NamedTuple):
+    """How lines end (``scene/ends.py``): the ``kinds`` that there are, in the order of a legend; whether synapses say
+    so, by their ``sign``."""
+
+    kinds: tuple[int, ...] = (1,)
+    said: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,8 +44,8 @@ class Contents:
     delays: str = ""
     #: whether something is removed in the course of a run
     lesions: bool = False
-    #: whether weights are negative, or can become so
-    inhibits: bool = False
+    #: None without lines
+    ends: Ends | None = None
     #: in how many seconds activity fades, the shortest and the longest, of those that have a trace
     traces: tuple[float, ...] = ()
 
@@ -48,8 +57,8 @@ def entries(contents: Contents, gains: Gains, theme: Theme, *, brief: bool = Fal
     result = legend_scales.colour(gains, contents.signals, theme)
     if contents.signals is not None:
         result += legend_scales.thickness(gains, theme)
-    if contents.inhibits and theme.ends == "signs":
-        result.append(_ends_in(theme))
+    if contents.ends is not None and contents.ends.kinds not in ((), (1,)) and theme.ends == "signs":
+        result.append(_ends_in(contents.ends, theme))
     if contents.learns:
         result += legend_scales.glow(gains, theme)
     if contents.teaches:
@@ -128,15 +137,19 @@ def _filled(items: Sequence[LegendEntry], width: float) -> list[list[LegendEntry
     return rows
 
 
-def _ends_in(theme: Theme) -> LegendEntry:
-    """Lines that end in an arrowhead, and in a bar."""
-    words = "line: sign of w"
-    across = max(2 * _STROKE + _STROKE_GAP, texts.width(words, SMALL))
+def _ends_in(ends: Ends, theme: Theme) -> LegendEntry:
+    """Lines that end in an arrowhead, in a bar, and in neither."""
+    words, samples = "line: sign of w", [("w ≥ 0", 1), ("w < 0", -1)]
+    if ends.said:
+        called = {1: "excites", 0: "neither", -1: "inhibits"}
+        words, samples = "line: what it does", [(called[kind], kind) for kind in ends.kinds]
+    every = len(samples) * (_STROKE + _STROKE_GAP) - _STROKE_GAP
+    across = max(every, texts.width(words, SMALL))
     shapes: list[Shape] = [heading("End", theme)]
-    for place, sign in enumerate(("w ≥ 0", "w < 0")):
-        x = (across - 2 * _STROKE - _STROKE_GAP) / 2 + place * (_STROKE + _STROKE_GAP)
+    for place, (sign, kind) in enumerate(samples):
+        x = (across - every) / 2 + place * (_STROKE + _STROKE_GAP)
         end = Arrowhead((x + _STROKE, SAMPLE_Y), (1.0, 0.0), _HEAD, 0.0, "")
-        end = ended(end, 2.0, theme.muted, bar=place == 1)
+        end = ended(end, 2.0, theme.muted, kind)
         shapes += [stroke(x, end.notch[0] - x, theme.muted, 2.0), end]
         shapes.append(Text((x + _STROKE / 2, FIRST_Y), sign, SMALL, theme.muted, "middle"))
     shapes.append(Text((across / 2, SECOND_Y), words, SMALL, theme.muted, "middle"))

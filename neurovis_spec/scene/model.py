@@ -70,14 +70,15 @@ class Polyline:
 @dataclass(frozen=True, slots=True)
 class Arrowhead:
     """The filled end of a line at ``tip``, along the unit vector ``direction``: an arrow whose back is notched, or a
-    bar across, with a stem that leads the line (``width`` wide) on to it. The line ends in the notch of either."""
+    bar across, with a stem that leads the line (``width`` wide) on to it, or nothing but that stem. The line ends in
+    the notch of each."""
 
     tip: Point
     direction: Point
     length: float
     half_width: float
     fill: str
-    kind: Literal["arrow", "bar"] = "arrow"
+    kind: Literal["arrow", "bar", "none"] = "arrow"
     width: float = 0.0
 
     #: in its lengths: how far from the tip the notch lies, how thick a bar is, how far its stem laps over the line
@@ -87,11 +88,14 @@ class Arrowhead:
 
     @property
     def corners(self) -> tuple[Point, ...]:
-        """The corners where the tip is the origin and points right: of an arrow tip, one barb, notch, the other."""
+        """The corners where the tip is the origin and points right: of an arrow tip, one barb, notch, the other; of
+        what is neither arrow nor bar those of its stem."""
         half, notch = self.half_width, -self.NOTCH * self.length
         if self.kind == "arrow":
             return (0.0, 0.0), (-self.length, half), (notch, 0.0), (-self.length, -half)
         bar, stem, lap = -self.BAR * self.length, self.width / 2, notch - self.LAP * self.length
+        if self.kind == "none":
+            return (0.0, stem), (lap, stem), (lap, -stem), (0.0, -stem)
         one = ((0.0, half), (bar, half), (bar, stem), (lap, stem))
         return (*one, *((along, -across) for along, across in reversed(one)))
 
@@ -120,10 +124,11 @@ def head_half_width(width: float, length: float) -> float:
     return max(HEAD_OF_LENGTH * length + HEAD_OF_WIDTH * width, 0.5 / Arrowhead.NOTCH * width + HEAD_MORE)
 
 
-def ended(head: Arrowhead, width: float, fill: str, bar: bool) -> Arrowhead:
-    """The same end on a line of another width and colour, as a bar or as an arrow."""
-    half = head_half_width(width, head.length)
-    return Arrowhead(head.tip, head.direction, head.length, half, fill, "bar" if bar else "arrow", width)
+def ended(head: Arrowhead, width: float, fill: str, end: int) -> Arrowhead:
+    """The same end on a line of another width and colour: an arrow (1), a bar (−1), or neither (0)."""
+    half = head_half_width(width, head.length) if end else width / 2
+    kind: Literal["arrow", "bar", "none"] = "none" if not end else "arrow" if end > 0 else "bar"
+    return Arrowhead(head.tip, head.direction, head.length, half, fill, kind, width)
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,13 +257,13 @@ class Film:
     frame f. For group ``lines[j]`` the line and its arrowhead have the colour value ``line_values[f, j]``, the line the
     width ``line_widths[f, j]`` (user units; the head follows by ``head_half_width``), and its glow the width
     ``glow_widths[f, j]`` (0 for none; a group that glows at any time has a glow in ``scene``, of width 0 where it
-    does not glow in frame 0). Where ``line_bars[f, j]`` it ends in a bar rather than in an arrow. Group ``shifts[k]``
-    is moved from where it stands in ``scene`` by ``shift_values[f, k]`` (x and y, user units; 0 in frame 0). A group
-    may be in one of the three at most. A group ``redrawn`` (an id) is in none of them: its shapes at frame f are
-    ``redrawn[id](f)``, and nothing that stays as it is stands in front of them. From frame ``faint[id]`` on, a group
-    that stands there has the opacity ``faintness``. ``captions[f]`` is the text in group ``caption``. Colours are
-    linear in sRGB between the theme's anchors, of NaN that of texts; ``still(f)`` is frame f as a scene, and
-    ``titles[f]`` its title, without which it is that of ``scene``.
+    does not glow in frame 0). It ends in an arrow where ``line_ends[f, j]`` is 1, in a bar where that is −1, and in
+    neither where it is 0. Group ``shifts[k]`` is moved from where it stands in ``scene`` by ``shift_values[f, k]`` (x
+    and y, user units; 0 in frame 0). A group may be in one of the three at most. A group ``redrawn`` (an id) is in none
+    of them: its shapes at frame f are ``redrawn[id](f)``, and nothing that stays as it is stands in front of them. From
+    frame ``faint[id]`` on, a group that stands there has the opacity ``faintness``. ``captions[f]`` is the text in
+    group ``caption``. Colours are linear in sRGB between the theme's anchors, of NaN that of texts; ``still(f)`` is
+    frame f as a scene, and ``titles[f]`` its title, without which it is that of ``scene``.
     """
 
     scene: Scene
@@ -269,7 +274,7 @@ class Film:
     line_values: FloatArray
     line_widths: FloatArray
     glow_widths: FloatArray
-    line_bars: npt.NDArray[np.bool_]
+    line_ends: npt.NDArray[np.int8]
     caption: str
     captions: tuple[str, ...]
     shifts: tuple[str, ...] = ()
@@ -287,7 +292,7 @@ class Film:
     @property
     def changing(self) -> npt.NDArray[np.bool_]:
         """Which lines change their width, their glow or their end."""
-        kept = (self.line_widths, self.glow_widths, self.line_bars)
+        kept = (self.line_widths, self.glow_widths, self.line_ends)
         result: npt.NDArray[np.bool_] = np.any([(values != values[:1]).any(axis=0) for values in kept], axis=0)
         return result
 

@@ -101,5 +101,5 @@ def _still(page: Page) -> Film:
     frames = len(page.captions)
     none = np.zeros((frames, 0))
     scene = Scene(page.width, page.height, page.theme, page.title, (), page.density)
-    bars = np.zeros((frames, 0), np.bool_)
-    return Film(scene, page.fps, (), (), none, none, none, none, bars, page.caption, page.captions)
+    ends = np.zeros((frames, 0), np.int8)
+    return Film(scene, page.fps, (), (), none, none, none, none, ends, page.caption, page.captions)

@@ -24,6 +24,7 @@ from neurovis_spec.scene import delays, encoding, legend, texts
 from neurovis_spec.scene.boxes import Box, boxes_of, entitled
 from neurovis_spec.scene.caption import CAPTION, CAPTION_Y, HEADER, TITLE, caption_text, title_text
 from neurovis_spec.scene.collapse import Gathered
+from neurovis_spec.scene.ends import EndArray, signed
 from neurovis_spec.scene.fading import seconds_of
 from neurovis_spec.scene.frame import MARGIN, MOST, Frame, Margins, fit, unit_for
 from neurovis_spec.scene.gains import Gains, in_pages
@@ -95,6 +96,10 @@ class Plan:
     unit: float
     #: what is left out, as the picture says it
     notes: tuple[str, ...]
+
+    def theme_ends(self, ends: EndArray) -> EndArray:
+        """How lines end in its theme, which may know nothing but arrows."""
+        return ends if self.theme.ends == "signs" else np.ones_like(ends)
 
     def caption_shape(self, words: str) -> Text | None:
         """The line under the title, if there is one."""
@@ -173,8 +178,9 @@ class _Content:
     #: who has a dotted line to whom
     teachers: Sequence[Teacher]
     lesions: Lesions
-    #: what the legend says of signals
+    #: what the legend says of signals, and how lines end
     signals: str
+    ends: legend.Ends
     notes: tuple[str, ...]
     extent: Rect
 
@@ -191,9 +197,9 @@ def _content(drawn: Gathered, layout: Layout, settings: RenderSettings, weights:
     beside = room_beside(network, RADIUS * UNIT) if settings.labels else []
     beside = [(index, reach) for index, reach in beside if index not in rooms]
     extent = _extent(positions, radii, routes, boxes, beside, rooms.values())
-    lesions, signals = lesions_of(network), Signals(drawn.whole).called
+    lesions, signals, ends = lesions_of(network), Signals(drawn.whole).called, _ends(drawn)
     return _Content(
-        network, positions, routes, seen, radii, rooms, sides, boxes, teachers, lesions, signals, notes, extent
+        network, positions, routes, seen, radii, rooms, sides, boxes, teachers, lesions, signals, ends, notes, extent
     )
 
 
@@ -464,8 +470,8 @@ def _frame(wanted: _Wanted, gains: Gains, delayed: str, margin: float) -> tuple[
             teaches=label_of(content.teachers) if content.teachers else "",
             delays=delayed,
             lesions=bool(content.lesions),
-            inhibits=_inhibits(network),
-            traces=_ends_of(seconds_of(network)),
+            ends=content.ends,
+            traces=_least_and_most(seconds_of(network)),
         )
         for brief in (False, True):
             items = legend.entries(contents, gains, theme, brief=brief)
@@ -505,16 +511,20 @@ def _noted(notes: Sequence[str], titled: bool, frame: Frame, theme: Theme) -> Gr
     return Group(tuple(lines), id="notes", title="\n".join(notes))
 
 
-def _ends_of(seconds: FloatArray) -> tuple[float, ...]:
+def _least_and_most(seconds: FloatArray) -> tuple[float, ...]:
     """The shortest and the longest time above 0: one where these are the same, none where there are none."""
     above = seconds[seconds > 0]
     return tuple(sorted({float(above.min()), float(above.max())})) if len(above) else ()
 
 
-def _inhibits(network: Network) -> bool:
-    """Whether a weight is negative, or may become so by learning."""
-    connections, changing = network.connections, network.changing
-    return bool((connections.weights.kept < 0).any() or (connections.low[changing] < 0).any())
+def _ends(drawn: Gathered) -> legend.Ends:
+    """Which ends there are: bars where a weight is negative, or may become so by learning, and what synapses say."""
+    network, said = drawn.network, signed(drawn.whole)
+    kinds = {*np.unique(drawn.ends(drawn.whole.connections.weights.whole())).tolist()}
+    free = network.changing if drawn.any else np.setdiff1d(network.changing, said)
+    if (network.connections.low[free] < 0).any():
+        kinds.add(-1)
+    return legend.Ends(tuple(kind for kind in (1, -1, 0) if kind in kinds), len(said) > 0)
 
 
 def _order(network: Network, widths: FloatArray, lines: npt.NDArray[np.bool_]) -> tuple[int, ...]:

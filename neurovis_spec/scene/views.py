@@ -18,6 +18,7 @@ from neurovis_spec.compiler.network import Network, StepLength
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene import body, encoding, strips
 from neurovis_spec.scene.encode import tooltips
+from neurovis_spec.scene.ends import effects_of, signed
 from neurovis_spec.scene.frame import MARGIN
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.gains import Scale as Own
@@ -318,14 +319,16 @@ class Maker:
             if not len(connections):
                 return Note(f"every |w| is below {number(self.min_weight)}")
         full, used = _full_at(weights, self.gains.thickness[connections], self.gains.thickness_scales)
+        every = np.stack([snapshot.weights for snapshot in snapshots])
+        effects, said = effects_of(network, every)[:, connections], len(signed(network)) > 0
         with np.errstate(over="ignore", invalid="ignore"):
-            values = np.clip(weights / full, -1.0, 1.0)
+            values = np.clip(effects / full, -1.0, 1.0)
         lows, highs = weights.min(axis=0), weights.max(axis=0)
         activity = np.stack([snapshots[0].activity, snapshots[0].activity])
         low, high = (ends.weights.whole().copy() for _ in range(2))
         low[connections], high[connections] = lows, highs
         titles = tooltips(network, self.gains, activity, np.stack([low, high]))[1]
-        scale = scale_of("weight", used)
+        scale = scale_of("weight (− inhibits)" if said else "weight", used)
         rows, columns = (order_of(network, self.layout, some) for some in (sources, targets))
         return Grid(MatrixCells(network, rows, columns, connections, np.nan_to_num(values), scale, titles, title))
 

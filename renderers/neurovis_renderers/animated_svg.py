@@ -43,6 +43,7 @@ from neurovis_spec.scene import (
     Theme,
     colours,
     filled_shape,
+    head_half_width,
     readable,
 )
 
@@ -58,8 +59,10 @@ _FAINT, _SHIFTED, _FIXED = "lesioned", "shifted", "fixed"
 _MOVING, _STANDING = "moving", "standing"
 #: Groups that have the class of a colour.
 _COLOURED = f"[class]:not(.{_SHIFTED},.{_MOVING},.{_STANDING})"
-#: The class of a line whose weight is less than 0 at the moment, where it is not always.
-_LESS = "less"
+#: The class of a line that ends otherwise at the moment than in an arrow, where it does not always.
+_OTHERWISE = {-1: "less", 0: "nil"}
+#: What the parts are of a head that ends in several ways.
+_PARTS = {1: "arrow", -1: "bar", 0: "none"}
 
 
 class AnimatedSvgRenderer:
@@ -99,7 +102,7 @@ class _Writer:
         self._letters: set[int] = set()
         self._widths: set[int] = set()
         self._glows: set[int] = set()
-        self._turning = False
+        self._turning: set[int] = set()
         self._captions = -1
         self._moves = self._redraws = False
 
@@ -130,10 +133,12 @@ class _Writer:
             self._widths.update(widths)
             self._glows.update(glows)
             tokens = [f"{c} w{w} g{g}" for c, w, g in zip(tokens, widths, glows, strict=True)]
-            bars = self._film.line_bars[:, place].tolist()
-            if len(set(bars)) > 1:
-                tokens = [f"{token} {_LESS}" if bar else token for token, bar in zip(tokens, bars, strict=True)]
-                self._turning = True
+            ends = self._film.line_ends[:, place].tolist()
+            if len(set(ends)) > 1:
+                tokens = [
+                    token if end > 0 else f"{token} {_OTHERWISE[end]}" for token, end in zip(tokens, ends, strict=True)
+                ]
+                self._turning.update(ends)
         return self._animated(group, tokens)
 
     def _animated(self, group: Group, tokens: Sequence[str]) -> str:
@@ -153,7 +158,7 @@ class _Writer:
             case Disc() | Rectangle():
                 return element(shape, "" if place == filled else _class(_FIXED))
             case Arrowhead() if group.id in self._lines and self._changing[self._lines[group.id]]:
-                return self._head_element(shape, self._film.line_bars[:, self._lines[group.id]])
+                return self._head_element(shape, self._film.line_ends[:, self._lines[group.id]])
             case Arrowhead() | Spline() if group.id not in self._lines:
                 return element(shape, _class(_FIXED))
             case _:
@@ -177,22 +182,31 @@ class _Writer:
         self._redraws = True
         return f"{open_group(group)}<g{_class(_MOVING)}>{moving}</g><g{_shown(_STANDING, False)}>{standing}</g></g>\n"
 
-    def _head_element(self, head: Arrowhead, bars: npt.NDArray[np.bool_]) -> str:
+    def _head_element(self, head: Arrowhead, ends: npt.NDArray[np.int8]) -> str:
         """A head in its own coordinates, so that its width alone can be scaled: at the tip, pointing right. One that
         is now a bar and now an arrow has both, of which the one that it is not at the moment is not displayed."""
         (x, y), (dx, dy) = head.tip, head.direction
         place = f"matrix({dx:.4g} {dy:.4g} {-dy:.4g} {dx:.4g} {num(x)} {num(y)})"
-        both, bar = bool(bars.any() and not bars.all()), head.kind == "bar"
-        inner = ""
-        if both or not bar:
-            inner += self._part(replace(head, kind="arrow").corners, head, _shown("arrow", not bar) if both else "")
-        if both or bar:
-            start, back, half = -(head.NOTCH + head.LAP) * head.length, -head.BAR * head.length, head.half_width
-            stem = f'<path class="stem" d="M{num(start)} 0H{num(back)}" stroke="{head.fill}" '
-            stem += f'stroke-width="{num(head.width)}"/>'
-            across = self._part(((0.0, half), (back, half), (back, -half), (0.0, -half)), head)
-            inner += f"<g{_shown('bar', bar)}>{stem}{across}</g>"
+        every = {1, *ends.tolist()} if len(set(ends.tolist())) > 1 else {ends[0].item()}
+        both, inner, half = len(every) > 1, "", head.half_width
+        if head.kind == "none":
+            half = head_half_width(head.width, head.length)
+        back, whole = -head.BAR * head.length, replace(head, half_width=half)
+        if 1 in every:
+            shown = _shown("arrow", head.kind == "arrow") if both else ""
+            inner += self._part(replace(whole, kind="arrow").corners, whole, shown)
+        if -1 in every:
+            across = self._part(((0.0, half), (back, half), (back, -half), (0.0, -half)), whole)
+            inner += f"<g{_shown('bar', head.kind == 'bar')}>{self._stem(head, back)}{across}</g>"
+        if 0 in every:
+            inner += f"<g{_shown('none', head.kind == 'none')}>{self._stem(head, 0.0)}</g>"
         return f'<g{_class("both") if both else ""} transform="{place}">{inner}</g>'
+
+    def _stem(self, head: Arrowhead, end: float) -> str:
+        """What leads a line on, as wide as this, from the notch of its head."""
+        start = -(head.NOTCH + head.LAP) * head.length
+        path = f'<path class="stem" d="M{num(start)} 0H{num(end)}" stroke="{head.fill}" '
+        return path + f'stroke-width="{num(head.width)}"/>'
 
     def _part(self, corners: Sequence[Point], head: Arrowhead, attributes: str = "") -> str:
         """What is filled of a head; its style says what its width follows from."""
@@ -235,8 +249,11 @@ class _Writer:
         if self._widths:
             rules += self._width_rules()
         if self._turning:
-            rules += [".both>.bar{display:none}", ".both>.arrow{display:inline}"]
-            rules += [f".{_LESS}>.both>.bar{{display:inline}}", f".{_LESS}>.both>.arrow{{display:none}}"]
+            others = [end for end in _OTHERWISE if end in self._turning]
+            rules += [*(f".both>.{_PARTS[end]}{{display:none}}" for end in others), ".both>.arrow{display:inline}"]
+            for end in others:
+                rules.append(f".{_OTHERWISE[end]}>.both>.{_PARTS[end]}{{display:inline}}")
+                rules.append(f".{_OTHERWISE[end]}>.both>.arrow{{display:none}}")
         if self._film.faint:
             rules.append(f".{_FAINT}{{opacity:{num(self._film.faintness)}}}")
         if self._captions > 1:

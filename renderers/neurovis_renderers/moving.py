@@ -50,6 +50,8 @@ _MUCH = 0.4
 #: Fragments that are kept of a band.
 MOST_KEPT = 6_000_000
 _Words = npt.NDArray[np.uint32]
+#: How lines end, as a Film has it.
+_Ends = npt.NDArray[np.int8]
 
 
 class TooDeepError(Exception):
@@ -108,18 +110,20 @@ class Moving:
             for place, number in (pair for pairs in parts for pair in pairs):
                 self.coloured[place] = turns[number]
         #: half widths and stems, at least and at most
-        self.least = self._halves(film.line_widths.min(axis=0), film.glow_widths.min(axis=0), film.line_bars[0])
-        self.most = self._halves(film.line_widths.max(axis=0), film.glow_widths.max(axis=0), film.line_bars[0])
+        self.least = self._halves(film.line_widths.min(axis=0), film.glow_widths.min(axis=0), film.line_ends[0])
+        turned = (film.line_ends != film.line_ends[:1]).any(axis=0)
+        wide = np.where(turned & (film.line_ends[0] == 0), np.int8(-1), film.line_ends[0])  # as it is when it is a head
+        self.most = self._halves(film.line_widths.max(axis=0), film.glow_widths.max(axis=0), wide)
         self.shaped = self.least[0] != self.most[0]
         heads, whose = self._ends
-        turning = heads[(film.line_bars != film.line_bars[:1]).any(axis=0)[whose]]
+        turning = heads[turned[whose]]
         self.shaped[turning] = True
-        self.least[0][turning] = 0  # what is now an arrow and now a bar hides nothing for certain
+        self.least[0][turning] = 0  # what is now an arrow and now something else hides nothing for certain
         self.least[1][turning] = -1
 
-    def _halves(self, widths: FloatArray, glows: FloatArray, bars: BoolArray) -> tuple[Numbers, Numbers]:
+    def _halves(self, widths: FloatArray, glows: FloatArray, line_ends: _Ends) -> tuple[Numbers, Numbers]:
         """Half the width of every line, glow and head in pixels, by place, of lines of such widths (in user units); and
-        of the stem of what ends in a bar, −1 elsewhere."""
+        of the stem of what ends in no arrow, −1 elsewhere."""
         density = self.film.scene.density
         halves: Numbers = self.sheet.halves + self.sheet.head_halves
         (lines, which), (shining, whose), (ends, of) = self._lines, self._glows, self._ends
@@ -130,13 +134,14 @@ class Moving:
             HEAD_OF_LENGTH * long + HEAD_OF_WIDTH * wide, 0.5 / Arrowhead.NOTCH * wide + HEAD_MORE
         )
         stems = self.sheet.head_stems.copy()  # of those that stand still, too
-        stems[ends] = np.where(bars[of], wide * (density / 2), -1)
+        stems[ends] = np.where(line_ends[of] > 0, -1, wide * (density / 2))
+        halves[ends] = np.where(line_ends[of] == 0, wide * (density / 2), halves[ends])
         result: Numbers = np.rint(halves / _STEP) * _STEP
         return result, stems
 
     def halves(self, frame: int) -> tuple[Numbers, Numbers]:
         """Half the width of every line, glow and head at a frame, by place, and of the stems."""
-        return self._halves(self.film.line_widths[frame], self.film.glow_widths[frame], self.film.line_bars[frame])
+        return self._halves(self.film.line_widths[frame], self.film.glow_widths[frame], self.film.line_ends[frame])
 
     def colours(self, frame: int) -> IntArray:
         """The colours of all shapes at a frame, by place."""

@@ -236,10 +236,11 @@ class Sheet:
 
     @cached_property
     def head_stems(self) -> Numbers:
-        """Half the width of the stem of each bar in pixels, by its place; −1 for arrows."""
+        """Half the width of the stem of each bar, and of what has no other end, in pixels, by its place; −1 for
+        arrows."""
         result = np.full(len(self), -1, np.float32)
         for place, head in self._heads:
-            if head.kind == "bar":
+            if head.kind != "arrow":
                 result[place] = head.width * self.density / 2
         return result
 

@@ -320,7 +320,7 @@ class EntryBuilder:
         called = self.context.census.neurons.names
         first = kept[both.first]
         ends = called[sources[first]], called[targets[first]]
-        many = f" ({both.count:,} of {len(kept):,} connections do)" if both.count > 2 else ""
+        many = f" ({both.many:,} of {len(kept):,} connections do)" if both.many > 2 else ""
         message = f"symmetric: true, and both '{' -> '.join(ends)}' and '{' -> '.join(ends[::-1])}' are there{many}"
         hint = "leave 'symmetric' out, or give one connection of each pair"
         self.constants.findings.error("both-ways", self._symmetric_span, message, hint)

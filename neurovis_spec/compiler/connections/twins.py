@@ -21,7 +21,7 @@ class Both(NamedTuple):
     """Pairs of which each is there in the other direction, too: the first of them, and how many there are."""
 
     first: int
-    count: int
+    many: int
 
 
 def one_of_each(i: Indices, j: Indices, counts: bool) -> tuple[Indices, Indices]:

@@ -266,7 +266,7 @@ export class Coverage {
     }
   }
 
-  /** The end of a line: an arrowhead with a notch, or a bar. @param {End} end @param {number} share @param {number} slot */
+  /** The end of a line: an arrowhead with a notch, or a bar, which is as narrow as the line where there is no end. @param {End} end @param {number} share @param {number} slot */
   head({ x, y, dx, dy, length, half, notch, back, lap, stem, bar, room }, share, slot) {
     if (x + room < this.left || y + room < this.top || x - room > this.left + SIDE || y - room > this.top + SIDE)
       return;

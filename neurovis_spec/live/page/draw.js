@@ -19,7 +19,7 @@ import { enter, leave, Mosaic } from './mosaic.js';
 /** @typedef {import('./coverage.js').End} End */
 /** A line as it was laid out: from these points, as this chain, in these tiles, which have room for this reach.
  * @typedef {{points: number[], head: Shape, end: End, box: number[], chain: Chain, tiles: Tile[], reach: number, room: number,
- *   width: number, glow: number, bar: boolean, share: number}} LaidLine */
+ *   width: number, glow: number, ending: number, share: number}} LaidLine */
 /** What lies otherwise when another `points`, `head` or `at` is put in place of the one before.
  * @typedef {{id: string, index: number, points: number[], head: Shape, rest: Shape[],
  *   laid: LaidLine | null}} Line */
@@ -286,7 +286,7 @@ export class Drawing {
       { scale } = camera,
       [left, top] = camera.origin;
     const mosaic = /** @type {Mosaic} */ (this.mosaic),
-      { fineness, levels, isFaint, isBar } = constants;
+      { fineness, levels, isFaint, isBar, isNegative } = constants;
     /** @param {string} id @param {number} kind */
     const shareOf = (id, kind) => (kind & isFaint ? constants.faint : 1) * (!near.size || near.has(id) ? 1 : RECEDING);
     discs.forEach((disc, at) => {
@@ -318,14 +318,14 @@ export class Drawing {
         share = shareOf(line.id, kind);
       const width = look.widths[index],
         glow = look.glows[index],
-        bar = (kind & isBar) !== 0;
+        ending = !(kind & isBar) ? 1 : kind & isNegative ? -1 : 0;
       mosaic.paint(at, fills[look.lines[index] + levels]);
       const same = laid && laid.points === points && laid.head === line.head;
-      if (same && laid.width === width && laid.glow === glow && laid.bar === bar && laid.share === share) return;
-      const end = this.end(line.head, width / fineness, bar, scale, camera.origin);
+      if (same && laid.width === width && laid.glow === glow && laid.ending === ending && laid.share === share) return;
+      const end = this.end(line.head, width / fineness, ending, scale, camera.origin);
       const reach = (Math.max(width, glow) / 2 / fineness) * scale + 0.5,
         { room } = end;
-      const now = { points, head: line.head, end, width, glow, bar, share };
+      const now = { points, head: line.head, end, width, glow, ending, share };
       if (same && reach <= laid.reach && room <= laid.room) {
         Object.assign(laid, now);
         mosaic.spoil(laid.tiles);
@@ -365,17 +365,23 @@ export class Drawing {
     coverage.picture(pictures.back);
   }
 
-  /** The end of a line of a width, in pixels. @param {Shape} shape @param {number} width @param {boolean} bar
+  /** The end of a line of a width, in pixels: an arrow (1), a bar (-1), or its stem alone (0). @param {Shape} shape
+   * @param {number} width @param {number} ending
    * @param {number} scale @param {number[]} origin @returns {End} */
-  end({ at, along, length: long }, width, bar, scale, origin) {
+  end({ at, along, length: long }, width, ending, scale, origin) {
     const { constants } = this,
       length = long * scale,
       notch = -constants.notch * length,
       lap = notch - constants.lap * length;
-    const half = Math.max(
-      constants.headOfLength * length + constants.headOfWidth * width * scale,
-      (0.5 / constants.notch) * width * scale + constants.headMore * scale,
-    );
+    const stem = (width / 2) * scale,
+      bar = ending <= 0;
+    const half =
+      ending === 0
+        ? stem
+        : Math.max(
+            constants.headOfLength * length + constants.headOfWidth * width * scale,
+            (0.5 / constants.notch) * width * scale + constants.headMore * scale,
+          );
     return {
       x: at[0] * scale + origin[0],
       y: at[1] * scale + origin[1],
@@ -386,16 +392,16 @@ export class Drawing {
       notch,
       back: -constants.bar * length,
       lap,
-      stem: (width / 2) * scale,
+      stem,
       bar,
       room: Math.hypot(half, bar ? lap : length) + 1,
     };
   }
 
   /** The end of a line that stays. @param {Context} context @param {Shape} shape @param {number} width @param {string} colour
-   * @param {boolean} bar */
-  head(context, shape, width, colour, bar) {
-    const { x, y, dx, dy, length, half, notch, back, lap, stem } = this.end(shape, width, bar, 1, [0, 0]);
+   * @param {number} ending */
+  head(context, shape, width, colour, ending) {
+    const { x, y, dx, dy, length, half, notch, back, lap, stem, bar } = this.end(shape, width, ending, 1, [0, 0]);
     const corners = bar
       ? [0, half, back, half, back, stem, lap, stem, lap, -stem, back, -stem, back, -half, 0, -half]
       : [0, 0, -length, half, notch, 0, -length, -half];
@@ -438,7 +444,7 @@ export class Drawing {
         context.restore();
         break;
       case 'head':
-        this.head(context, shape, shape.width || 0.6, shape.fill, shape.bar);
+        this.head(context, shape, shape.width || 0.6, shape.fill, shape.end);
         break;
       case 'ramp': {
         const step = across / shape.colours.length,
