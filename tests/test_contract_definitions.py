@@ -112,7 +112,8 @@ DEFAULTS = {
     "decay": {"rate": 0.01},
 }  # fmt: skip
 SYNAPSES = {
-    "gap_junction": {}, "diffusive": {}, "graded": {"E": 0, "rest": -40}, "phase": {"lag": 0}, "amplitude_phase": {"lag": 0},
+    "gap_junction": {}, "diffusive": {}, "graded": {"E": 0, "rest": -40},
+    "phase": {"lag": 0}, "amplitude_phase": {"lag": 0},
     "sigmoidal_conductance": {"E": 0, "threshold": -44, "slope": 2, "rest": -40},
 }  # fmt: skip
 SIGNALS = {

@@ -123,7 +123,8 @@ class Reading(NamedTuple):
 LATER: Final[Mapping[Kind, frozenset[str]]] = {
     MODEL: frozenset({
         "leaky", "fitzhugh_nagumo", "matsuoka", "hopf", "van_der_pol", "wilson_cowan", "jansen_rit", "phase_oscillator",
-        "amplitude_oscillator", "ornstein_uhlenbeck", "cfc", "hodgkin_huxley", "morris_lecar", "graded", "danner", "ltc",
+        "amplitude_oscillator", "ornstein_uhlenbeck", "cfc", "hodgkin_huxley", "morris_lecar", "graded", "danner",
+        "ltc",
     }),
 }  # fmt: skip
 _READINGS = (
