@@ -81,6 +81,12 @@ def test_a_centre_that_learns_is_set_by_no_parameter_and_goes_on_from_a_checkpoi
     assert untouched.activity[3] != simulation.activity[3]  # M1 -> M2 follows the parameter
 
 
+def test_a_centre_is_recorded_by_name_where_its_rule_has_no_states() -> None:
+    recording = nv.compile_text(SPEC).run(states=["(Y -> M).centre"])
+    halved = 0.75 * 0.5 ** np.arange(30) + 0 * recording["(Y -> M).centre"].T  # dt is 0.5
+    np.testing.assert_allclose(recording["(Y -> M).centre"], halved.T)
+
+
 def test_an_output_may_be_a_centre() -> None:
     network = nv.compile_text(SPEC + "outputs: {place: (X -> M).centre}\n")
     assert network.run()["place"].shape == (30, 2)

@@ -206,7 +206,7 @@ def _steps(whole: str, both: bool) -> str:
     """How to write what has several arrows, or (``both``) one that goes both ways."""
     names = [part.strip() for part in whole.replace("<->", "->").split("->")]
     steps = [*pairwise(names), *(pairwise(reversed(names)) if both else ())]
-    written = ", ".join(f"{one} -> {other}" for one, other in steps)
+    written = ", ".join(dict.fromkeys(f"{one} -> {other}" for one, other in steps))
     return f"write each by itself: {shorten(written, 200)}" if all(names) else "write FROM -> TO"
 
 

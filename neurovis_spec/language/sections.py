@@ -302,9 +302,11 @@ class ConnectionModel(Model):
         "topology": "pattern",
     }
 
-    weight: Annotated[FormulaField | None, PAIR, NotWith(("matrix", "edges"))] = Field(
-        None, description="One number, or an expression of i, j, n_from, n_to (default 1)."
-    )
+    weight: Annotated[
+        FormulaField | None,
+        PAIR,
+        NotWith(("matrix", "edges"), hint="write the weights into '{other}'; an edge is [FROM, TO, WEIGHT, DELAY]"),
+    ] = Field(None, description="One number, or an expression of i, j, n_from, n_to (default 1).")
     centre: Annotated[CentreField, PAIR] | None = Field(
         None, description="For combine: distance; like weight or matrix (default 0)."
     )
@@ -363,6 +365,8 @@ class ConnectionModel(Model):
         taken_by = [one.name for one in PATTERNS.values() if name in one.settings]
         if name in ("rate", "target", "learning_rate", "eta"):
             return f"'{name}' belongs to a rule, and stands with it", f"write plasticity: {{RULE: {{{name}: …}}}}"
+        if name == "E":
+            return f"'{name}' belongs to a synapse, and stands with it", f"write synapse: {{SYNAPSE: {{{name}: …}}}}"
         if not taken_by:
             return None
         hint = f"write pattern: {{{taken_by[0]}: {{{name}: …}}}}"

@@ -114,16 +114,16 @@ def _state(network: Network, part: Part, names: Names, *, outputs: bool = True) 
 
 
 def _holders_of(network: Network, kind: Kind) -> tuple[Holder, ...]:
-    """The states of all definitions of a kind, with those that have them."""
+    """The states of all definitions of a kind, with those that have them; a centre that learns is one."""
     return tuple(
         Holder(
             holder.members,
-            use.definition.name,
-            tuple(one.name for one in use.definition.state if not isinstance(one, Check)),
-            tuple(one.name for one in use.definition.outputs),
+            made.name,
+            tuple(one.name for one in made.kept if one not in made.outputs and not isinstance(one, Check)),
+            tuple(one.name for one in made.outputs),
         )
-        for holder, use in network.uses
-        if use.definition.kind == kind
+        for holder, made in ((holder, use.definition) for holder, use in network.uses)
+        if made.kind == kind
     )
 
 

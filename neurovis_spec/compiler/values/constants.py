@@ -110,6 +110,11 @@ class Sight(NamedTuple):
         """Whether a name means something; those with a point are of ends, and who uses the definition knows more."""
         return name in self.known or (self.ends and "." in name)
 
+    @property
+    def of_connections(self) -> bool:
+        """Whether it is that of a rule or a synapse, where ``E`` is hardly meant for e: it is a reversal potential."""
+        return self.ends and bool(self.home.within)
+
 
 def parse_formula(
     formula: Formula,
@@ -143,7 +148,7 @@ def parse_formula(
         unknown = unknown_names(tree, names(tree).difference(unused))
         used = [(node.name, node.start, node.end) for node in unknown]
     for name, start, end in used:
-        few = () if findings.many else known
+        few = () if findings.many else [one for one in known if one != "e"] if sight.of_connections else known
         message, hint = _unknown(name, few, functions or {}, sight.what)
         if sight.ends and (meant := _END_BEHIND.fullmatch(name)):
             hint = f"what '{meant[1]}' is at an end of a connection is written {meant[2]}.{meant[1]}"
@@ -153,6 +158,9 @@ def parse_formula(
             hint = sight.outside.hint.format(name)
         elif name in UNITS and (factor := _FACTOR.search(formula.value, 0, start)):
             hint = unit_hint(factor[1].strip(), name)
+        elif sight.of_connections and (hint or "").startswith(sight.what):
+            signal = ", or under signals where it is another neuron's" if sight.home.within[0] == "rules" else ""
+            hint = f"declare it under parameters{signal}; at the ends of the connection it is pre.{name}, post.{name}"
         lost = Undeclared(name, sight.home)
         findings.error("unknown-name", formula.node.at(start, end), message, hint, undeclared=lost)
     return UNKNOWN
