@@ -59,6 +59,50 @@ def same_bits(network: nv.CompiledNetwork, steps: int) -> None:
     np.testing.assert_array_equal(one_by_one.activity[:, 0], expected.activity[:, 0])
 
 
+JOINED = """
+neurovis: 1
+name: joined
+time: {dt: 0.01, integrate: METHOD}
+parameters: {level: 0.5}
+models:
+  rate:
+    time: ms
+    parameters: {tau: 20}
+    ports: [gate]
+    state: {v: {derivative: (f(drive + 0.1*gate) - v)/tau}, s: {initial: 0.1, derivative: 0.01*(v - s)}}
+    activity: v
+  step: {state: {u: {initial: 0.2, each_step: 0.9*u + 0.1*drive}}, activity: u, outputs: {twice: 2*u}}
+synapses:
+  graded: {parameters: {E: 0.3}, signal: weight*pre.s*(E - post.v)}
+  gap: {signal: weight*(pre.v - post.v)}
+  slow:
+    time: ms
+    parameters: {tau: 30, E: 0}
+    state: {g: {initial: 0.1, derivative: (pre - g)/tau}}
+    signal: weight*g*(E - 0.1*post.s)
+  kept: {state: {r: {each_step: 0.8*r + 0.2*sent}}, signal: weight*r*post.u}
+neurons:
+  A: {count: 20, model: {rate: {tau: 15 + i}}, activation: tanh, initial: {v: 0.1*sin(i)}}
+  B: {count: 18, model: rate, activation: sigmoid, bias: {gate: 0.2}}
+  M: {count: 17, model: step, bias: 0.1}
+connections:
+  - A -> A: {weight: "normal(0, 0.3)", pattern: {random: {probability: 0.6}}, synapse: {graded: {E: level + 0.01*i}}}
+  - A -> A: {weight: "uniform(0, 1)", pattern: {random: {probability: 0.2}}, synapse: gap}
+  - A -> B: {weight: 0.4, pattern: {random: {probability: 0.6}}, port: {drive: 1, gate: 2}, synapse: {slow: {E: level}}}
+  - B -> A: {weight: "uniform(-1, 1)", pattern: {random: {probability: 0.6}}, delay: 2, synapse: gap}
+  - B -> A: {weight: "uniform(-1, 1)", pattern: all_to_all, send: s}
+  - B -> A: {weight: 0.3, pattern: {random: {probability: 0.3}}, delay: {seconds: 0.013 + 0.001*i}, synapse: graded}
+  - M -> M: {weight: 0.1, pattern: {random: {probability: 0.8}}, synapse: kept, delay: 1}
+  - M -> A: {weight: 0.1, pattern: {random: {probability: 0.3}}, send: twice, port: gate, plasticity: oja}
+  - B -> M: {weight: 0.2, pattern: all_to_all, synapse: kept, delay: 0}
+events:
+  - {at: 5, lesion: [A3, M -> M]}
+  - {from: 6, to: 7, clamp: {B2: 0.4}}
+  - {at: 6, set: {level: 0.6}}
+  - {at: 7, mend: [A3, M -> M]}
+"""
+
+
 DISTANCES = """
 neurovis: 1
 name: distances
@@ -97,6 +141,15 @@ def test_many_neurons_are_summed_beside_each_other_in_their_order(method: str) -
     network = nv.compile_text(MANY.replace("METHOD", method))
     assert len(network.network.connections) > c_backend.SMALL
     same_bits(network, 4)
+
+
+@pytest.mark.parametrize("method", ["heun", "exponential"])
+def test_many_synapses_of_several_kinds_are_added_up_in_their_order(method: str) -> None:
+    """Runs of connections of a kind, kinds that take turns, packed weights; and all that events do to them."""
+    text = JOINED.replace("METHOD", method)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        same_bits(nv.compile_text(text), 13)
 
 
 @FORMS

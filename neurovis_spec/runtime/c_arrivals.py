@@ -22,7 +22,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import CENTRE, SYNAPSE, Port
 from neurovis_spec.language.expressions.emit_c import Value
 from neurovis_spec.language.words import Combine
-from neurovis_spec.runtime.c_code import Code, Form, Place, state_name
+from neurovis_spec.runtime.c_code import Code, Form, Place, plus, state_name
 from neurovis_spec.runtime.c_connections import Forming, Some, taken
 from neurovis_spec.runtime.signals import SignalLayout
 from neurovis_spec.runtime.stages import taken_by
@@ -79,11 +79,13 @@ def _in_lanes(ends: IntArray) -> tuple[_Lanes, Indices]:
 
 class _Run(NamedTuple):
     """Connections of neurons that are gone through in a loop of their own: of which synapses they are (−1: of none),
-    which they are of all that arrive, neuron by neuron, those of the i-th neuron up to ``ends[i + 1]``."""
+    which they are of all that arrive, neuron by neuron, those of the i-th neuron up to ``ends[i + 1]``; and how many
+    connections are in the runs before."""
 
     kinds: tuple[int, ...]
     edges: Indices
     ends: IntArray
+    before: int = 0
 
 
 def _runs(kinds: IntArray, connections: Indices, ends: IntArray) -> tuple[_Run, ...]:
@@ -95,9 +97,10 @@ def _runs(kinds: IntArray, connections: Indices, ends: IntArray) -> tuple[_Run, 
     if bool(((np.diff(ranks) < 0) & (np.diff(owner) == 0)).any()):
         return (_Run(tuple(found), np.arange(len(kinds)), ends),)
     of_kind = [np.flatnonzero(kinds == kind) for kind in found]
+    before = np.cumsum([0, *map(len, of_kind)]).tolist()
     return tuple(
-        _Run((kind,), edges, np.searchsorted(owner[edges], np.arange(len(ends))).astype(np.int64))
-        for kind, edges in zip(found, of_kind, strict=True)
+        _Run((kind,), edges, np.searchsorted(owner[edges], np.arange(len(ends))).astype(np.int64), first)
+        for kind, edges, first in zip(found, of_kind, before, strict=False)
     )
 
 
@@ -124,6 +127,8 @@ class Incoming:
     kinds: IntArray | None = None
     #: where so many arrive that they are not written out, in which order
     runs: tuple[_Run, ...] = ()
+    #: whether none of the weights changes in a step, so that those of runs may be packed
+    weights_stay: bool = False
 
 
 def incoming_of(network: Network, port: Port, count: int, fusible: bool = True) -> Incoming:
@@ -144,7 +149,8 @@ def incoming_of(network: Network, port: Port, count: int, fusible: bool = True) 
     if (kinds >= 0).any():
         few = 0 <= degree <= _FEW
         runs = () if few else _runs(kinds, own, ends)
-        return Incoming(own, ends, degree, False, False, None, factors, port.combine, kinds, runs)
+        stay = bool((rules < 0).all())
+        return Incoming(own, ends, degree, False, False, None, factors, port.combine, kinds, runs, stay)
     full = port.combine == "sum" and degree > 1 and 1 < count <= _BESIDE and len(_different(delays)) == 1 and not late
     if full:
         rows, sent = own.reshape(count, degree), taken_by(network)[own].reshape(count, degree)
@@ -232,6 +238,8 @@ class Arrivals:
             self.connections = self.connections[read]
             self.factors = None if self.factors is None else self.factors[read]
         self.kinds, self.runs = incoming.kinds, () if form.written_out else incoming.runs
+        self.can_be_packed = bool(self.runs) and incoming.weights_stay
+        self._packs = form.fused and self.can_be_packed
         #: the connections, in the place of those with a synapse some other one
         self.plain = self.connections
         if self.kinds is not None:
@@ -272,6 +280,9 @@ class Arrivals:
     @property
     def packed(self) -> Indices:
         """The connections whose weights are packed; those of a full matrix lie as they are read."""
+        if self.can_be_packed:
+            read = np.concatenate([run.edges for run in self.runs])
+            return np.asarray(self.connections[read], dtype=self.connections.dtype)
         return self.connections if self.can_be_fused and not self.dense else self.connections[:0]
 
     @contextmanager
@@ -364,6 +375,9 @@ class Arrivals:
         code, total = self.code, self.code.variable("u", start)
         for run in self.runs:
             at = self._at(target, run.kinds)
+            if self._packs:
+                weight = f"packed[{plus(self.begin + run.before, 'e')}]"
+                at = at._replace(known={kind: {**known, "weight": weight} for kind, known in at.known.items()})
             begin, end = (code.at(run.ends, where) for where in (target, f"({target} + 1)"))
             with code.block(code.loop("e", str(end), begin)):
                 self._add(total, "e", run.edges, at)

@@ -147,7 +147,7 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
         else
             odd += nv_plain(p, c->k + i, s, follows);
         follows = form == 0;
-        if (fused)
+        if (fused && BEFORE)
             memcpy(p->before, p->activity, sizeof(double)*NEURONS);
         if (kept) {
             memcpy(activity, p->activity, sizeof(double)*NEURONS);
@@ -224,7 +224,7 @@ def _write(network: Network, layout: SignalLayout) -> Written:
     # a network that is written out is in registers, and nothing is gained
     incoming = incoming_in(network)
     whole = StepCode(network, Code(emitter, tables, network.dt, {}), Form(), incoming, layout, plan)
-    fused = not small and bool(whole.fuses.any())
+    fused = not small and whole.count + int(whole.fuses.sum()) > 0
     for type_, name, form, write, parameters, of_fused in _functions(small, watched):
         code = Code(emitter, tables, network.dt, network.settable.variables)
         if fused or not of_fused:
@@ -238,6 +238,7 @@ def _write(network: Network, layout: SignalLayout) -> Written:
     neurons, connections = _look(network)
     defined += [f"#define LOOK_NEURONS ({neurons})", f"#define LOOK_CONNECTIONS ({connections})"]
     defined += [f"#define WATCHED {int(watched)}", f"#define FUSED {int(fused)}"]
+    defined.append(f"#define BEFORE {int(whole.fuses.any())}")
     used = words_of(bodies)
     parts = [
         _HEAD,

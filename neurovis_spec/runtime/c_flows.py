@@ -172,6 +172,7 @@ class _Integration:
             return start if held is None else f"fh[{plus(held, place)}]"
 
         arrivals = self.arrivals(anew, begins, self.plan.sent)
+        arrivals.begin = self.step.at_stages[part.number, port.name].begin
         arrivals.finished = held is None or len(anew.connections) > 0  # else what is held is
         return arrivals
 
@@ -273,6 +274,8 @@ class _Integration:
                 write_arriving(self.step, self.sight.lags, self.plan.lagging)
         parts = self.plan.of_stage
         for part, one in taken_in_order(parts):
+            if not self.step.form.held and one.places[0] in self.plan.idle:
+                continue
             with self.unless_there(part, one, first):
                 self.neurons(part, one.formulas, partial(self.give, part, one))
         for part in parts:
@@ -453,7 +456,8 @@ class _StageSight(Sight):
         """An activity, an outlet or an input, as it is at the stage where it flows, else as it was left."""
         network, plan = self.network, self.plan
         more = {"fo": plan.parts_taken, "fv": network.vector_size if network.held_inputs else 0}
-        return taken_at(network, self.code, plan.now(index), place, more)
+        more["fy" if "fy" in plan.parts else "fx"] = plan.count
+        return taken_at(network, self.code, plan.now(index, direct=not self.form.held), place, more)
 
     def states(self, some: Some) -> dict[str, str]:
         """The states of a synapse or a rule at one connection; those that flow as they are at the stage."""

@@ -25,6 +25,7 @@ from neurovis_spec.arrays import BoolArray, Indices, IntArray, width
 from neurovis_spec.compiler.flows import BY_SLOPE
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Diffuse, Integrate, Key, Port, Use
+from neurovis_spec.language.expressions.tree import Name
 from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.c_arrivals import Incoming, Sent, incoming_of
 from neurovis_spec.runtime.lags import lags_of
@@ -39,6 +40,7 @@ from neurovis_spec.runtime.stages import (
     parts_of,
     places_among_taken,
     taken_by,
+    taken_in_order,
     unfolded,
 )
 
@@ -178,9 +180,40 @@ class Plan:
         """Which activities and outlets flow."""
         return flowing(self.network)
 
-    def now(self, places: IntArray) -> IntArray:
+    @cached_property
+    def count(self) -> int:
+        """How many flow states there are."""
+        return sum(one.size for one in self.states)
+
+    @cached_property
+    def direct(self) -> IntArray:
+        """Of activities and outlets, where what is taken at a stage is a flow state, which; −1 for the others."""
+        found = np.full(len(self.places), -1, dtype=np.int64)
+        for part, one in taken_in_order(self.of_stage):
+            ((_, tree),) = one.formulas.trees
+            if isinstance(tree, Name) and tree.name in part.flows:
+                start = self.starts[Key(part.population.model.owner, tree.name)]
+                found[one.places] = np.arange(start, start + len(one.places))
+        return found
+
+    @cached_property
+    def idle(self) -> frozenset[int]:
+        """The places among activities and outlets of what nothing reads that is taken at a stage, where nothing is
+        held: flow states that synapses and rules alone take."""
+        connections = [one.anew.connections for one in self.reaching.values()]
+        incoming = np.concatenate([np.zeros(0, dtype=np.int64), *connections])
+        plain = taken_by(self.network)[incoming[self.network.synapses.numbers[incoming] < 0]]
+        alone = [
+            one.places
+            for _, one in taken_in_order(self.of_stage)
+            if (self.direct[one.places] >= 0).all() and not np.isin(one.places, plain).any()
+        ]
+        return frozenset(np.concatenate(alone).tolist() if alone else ())
+
+    def now(self, places: IntArray, direct: bool = False) -> IntArray:
         """Where what connections read now, by its places among activities, outlets and inputs, is to be found at a
-        stage: behind all these stand what is taken at the stage, then the inputs as they are at it."""
+        stage: behind all these stand what is taken at the stage, then the inputs as they are at it, then the flow
+        states, which are read ``direct`` where they are what is taken."""
         network = self.network
         neural = len(network.neurons) + network.outlet_count
         behind = neural + network.vector_size
@@ -189,7 +222,12 @@ class Plan:
         for entry in map(network.input_index.__getitem__, network.held_inputs):
             formulas |= (places >= neural + entry.start) & (places < neural + entry.start + entry.size)
         anew = np.where(formulas, behind + self.parts_taken + places - neural, places)
-        return np.where(taken >= 0, behind + taken, anew)
+        found = np.where(taken >= 0, behind + taken, anew)
+        if not direct:
+            return found
+        states = behind + self.parts_taken + (network.vector_size if network.held_inputs else 0)
+        own = np.append(np.where(self.flows, self.direct, -1), -1)[np.minimum(places, neural)]
+        return np.where(own >= 0, states + own, found)
 
     @cached_property
     def parts_taken(self) -> int:
@@ -231,7 +269,7 @@ class Plan:
     def parts(self) -> Mapping[str, int]:
         """Where the parts of ``work`` begin, by their names; those of no numbers are left out."""
         several = len(STAGES[self.operation.method]) > 1
-        count = sum(one.size for one in self.states)
+        count = self.count
         sizes = {
             "fx": count,
             "fy": count if several else 0,

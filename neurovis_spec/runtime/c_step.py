@@ -101,11 +101,16 @@ class StepCode:
             if _common_delay(network.connections.delays[network.projections[number].members]) > 0
             and self.all_send(network.projections[number].members)
         )
-        for arrivals in chain(*self.arrivals):
+        #: what arrives at a stage at ports of populations
+        self.at_stages = {
+            key: Arrivals(network, one.anew, code, form, layout, forming)
+            for key, one in (plan.reaching if plan is not None else {}).items()
+        }
+        for arrivals in self.packing:
             if arrivals.can_be_fused:
                 self.fuses[arrivals.connections] = True
-                arrivals.begin = self.count
-                self.count += len(arrivals.packed)
+            arrivals.begin = self.count
+            self.count += len(arrivals.packed)
 
     def all_send(self, connections: Indices) -> bool:
         """Whether signals of all of these leave, and none has a continuous delay."""
@@ -113,10 +118,16 @@ class StepCode:
         whole = lags is None or bool(np.isnan(lags[connections]).all())
         return whole and bool((self.layout.offsets[connections] >= 0).all())
 
+    @property
+    def packing(self) -> Iterator[Arrivals]:
+        """Whatever may have its weights packed."""
+        return (one for one in chain(*self.arrivals, self.at_stages.values()) if one.can_be_fused or one.can_be_packed)
+
     def pack(self) -> None:
-        """The weights of fused populations in the order in which they are read, where they do not lie so."""
+        """The weights of fused populations, and of synapses, in the order in which they are read, where they do not lie
+        so."""
         code = self.code
-        for arrivals in chain(*self.arrivals):
+        for arrivals in self.packing:
             if len(arrivals.packed):
                 code.line(code.loop("e", len(arrivals.packed)))
                 code.line(f"    packed[{arrivals.begin} + e] = weights[{code.at(arrivals.packed, 'e')}];")
