@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from exported import exported
+from exported import built, exported
 from hypothesis import Phase, given, settings
 from random_flows import flowing_specs
 from random_specs import Spec
@@ -219,3 +219,38 @@ events: [{{from: 5, to: 7, clamp: {{A1: 0.9}}}}, {{at: 9, set: {{p: 0.2}}}}]
     taken = c_backend.written(network.network).text.count("if (follows")
     assert taken == ((sent != "v*cos(t)") + 1) * ("each_episode" not in state)
     same_bits(network, 14)
+
+
+CONDUCTANCES = """
+neurovis: 1
+name: conductances
+time: {dt: 0.001, integrate: METHOD}
+models:
+  cell:
+    parameters: {E: -60}
+    state: {v: {initial: -50, derivative: 10*(E - v) + drive}, s: {derivative: 5*(1/(1 + exp(-0.2*(v + 40))) - s)}}
+    activity: v
+synapses:
+  graded: {parameters: {E: -75}, signal: weight*pre.s*(E - post.v)}
+  slow: {parameters: {E: 0}, state: {g: {derivative: 3*(tanh(pre.v) - g)}}, signal: weight*g*tanh(E - post.v)}
+neurons: {A: {count: 4, model: cell, bias: 200, initial: {v: -50 + i}}}
+connections:
+  - A1 -> A2: {weight: 3, synapse: graded}
+  - A2 -> A1: {weight: 3, synapse: graded}
+  - A3 -> A4: {weight: 3, synapse: slow}
+  - A4 -> A3: {weight: 3, synapse: slow, delay: 2}
+events: [{from: 5, to: 9, clamp: {A1.v: -40}}, {at: 6, lesion: A3 -> A4}, {at: 8, mend: A3 -> A4}]
+"""
+
+
+@pytest.mark.parametrize(("method", "stages", "calls"), [("rk4", 4, 4 * 8), ("exponential", 1, 8 + 2)])
+def test_exported_conductances_say_what_they_cost(method: str, stages: int, calls: int, tmp_path: Path) -> None:
+    """No heap; the size of the state, the stages, the signals and the functions of a step, as they are."""
+    network = nv.compile_text(CONDUCTANCES.replace("METHOD", method))
+    runs_alike(network, tmp_path, steps=14)
+    readme, source = ((tmp_path / name).read_text() for name in ("README.md", "conductances.c"))
+    assert f"takes {len(built(network, tmp_path).memory)} bytes" in readme
+    assert f"- {stages} stage" in readme
+    assert "at each 10 derivatives, and 4 signals made anew" in readme
+    assert f"- {calls} calls of functions" in readme
+    assert "malloc" not in source

@@ -20,7 +20,7 @@ from neurovis_spec.compiler.events.changes import Change, Clamp
 from neurovis_spec.compiler.events.settable import table_of
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Input, Network, Noise
-from neurovis_spec.compiler.program import Owner
+from neurovis_spec.compiler.program import SYNAPSE, Owner
 from neurovis_spec.compiler.run_checks import without_checks
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.language.expressions.emit_c import Emitter, Value
@@ -153,7 +153,7 @@ class Exported:
             Member("activity", state.activity, "a[k - 1] of all neurons"),
             Member("weights", state.weights, "w[k] of all connections"),
             Member("signals", state.signals, "what is under way on delayed connections"),
-            Member("history", state.history.ravel(), "past activities, for rules"),
+            Member("history", state.history.ravel(), self._about_history()),
             Member("outlets", state.outlets, "what connections take beside activities"),
             *(
                 Member(kept, np.concatenate([np.zeros(0), *arrays]), _STATES.get(kept, "states"))
@@ -168,6 +168,11 @@ class Exported:
             about = "what neurons are held at" + (", then states" if self.fixing else "")
             members.append(Member("holding", np.zeros(self.clampable), about))
         return [member for member in members if len(member.begin) or member.name in ("activity", "weights")]
+
+    def _about_history(self) -> str:
+        """What the history is."""
+        joined = any(one.kind == SYNAPSE for one in self.network.projections)
+        return "what was sent in the past, for synapses and rules" if joined else "past activities, for rules"
 
     @property
     def takes_initial(self) -> bool:

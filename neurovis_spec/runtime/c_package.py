@@ -7,12 +7,16 @@ there is left alone: an example and a CMakeLists.txt that are there stay; any ot
 from __future__ import annotations
 
 import warnings
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
+import numpy as np
+
+from neurovis_spec.arrays import Indices
+from neurovis_spec.compiler.flows import ports_read_by
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import RULE, Definition, is_activation
+from neurovis_spec.compiler.program import RULE, SYNAPSE, Definition, Port, is_activation
 from neurovis_spec.language.expressions.emit_c import INEXACT
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.expressions.tree import Call, Tree, walk
@@ -21,7 +25,16 @@ from neurovis_spec.runtime.c_names import words
 from neurovis_spec.runtime.c_plan import STAGES
 from neurovis_spec.runtime.c_settable import ExportError
 from neurovis_spec.runtime.files import replacing
-from neurovis_spec.runtime.stages import Formulas, Part, apart, contacts_of, parts_of
+from neurovis_spec.runtime.stages import (
+    Formulas,
+    Part,
+    apart,
+    contacts_of,
+    formed_at,
+    parts_of,
+    signal_of,
+    unfolded,
+)
 from neurovis_spec.runtime.state import State
 
 #: What gcc and clang are told, so that the bits are those of the backend c: no operation is joined to another, and no
@@ -106,8 +119,8 @@ def size_of_state(exported: Exported) -> int:
     size = -(-numbers * number // 8) * 8 + 8 + len(network.settable.slots)  # the numbers, k and chosen
     if len(exported.phases) > 1:
         size = -(-size // 4) * 4 + 4  # phase
-    if exported.holding:  # held
-        size += len(network.neurons)
+    if exported.holding:  # held and lesioned
+        size += exported.clampable + len(network.neurons) * bool(network.outlets)
     return -(-size // 8) * 8
 
 
@@ -137,6 +150,28 @@ def _calls_a_stage(part: Part) -> int:
     return _calls(trees) + activations * _calls_a_step(part.population.activation.definition)
 
 
+def _signals(network: Network, formulas: Mapping[int, Formulas], ports: Iterable[tuple[Port, Indices]]) -> int:
+    """How many functions of the library are called by what synapses bring to ports, by the formulas of projections; of
+    each port these connections."""
+    formed = (one for port, places in ports for one in formed_at(network, port.incoming[places]))
+    return sum(_calls(_trees_of(formulas[one.number])) * len(one.places) for one in formed if one.number in formulas)
+
+
+def _of_synapses(network: Network) -> int:
+    """How many functions synapses call once a step: for their states, and for ports that are read at an update."""
+    synapses = {number: one for number, one in enumerate(network.projections) if one.kind == SYNAPSE}
+    functions = 0
+    for one in synapses.values():
+        definition = one.use.definition
+        changes = [tree for state in definition.state for tree in (state.each_step, state.each_episode)]
+        functions += _calls([*(tree for _, tree in unfolded(definition.let, changes).let), *changes]) * len(one.members)
+    for population in network.populations:
+        read = ports_read_by(population.model.definition).update
+        ports = [(port, np.arange(len(port.incoming))) for port in population.ports if port.name in read]
+        functions += _signals(network, {number: signal_of(one) for number, one in synapses.items()}, ports)
+    return functions
+
+
 def _integration(exported: Exported) -> tuple[int, list[str]]:
     """How many functions the integration calls in a step, and what else it takes; none where nothing flows."""
     network = exported.network
@@ -150,6 +185,14 @@ def _integration(exported: Exported) -> tuple[int, list[str]]:
     signals = sum(len(apart(port)[1]) for part in parts for port in part.ports)
     functions = stages * sum(_calls_a_stage(part) * len(part.population.members) for part in parts)
     functions += stages * sum(_calls(_trees_of(one.derivatives, one.slopes)) * count for one, count in joined)
+    signal = {one.number: one.signal for one, _ in joined}
+    for part in parts:
+        for made in (*(taken.formulas for taken in part.taken), part.derivatives):
+            functions += stages * _signals(network, signal, [(port, apart(port)[1]) for port in made.ports])
+        for through in part.through:
+            back = {one.number: one.back for one, _ in joined}
+            functions += stages * _calls(_trees_of(through.slope)) * len(part.population.members)
+            functions += stages * _signals(network, back, [(through.port, apart(through.port)[1])])
     how = f"{by.method}, {plural(by.substeps, 'substep')}" if by.substeps > 1 else by.method
     anew = f", and {plural(signals, 'signal')} made anew" if signals else ""
     kept = sum(len(member.begin) for member in exported.members if member.name == "work")
@@ -176,7 +219,9 @@ def _cost(exported: Exported) -> str:
             each += _calls_a_step(population.activation.definition)
         functions += each * len(population.members)
     for projection in network.projections:
-        functions += _calls_a_step(projection.rule.definition) * len(projection.members)
+        if projection.kind == RULE:
+            functions += _calls_a_step(projection.rule.definition) * len(projection.members)
+    functions += _of_synapses(network)
     functions += _calls(entry.expression for entry in network.inputs)
     at_stages, stages = _integration(exported)
     drawn = sum(len(noise.members) for noise in network.noises)
