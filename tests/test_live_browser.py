@@ -26,6 +26,7 @@ from neurovis_spec.live.server import Server
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import Capabilities
 from neurovis_spec.live.view import view_of
+from neurovis_spec.scene.fading import snapshots_of
 
 pytestmark = pytest.mark.browser
 
@@ -100,6 +101,41 @@ def test_the_page_shows_the_picture_that_render_draws(spec: str, theme: str, tmp
             seen = taken.crop((0, 0, *drawn.size))
             seen.save(tmp_path / "seen.png")
             drawn.save(tmp_path / "drawn.png")
+        assert similarity(seen, drawn) >= 0.98
+
+    asyncio.run(main())
+
+
+JOINED = """neurovis: 1
+name: joined
+time: {dt: 0.05, steps: 400}
+models: {cell: {state: {v: {initial: 0, derivative: drive - v}}, activity: v}}
+synapses:
+  gap: {signal: weight*(pre.v - post.v), sign: 0}
+  graded: {parameters: {E: 1}, signal: weight*pre.v*(E - post.v), sign: E}
+neurons: {N: {count: 5, model: cell, initial: {v: i - 2}, bias: i}}
+connections:
+  - N -> N: {weight: 0.5, synapse: gap, pattern: chain, symmetric: true}
+  - N1 -> N3: {weight: 0.4, synapse: {graded: {E: -1}}}
+  - N2 -> N4: {weight: 0.2, synapse: graded}
+  - N3 -> N5: {weight: 0.3, symmetric: true}
+  - N1 -> N5: {weight: -0.2, symmetric: true}
+"""
+
+
+def test_the_page_shows_how_synapses_and_symmetric_pairs_end(tmp_path: Path) -> None:
+    (tmp_path / "joined.yaml").write_text(JOINED)
+
+    async def main() -> None:
+        async with shown(str(tmp_path / "joined.yaml"), tmp_path) as (opened, compiled, _):
+            await opened.until(f"{STEP} > 5")
+            step = await pause(opened)
+            taken = Image.open(io.BytesIO(await opened.shot())).convert("RGB")
+            (snapshot,) = snapshots_of(compiled.network, compiled.run(step + 1), [step])
+            drawn = Image.open(io.BytesIO(file_of(scene_of(compiled, snapshot), ".png"))).convert("RGB")
+            seen = taken.crop((0, 0, *drawn.size))
+        seen.save(tmp_path / "seen.png")
+        drawn.save(tmp_path / "drawn.png")
         assert similarity(seen, drawn) >= 0.98
 
     asyncio.run(main())

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scenes import scene_of
+from scenes import film_of, scene_of
 from small_specs import compiled
 
 import neurovis_spec as nv
@@ -17,8 +17,9 @@ from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.turns import Lesion
 from neurovis_spec.scene.collapse import gathered
 from neurovis_spec.scene.fading import snapshots_of
+from neurovis_spec.scene.film import still
 from neurovis_spec.scene.lesions import lesions_of
-from neurovis_spec.scene.model import Scene
+from neurovis_spec.scene.model import Arrowhead, Disc, Scene, Spline
 
 HEAD = """time: {dt: 0.1, steps: 20}
 parameters: {g: 0.5, lag: 1}
@@ -171,3 +172,26 @@ def test_what_cannot_be_symmetric_is_told() -> None:
         network("M -> M: {pattern: one_to_one, symmetric: true}")
     with pytest.raises(nv.SpecError, match="has no port 'a'"):
         network("M -> N: {symmetric: true, port: a, pattern: all_to_all}")
+
+
+@pytest.mark.parametrize("size", ["", "render: {size: [900, 700]}\n"])
+def test_a_line_that_leads_both_ways_has_a_head_at_either_end(size: str) -> None:
+    made = network("M -> M: {pattern: chain, weight: -1, symmetric: true}\n  - M1 -> M3: 1", size)
+    steps = list(snapshots_of(made.network, made.run(), [0, 3]))
+    scene = still(film_of(made, steps), 1)
+    found = {group.data["connection"]: group.shapes for group in scene.groups if "connection" in group.data}
+    assert {name: len(shapes) for name, shapes in found.items()} == {"M1 -> M2": 3, "M2 -> M3": 3, "M1 -> M3": 2}
+    discs = {group.data["neuron"]: group.shapes[0] for group in scene.groups if "neuron" in group.data}
+    for name in ("M1 -> M2", "M2 -> M3"):
+        spline, *heads = found[name]
+        assert isinstance(spline, Spline)
+        ends = spline.points[-1], spline.points[0]
+        for head, end, neuron in zip(heads, ends, name.split(" -> ")[::-1], strict=True):
+            assert isinstance(head, Arrowhead)
+            disc = discs[neuron]
+            assert isinstance(disc, Disc)
+            assert head.kind == "bar"
+            assert head.notch == pytest.approx(end, abs=0.05 * head.length)
+            toward = np.subtract(disc.centre, head.tip)
+            assert np.dot(toward / np.hypot(*toward), head.direction) > 0.9
+            assert disc.radius < np.hypot(*toward) < disc.radius + head.length

@@ -25,7 +25,7 @@ from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.network import Input, Network
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.backend import Stepper, ready
-from neurovis_spec.runtime.columns import ALL, columns_of
+from neurovis_spec.runtime.columns import Keep, columns_of
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.embodied import embodied
 from neurovis_spec.runtime.errors import RecordingError
@@ -44,6 +44,8 @@ _OF_SENSITIVITY = ("mean", "rms", "elasticity")
 STEP = 1e-4
 #: The second difference, of the first; how far both derivatives may be apart, of the larger one and of the rounding.
 _FINER, _APART, _ROUNDING = 0.25, 0.1, 1e3
+#: Of a trial the activities alone are looked at.
+_KEPT = Keep(sent=False)
 #: What moves something by so much, and gives the outputs; ParameterError where it cannot be there.
 Move = Callable[[float], FloatArray]
 
@@ -82,8 +84,8 @@ class Trials:
         self._made, self._body = ready(network), embodied(network)
         self._simulation = Simulation(network, self._made, inputs=inputs, body=self._body)
         self._state = initial_state(network)
-        self._widths = columns_of(network, ALL, self._body).widths(network)
-        course = Course(first, inputs=inputs, backend=self._made, body=self._body)
+        self._widths = columns_of(network, _KEPT, self._body).widths(network)
+        course = Course(first, inputs=inputs, backend=self._made, keep=_KEPT, body=self._body)
         _go(network, self._state, course, Last(self._widths))
         if self._body is not None:
             self._body.put(self._state)
@@ -114,9 +116,10 @@ class Trials:
         return self._run(self._simulation.state())[:, self.outputs]
 
     def with_weight(self, connection: int, more: float) -> FloatArray:
-        """The outputs (steps, outputs) with a connection's weight increased by ``more`` from the first step on."""
+        """The outputs (steps, outputs) with a connection's weight, and that of its twin, increased by ``more`` from the
+        first step on."""
         state = self._state.copy()
-        state.weights[connection] += more
+        state.weights[self.network.connections.with_twins(np.array([connection], dtype=np.int64))] += more
         return self._run(state)[:, self.outputs]
 
     def with_input(self, entry: Input, other: Callable[[FloatArray], FloatArray]) -> FloatArray:
@@ -133,7 +136,7 @@ class Trials:
     def _run(self, state: State, seen: Callable[[FloatArray], FloatArray] | None = None) -> FloatArray:
         rows = InMemory(self._widths, self.steps)
         made = self._made if seen is None else replace(self._made, stepper=_Turned(self._made.stepper, seen))
-        course = Course(self.steps, inputs=self._inputs, backend=made, body=self._body)
+        course = Course(self.steps, inputs=self._inputs, backend=made, keep=_KEPT, body=self._body)
         _go(self.network, state, course, rows)
         return rows.numbers(Steps(self.steps, 1, self.start)).rows.activity
 
@@ -238,8 +241,9 @@ def sensitivity(
 ) -> NamedArray:
     """A row for each input, each parameter that can be set in a run and each connection: the ``mean`` over steps and
     outputs of ∂output/∂it, its root mean square (``rms``), and the ``elasticity``, the rms times the size of it: how
-    much the outputs change where it changes by its own size. A weight that learns goes on learning; an input is changed
-    by the same at all steps. NaN where there is no derivative. See ``Trials`` for the arguments."""
+    much the outputs change where it changes by its own size. A symmetric pair is one. A weight that learns goes on
+    learning; an input is changed by the same at all steps. NaN where there is no derivative. See ``Trials`` for the
+    arguments."""
     return sensitivity_by(Trials(network, start, steps, inputs, of), progress)
 
 
@@ -273,8 +277,10 @@ def _moves(trials: Trials) -> Iterator[tuple[str, float, Move]]:
                 return trials.changed(lambda simulation: simulation.set({name: value + h}))
 
             yield f"parameter {name}", abs(value), move
-    weights = trials.weights
+    weights, second = trials.weights, frozenset(network.connections.second.tolist())
     for index, name in enumerate(network.connection_names):
+        if index in second:
+            continue  # a symmetric pair has one weight
         yield name, abs(float(weights[index])), lambda h, index=index: trials.with_weight(index, h)  # type: ignore[misc]
 
 

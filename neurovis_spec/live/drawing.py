@@ -45,8 +45,9 @@ from neurovis_spec.scene.plan import Plan, rerouted
 
 #: How a line ends, as the page has it.
 ENDS = {"arrow": 1, "none": 0, "bar": -1}
-#: A line: its points one after the other, the tip of its head, and the direction of this.
-Run = tuple[list[float], list[float], list[float]]
+#: A line: its points one after the other, the tip of its head, and the direction of this; and where it leads both ways
+#: the tip of the other one.
+Run = tuple[list[float], ...]
 
 
 def content(
@@ -159,5 +160,5 @@ def moved(planned: Plan, before: Layout, after: Layout) -> Moved:
     for index, line in zip(other, rerouted(planned, after, other), strict=True):
         points = [round(value, 2) for point in line.points for value in point]
         tip, along = ([round(value, 5) for value in point] for point in (line.tip, line.direction))
-        lines[f"c{index}"] = (points, tip, along)
+        lines[f"c{index}"] = points, tip, along, *([[round(value, 5) for value in line.tail]] if line.tail else [])
     return Moved(discs, lines)

@@ -345,6 +345,7 @@ class _Gatherer:
             tuple(descriptions),
             tuple(learns),
             (*old.labels, *(None for _ in entries[len(old.labels) :])),
+            synapses=(*old.synapses, *(None for _ in entries[len(old.labels) :])) if old.synapses else (),
             twins=self._twins(),
         )
 

@@ -159,8 +159,8 @@ def _connections(planned: Plan, seen: Looks, glowing: npt.NDArray[np.bool_], tit
     groups = []
     for index in planned.order:
         line, width = planned.lines[index], widths[index]
-        head = ended(line.end, width, strokes[index], ends[index])
-        shapes: tuple[Shape, ...] = (Spline(line.points, strokes[index], width), head)
+        heads = (ended(end, width, strokes[index], ends[index]) for end in line.ends)
+        shapes: tuple[Shape, ...] = (Spline(line.points, strokes[index], width), *heads)
         if glowing[index]:
             shapes = (Spline(line.points, planned.theme.glow, glows[index], glow=True), *shapes)
         if index in planned.beads:
@@ -205,13 +205,14 @@ def tooltips(network: Network, gains: Gains, activity: FloatArray, weights: Floa
     of_connections = []
     scaled = _gains_of(network, gains)
     lows, highs = weights.min(axis=0).tolist(), weights.max(axis=0).tolist()
-    twins = None if connections.twins is None else connections.twins.tolist()
+    twins, synapses = None if connections.twins is None else connections.twins.tolist(), connections.synapses
     rows = zip(connections.delays.tolist(), connections.entry.tolist(), strict=True)
     for index, (delay, entry) in enumerate(rows):
         parts = [
             network.connection_names[index].replace("->", "→" if twins is None or twins[index] < 0 else "↔")
             + (f": {called}" if (called := connections.labels[entry]) else ""),
             f"weight {_range(lows[index], highs[index])}",
+            f"synapse {synapses[entry]}" if synapses and synapses[entry] else "",
             connections.learns[entry] or "",
             f"delay {delay}" if delay != 1 else "",
             connections.descriptions[entry] or "",

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,17 +21,36 @@ from neurovis_spec.scene.model import Arrowhead
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A connection as it is drawn: ``points`` end in the notch of the head at ``tip``."""
+    """A connection as it is drawn: ``points`` end in the notch of the head at ``tip``. One that leads both ways begins
+    in that of a head at ``tail``, too, which points ``back``."""
 
     points: tuple[Point, ...]
     tip: Point
     direction: Point
     head: float
+    tail: Point | tuple[()] = ()
+    back: Point = (0.0, 0.0)
 
     @property
     def end(self) -> Arrowhead:
         """What it ends in, whatever its width and its colour."""
         return Arrowhead(self.tip, self.direction, self.head, 0.0, "")
+
+    @property
+    def ends(self) -> tuple[Arrowhead, ...]:
+        """What it ends in at its tip and, where it leads both ways, at its tail."""
+        return (self.end, Arrowhead(self.tail, self.back, self.head, 0.0, "")) if self.tail else (self.end,)
+
+    def both_ways(self) -> Line:
+        """The same with a head at either end."""
+        points, notch = np.array(self.points), Arrowhead.NOTCH * self.head
+        k = (len(points) - 1) / 3
+        at = min(float(leaving(points[None], notch)[0]), 0.6 * k)
+        rest = between(self.points, at, k)
+        (x0, y0), (x1, y1) = rest[0], self.points[0]
+        length = math.hypot(x1 - x0, y1 - y0)
+        back = ((x1 - x0) / length, (y1 - y0) / length) if length > 0 else (-1.0, 0.0)
+        return replace(self, points=rest, tail=self.points[0], back=back)
 
 
 def routes_of(names: Sequence[str], ends: Sequence[tuple[str, str]], layout: Layout) -> list[FloatArray]:

@@ -227,6 +227,7 @@ def _on_page(content: _Content, framed: _Framed, gains: Gains, layout: Layout) -
     ends = np.stack([radii[network.connections.sources.whole()], radii[network.connections.targets.whole()]], axis=1)
     kept = np.flatnonzero(content.seen.lines).tolist()
     lines = trimmed([frame.map(content.routes[index]) for index in kept], ends[kept], RADIUS * frame.scale)
+    lines = _both_ways(network, kept, lines)
     reaches = _reaches(network, gains, frame.widest)
     obstacles = Obstacles(_dots(lines), [reaches[index] for index in kept], centres, radii)
     picture = framed.picture(len(content.notes))
@@ -329,7 +330,16 @@ def rerouted(planned: Plan, layout: Layout, connections: Sequence[int]) -> list[
         [network.connection_names[index] for index in connections], [(names[a], names[b]) for a, b in pairs], layout
     )
     discs = np.array([(radii[a], radii[b]) for a, b in pairs]).reshape(-1, 2)
-    return trimmed([frame.map(route) for route in routes], discs, radius, unit)
+    return _both_ways(network, connections, trimmed([frame.map(route) for route in routes], discs, radius, unit))
+
+
+def _both_ways(network: Network, connections: Sequence[int], lines: list[Line]) -> list[Line]:
+    """The lines of some connections, those of symmetric pairs with a head at either end."""
+    twins = network.connections.twins
+    if twins is None:
+        return lines
+    pairs = zip(lines, twins[np.array(connections, np.int64)].tolist(), strict=True)
+    return [line if twin < 0 else line.both_ways() for line, twin in pairs]
 
 
 def _lengths(routes: Sequence[FloatArray]) -> FloatArray:

@@ -20,7 +20,7 @@ Scaled = TypeVar("Scaled", bound="DataclassInstance")
 _Extent: TypeAlias = "float | tuple[_Extent, ...]"
 
 _LENGTHS = {"radius", "width", "height", "length", "half_width", "stroke_width", "size", "head", "dash"}
-_MEASURED = _LENGTHS | {"centre", "corner", "point", "points", "tip"}
+_MEASURED = _LENGTHS | {"centre", "corner", "point", "points", "tip", "tail"}
 
 
 def scaled(thing: Scaled, by: float) -> Scaled:

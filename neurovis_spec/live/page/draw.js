@@ -18,12 +18,19 @@ import { enter, leave, Mosaic } from './mosaic.js';
 /** @typedef {import('./coverage.js').Round} Round */
 /** @typedef {import('./coverage.js').End} End */
 /** A line as it was laid out: from these points, as this chain, in these tiles, which have room for this reach.
- * @typedef {{points: number[], head: Shape, end: End, box: number[], chain: Chain, tiles: Tile[], reach: number, room: number,
+ * @typedef {{points: number[], head: Shape, end: End, start: End | null, box: number[], chain: Chain, tiles: Tile[], reach: number, room: number,
  *   width: number, glow: number, ending: number, share: number}} LaidLine */
 /** What lies otherwise when another `points`, `head` or `at` is put in place of the one before.
- * @typedef {{id: string, index: number, points: number[], head: Shape, rest: Shape[],
+ * @typedef {{id: string, index: number, points: number[], head: Shape, tail: Shape | null, rest: Shape[],
  *   laid: LaidLine | null}} Line */
 /** @typedef {{id: string, index: number, shape: Shape, rest: Shape[], laid: (Round & {tiles: Tile[]}) | null}} Disc */
+
+/** What a line is drawn of: its points, its head, one at its other end if it leads both ways, and what lies on it.
+ * @param {Shape[]} shapes @returns {{points: number[], head: Shape, tail: Shape | null, rest: Shape[]}} */
+function parts([{ points }, head, ...rest]) {
+  const tail = rest[0]?.kind === 'head' ? rest[0] : null;
+  return { points, head: { ...head }, tail, rest: tail ? rest.slice(1) : rest };
+}
 
 /** The path of a cubic spline. @param {number[]} points @returns {Path2D} */
 function spline(points) {
@@ -112,8 +119,7 @@ export class Drawing {
     if (data.neuron !== undefined) {
       this.discs.push({ id, index: Number(id.slice(1)), shape: shapes[0], rest: shapes.slice(1), laid: null });
     } else if (data.connection !== undefined) {
-      const [{ points }, head, ...rest] = shapes;
-      this.lines.push({ id, index: Number(id.slice(1)), points, head, rest, laid: null });
+      this.lines.push({ id, index: Number(id.slice(1)), ...parts(shapes), laid: null });
     } else if (id === 'caption') {
       this.caption = shapes[0];
     } else {
@@ -128,7 +134,7 @@ export class Drawing {
       disc = this.discs.find((one) => one.id === id);
     if (group) group.shapes = shapes;
     if (disc) [disc.shape, ...disc.rest] = shapes;
-    if (line) [{ points: line.points }, line.head, ...line.rest] = [shapes[0], { ...shapes[1] }, ...shapes.slice(2)];
+    if (line) Object.assign(line, parts(shapes));
   }
 
   /** Draw a look; true where there is more to be drawn in the next frame.
@@ -323,16 +329,17 @@ export class Drawing {
       const same = laid && laid.points === points && laid.head === line.head;
       if (same && laid.width === width && laid.glow === glow && laid.ending === ending && laid.share === share) return;
       const end = this.end(line.head, width / fineness, ending, scale, camera.origin);
+      const start = line.tail && this.end(line.tail, width / fineness, ending, scale, camera.origin);
       const reach = (Math.max(width, glow) / 2 / fineness) * scale + 0.5,
         { room } = end;
-      const now = { points, head: line.head, end, width, glow, ending, share };
+      const now = { points, head: line.head, end, start, width, glow, ending, share };
       if (same && reach <= laid.reach && room <= laid.room) {
         Object.assign(laid, now);
         mosaic.spoil(laid.tiles);
         return;
       }
       const chain = same ? laid.chain : flattened(points, scale, camera.origin);
-      const tiles = mosaic.beside(chain, reach + SPARE, end.x, end.y, room + SPARE);
+      const tiles = mosaic.beside(chain, reach + SPARE, [end, ...(start ? [start] : [])], room + SPARE);
       if (laid) {
         leave(laid.tiles, 'lines', at);
         mosaic.spoil(laid.tiles);
@@ -360,6 +367,7 @@ export class Drawing {
         { laid } = lines[at];
       if (!laid) continue;
       coverage.head(laid.end, laid.share, at);
+      if (laid.start) coverage.head(laid.start, laid.share, at);
       coverage.line(laid.chain, laid.width * half, laid.glow * half, laid.share, at, colours.glow);
     }
     coverage.picture(pictures.back);

@@ -112,10 +112,12 @@ export class Mosaic {
     return found;
   }
 
-  /** The tiles along a curve, and around where it ends. @param {Chain} chain @param {number} reach @param {number} x
-   * @param {number} y @param {number} room @returns {Tile[]} */
-  beside({ at, parts }, reach, x, y, room) {
-    const found = this.around(x, y, room);
+  /** The tiles along a curve, and around where it ends. @param {Chain} chain @param {number} reach
+   * @param {{x: number, y: number}[]} ends @param {number} room @returns {Tile[]} */
+  beside({ at, parts }, reach, ends, room) {
+    const [{ x, y }, ...others] = ends,
+      found = this.around(x, y, room);
+    for (const end of others) this.touched(end.x - room, end.y - room, end.x + room, end.y + room, found);
     for (let i = 0; i < 2 * parts; i += 2) {
       const [x0, y0, x1, y1] = [at[i], at[i + 1], at[i + 2], at[i + 3]],
         least = Math.min(y0, y1) - reach;

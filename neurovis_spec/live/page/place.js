@@ -7,7 +7,8 @@
 /** @typedef {import('./protocol.js').Link} Link */
 /** @typedef {import('./protocol.js').Scene} Scene */
 /** Where a group stands: of a disc and its label the points, of a line its points and the tip of its head.
- * @typedef {{at: number[][], points: number[], along: number[]}} Stand */
+ * @typedef {{at: number[][], points: number[], along: number[], isBoth?: boolean}} Stand of a line whether it has a head
+ *   at either end, the other one as its third shape */
 /** @typedef {{neurons: string[], undo: boolean, files: boolean}} Put */
 /** @typedef {{discs: Object<string, number[]>, lines: Object<string, number[][]>}} Moved */
 
@@ -19,13 +20,15 @@ const endsOf = ({ data: { signal, from, to } }) => (signal === undefined ? [from
 
 /** A line whose ends are elsewhere. @param {Stand} stand @param {number[] | null} start by how much @param {number[] | null} end
  * @returns {Stand} */
-function bent({ at, points, along }, start, end) {
+function bent({ at, points, along, isBoth }, start, end) {
   const last = points.length / 2 - 1;
   const shift = (/** @type {number} */ value, /** @type {number} */ axis, /** @type {number} */ share) =>
     value + (1 - share) * (start ? start[axis] : 0) + share * (end ? end[axis] : 0);
+  const shareAt = (/** @type {number} */ place) => (place === 1 ? 1 : place === 2 && isBoth ? 0 : 0.5);
   return {
     along,
-    at: at.map((point, place) => point?.map((value, axis) => shift(value, axis, place === 1 ? 1 : 0.5))),
+    isBoth,
+    at: at.map((point, place) => point?.map((value, axis) => shift(value, axis, shareAt(place)))),
     points: points.map((value, place) => shift(value, place & 1, (place >> 1) / last)),
   };
 }
@@ -89,7 +92,8 @@ export class Placing {
   stand(id) {
     const { shapes } = /** @type {Group} */ (this.groups.get(id));
     const along = shapes[0].points && shapes[1].along;
-    return { at: shapes.map(({ at }) => at), points: shapes[0].points, along };
+    const isBoth = Boolean(along) && shapes[2]?.kind === 'head';
+    return { at: shapes.map(({ at }) => at), points: shapes[0].points, along, isBoth };
   }
 
   /** Have a group stand so. @param {string} id @param {Stand} stand */
@@ -101,6 +105,11 @@ export class Placing {
       shape.at = stand.at[place];
     });
     if (stand.points) [shapes[0].points, shapes[1].along] = [stand.points, stand.along];
+    if (stand.isBoth) {
+      const [dx, dy] = [0, 1].map((axis) => shapes[2].at[axis] - stand.points[axis]),
+        far = Math.hypot(dx, dy) || 1;
+      shapes[2].along = [dx / far, dy / far];
+    }
     this.redraw(group);
   }
 
@@ -192,9 +201,10 @@ export class Placing {
       const [start, end] = endsOf(group).map((name) => by.get(name) ?? null);
       if (start || end) this.last.set(id, bent(this.first.get(id) || this.stand(id), start, end));
     }
-    for (const [id, [points, tip, along]] of Object.entries(moved.lines)) {
-      const { at } = this.first.get(id) || this.stand(id);
-      this.last.set(id, { at: [at[0], tip, ...at.slice(2)], points, along });
+    for (const [id, [points, tip, along, tail]] of Object.entries(moved.lines)) {
+      const { at, isBoth } = this.first.get(id) || this.stand(id),
+        heads = isBoth ? [tip, tail] : [tip];
+      this.last.set(id, { at: [at[0], ...heads, ...at.slice(1 + heads.length)], points, along, isBoth });
     }
     for (const [id, stand] of this.last) this.set(id, stand);
     this.follow();

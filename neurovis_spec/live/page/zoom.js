@@ -131,7 +131,7 @@ export class Zoom {
       [first] = shapes;
     if (ink === 1 || !(Object.keys(data).length || /^(box|instance|title):/.test(id))) return group;
     const { notch } = /** @type {Scene} */ (this.scene).constants,
-      head = shapes.find(({ kind }) => kind === 'head');
+      [head, tail] = shapes.filter(({ kind }) => kind === 'head');
     return {
       ...group,
       shapes: shapes.map((shape) => {
@@ -141,14 +141,16 @@ export class Zoom {
           made.dash = shape.dash.map((length) => length * ink);
           // the head is shorter, and the line goes on to it
           if (head) {
-            const more = notch * head.length * (1 - ink),
-              [x, y] = shape.points.slice(-2);
+            const more = notch * head.length * (1 - ink);
+            const on = (
+              /** @type {number[]} */ [x, y],
+              /** @type {number[]} */ along,
+              /** @type {number[]} */ shares,
+            ) => shares.flatMap((share) => [x + share * more * along[0], y + share * more * along[1]]);
             made.points = [
+              ...(tail ? on(shape.points, tail.along, [1, 2 / 3, 1 / 3]) : []),
               ...shape.points,
-              ...[1 / 3, 2 / 3, 1].flatMap((share) => [
-                x + share * more * head.along[0],
-                y + share * more * head.along[1],
-              ]),
+              ...on(shape.points.slice(-2), head.along, [1 / 3, 2 / 3, 1]),
             ];
           }
         }
