@@ -222,6 +222,52 @@ def test_the_three_cells_settle_where_the_page_says() -> None:
     assert 1 / (1 + np.exp((-52 - run["A"][-1]) / 2)) == pytest.approx(0.44, abs=0.005)
 
 
+def test_the_wave_travels_as_the_page_says() -> None:
+    text = example("swimming")
+    phases = nv.compile_text(text).run()["phase"]
+    assert np.diff(phases[-1]) == pytest.approx([-0.785] * 7, abs=1e-3)
+    (start,) = (phases[0],)
+    segments = np.arange(8)
+    lags = 2 * np.pi / 8 * (segments[:, None] - segments)  # of the target, a row, to the source
+    beside = np.abs(segments[:, None] - segments) == 1
+
+    def flow(t: float, x: FloatArray) -> FloatArray:
+        theta, r, speed = x.reshape(3, 8)
+        pulls = np.where(beside, 4 * r * np.sin(theta - theta[:, None] - lags), 0)
+        return np.concatenate((2 * np.pi + pulls.sum(axis=1), speed, 20 * (5 * (1 - r) - speed)))
+
+    exact = solve_ivp(flow, (0, 2), np.concatenate((start, np.zeros(16))), rtol=1e-11, atol=1e-12).y[:8, -1]
+    assert phases[200] == pytest.approx(exact, abs=1e-4)
+    two = text.replace("  N -> N:\n", "  N1..N7 -> N2..N8:\n").replace("{band: {width: 1}}", "one_to_one")
+    two = two.replace("lag*(j - i)", "lag") + "\n"
+    there = two[two.index("  N1..N7") : two.index("outputs")]
+    back = there.replace("N1..N7 -> N2..N8", "N2..N8 -> N1..N7").replace("lag: lag", "lag: -lag")
+    assert nv.compile_text(two.replace(there, there + back)).run()["phase"][-1] == pytest.approx(phases[-1], abs=1e-9)
+
+
+def test_a_ring_both_ways_is_made_as_the_page_says() -> None:
+    def pairs(entries: str) -> set[tuple[int, int]]:
+        text = f"neurovis: 1\nname: x\nneurons: {{N: {{count: 8, bias: 1}}}}\nconnections:\n{entries}"
+        found = nv.compile_text(text).network.connections
+        return set(zip(found.sources.whole().tolist(), found.targets.whole().tolist(), strict=True))
+
+    ring = {(i, (i + step) % 8) for i in range(8) for step in (1, -1)}
+    assert pairs("- N -> N: {pattern: ring}\n- N2..N8 + N1 -> N: {pattern: one_to_one}") == ring
+    assert pairs("- N -> N: {pattern: ring, symmetric: true}") == ring
+    chain = {(i, j) for i, j in ring if abs(i - j) == 1}
+    assert pairs("- N -> N: {pattern: {band: {width: 1}}}") == chain
+    assert pairs("- N -> N: {pattern: chain}\n- N2..N8 -> N1..N7: {pattern: one_to_one}") == chain
+
+
+def test_the_half_centre_takes_turns_as_the_page_says() -> None:
+    run = nv.compile_text(example("half_centre")).run()["N"][500:]
+    left, right = (np.nonzero((cell[1:] > 0) & (cell[:-1] <= 0))[0] * 0.2 for cell in run.T)
+    assert np.diff(left) == pytest.approx(np.full(len(left) - 1, 106), abs=0.5)
+    assert right[right > left[0]][0] - left[0] == pytest.approx(53, abs=1)
+    alone = nv.compile_text(example("half_centre"), inhibition=0).run()["N"]
+    assert np.ptp(alone[-500:]) < 1
+
+
 def test_the_noise_has_the_deviation_that_the_page_says() -> None:
     assert round(float(nv.compile_text(example("noise")).run()["X"][250:].std()), 2) == 2.01
 

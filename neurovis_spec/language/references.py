@@ -206,7 +206,9 @@ def _steps(whole: str, both: bool) -> str:
     """How to write what has several arrows, or (``both``) one that goes both ways."""
     names = [part.strip() for part in whole.replace("<->", "->").split("->")]
     steps = [*pairwise(names), *(pairwise(reversed(names)) if both else ())]
-    written = ", ".join(dict.fromkeys(f"{one} -> {other}" for one, other in steps))
+    if both and names[0] and len({*names}) == 1:
+        return f"write {shorten(f'{names[0]} -> {names[0]}', 200)}, with symmetric: true for both ways"
+    written = ", ".join(f"{one} -> {other}" for one, other in steps)
     return f"write each by itself: {shorten(written, 200)}" if all(names) else "write FROM -> TO"
 
 
