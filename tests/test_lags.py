@@ -17,7 +17,9 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.cli.overview import overview
 from neurovis_spec.runtime.columns import Keep
 from neurovis_spec.runtime.course import Course
+from neurovis_spec.runtime.formed import signals_of
 from neurovis_spec.runtime.record import record
+from neurovis_spec.runtime.simulation import Simulation
 from neurovis_spec.runtime.step_check import check_step
 
 BACKENDS = ["reference", "numpy", pytest.param("c", marks=pytest.mark.compiler)]
@@ -319,3 +321,41 @@ def test_exported_as_well(form: Callable[[str], str], real: str, tmp_path: Path)
     for row in network.run(20, backend="reference").activity:
         controller.step()
         np.testing.assert_allclose(controller.activity, row, rtol=0, atol=0 if real == "double" else 1e-4)
+
+
+BEGINNING = """\
+neurovis: 1
+name: beginning
+time: {dt: 0.1, integrate: euler}
+models:
+  source: {state: {v: {initial: 1, derivative: -v}}, activity: v}
+  cell: {state: {v: {derivative: drive}, seen: {each_step: drive}}, activity: v}
+synapses: {brought: {state: {u: {each_step: pre.v}}, signal: weight*pre.v + u}}
+neurons: {S: {count: 3, model: source}, A: {count: 3, model: cell}, B: {count: 3, model: cell}}
+connections:
+  S -> A: {pattern: one_to_one, synapse: brought, delay: {seconds: 0.42 - 0.1*i}}
+  S -> B: {pattern: one_to_one, synapse: brought, delay: 1 + i}
+"""
+
+
+@pytest.mark.parametrize("backend", ["reference", "numpy"])
+@pytest.mark.parametrize("apart", [True, False])
+def test_a_synapse_brings_before_the_first_step_what_was_there_wherever_it_is_formed(backend: str, apart: bool) -> None:
+    """Also in the map, for which delays are rounded, and in a picture; with a delay in steps there is 0 until something
+    arrives. Where they lead to one group they are formed together."""
+    text = BEGINNING
+    if not apart:
+        text = text.replace("A: {count: 3,", "A: {count: 6,").replace(", B: {count: 3, model: cell}", "")
+        text = text.replace("S -> A:", "S -> A1..A3:").replace("S -> B:", "S -> A4..A6:")
+    simulation = Simulation(nv.compile_text(text).network, backend)
+    v = 0.9 ** np.arange(8)
+    for k in range(8):
+        simulation.step()
+        late = v[np.maximum(k - np.array([4, 3, 2]), 0)]
+        held = np.where(k >= np.arange(1, 4), v[k - np.arange(1, 4)], 0)
+        expected = 2 * np.concatenate([late, held]) if k else np.zeros(6)
+        state = simulation.state()
+        if k:  # at step 0 no state of it is made
+            seen = np.concatenate([one["seen"] for one in state.cells.values() if "seen" in one])
+            np.testing.assert_allclose(seen, expected, rtol=1e-12)
+            np.testing.assert_allclose(signals_of(simulation.network, state, state.weights), expected, rtol=1e-12)

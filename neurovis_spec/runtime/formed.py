@@ -19,8 +19,9 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import SYNAPSE, Key, Projection
 from neurovis_spec.language.expressions.evaluate import Given, evaluate_array
 from neurovis_spec.language.expressions.functions import NUMPY, Library
+from neurovis_spec.runtime.lags import lags_of
 from neurovis_spec.runtime.stages import End, Formulas, ends_of, signal_of, taken_by
-from neurovis_spec.runtime.state import State, constants
+from neurovis_spec.runtime.state import NEVER_LOST, State, constants
 
 
 def signals_of(network: Network, state: State, weights: FloatArray, by: Library = NUMPY) -> FloatArray:
@@ -37,18 +38,22 @@ def formed(network: Network, projection: Projection, formulas: Formulas, state: 
 
 
 class _Synapses(NamedTuple):
-    """A projection whose members (k,) have a synapse: what is formed of what, and the delays of these."""
+    """A projection whose members (k,) have a synapse: what is formed of what, the delays of these, and the ``first``
+    step that they look at: with a continuous delay what was sent at step 0 is what was there before."""
 
     projection: Projection
     formulas: Formulas
     ends: Mapping[str, End]
     delays: IntArray
+    first: IntArray
 
     @classmethod
     def of(cls, network: Network, projection: Projection) -> _Synapses:
         """The signals of a projection."""
-        delays = network.connections.delays[projection.members]
-        return cls(projection, signal_of(projection), ends_of(network, projection), delays)
+        members, lags = projection.members, lags_of(network)
+        late = np.zeros(len(members), dtype=np.bool_) if lags is None else lags.there[members]
+        delays, first = network.connections.delays[members], np.where(late, 0, NEVER_LOST)
+        return cls(projection, signal_of(projection), ends_of(network, projection), delays, first)
 
 
 class Forming:
@@ -77,16 +82,16 @@ class Forming:
         network, use, members, delays = self._network, of.projection.use, of.projection.members, of.delays
         unit, k = use.definition.per_second, state.k - 1
         known: dict[str, Given] = {**constants(network.dt * unit), "k": float(k), "t": k * network.dt * unit}
-        known |= {
-            name: _as_set(network, Key(use.owner, name), values, state) for name, values in use.parameters.items()
-        }
+        for name, values in use.parameters.items():
+            known[name] = _as_set(network, Key(use.owner, name), values, state)
         known |= state.cells[use.owner]
         known["weight"] = weights[members]
-        lost = k - delays < state.conditions.structure.lost[members]
+        left = k - delays if state.continued else np.maximum(k - delays, of.first)
+        lost = left < state.conditions.structure.lost[members]
         for name, end in of.ends.items():
             known[name] = sent[end.places]
             if end.past and delays.any():
-                past = state.history[(k - delays) % len(state.history), end.places]
+                past = state.history[left % len(state.history), end.places]
                 known[name] = np.where(delays > 0, np.where(lost, 0.0, past), sent[end.places])
         for name, tree in of.formulas.let:
             known[name] = evaluate_array(tree, known, by=self._by)

@@ -259,16 +259,23 @@ def ends_at(step: Step, projection: Projection, read: Collection[str]) -> dict[s
 
 def end_at(step: Step, members: IntArray, end: End) -> str:
     """Something that connections read of an end: as it is now, or what was sent by their delays ago."""
-    delays = step.network.connections.delays[members]
+    delays, places = step.network.connections.delays[members], end.places
     past = np.asarray(end.past & (delays > 0))
+    late = past & (False if step.lags is None else step.lags.there[members])
+    past &= ~late
     if past.all():
-        return _past(step, members, end.places)
-    if not past.any():
-        return sent_at(step, end.places, broadcast=True)
-    parts = [
-        (_past(step, members[past], end.places[past]), np.flatnonzero(past)),
-        (sent_at(step, end.places[~past]), np.flatnonzero(~past)),
-    ]
+        return _past(step, members, places)
+    if not (past | late).any():
+        return sent_at(step, places, broadcast=True)
+    parts = []
+    if past.any():
+        parts.append((_past(step, members[past], places[past]), np.flatnonzero(past)))
+    if late.any():
+        made = long_past(step, members[late], places[late], delays[late])
+        parts.append((made, np.flatnonzero(late)))
+    now = np.flatnonzero(~(past | late))
+    if len(now):
+        parts.append((sent_at(step, places[now]), now))
     return put_together(step.code, parts, len(members), "a")
 
 
@@ -285,6 +292,18 @@ def _past(step: Step, members: IntArray, places: IntArray) -> str:
     if not (lost > NEVER_LOST).any():
         return past
     return f"np.where(k < {code.constant(lost + delays)}, 0.0, {past})"
+
+
+def long_past(step: Step, members: IntArray, places: IntArray, ago: IntArray) -> str:
+    """Activities and outlets of so many steps ago, for continuous delays: before the first step they are as at that, 0
+    where they are lost."""
+    code, lost = step.code, step.structure.lost[members]
+    code.head_lines.add(f"since = {NEVER_LOST} if state.continued else 0")
+    rows = f"np.maximum(k - {code.constant(ago)}, since) % {step.depth}"
+    made = f"history[{rows}, {code.constant(np.ascontiguousarray(places, dtype=np.intp))}]"
+    if (lost > NEVER_LOST).any():
+        made = f"np.where(k < {code.constant(lost + ago)}, 0.0, {made})"
+    return code.let("a", made)
 
 
 def each(step: Step, projection: Projection, read: frozenset[str], value: str) -> str:

@@ -13,10 +13,9 @@ import numpy as np
 from neurovis_spec.arrays import Indices, IntArray
 from neurovis_spec.compiler.program import Projection
 from neurovis_spec.runtime.lags import Lags
-from neurovis_spec.runtime.numpy_arrivals import Step, end_at, put_together, signals_of
+from neurovis_spec.runtime.numpy_arrivals import Step, end_at, long_past, put_together, signals_of
 from neurovis_spec.runtime.numpy_code import Code
 from neurovis_spec.runtime.stages import End, ends_of
-from neurovis_spec.runtime.state import NEVER_LOST
 
 
 class Around(NamedTuple):
@@ -37,19 +36,8 @@ def signals_around(step: Step, lags: Lags, connections: Indices) -> Around:
 def ends_around(step: Step, lags: Lags, members: IntArray, places: IntArray) -> Around:
     """Activities and outlets, one a connection, as they were around the time at which those left that arrive in a
     step."""
-    first, second, third = (past(step, members, places, lags.whole[members] + 1 - after) for after in (-1, 0, 1))
+    first, second, third = (long_past(step, members, places, lags.whole[members] + 1 - after) for after in (-1, 0, 1))
     return Around((first, second, third), step.code.constant(lags.part[members]))
-
-
-def past(step: Step, members: IntArray, places: IntArray, ago: IntArray) -> str:
-    """Activities and outlets of so many steps ago; before the first step they are as at that, 0 where they are lost."""
-    code, lost = step.code, step.structure.lost[members]
-    code.head_lines.add(f"since = {NEVER_LOST} if state.continued else 0")
-    rows = f"np.maximum(k - {code.constant(ago)}, since) % {step.depth}"
-    made = f"history[{rows}, {code.constant(np.ascontiguousarray(places, dtype=np.intp))}]"
-    if (lost > NEVER_LOST).any():
-        made = f"np.where(k < {code.constant(lost + ago)}, 0.0, {made})"
-    return code.let("a", made)
 
 
 def behind_lags(step: Step, projection: Projection) -> dict[str, str]:
@@ -72,10 +60,11 @@ def behind_lags(step: Step, projection: Projection) -> dict[str, str]:
 def _behind_step(step: Step, lags: Lags, members: IntArray, places: IntArray) -> str:
     """Activities and outlets that arrive at the end of a step."""
     code, late = step.code, lags.part > 0
-    next_ = past(step, members, places, lags.whole)
+    next_ = long_past(step, members, places, lags.whole)
     if not late.any():
         return next_
-    one, share = past(step, members, places, lags.whole + late), code.constant(np.where(late, 1.0 - lags.part, 0.0))
+    one = long_past(step, members, places, lags.whole + late)
+    share = code.constant(np.where(late, 1.0 - lags.part, 0.0))
     between = f"{one} + {share} * ({next_} - {one})"
     return between if late.all() else f"np.where({code.constant(late)}, {between}, {next_})"
 

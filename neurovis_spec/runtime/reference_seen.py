@@ -230,11 +230,15 @@ class Seen:
         return found
 
     def past(self, connection: int, index: int, state: State, share: float | None) -> float:
-        """An activity or an outlet of d steps ago, 0 where that is lost; or with a continuous delay as it was before
-        this share of the step was over, at the first step what it was before, too."""
-        if share is None or self.lags is None or not self.lags.there[connection]:
-            return self.remembered(connection, index, state.k - int(self.delays[connection]), state)
-        at, least = self.lags.at(connection, share), NEVER_LOST if state.continued else 0
+        """An activity or an outlet of d steps ago, 0 where that is lost; with a continuous delay at the first step what
+        it was before, too, and as it was before this ``share`` of the step was over, if it is said."""
+        step = state.k - int(self.delays[connection])
+        if self.lags is None or not self.lags.there[connection]:
+            return self.remembered(connection, index, step, state)
+        least = NEVER_LOST if state.continued else 0
+        if share is None:
+            return self.remembered(connection, index, max(step, least), state)
+        at = self.lags.at(connection, share)
         first = state.k - 1 - int(self.lags.whole[connection]) + at.first
         return at.of(*(self.remembered(connection, index, max(one, least), state) for one in (first, first + 1)))
 
