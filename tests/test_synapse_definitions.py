@@ -201,3 +201,14 @@ def test_files_that_are_included_and_modules_have_synapses(tmp_path: Path) -> No
     whole = network.text()
     library.unlink()
     assert nv.compile_text(whole, folder=tmp_path).hash == network.hash
+
+
+def test_no_state_of_a_synapse_has_the_name_of_its_signal() -> None:
+    """(A -> B).signal is what the synapse gives, in recordings."""
+    text = "neurons: {A: {bias: 1}, B: {}}\nconnections: {A -> B: {synapse: s}}\n"
+    body = "{state: {signal: {each_step: signal + pre}}, signal: weight*signal}"
+    code, message, hint = answer(f"synapses: {{s: {body}}}\n{text}")
+    assert (code, hint) == ("reserved-name", "choose another name")
+    assert message == "'signal' is no name for a state of a synapse: it means what the synapse gives"
+    one = f"synapses: {{s: {{parameters: {{signal: 1}}, signal: weight*signal}}}}\n{text}"
+    assert compiled(one).run(2).state_names == ("(A -> B).signal",)

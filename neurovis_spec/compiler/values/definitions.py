@@ -219,6 +219,13 @@ class _Checker:
             self.findings.error("duplicate-name", span, self.taken(name), f"choose another name{such}")
         self.known.declared[name] = span
 
+    def state(self, name: str, kind: Kind) -> None:
+        """Declare a state; none of a synapse is called as its signal is, which is recorded beside states."""
+        if kind == SYNAPSE and name == kind.gives:
+            message = f"'{name}' is no name for a state of a synapse: it means what the synapse gives"
+            self.findings.error("reserved-name", self._key("state", name), message, "choose another name")
+        self.declare("state", name)
+
     def taken(self, name: str) -> str:
         """The message for a name that is declared twice, or that is one of the given ones."""
         first = self.known[name]
@@ -465,7 +472,7 @@ def definition_of(
     if signals is UNKNOWN:
         return UNKNOWN
     for key in () if parts.state is None else names_of(model, "state", parts.state):
-        checker.declare("state", key)
+        checker.state(key, kind)
     ports = checker.ports(parts.ports)
     let = checker.let(parts.let)
     state = checker.states(parts.state or {}, defaults)
