@@ -299,8 +299,12 @@ def long_past(step: Step, members: IntArray, places: IntArray, ago: IntArray) ->
     where they are lost."""
     code, lost = step.code, step.structure.lost[members]
     code.head_lines.add(f"since = {NEVER_LOST} if state.continued else 0")
-    rows = f"np.maximum(k - {code.constant(ago)}, since) % {step.depth}"
-    made = f"history[{rows}, {code.constant(np.ascontiguousarray(places, dtype=np.intp))}]"
+    if (ago == ago[0]).all():
+        count = len(step.network.neurons) + step.network.outlet_count
+        made = code.select(f"history[max(k - {ago[0]}, since) % {step.depth}]", places, count)
+    else:
+        rows = f"np.maximum(k - {code.constant(ago)}, since) % {step.depth}"
+        made = f"history[{rows}, {code.constant(np.ascontiguousarray(places, dtype=np.intp))}]"
     if (lost > NEVER_LOST).any():
         made = f"np.where(k < {code.constant(lost + ago)}, 0.0, {made})"
     return code.let("a", made)
