@@ -121,6 +121,11 @@ def connections_state(name: StateName, connections: IntArray, wiring: Wiring) ->
     if not holders:
         return Refusal(f"no rule changes '{shorten(name.owner.text)}', so it has no states")
     of = f"of '{shorten(name.owner.text)}'"
+    several = [holder for holder in holders if holder.states and connections[0] in holder.members]
+    if len(several) > 1:
+        kinds = " and ".join(f"'{one.kind}'" for one in several)
+        hint = suggest(name.state, [state for one in several for state in one.states], "their states are")
+        return Refusal(f"{kinds} {of} have no state '{shorten(name.state)}'", hint)
     if rules and not any(one.states for one in synapses):
         return no_state("rule", rules[0].kind, of, name.state, rules[0].states)
     return no_state("synapse", synapses[0].kind, of, name.state, synapses[0].states)
