@@ -55,7 +55,7 @@ from neurovis_spec.language.library import (
     SynapseModel,
 )
 from neurovis_spec.language.located import IDENTIFIER, Formula, Located, bad_name, name_hint
-from neurovis_spec.language.model import names_of
+from neurovis_spec.language.model import names_of, unread
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.values import ParameterModel, WrittenPort
@@ -135,7 +135,7 @@ _READINGS = (
 )
 
 #: Keys of a definition that declare what is named where it is used, and those that declare names for its formulas.
-_NAMED = frozenset({"parameters", "signals", "ports", "outputs"})
+_NAMED = frozenset({"parameters", "signals", "ports", "outputs", "state"})
 _SECTIONS = ("parameters", "signals", "let", "state")
 _DECLARING = frozenset({*_SECTIONS, "ports"})
 #: Keys that are not there yet, and are to declare names: what reads these is not to blame.
@@ -420,9 +420,11 @@ class _Checker:
         return self.tree(formula, sight=self.sight(known, "known here")._replace(ends=True))
 
     def states(self, state: Mapping[str, StateModel], defaults: Defaults) -> tuple[Quantity, ...]:
-        """The states; their right-hand sides see everything, their initial values the parameters alone."""
+        """The states; their right-hand sides see everything, their initial values the parameters alone. One that could
+        not be read is there all the same, since others may name it."""
         constant = self.sight((*ALWAYS, *(default.name for default in defaults)), "known here")
-        return tuple(
+        lost = tuple(map(Quantity, unread(self.model, "state")))
+        return lost + tuple(
             Quantity(
                 name,
                 self.optional(model.each_step, self.functions),
@@ -475,7 +477,7 @@ def definition_of(
         checker.state(key, kind)
     ports = checker.ports(parts.ports)
     let = checker.let(parts.let)
-    state = checker.states(parts.state or {}, defaults)
+    state = () if parts.state is None else checker.states(parts.state, defaults)
     unfolded = checker.unfolded(let) if reading.inlined else {}
     if unfolded is UNKNOWN:
         return UNKNOWN
