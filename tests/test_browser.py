@@ -148,7 +148,7 @@ def at(svg: bytes, seconds: float) -> str:
 def unmoving(drawn: Scene) -> Film:
     """A film in which nothing changes."""
     nothing = np.zeros((2, 0))
-    return Film(drawn, 10.0, (), (), nothing, nothing, nothing, nothing, nothing > 0, "none", ("", ""))
+    return Film(drawn, 10.0, (), (), nothing, nothing, nothing, nothing, nothing.astype(np.int8), "none", ("", ""))
 
 
 @pytest.mark.parametrize("kind", ["still", "film"])
@@ -333,7 +333,7 @@ def test_what_is_shifted_moves_and_stands_still_with_reduced_motion(browser: Bro
     dot = Group((Disc((20, 30), 5, "#101010", "#101010", 1),), "dot", {"part": "dot"})
     empty = np.zeros((3, 0))
     made = Film(
-        Scene(200, 100, theme, "a dot", (dot,)), 10.0, (), (), empty, empty, empty, empty, empty > 0, "caption",
+        Scene(200, 100, theme, "a dot", (dot,)), 10.0, (), (), empty, empty, empty, empty, empty.astype(np.int8), "caption",
         ("",) * 3, shifts=("dot",), shift_values=np.array([[[0, 0]], [[50, 0]], [[100.5, -4]]], float),
     )  # fmt: skip
     svg = AnimatedSvgRenderer().animate(made, ".svg")
