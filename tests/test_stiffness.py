@@ -82,6 +82,20 @@ def test_what_diverges_by_itself_is_not_called_stiff() -> None:
     assert all("stiff" not in str(one.message) for one in told)
 
 
+def test_an_activation_between_that_a_derivative_reads_is_looked_through() -> None:
+    """The slopes that are followed read that of the activation, which has none of its own."""
+    text = """\
+neurovis: 1
+name: x
+time: {dt: 0.1}
+models: {m: {let: {r: f(v)}, state: {v: {initial: 1, derivative: v*v*(1 + r)}}, activity: r}}
+neurons: {A: {model: m, activation: tanh}}
+"""
+    with pytest.warns(RuntimeWarning) as told:
+        nv.compile_text(text).run(60, backend="numpy")
+    assert all("stiff" not in str(one.message) for one in told)
+
+
 def test_states_of_connections_alone_diverge_without_a_word_of_it() -> None:
     text = """\
 neurovis: 1

@@ -9,7 +9,7 @@ that is held over a step, does not. A state without any formula keeps what it be
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -109,7 +109,7 @@ def slope_by(definition: Definition, tree: Tree, name: str) -> Slope:
     """
     slopes: dict[str, Tree] = {name: Number(1.0)}
     let: list[tuple[str, Tree]] = []
-    for between, formula in definition.let:
+    for between, formula in _needed(definition.let, tree):
         made = slope(formula, slopes, _SLOPES)
         if not isinstance(made, Number):
             let.append((f"d {between}/d {name}", made))
@@ -150,7 +150,7 @@ def jacobian(definition: Definition) -> Jacobian:
     return Jacobian(tuple(let), diagonal)
 
 
-def _needed(let: list[tuple[str, Tree]], by: Tree) -> list[tuple[str, Tree]]:
+def _needed(let: Sequence[tuple[str, Tree]], by: Tree) -> list[tuple[str, Tree]]:
     """Of some intermediate values those that a formula needs."""
     wanted = set(names(by))
     found: list[tuple[str, Tree]] = []
