@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -87,8 +88,11 @@ def follow(spec: Spec, exact: bool) -> None:
 def test_a_run_in_pieces_is_the_whole_one(
     spec: Spec, backend: str, cut: int, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
+    in_pieces(compiled(spec), backend, cut, tmp_path_factory.mktemp("pieces") / "state")
+
+
+def in_pieces(network: Network, backend: str, cut: int, checkpoint: Path) -> None:
     """Stepped, gone on from a checkpoint, gone back: bit for bit what a run makes at once."""
-    network, checkpoint = compiled(spec), tmp_path_factory.mktemp("pieces") / "state"
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         whole = record(network, Course(STEPS, backend=backend, keep=Keep(states=("all",))))

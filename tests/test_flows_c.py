@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from exported import built, exported
 from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
 from random_flows import flowing_specs
 from random_specs import Spec
 from test_export_c import runs_alike
-from test_flow_conformance import compiled
+from test_flow_conformance import compiled, in_pieces
 
 import neurovis_spec as nv
 from neurovis_spec.runtime import c_backend, c_export
@@ -134,6 +135,15 @@ def test_random_networks_have_the_bits_of_the_reference(small: int, spec: Spec) 
         warnings.simplefilter("ignore")
         patch.setattr(c_backend, "SMALL", small)
         same_bits(nv.compile(spec), 12)
+
+
+@FORMS
+@settings(max_examples=4, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(spec=flowing_specs(), cut=st.integers(1, 11))
+def test_a_run_in_pieces_is_the_whole_one(small: int, spec: Spec, cut: int) -> None:
+    with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(c_backend, "SMALL", small)
+        in_pieces(compiled(spec), "c", cut, Path(folder) / "state")
 
 
 @pytest.mark.parametrize("method", ["euler", "heun", "rk4", "{method: exponential, substeps: 2}", "semi_implicit"])
