@@ -173,6 +173,14 @@ class Sent(NamedTuple):
     late: Indices | None = None
 
 
+class Anew(NamedTuple):
+    """What is made anew at a stage: the code of what the sum of a neuron ``begins`` with, by its place, else nothing,
+    and what connections without delay take, else activities and outlets."""
+
+    begins: Callable[[Place], Value]
+    sent: Sent
+
+
 class _Target(NamedTuple):
     """A neuron at which something arrives: its place in the population, and what synapses of projections read of it,
     by the numbers of these."""
@@ -205,8 +213,7 @@ def _alike(which: BoolArray) -> bool:
 class Arrivals:
     """What arrives at a port of the neurons of a population: their connections, in the order in which they are read:
     neuron by neuron, or as ``lanes`` says. What arrives at one neuron is put together in the order of its connections.
-    ``begins`` gives the code of what the sum of a neuron begins with, by its place, and ``sent`` is what connections
-    without delay take; left out, they are nothing and the activities. ``forming`` makes what synapses bring."""
+    ``forming`` makes what synapses bring, and ``anew`` says what is another at a stage."""
 
     def __init__(
         self,
@@ -216,8 +223,7 @@ class Arrivals:
         form: Form,
         layout: SignalLayout,
         forming: Forming,
-        begins: Callable[[Place], Value] | None = None,
-        sent: Sent | None = None,
+        anew: Anew | None = None,
     ) -> None:
         self.network, self.code, self.form, self.forming = network, code, form, forming
         self.combine, self.count = incoming.combine, len(incoming.ends) - 1
@@ -226,7 +232,8 @@ class Arrivals:
         self.can_be_fused, self.ends, self.degree = incoming.can_be_fused, incoming.ends, incoming.degree
         #: whether it is formed here, not sent
         self.fused = form.fused and incoming.can_be_fused
-        self._begins, self._sent = begins, sent
+        self._begins = None if anew is None else anew.begins
+        self._sent = None if anew is None else anew.sent
         #: whether nothing is added any more to what is put together here
         self.finished = True
         self.connections, self.factors = incoming.connections, incoming.factors

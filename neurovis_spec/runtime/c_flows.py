@@ -47,7 +47,7 @@ from neurovis_spec.language.expressions.emit_c import INEXACT, Made, Value
 from neurovis_spec.language.expressions.parser import formula
 from neurovis_spec.language.expressions.tree import Name
 from neurovis_spec.language.words import Method
-from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, Sent
+from neurovis_spec.runtime.c_arrivals import Anew, Arrivals, Incoming
 from neurovis_spec.runtime.c_code import Place, plus, words_of
 from neurovis_spec.runtime.c_connections import Forming, Sight, Some, own_of, taken_at
 from neurovis_spec.runtime.c_lags import write_arriving
@@ -157,11 +157,9 @@ class _Integration:
 
         self.step.each(len(part.population.members), {0: arrivals}, kept)
 
-    def arrivals(
-        self, incoming: Incoming, begins: Callable[[Place], Value] | None = None, sent: Sent | None = None
-    ) -> Arrivals:
+    def arrivals(self, incoming: Incoming, anew: Anew | None = None) -> Arrivals:
         """What arrives at a port of a population."""
-        return Arrivals(self.network, incoming, self.code, self.step.form, self.step.layout, self.forming, begins, sent)
+        return Arrivals(self.network, incoming, self.code, self.step.form, self.step.layout, self.forming, anew)
 
     def at_stage(self, part: Part, port: Port) -> Arrivals:
         """What arrives at a port at a stage: what is held, and on top of it what flows."""
@@ -171,7 +169,7 @@ class _Integration:
         def begins(place: Place) -> Value:
             return start if held is None else f"fh[{plus(held, place)}]"
 
-        arrivals = self.arrivals(anew, begins, self.plan.sent)
+        arrivals = self.arrivals(anew, Anew(begins, self.plan.sent))
         arrivals.begin = self.step.at_stages[part.number, port.name].begin
         arrivals.finished = held is None or len(anew.connections) > 0  # else what is held is
         return arrivals
