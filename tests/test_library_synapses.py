@@ -3,7 +3,9 @@ order, or the formulas of its paper."""
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from examples import SPECS
@@ -244,3 +246,51 @@ instances: {J: {module: joint, count: 18, set: {drive: 0.19 + 0.001*i, first: -7
         state = tuple(
             one + (a + 2 * b + 2 * c + d) * (0.01 / 6) for one, a, b, c, d in zip(state, *slopes, strict=True)
         )
+
+
+def test_the_whole_worm_by_graded_synapses_and_gap_junctions(tmp_path: Path) -> None:
+    """The 448 cells of C. elegans and all 7,379 pairs that touch (``specs/worm/data/worm.csv``), in the model of
+    Kunert, Shlizerman and Kutz, with a hundredth of its conductance a contact: with 100 pS a millisecond is too long
+    for rk4."""
+    with (SPECS / "worm" / "data" / "worm.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    cells = list(dict.fromkeys(row[end] for row in rows for end in ("from", "to")))
+    place = {cell: index for index, cell in enumerate(cells)}
+    contacts = {kind: np.zeros((448, 448)) for kind in ("chemical", "electrical")}
+    inhibits = np.array([cell.startswith(("DD", "VD")) for cell in cells])
+    files = {name: ["from,to,weight"] for name in ("excitatory", "inhibitory", "electrical")}
+    for row in rows:
+        source, target = place[row["from"]], place[row["to"]]
+        contacts[row["kind"]][source, target] = float(row["contacts"])
+        name = "electrical" if row["kind"] == "electrical" else "inhibitory" if inhibits[source] else "excitatory"
+        files[name].append(f"N{source + 1},N{target + 1},{row['contacts']}")
+    for name, lines in files.items():
+        (tmp_path / f"{name}.csv").write_text("\n".join(lines), encoding="utf-8")
+    touched = place["PLML"]
+    spec = f"""neurovis: 1
+name: worm
+neurons: {{N: {{count: 448, model: graded, initial: {{v: -35}}}}, T: {{bias: 5000}}}}
+connections:
+  - N -> N: {{edges: {{file: excitatory.csv}}, synapse: graded}}
+  - N -> N: {{edges: {{file: inhibitory.csv}}, synapse: {{graded: {{E: -45}}}}}}
+  - N -> N: {{edges: {{file: electrical.csv}}, synapse: gap_junction}}
+  - T -> N{touched + 1}: {{delay: 0}}
+"""
+
+    def flow(t: float, x: FloatArray) -> FloatArray:
+        v, s = x[:448], x[448:]
+        sent = contacts["chemical"].T @ (s * np.where(inhibits, -45.0, 0.0)) - contacts["chemical"].T @ s * v
+        gaps = contacts["electrical"].T @ v - contacts["electrical"].sum(axis=0) * v
+        current = 10 * (-35 - v) + sent + gaps
+        current[touched] += 5000
+        return np.concatenate((current, sigmoid(0.125 * (v + 35)) * (1 - s) - 5 * s))
+
+    start = np.concatenate((np.full(448, -35.0), np.full(448, 1 / 11)))
+    expected = solved(flow, start, 0.05, 51, "LSODA")[:, :448]
+    assert np.ptp(expected[-1]) > 10
+    assert len(rows) == 7379
+    for dt, bound in ((1, 4.3e-4), (0.2, 5.6e-7)):
+        steps = round(50 / dt)
+        network = nv.compile_text(f"{spec}time: {{dt: {dt} ms}}\n", folder=tmp_path)
+        found = network.run(steps + 1, backend="numpy")["N"]
+        assert np.abs(found[:: round(1 / dt)] - expected).max() < bound
