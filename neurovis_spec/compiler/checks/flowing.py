@@ -28,6 +28,8 @@ from neurovis_spec.language.expressions.derivative import as_derivative
 from neurovis_spec.language.library import StateModel
 from neurovis_spec.language.words import Method
 
+#: What to do where connections have different delays, one step among them.
+_IN_SECONDS: Final = "write them in seconds, which are not rounded: delay: {seconds: …}"
 #: Methods of an order above 1.
 _HIGHER: Final = frozenset(("heun", "rk4"))
 
@@ -84,12 +86,14 @@ def _held_couplings(compiled: Compiled, method: Method, findings: Findings) -> N
         told.add(span)
         first = np.flatnonzero(would & (entry == number))[0]
         start, end = (int(census.models.of[ends.compact()[first]]) for ends in (wired.sources, wired.targets))
-        message = f"'{bundle.name}' has a delay of one step, over which {method} holds its signal: its order is 1 then"
+        some = bool((delays[entry == number] != 1).any())
+        whose, its = (f"one of '{bundle.name}'", "that") if some else (f"'{bundle.name}'", "its")
+        message = f"{whose} has a delay of one step, over which {method} holds {its} signal: its order is 1 then"
         synapse = None if bundle.synapse is None else bundle.synapse.definition
         if body.delay is None and census.models.delay(start, end, bundle.route, synapse) == 1:
             source, target = (census.models.different[model] for model in (start, end))
             message += f". That is the default, since {_why_held(source, bundle.route.sends, target, synapse)}"
-        findings.warning("held-coupling", span, message, hint)
+        findings.warning("held-coupling", span, message, _IN_SECONDS if some and body.delay is not None else hint)
 
 
 def _why_held(source: Definition, sends: str, target: Definition, synapse: Definition | None) -> str:
