@@ -338,7 +338,7 @@ connections:
 """
 
 
-@pytest.mark.parametrize("backend", ["reference", "numpy"])
+@pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("apart", [True, False])
 def test_a_synapse_brings_before_the_first_step_what_was_there_wherever_it_is_formed(backend: str, apart: bool) -> None:
     """Also in the map, for which delays are rounded, and in a picture; with a delay in steps there is 0 until something

@@ -194,10 +194,13 @@ class Sight:
             return now
         if self.sent and self.lags is not None and self.lags.there[connections].any():
             return self.between_steps(connections, self.lags, end.places[some.which], place)
-        value = self.past(index, delays, place)
-        if self.form.lost:
-            lost = f"lost[{code.at(connections, place)}]"
-            value = f"k - ({code.at(delays, place)}) < {lost} ? {code.text(0.0)} : {value}"
+        if own_of(self.late(connections), place).any():
+            value = self.remembered(connections, index, place, *self.steps_ago(delays, place))
+        else:
+            value = self.past(index, delays, place)
+            if self.form.lost:
+                lost = f"lost[{code.at(connections, place)}]"
+                value = f"k - ({code.at(delays, place)}) < {lost} ? {code.text(0.0)} : {value}"
         if not own.all() and not self.sent:
             return code.let("a", f"{code.at(delays, place)} ? ({value}) : {now}")
         return code.let("a", value) if self.form.lost else value
