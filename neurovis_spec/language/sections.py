@@ -298,7 +298,7 @@ class ConnectionModel(Model):
     ELSEWHERE: ClassVar[AnyMapping[str, str]] = {
         **dict.fromkeys(("w", "strength"), "weight"),
         **dict.fromkeys(("rule", "learning"), "plasticity"),
-        **dict.fromkeys(("lag", "latency"), "delay"),
+        "latency": "delay",
         "topology": "pattern",
     }
 
@@ -365,8 +365,10 @@ class ConnectionModel(Model):
         taken_by = [one.name for one in PATTERNS.values() if name in one.settings]
         if name in ("rate", "target", "learning_rate", "eta"):
             return f"'{name}' belongs to a rule, and stands with it", f"write plasticity: {{RULE: {{{name}: …}}}}"
-        if name == "E":
-            return f"'{name}' belongs to a synapse, and stands with it", f"write synapse: {{SYNAPSE: {{{name}: …}}}}"
+        if name in ("lag", "E"):
+            time = ", or delay: … for a time" if name == "lag" else ""
+            hint = f"write synapse: {{SYNAPSE: {{{name}: …}}}}{time}"
+            return f"'{name}' belongs to a synapse, and stands with it", hint
         if not taken_by:
             return None
         hint = f"write pattern: {{{taken_by[0]}: {{{name}: …}}}}"
