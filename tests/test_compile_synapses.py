@@ -173,7 +173,8 @@ def test_the_states_of_synapses_are_referred_to_and_recorded() -> None:
     text = HEAD + "  A -> B: {synapse: low, pattern: one_to_one}\n" + "outputs: {g: (A -> B).g, one: (A2 -> B2).g}\n"
     compiled = nv.compile_text(text)
     recording = compiled.run(6, backend="reference", states=["(A -> B).g"])
-    assert recording.state_names == ("(A1 -> B1).g", "(A2 -> B2).g")
+    signals = ("(A1 -> B1).signal", "(A2 -> B2).signal")  # by which pictures of it colour these connections
+    assert recording.state_names == ("(A1 -> B1).g", "(A2 -> B2).g", *signals)
     assert (recording.states[-1] > 0.01).all()
     with pytest.raises(KeyError, match=r"the synapse 'low' of 'A -> B' has no state 'h'; its states are: g"):
         compiled.run(1, backend="reference", states=["(A -> B).h"])

@@ -66,7 +66,7 @@ def test_an_input_of_size_1_goes_to_all_and_one_of_size_n_to_one_each() -> None:
 
 
 def test_where_a_number_is_drawn_once_it_may_hold_normal_and_uniform() -> None:
-    """Bias, initial and weight, each neuron and connection its own; nowhere else, but in centres and noise."""
+    """Bias, initial and weight, each neuron and connection its own; nowhere else, but in centres, delays and noise."""
     group = "{count: 3, bias: 'normal(0, 1)', initial: 'uniform(0, 1)', noise: 'normal(0, 1)'}"
     text = (
         f"neurons: {{A: {group}, B: {{combine: distance}}}}\n"
@@ -82,7 +82,6 @@ def test_where_a_number_is_drawn_once_it_may_hold_normal_and_uniform() -> None:
         f"neurons: {{A: {{position: [{draw}, 0]}}}}",
         f"neurons: {{A: {{activation: {{gaussian: {{sigma: {draw}}}}}}}}}",
         f"neurons: {{A: {{model: {{leaky_integrator: {{leak: {draw}}}}}}}}}",
-        f"neurons: {{A: {{}}}}\nconnections: {{A -> A: {{delay: {draw}}}}}",
         f"neurons: {{A: {{}}}}\nconnections: {{A -> A: {{plasticity: {{hebbian: {{rate: {draw}}}}}}}}}",
         f"neurons: {{A: {{}}}}\nconnections: {{A -> A: {{plasticity: hebbian, bounds: [-9, {draw}]}}}}",
         f"neurons: {{A: {{count: 3}}}}\nconnections: {{A -> A: {{pattern: {{random: {{probability: {draw}}}}}}}}}",
