@@ -333,8 +333,8 @@ def test_what_is_shifted_moves_and_stands_still_with_reduced_motion(browser: Bro
     dot = Group((Disc((20, 30), 5, "#101010", "#101010", 1),), "dot", {"part": "dot"})
     empty = np.zeros((3, 0))
     made = Film(
-        Scene(200, 100, theme, "a dot", (dot,)), 10.0, (), (), empty, empty, empty, empty, empty.astype(np.int8), "caption",
-        ("",) * 3, shifts=("dot",), shift_values=np.array([[[0, 0]], [[50, 0]], [[100.5, -4]]], float),
+        Scene(200, 100, theme, "a dot", (dot,)), 10.0, (), (), empty, empty, empty, empty, empty.astype(np.int8),
+        "caption", ("",) * 3, shifts=("dot",), shift_values=np.array([[[0, 0]], [[50, 0]], [[100.5, -4]]], float),
     )  # fmt: skip
     svg = AnimatedSvgRenderer().animate(made, ".svg")
     moving = measured(browser, svg, WHERE)

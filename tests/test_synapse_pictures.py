@@ -96,7 +96,7 @@ def test_lines_have_the_colour_of_what_a_synapse_forms() -> None:
     assert abs(made[names[2]][40]) > 0.1
 
 
-@pytest.mark.parametrize("backend", ["reference", "numpy"])
+@pytest.mark.parametrize("backend", ["reference", "numpy", pytest.param("c", marks=pytest.mark.compiler)])
 def test_a_run_a_recording_a_simulator_and_the_live_page_agree(backend: str, tmp_path: Path) -> None:
     wanted = formed(compiled(TEXT), 40, backend, turned=True)
     network = compiled(TEXT + EVENTS)
