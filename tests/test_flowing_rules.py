@@ -102,7 +102,9 @@ def test_a_connection_that_does_not_learn_stays_as_it_is(backend: str) -> None:
 @pytest.mark.compiler
 @pytest.mark.parametrize("method", ["rk4", "semi_implicit"])
 def test_rules_flow_in_exported_c(method: str, tmp_path: Path) -> None:
-    events = "events: [{at: 20, learning: {K -> O: false}}, {at: 2.5 ms, learning: {K -> O: true}}]\n"
+    """Strictly compiled: nothing is read that no formula uses, where lesions lose what was sent either."""
+    events = "events: [{at: 20, learning: {K -> O: false}}, {at: 2.5 ms, learning: {K -> O: true}}, "
+    events += "{at: 30, lesion: K -> O}, {at: 33, mend: K -> O}]\n"
     network = nv.compile_text(SPEC.replace("METHOD", method) + events)
     recording = network.run(backend="reference")
     controller = exported(network, tmp_path / "c")

@@ -650,9 +650,12 @@ class StepCode:
         return code.let("n", weight)
 
     def seen(self, projection: Projection, place: Place) -> dict[str, Value]:
-        """What a rule may read besides its own: what there is at both ends, and the signals."""
+        """What a rule reads besides its own, but in derivatives of its states: what there is at both ends, and the
+        signals."""
+        made = projection.use.definition
         some = Some(projection.use.owner.number, np.arange(len(projection.members)), place)
-        return self.behind.at_ends(some, projection.read)
+        ends = () if self.network.episode is None else (one.each_episode for one in made.lasting)
+        return self.behind.at_ends(some, unfolded(made.let, [*made.steps.values(), *ends]).names)
 
 
 class _Own(NamedTuple):
