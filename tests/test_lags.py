@@ -198,7 +198,7 @@ def test_what_comes_once_a_step_sees_whole_steps(backend: str) -> None:
     np.testing.assert_allclose(found["B.seen"][1:4], signals[0], rtol=1e-15)
 
 
-@pytest.mark.parametrize("backend", ["reference", "numpy"])
+@pytest.mark.parametrize("backend", BACKENDS)
 def test_a_synapse_reads_its_source_between_steps(backend: str) -> None:
     plain, joined = (
         record(nv.compile_text(one).network, Course(40, backend=backend)).activity
