@@ -128,7 +128,7 @@ def test_a_distance_is_one_where_only_some_neurons_are_given_what_flows(
 
 @FORMS
 @settings(max_examples=12, deadline=None, phases=(Phase.explicit, Phase.generate))
-@given(spec=flowing_specs(synapses=False))
+@given(spec=flowing_specs())
 def test_random_networks_have_the_bits_of_the_reference(small: int, spec: Spec) -> None:
     compiled(spec)
     with warnings.catch_warnings(), pytest.MonkeyPatch.context() as patch:
@@ -164,7 +164,7 @@ def test_many_synapses_of_several_kinds_are_added_up_in_their_order(method: str)
 
 @FORMS
 @settings(max_examples=5, deadline=None, phases=(Phase.explicit, Phase.generate))
-@given(spec=flowing_specs(synapses=False))
+@given(spec=flowing_specs())
 def test_random_networks_run_alike_when_exported(small: int, spec: Spec) -> None:
     compiled(spec)
     with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:

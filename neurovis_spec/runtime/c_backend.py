@@ -58,8 +58,8 @@ _NEVER: Final = 1 << 62
 #: ``nv_course``: ``steps`` steps from ``k`` on, the first in ``form``, the others in the form ``then``; the inputs of
 #: each are a row of ``rows``, but for those that the step computes, which it puts there. Steps that ``every`` divides
 #: are kept: a row of ``activity``; one of ``weights`` with those that are ``changing``, which lie next to each other if
-#: ``beside``; and one of ``states``, with the ``columns`` numbers that ``probed`` points to. With ``look`` it ends
-#: behind the first step after which something is not finite.
+#: ``beside``; and one of ``states``, with the ``columns`` numbers that ``probed`` points to. With ``formed`` the signals
+#: of synapses stand there then. With ``look`` it ends behind the first step after which something is not finite.
 _HEAD: Final = """#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -84,7 +84,7 @@ typedef struct {
 
 typedef struct {
     int64_t k, steps, every, form, then, look, beside, columns;
-    double *rows, *activity, *weights, *states;
+    double *rows, *activity, *weights, *states, *formed;
     const int64_t *changing;
     const double *const *probed;
 } nv_course;
@@ -152,6 +152,8 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
         if (kept) {
             memcpy(activity, p->activity, sizeof(double)*NEURONS);
             activity += NEURONS;
+            if (c->formed)
+                nv_signals(p, c->k + i, c->formed);
             for (int64_t j = 0; j < c->columns; j++)
                 *states++ = *c->probed[j];
         }
@@ -272,6 +274,7 @@ def _functions(small: bool, watched: bool) -> tuple[_Function, ...]:
             f"{of_step}, int follows",
             of_fused=True,
         ),
+        _Function("void", "nv_signals", Form(gone=True, lost=True), StepCode.signals, ", int64_t k, double *formed"),
         _Function("void", "nv_pack", fused, StepCode.pack, of_fused=True),
         _Function("void", "nv_leave", fused, lambda step: step.leave(step.fuses), of_fused=True),
     )
@@ -326,7 +329,10 @@ class _Course(ctypes.Structure):
 
     _fields_ = [
         *((name, ctypes.c_int64) for name in ("k", "steps", "every", "form", "then", "look", "beside", "columns")),
-        *((name, ctypes.c_void_p) for name in ("rows", "activity", "weights", "states", "changing", "probed")),
+        *(
+            (name, ctypes.c_void_p)
+            for name in ("rows", "activity", "weights", "states", "formed", "changing", "probed")
+        ),
     ]
 
 
@@ -341,6 +347,8 @@ class CStepper:
         self.functions: Library = c_functions.library()
         #: the inputs of the step that is made: what it computes of them stands there behind it
         self.vector = np.zeros(network.vector_size)
+        #: not where a rule has changed, behind a step, a weight that a synapse reads
+        self.forms_signals = not ((network.synapses.numbers >= 0) & (network.connections.rules.whole() >= 0)).any()
         #: the inputs that a step computes, and of each input whether it is one
         self._computed = _NO_INPUTS
         self._reads = np.zeros(len(network.inputs), dtype=np.uint8)
@@ -367,6 +375,8 @@ class CStepper:
         self._holds: object = None
         self._fixed: object = None
         self._structure: Structure | None = None
+        #: signals of synapses behind a step that is kept, of all connections
+        self._formed = np.zeros(len(network.connections) if len(network.synapses.holders) else 0)
         #: what the next run reads of states, and where it puts that
         self._probed: tuple[Probe, FloatArray] | None = None
         #: the first step at which nothing is held, left out, still or lost
@@ -452,7 +462,8 @@ class CStepper:
         )
         if self._probed is not None:
             probe, states = self._probed
-            numbers, self._probed = probe.addresses(state), None
+            numbers, self._probed = probe.addresses(state, self._formed), None
+            course.formed = self._formed.ctypes.data if probe.forms else None
             course.columns, course.states, course.probed = len(numbers), states.ctypes.data, numbers.ctypes.data
         made: int = self._run(self._address, ctypes.addressof(course))
         state.k += made

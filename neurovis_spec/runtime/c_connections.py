@@ -14,7 +14,7 @@ import numpy as np
 
 from neurovis_spec.arrays import BoolArray, Indices, IntArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import SYNAPSE, Definition, Key, Population, Projection
+from neurovis_spec.compiler.program import RULE, SYNAPSE, Definition, Key, Population, Projection
 from neurovis_spec.language.expressions.emit_c import Value
 from neurovis_spec.language.expressions.tree import Name
 from neurovis_spec.runtime.c_code import Code, Form, Place, state_name
@@ -192,7 +192,8 @@ class Sight:
         now = self.now(index, place)
         if not own.any():
             return now
-        if self.sent and self.lags is not None and self.lags.there[connections].any():
+        is_rule = self.network.projections[some.number].kind == RULE
+        if self.sent and is_rule and self.lags is not None and self.lags.there[connections].any():
             return self.between_steps(connections, self.lags, end.places[some.which], place)
         if own_of(self.late(connections), place).any():
             value = self.remembered(connections, index, place, *self.steps_ago(delays, place))

@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
 
@@ -403,7 +403,8 @@ class _Integration:
             for number, one in slopes.items()
         }
         step, forming = self.step, Forming(self.sight, formulas)
-        arrivals = Arrivals(self.network, self.plan.back(part, through), self.code, step.form, step.layout, forming)
+        form = replace(step.form, fused=False)  # these are summed here alone: no weights are packed in their order
+        arrivals = Arrivals(self.network, self.plan.back(part, through), self.code, form, step.layout, forming)
         return self.code.text(self.code.let("u", arrivals.combined(place)))
 
     def slope(

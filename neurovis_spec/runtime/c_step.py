@@ -555,6 +555,19 @@ class StepCode:
 
         self.each(len(members), _NO_ARRIVALS, received)
 
+    def signals(self) -> None:
+        """The signal of each connection with a synapse as it is behind a step, into ``formed``; 0 of one that is left
+        out."""
+        code = self.code
+        for number, projection in enumerate(self.network.projections):
+            if projection.kind != SYNAPSE:
+                continue
+            members, forming = projection.members, Forming(self.behind, {number: signal_of(projection)})
+            with code.block(code.loop("q", len(members))):
+                connection = code.at(members, "q")
+                value = code.text(forming.value(Some(number, np.arange(len(members)), "q"), {}))
+                code.line(f"formed[{connection}] = gone[{connection}] ? {code.text(0.0)} : {value};")
+
     def learn(self, operation: Learn) -> None:
         """The rule of a projection: in a loop several connections side by side, then one by one those that are left.
         The sums ``o`` are put together behind the loop, so that no addition waits for the one before."""

@@ -93,13 +93,16 @@ class Probe:
         if self.forms:
             row[self.signals] = np.nan if signals is None else signals[self.joined]
 
-    def addresses(self, state: State) -> IntArray:
-        """Where in memory each number lies (columns,), as long as the arrays of a state are the same ones; signals lie
-        nowhere."""
+    def addresses(self, state: State, signals: FloatArray | None = None) -> IntArray:
+        """Where in memory each number lies (columns,), as long as the arrays of a state are the same ones; that of a
+        signal lies in ``signals``, of all connections (m,), which whoever reads it has to form."""
         found = np.empty(len(self.names), np.int64)
         for read in self.reads:
             array = state.cells[read.owner][read.state]
             found[read.columns] = array.ctypes.data + array.strides[0] * read.members
+        if self.forms:
+            assert signals is not None
+            found[self.signals] = signals.ctypes.data + signals.strides[0] * self.joined
         return found
 
     def now(self, state: State, signals: FloatArray | None = None) -> FloatArray:

@@ -207,9 +207,10 @@ def run_steps(network: Network, state: State, course: Course, rows: RowSink, pro
     make: _Make = _OneByOne(hands, columns, stepper, body, frozenset(course.inputs or ()), forming)
     pace = _Pace(STRETCH, STRETCH)
     # a runner gives the activities of all neurons and all changing weights, states only where it is a probing one, and
-    # no signals
+    # signals of synapses where it forms them
     plain = columns.neurons is None and len(columns.weights) == len(network.changing)
-    plain = plain and (not columns.probe.names or (isinstance(stepper, Probing) and not columns.probe.forms))
+    if columns.probe.names:
+        plain = plain and isinstance(stepper, Probing) and (stepper.forms_signals or not columns.probe.forms)
     if (
         isinstance(stepper, Runner)
         and plain
