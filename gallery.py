@@ -186,6 +186,26 @@ PICTURES = (
         "the difference.",
     ),
     Picture(
+        "stick_insect",
+        "stick_insect/stick_insect",
+        150,
+        "Conductances: a leg of a stick insect",
+        "Three joints, each with a half-centre: C1 and C2 inhibit each other (lines that end in bars) and take turns. "
+        "The leg is lifted, since C1 of LD is up; through S the other joints feel that, and are to follow. A line has "
+        "the colour of the current that flows through it.",
+        views=("network",),
+    ),
+    Picture(
+        "worm",
+        "worm/worm",
+        100,
+        "Gap junctions and graded synapses: a worm is touched",
+        "The head is to the left, the back up. ALM and AVM have been touched for 25 ms, and AVD and AVA follow; the "
+        "motor neurons of A type, which move the worm back, have come further than those of B type. Lines without ends "
+        "are gap junctions.",
+        views=("network",),
+    ),
+    Picture(
         "walk",
         "walk/walk",
         52,
@@ -282,6 +302,8 @@ BESIDE = {
     "sound": "Much the same.",
     "reward": "As above, C2 stands below C1, and the kernels are out of order. G stands near what it drives; ours near"
     " what drives it.",
+    "stick_insect": "Each joint is drawn in its own way, and they stand one above the other.",
+    "worm": "dot has no place for what is where in the worm, and makes ranks of what goes around in circles.",
     "walk": "As above, C2 stands below C1, and the kernels are out of order.",
     "hexapod": "dot draws six legs six times: each has other ranks and another place for its parts, left and right are"
     " no mirror images, and the delay lines run down, one beside the other. Free of all that it needs less room and may"

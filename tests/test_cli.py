@@ -26,6 +26,7 @@ ROOT = Path(__file__).parents[1]
 SPECS = ROOT / "specs"
 HEXAPOD = SPECS / "hexapod" / "hexapod.yaml"
 WALK = SPECS / "walk" / "walk.yaml"
+IN_FOLDERS = [HEXAPOD, SPECS / "stick_insect" / "stick_insect.yaml", WALK, SPECS / "worm" / "worm.yaml"]
 ERRORS = sorted((ROOT / "tests" / "errors").glob("*.yaml"))
 PULL = np.array([[1.0, 2.0], [3.0, 4.0]])
 
@@ -207,7 +208,7 @@ def test_bytes_that_are_no_text_get_a_finding_at_their_place(folder: Path) -> No
 
 
 def test_validate_says_ok_for_each_spec_of_several() -> None:
-    specs = [*sorted(SPECS.glob("*.yaml")), HEXAPOD, WALK]
+    specs = [*sorted(SPECS.glob("*.yaml")), *IN_FOLDERS]
     lines = good("validate", *specs).splitlines()
     assert [line.split(": ok (")[0] for line in lines] == [str(spec) for spec in specs]
     assert f"{SPECS / 'cpg_rbf.yaml'}: ok (12 neurons, 28 connections)" in lines
@@ -447,7 +448,7 @@ def test_new_writes_a_spec_that_goes_all_the_way(folder: Path) -> None:
     good("render", "first.yaml", "-o", "first.svg")
 
 
-@pytest.mark.parametrize("example", [*sorted(SPECS.glob("*.yaml")), HEXAPOD, WALK], ids=lambda path: path.stem)
+@pytest.mark.parametrize("example", [*sorted(SPECS.glob("*.yaml")), *IN_FOLDERS], ids=lambda path: path.stem)
 def test_new_from_an_example_is_that_example_under_another_name(folder: Path, example: Path) -> None:
     good("new", "mine", "--from", example.stem)
     mine = nv.compile("mine/mine.yaml" if example.parent.name == example.stem else "mine.yaml")
