@@ -1,23 +1,26 @@
 """How long networks with derivatives take: beside Brian2 and PyRates, and beside C and NumPy by hand.
 
 In: ``--peers PYTHON``, a Python that has Brian2 and PyRates (they need another NumPy than we do), or ``PEERS_PYTHON``;
-without either, or with ``--no-peers``, the tables are ours alone. Out: two tables on standard output. Run it with
+without either, or with ``--no-peers``, the tables are ours alone. Out: three tables on standard output. Run it with
 ``python benchmarks/dynamics.py``; only the ratios of one run can be compared.
 
-The first table has three networks: the two populations of Wilson and Cowan, a hundred columns of Jansen and Rit, a
-CTRNN of a thousand. All keep the activity of each neuron at each step. "Evaluations" are those of all derivatives, a
-step of dt; "error" is the greatest distance from SciPy's DOP853 (rtol 1e-11) over all neurons and steps; "time" is the
-quotient of what a peer takes and what we take, for the same time of the network, with the quickest of our methods and
-steps whose error is no greater.
+The first table has five networks: the two populations of Wilson and Cowan, a hundred columns of Jansen and Rit, a
+CTRNN of a thousand; and two with synapses: a hundred phases, each coupled to all others, after Kuramoto, and the 448
+cells of C. elegans (``specs/worm``), with graded synapses and gap junctions. All keep the activity of each neuron at
+each step. "Evaluations" are those of all derivatives, a step of dt; "error" is the greatest distance from SciPy's
+DOP853 (rtol 1e-11) over all neurons and steps; "alike" is the quotient of what a peer takes and what we take in C with
+the same method and dt; "time" is that for the same time of the network, with the quickest of our methods and steps
+whose error is no greater.
 
 The second has 216 stiff cells, pairs of half-centres with persistent sodium (Daun, Rubin and Rybak 2009, Journal of
 Computational Neuroscience 27:3-36), beside what a careful author would write for this one network in C and in NumPy;
-C is compiled by the same compiler with the same flags.
+C is compiled by the same compiler with the same flags. The third has the two networks with synapses beside C by hand.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import ctypes
 import os
 import shutil
@@ -40,6 +43,7 @@ import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.c_backend import CBackend
+from neurovis_spec.runtime.columns import Keep
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.numpy_backend import NumpyBackend
@@ -53,7 +57,7 @@ Numbers: TypeAlias = FloatArray | IntArray
 STAGES = {"euler": 1, "heun": 2, "rk4": 4}
 #: our methods, and the dt of each as a multiple of the case's
 OURS = (("euler", 1), ("heun", 1), ("rk4", 1), ("rk4", 2), ("rk4", 4), ("rk4", 0.5), ("rk4", 0.25))
-PEERS = (("brian2", "rk4"), ("pyrates", "euler"), ("pyrates", "DOP853"))
+PEERS = (("brian2", "euler"), ("brian2", "rk4"), ("pyrates", "euler"), ("pyrates", "DOP853"))
 REPEATS = 9
 
 
@@ -160,6 +164,67 @@ connections:
     return Case("ctrnn", f"CTRNN, {n}/{10 * n}", spec, flow, np.tanh, np.zeros(n), 0.02, 1000, given)
 
 
+def kuramoto(n: int = 100) -> Case:
+    """Phases of unlike frequencies, each coupled to all others."""
+    random = np.random.default_rng(3)
+    frequencies, phases, weight = random.normal(1, 0.1, n), random.uniform(0, 6, n), 2 / n
+    targets, sources = np.nonzero(~np.eye(n, dtype=np.bool_))
+    spec = f"""neurons:
+  N: {{count: {n}, model: {{phase_oscillator: {{nu: {frequencies.tolist()}}}}}, initial: {{theta: {phases.tolist()}}}}}
+connections: {{N -> N: {{weight: {weight!r}, pattern: all_to_all, synapse: phase}}}}"""
+
+    def flow(t: float, theta: FloatArray) -> FloatArray:
+        return np.asarray(2 * np.pi * frequencies + weight * np.sin(theta - theta[:, np.newaxis]).sum(1))
+
+    given: dict[str, Numbers] = {"sources": sources, "targets": targets, "weights": np.full(len(sources), weight)}
+    given |= {"p": frequencies, "initial": phases}
+    return Case("kuramoto", f"Kuramoto, {n}/{len(sources)}", spec, flow, np.cos, phases, 0.01, 1000, given)
+
+
+def worm() -> Case:
+    """The cells of C. elegans, of which one is touched; a hundredth of the conductance of Kunert, Shlizerman and Kutz a
+    contact, or a millisecond were too long for any method here."""
+    with (HERE.parent / "specs" / "worm" / "data" / "worm.csv").open(encoding="utf-8", newline="") as file:
+        rows = sorted(csv.DictReader(file), key=lambda row: row["kind"])
+    cells = list(dict.fromkeys(row[end] for row in rows for end in ("from", "to")))
+    place, n = {cell: index for index, cell in enumerate(cells)}, len(cells)
+    sources, targets = (np.array([place[row[end]] for row in rows]) for end in ("from", "to"))
+    weights, gap = (
+        np.array([float(row["contacts"]) for row in rows]),
+        np.array([row["kind"] == "electrical" for row in rows]),
+    )
+    reversals = np.where([row["from"].startswith(("DD", "VD")) for row in rows], -45.0, 0.0)
+    current, opens = np.where(np.arange(n) == place["PLML"], 5000.0, 0.0), 1 / 11
+    written = [
+        entries(sources[some], targets[some], weights[some], f", synapse: {synapse}")
+        for some, synapse in (
+            (~gap & (reversals == 0), "graded"),
+            (~gap & (reversals < 0), "{graded: {E: -45}}"),
+            (gap, "gap_junction"),
+        )
+    ]
+    spec = f"""neurons: {{N: {{count: {n}, model: graded, initial: {{v: -35}}, bias: {current.tolist()}}}}}
+connections:
+{chr(10).join(written)}"""
+    size, chemical = (n, n), ~gap
+    opened, pulled, joined = (
+        csr_array((values[some], (targets[some], sources[some])), shape=size)
+        for values, some in ((weights, chemical), (weights * reversals, chemical), (weights, gap))
+    )
+    gaps = joined.sum(1)
+
+    def flow(t: float, x: FloatArray) -> FloatArray:
+        v, s = x[:n], x[n:]
+        arriving = pulled @ s - (opened @ s) * v + joined @ v - gaps * v
+        slopes = 10 * (-35 - v) + arriving + current, sigmoid(0.125 * (v + 35)) * (1 - s) - 5 * s
+        return np.concatenate(slopes)
+
+    given: dict[str, Numbers] = {"sources": sources, "targets": targets, "weights": weights, "reversal": reversals}
+    given |= {"kinds": gap.astype(np.int64), "p": current, "initial": np.full(n, -35.0), "s": np.full(n, opens)}
+    name, start = f"C. elegans, {n}/{len(rows)}", np.concatenate((np.full(n, -35.0), np.full(n, opens)))
+    return Case("worm", name, spec, flow, lambda x: x[:, :n], start, 5e-4, 1000, given)
+
+
 @dataclass(frozen=True)
 class Row:
     """What one tool took with one method."""
@@ -185,18 +250,25 @@ def best(run: Callable[[], object]) -> float:
     return min(found)
 
 
+def compiled_with(case: Case, method: str, dt: float) -> Network:
+    """The network of a case."""
+    head = f"neurovis: 1\nname: x\ntime: {{dt: {dt!r}, integrate: {method}}}\n"
+    return nv.compile_text(head + case.spec).network
+
+
 def rows_of(case: Case, peers: str | None) -> list[Row]:
     """All tools on one network."""
     end = case.dt * case.steps
     grid = np.arange(4 * case.steps + 1) * (case.dt / 4)
-    exact = case.shown(solve_ivp(case.flow, (0, end), case.start, "DOP853", grid, rtol=1e-11, atol=1e-12).y.T)
+    exact = case.shown(
+        solve_ivp(case.flow, (0, end), case.start, "DOP853", grid, rtol=1e-11, atol=1e-12, max_step=4 * case.dt).y.T
+    )
     found = []
     for backend in ("c", "numpy"):
         for method, times in OURS if backend == "c" else OURS[2:3]:
             dt, steps = case.dt * times, round(case.steps / times)
-            head = f"neurovis: 1\nname: x\ntime: {{dt: {dt!r}, integrate: {method}}}\n"
-            network = nv.compile_text(head + case.spec).network
-            course = Course(steps + 1, backend=backend)
+            network = compiled_with(case, method, dt)
+            course = Course(steps + 1, backend=backend, keep=Keep(sent=False))
             error = np.abs(record(network, course).activity - exact[:: round(4 * times)]).max()
             seconds = best(lambda network=network, course=course: record(network, course))  # type: ignore[misc]
             found.append(Row(f"ours, {backend}", method, dt, seconds, steps, STAGES[method] * steps, float(error)))
@@ -218,22 +290,31 @@ def peer(case: Case, tool: str, method: str, python: str, exact: FloatArray) -> 
     return Row(tool, method, case.dt, float(seconds), case.steps, int(evaluations), error)
 
 
-def compare(peers: str | None) -> None:
+CASES = {"wilson_cowan": wilson_cowan, "jansen_rit": jansen_rit, "ctrnn": ctrnn, "kuramoto": kuramoto, "worm": worm}
+
+
+def compare(peers: str | None, names: list[str] | None) -> None:
     """The table of the networks."""
-    heads = ("tool", "method", "dt, ms", "µs a step", "evaluations", "error", "time", "with")
+    heads = ("tool", "method", "dt, ms", "µs a step", "evaluations", "error", "alike", "time", "with")
     print("| network | " + " | ".join(heads) + " |\n|" + " --- |" * (len(heads) + 1))
-    for case in (wilson_cowan(), jansen_rit(), ctrnn()):
+    for name in names or CASES:
+        case = CASES[name]()
         rows = rows_of(case, peers)
         for row in rows:
             step, evaluations = row.seconds / row.steps * 1e6, row.evaluations / row.steps
             cells = [row.tool, row.method, f"{row.dt * 1e3:g}", f"{step:.3g}", f"{evaluations:.3g}", f"{row.error:.1e}"]
-            as_good = [one for one in rows if one.tool == "ours, c" and one.error <= row.error]
-            if not row.tool.startswith("ours") and as_good:
-                quickest = min(as_good, key=lambda one: one.seconds)
-                cells += [f"{row.seconds / quickest.seconds:.1f}", f"{quickest.method}, {quickest.dt * 1e3:g} ms"]
-            else:
-                cells += ["–", "–"]
-            print(f"| {case.name} | " + " | ".join(cells) + " |", flush=True)
+            print(f"| {case.name} | " + " | ".join(cells + quotients(row, rows)) + " |", flush=True)
+
+
+def quotients(row: Row, rows: list[Row]) -> list[str]:
+    """What a peer takes over what we do: with the same method and dt, and with the quickest of no greater error."""
+    ours = [] if row.tool.startswith("ours") else [one for one in rows if one.tool == "ours, c"]
+    alike = [f"{row.seconds / one.seconds:.2f}" for one in ours if (one.method, one.dt) == (row.method, row.dt)]
+    as_good = [one for one in ours if one.error <= row.error]
+    if not as_good:
+        return [*(alike or "–"), "–", "–"]
+    quickest = min(as_good, key=lambda one: one.seconds)
+    return [*(alike or "–"), f"{row.seconds / quickest.seconds:.1f}", f"{quickest.method}, {quickest.dt * 1e3:g} ms"]
 
 
 # ---- 216 stiff cells -----------------------------------------------------------------------------------------------
@@ -410,7 +491,7 @@ def stiff_in_numpy(joined: Links, method: str, dt: float, steps: int) -> Callabl
 
 def ours_in_c(network: Network, steps: int) -> Callable[[], FloatArray]:
     """The loop of the backend, with all activities kept."""
-    stepper, rows = CBackend().prepare(network), np.empty((steps, CELLS))
+    stepper, rows = CBackend().prepare(network), np.empty((steps, len(network.neurons)))
 
     def run() -> FloatArray:
         stepper.run(initial_state(network), np.zeros((steps, 0)), rows, np.empty((steps, 0)), 1, True)
@@ -450,12 +531,7 @@ def stiff(steps: int = 1001) -> None:
         }
         rows = {name: run().copy() for name, run in runs.items()}
         assert np.isfinite(rows["c"]).all()
-        took = dict.fromkeys(runs, float("inf"))
-        for _ in range(2 * REPEATS):
-            for name, run in runs.items():
-                start = time.process_time()
-                run()
-                took[name] = min(took[name], (time.process_time() - start) / steps * 1e6)
+        took = quickest_of(runs, steps)
         bits = "equal" if rows["c"].tobytes() == rows["c by hand"].tobytes() else "differ"
         apart = np.abs(rows["numpy"] - rows["numpy by hand"]).max()
         cells = [f"{took['c']:.3g}", f"{took['c by hand']:.3g}", f"{took['c'] / took['c by hand']:.2f}", bits]
@@ -464,17 +540,144 @@ def stiff(steps: int = 1001) -> None:
         print(f"| {method}, {dt} ms | " + " | ".join(cells) + " |", flush=True)
 
 
+# ---- synapses ------------------------------------------------------------------------------------------------------
+
+#: the loop of a careful author over the stages, with what changes a network's states as ``slopes``
+BY_HAND = """
+void run(int64_t steps, int64_t rk4, double h, int64_t cells, const int32_t *first, const int32_t *source,
+         const double *w, const int32_t *chemical, const double *E, const double *p, double *restrict x,
+         double *restrict rows)
+{
+    static double f[1000], y[1000], sum[1000];
+    const int32_t n = (int32_t)cells, all = STATES*n;
+    for (int32_t i = 0; i < n; i++)
+        rows[i] = SHOWN;
+    for (int64_t k = 1; k < steps; k++) {
+        slopes(n, x, sum, first, source, w, chemical, E, p);
+        if (rk4) {
+            for (int32_t q = 0; q < all; q++)
+                y[q] = x[q] + (h/2.0)*sum[q];
+            slopes(n, y, f, first, source, w, chemical, E, p);
+            for (int32_t q = 0; q < all; q++) {
+                sum[q] += 2.0*f[q];
+                y[q] = x[q] + (h/2.0)*f[q];
+            }
+            slopes(n, y, f, first, source, w, chemical, E, p);
+            for (int32_t q = 0; q < all; q++) {
+                sum[q] += 2.0*f[q];
+                y[q] = x[q] + h*f[q];
+            }
+            slopes(n, y, f, first, source, w, chemical, E, p);
+            for (int32_t q = 0; q < all; q++)
+                x[q] += (h/6.0)*(sum[q] + f[q]);
+        } else {
+            for (int32_t q = 0; q < all; q++)
+                x[q] += h*sum[q];
+        }
+        for (int32_t i = 0; i < n; i++)
+            rows[k*n + i] = SHOWN;
+    }
+}
+"""
+#: of each network what is kept, and the derivatives; its first connections, up to ``chemical``, are graded synapses
+SLOPES_BY_HAND = {
+    "kuramoto": """
+#define STATES 1
+#define SHOWN cos(x[i])
+static void slopes(int32_t n, const double *restrict x, double *restrict f, const int32_t *first,
+                   const int32_t *source, const double *w, const int32_t *chemical, const double *E, const double *p)
+{
+    for (int32_t i = 0; i < n; i++) {
+        double u = 0.0;
+        for (int32_t e = first[i]; e < first[i + 1]; e++)
+            u += w[e]*sin(x[source[e]] - x[i]);
+        f[i] = 6.283185307179586*p[i] + u;
+    }
+}
+""",
+    "worm": """
+#define STATES 2
+#define SHOWN x[i]
+static void slopes(int32_t n, const double *restrict x, double *restrict f, const int32_t *first,
+                   const int32_t *source, const double *w, const int32_t *chemical, const double *E, const double *p)
+{
+    const double *v = x, *s = x + n;
+    for (int32_t i = 0; i < n; i++) {
+        double u = 0.0;
+        for (int32_t e = first[i]; e < chemical[i]; e++)
+            u += w[e]*s[source[e]]*(E[e] - v[i]);
+        for (int32_t e = chemical[i]; e < first[i + 1]; e++)
+            u += w[e]*(v[source[e]] - v[i]);
+        f[i] = 10.0*(-35.0 - v[i]) + (u + p[i]);
+        f[n + i] = 1.0/(1.0 + exp(-(0.125*(v[i] + 35.0))))*(1.0 - s[i]) - 5.0*s[i];
+    }
+}
+""",
+}
+
+
+def synapses_in_c(case: Case, method: str) -> Callable[[], FloatArray]:
+    """C by hand for a network with synapses."""
+    given, n, steps = case.given, len(case.given["p"]), case.steps + 1
+    kinds = given.get("kinds", np.zeros(len(given["weights"]), dtype=np.int64))
+    reversals = given.get("reversal", np.zeros(len(kinds)))
+    order = np.lexsort((-reversals, kinds, given["targets"]))
+    targets = given["targets"][order]
+    first = np.searchsorted(targets, np.arange(n + 1)).astype(np.int32)
+    chemical = (first[:-1] + np.bincount(targets[kinds[order] == 0], minlength=n)).astype(np.int32)
+    source, w, reversal = given["sources"][order].astype(np.int32), given["weights"][order], reversals[order]
+    arrays, rows = (first, source, w, chemical, reversal, given["p"]), np.empty((steps, n))
+    compiled = loaded(SLOPES_BY_HAND[case.network] + BY_HAND)
+
+    def run() -> FloatArray:
+        x = case.start.copy()
+        numbers = ctypes.c_int64(steps), ctypes.c_int64(method == "rk4"), ctypes.c_double(case.dt), ctypes.c_int64(n)
+        compiled(*numbers, *map(at, arrays), at(x), at(rows))
+        return rows
+
+    return run
+
+
+def synapses() -> None:
+    """The table of networks with synapses."""
+    print("\n| network | method | C | by hand | C/by hand | bits | differ by |\n|" + " --- |" * 7)
+    for case in (kuramoto(), worm()):
+        for method in ("euler", "rk4"):
+            network = compiled_with(case, method, case.dt)
+            runs = {"c": ours_in_c(network, case.steps + 1), "by hand": synapses_in_c(case, method)}
+            rows = {name: run().copy() for name, run in runs.items()}
+            took = quickest_of(runs, case.steps)
+            bits = "equal" if rows["c"].tobytes() == rows["by hand"].tobytes() else "differ"
+            cells = [f"{took['c']:.3g}", f"{took['by hand']:.3g}", f"{took['c'] / took['by hand']:.2f}", bits]
+            print(f"| {case.name} | {method} | " + " | ".join(cells), end="")
+            print(f" | {np.abs(rows['c'] - rows['by hand']).max():.0e} |", flush=True)
+
+
+def quickest_of(runs: dict[str, Callable[[], FloatArray]], steps: int) -> dict[str, float]:
+    """The microseconds a step that the quickest run of each takes; they take turns."""
+    took = dict.fromkeys(runs, float("inf"))
+    for _ in range(2 * REPEATS):
+        for name, run in runs.items():
+            start = time.process_time()
+            run()
+            took[name] = min(took[name], (time.process_time() - start) / steps * 1e6)
+    return took
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description="Networks with derivatives, beside peers and by hand.")
     parser.add_argument("--peers", default=os.environ.get("PEERS_PYTHON"), help="a Python with Brian2 and PyRates")
     parser.add_argument("--no-peers", action="store_true")
-    parser.add_argument("--only", choices=("compared", "stiff"))
+    parser.add_argument("--only", choices=("compared", "stiff", "synapses"))
+    parser.add_argument("--networks", nargs="+", choices=CASES, help="of the first table; all unless said")
     asked = parser.parse_args()
-    if asked.only != "stiff":
+    if asked.only in (None, "compared"):
         peers = asked.peers and str(Path(shutil.which(asked.peers) or asked.peers).absolute())
-        compare(None if asked.no_peers else peers)
-    if asked.only != "compared":
+        compare(None if asked.no_peers else peers, asked.networks)
+    if asked.only in (None, "stiff"):
         stiff()
+    if asked.only in (None, "synapses"):
+        synapses()
 
 
 if __name__ == "__main__":
