@@ -222,21 +222,24 @@ def _edges(network: str, given: dict[str, np.ndarray]) -> list[tuple[str, str, o
     """The connections with synapses, an edge each with a template of its kind."""
     from pyrates import EdgeTemplate, OperatorTemplate
 
-    def template(one: Coupling, value: float) -> EdgeTemplate:
+    def template(one: Coupling, value: float, number: int) -> EdgeTemplate:
         variables: dict[str, object] = {"brought": "output(0.0)"}
         variables |= dict.fromkeys((f"{one.source}_pre", f"{one.target}_post"), "input(0.0)")
         variables |= {one.parameter: value} if one.parameter else {}
-        operator = OperatorTemplate(name="c", equations=[f"brought = {one.signal}"], variables=variables)
-        return EdgeTemplate(name="e", operators=[operator])
+        operator = OperatorTemplate(name=f"c{number}", equations=[f"brought = {one.signal}"], variables=variables)
+        return EdgeTemplate(name=f"e{number}", operators=[operator])
 
     made: dict[tuple[int, float], EdgeTemplate] = {}
     kinds, edges = given.get("kinds", np.zeros(len(given["weights"]), dtype=np.int64)), []
     for e, (i, j, kind) in enumerate(zip(given["sources"], given["targets"], kinds, strict=True)):
         one = COUPLINGS[network][kind]
         value = float(given[one.parameter][e]) if one.parameter else 0.0
-        used = made.setdefault((kind, value), template(one, value))
-        values: dict[str, object] = {"weight": float(given["weights"][e]), f"e/c/{one.source}_pre": "source"}
-        values[f"e/c/{one.target}_post"] = f"n{j}/{_place(network, one.target)}"
+        if (kind, value) not in made:  # of two templates of one name it would take the first
+            made[kind, value] = template(one, value, len(made))
+        used = made[kind, value]
+        at = f"{used.name}/c{used.name[1:]}"
+        values: dict[str, object] = {"weight": float(given["weights"][e]), f"{at}/{one.source}_pre": "source"}
+        values[f"{at}/{one.target}_post"] = f"n{j}/{_place(network, one.target)}"
         ends = f"n{i}/{_place(network, one.source)}", f"n{j}/o/{one.into}"
         edges.append((*ends, used, values))
     return edges
