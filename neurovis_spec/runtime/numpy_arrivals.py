@@ -127,7 +127,7 @@ def signals_at(step: Step, number: int, port: Port, places: Indices) -> str:
     parts: list[tuple[str, IntArray]] = []
     for one in formed_at(step.network, incoming):
         parts.append((some_of(step, one, before_update(step, one.number)), one.places))
-        delays = np.where(np.isin(np.arange(len(delays)), one.places), -1, delays)  # nothing is under way there
+    delays = np.where(step.network.synapses.numbers[incoming] < 0, delays, -1)  # with a synapse nothing is under way
     undelayed = np.flatnonzero(delays == 0)
     if len(undelayed):
         weights = code.select("weights", incoming[undelayed], len(connections))
