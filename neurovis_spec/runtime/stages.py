@@ -315,9 +315,12 @@ def _formulas(definition: Definition, trees: Iterable[tuple[str, Tree | None]], 
 def ends_of(network: Network, projection: Projection) -> dict[str, End]:
     """What a projection reads of the ends of its connections, by names: ``pre``, ``sent`` and ``post``, and those of
     ``Projection.ends``; and its signals, which may be inputs: these stand behind the outlets."""
-    members, read = projection.members, projection.read
-    sent = np.asarray(taken_by(network)[members], dtype=np.int64)
-    found = {"pre": End(sent, True), "sent": End(sent, False), "post": End(network.connections.targets[members], False)}
+    members, read, found = projection.members, projection.read, dict[str, End]()
+    if not read.isdisjoint(("pre", "sent")):
+        sent = np.asarray(taken_by(network)[members], dtype=np.int64)
+        found = {"pre": End(sent, True), "sent": End(sent, False)}
+    if "post" in read:
+        found["post"] = End(network.connections.targets[members], False)
     found |= {name: End(places, name.startswith("pre.")) for name, places in projection.ends.items()}
     found |= {name: End(places, False) for name, places in projection.signals.items()}
     return {name: end for name, end in found.items() if name in read}
