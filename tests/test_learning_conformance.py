@@ -60,7 +60,7 @@ def follow(spec: Spec, backend: Backend) -> None:
                 np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12, err_msg=f"{name} at {k}")
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(spec=learning_specs())
 def test_each_step_in_numpy_agrees(spec: Spec) -> None:
     follow(spec, NumpyBackend())
