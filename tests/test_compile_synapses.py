@@ -12,6 +12,7 @@ from neurovis_spec.cli.overview import overview
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Check, Gather, Integrate, Learn, Receive, SendAhead, Update
 from neurovis_spec.compiler.run_checks import without_checks
+from neurovis_spec.diagnostics import SpecError
 from neurovis_spec.runtime.simulation import Simulation
 
 HEAD = """\
@@ -277,6 +278,18 @@ def test_delayed_signals_take_no_slots_and_are_remembered() -> None:
     state = Simulation(network, backend="reference").state()
     assert len(state.signals) == 2
     assert state.history.shape == (4, len(network.neurons) + network.outlet_count)
+
+
+def test_what_is_remembered_fits_into_memory() -> None:
+    spec = {
+        "neurovis": 1,
+        "name": "long",
+        "synapses": {"s": {"signal": "weight*pre"}},
+        "neurons": {"E": {"count": 300}},
+        "connections": {"E1 -> E2": {"synapse": "s", "delay": 1_000_000}},
+    }
+    with pytest.raises(SpecError, match="300,000,000 numbers would be kept for a synapse"):
+        nv.compile(spec)
 
 
 # Checks in a run

@@ -151,7 +151,7 @@ def _compile_sections(spec: Spec, request: Request, findings: Findings) -> _Sect
     declared.expansion.depend()  # last, as every section may have made parameters of instances structural
     order = _order(connected, census, inputs, noises, findings)
     valid = connected.complete and findings.errors == before
-    if order is None or not valid or not _signals_fit(connected.bundles, findings):
+    if order is None or not valid or not _signals_fit(connected.bundles, len(census.neurons), findings):
         _read_events(spec, finder, constants)  # for its findings alone
         return None
     return _Sections(
@@ -381,15 +381,19 @@ def _outputs_of(cycle: Cycle, connected: Connected, census: Census) -> tuple[str
     return tuple(names)
 
 
-def _signals_fit(bundles: tuple[Bundle, ...], findings: Findings) -> bool:
+def _signals_fit(bundles: tuple[Bundle, ...], neurons: int, findings: Findings) -> bool:
     """Whether the signals under way fit into memory: delays of all connections together. With a synapse nothing is
-    under way."""
+    under way; in its place what all neurons send is kept for as long as its delay is."""
     total = 0
-    for bundle in (one for one in bundles if one.synapse is None):
-        total += int(bundle.delays.sum())
-        if total > MOST_SIGNALS:
-            message = f"{amount(total)} signals would be under way at once (connections times delay); "
-            findings.error("too-many", bundle.key, f"{message}{MOST_SIGNALS:,} are the most")
+    for bundle in bundles:
+        if bundle.synapse is None:
+            total += int(bundle.delays.sum())
+            much, what = total, "signals would be under way at once (connections times delay)"
+        else:
+            much = neurons * int(bundle.delays.max(initial=0))
+            what = "numbers would be kept for a synapse (neurons times delay)"
+        if much > MOST_SIGNALS:
+            findings.error("too-many", bundle.key, f"{amount(much)} {what}; {MOST_SIGNALS:,} are the most")
             return False
     return True
 
