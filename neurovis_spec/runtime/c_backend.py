@@ -58,8 +58,8 @@ _NEVER: Final = 1 << 62
 #: ``nv_course``: ``steps`` steps from ``k`` on, the first in ``form``, the others in the form ``then``; the inputs of
 #: each are a row of ``rows``, but for those that the step computes, which it puts there. Steps that ``every`` divides
 #: are kept: a row of ``activity``; one of ``weights`` with those that are ``changing``, which lie next to each other if
-#: ``beside``; and one of ``states``, with the ``columns`` numbers that ``probed`` points to. With ``formed`` the signals
-#: of synapses stand there then. With ``look`` it ends behind the first step after which something is not finite.
+#: ``beside``; and one of ``states``, with the ``columns`` numbers that ``probed`` points to, of which signals of
+#: synapses stand in ``formed``. With ``look`` it ends behind the first step after which something is not finite.
 _HEAD: Final = """#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
