@@ -120,3 +120,14 @@ def test_numbers_that_are_given_for_all_steps_are_so_in_shorter_ones() -> None:
     text = PAIR.replace("neurons: {H: {", "inputs: {two: {size: 2}}\nneurons: {H: {input: two, ") % "rk4"
     for_each_step = np.tile([0.1, -0.2], (60, 1))
     assert errors(text, inputs={"two": [0.1, -0.2]}) == errors(text, inputs={"two": for_each_step})
+
+
+def test_continuous_delays_are_rounded_anew_where_they_are_seen_once_a_step() -> None:
+    text = """time: {dt: 0.5 ms, steps: 100}
+models: {c: {state: {x: {initial: 1, derivative: -100*x + 100*drive}}, activity: x}}
+neurons: {A: {model: c}, B: {model: c, initial: {x: 0.5}}}
+connections: {A -> B: {weight: 0.5, delay: 4.3 ms}, B -> A: {weight: -0.8, delay: 4.3 ms}}
+"""
+    assert all(one.order == pytest.approx(1.6, abs=0.4) for one in errors(text).values())
+    finer = stretched(compiled(text).network, 4).connections
+    assert (finer.delays.tolist(), finer.lags and finer.lags.tolist()) == ([34, 34], [34.4, 34.4])

@@ -82,8 +82,11 @@ def stretched(network: Network, parts: int) -> Network:
     so from the first of these on."""
     changes = tuple(change._replace(at=_begins(change.at, parts)) for change in network.changes)
     made = network.connections
-    lags = None if made.lags is None else reals(made.lags.whole() * parts)
-    connections = replace(made, delays=integers(made.delays.whole() * parts), lags=lags)
+    connections = replace(made, delays=integers(made.delays.whole() * parts))
+    if made.lags is not None:  # rounded anew to the shorter steps where the map sees them
+        lags = made.lags.whole() * parts
+        delays = np.where(np.isnan(lags), made.delays.whole() * parts, np.maximum(np.rint(np.nan_to_num(lags)), 1))
+        connections = replace(made, delays=integers(delays.astype(np.int64)), lags=reals(lags))
     return replace(
         network,
         dt=network.dt / parts,
