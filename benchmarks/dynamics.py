@@ -56,7 +56,7 @@ Numbers: TypeAlias = FloatArray | IntArray
 #: evaluations of all derivatives a step
 STAGES = {"euler": 1, "heun": 2, "rk4": 4}
 #: our methods, and the dt of each as a multiple of the case's
-OURS = (("euler", 1), ("heun", 1), ("rk4", 1), ("rk4", 2), ("rk4", 4), ("rk4", 0.5), ("rk4", 0.25))
+OURS = (("euler", 1), ("heun", 1), ("rk4", 1), ("rk4", 2), ("rk4", 4), ("rk4", 8), ("rk4", 0.5), ("rk4", 0.25))
 PEERS = (("brian2", "euler"), ("brian2", "rk4"), ("pyrates", "euler"), ("pyrates", "DOP853"))
 REPEATS = 9
 
