@@ -138,7 +138,7 @@ def _projection(one: Projection, moved: IntArray, names: npt.NDArray[np.str_]) -
     signals = {name: moved[indices] for name, indices in one.signals.items()}
     rule, parameters = _definition(one.rule.definition), one.rule.parameters
     fields = {"rule": rule, "members": one.members, "parameters": parameters, "signals": signals}
-    states = {name: names[indices].tolist() for name, indices in one.signals.items() if names[indices].any()}
+    states = {name: names[indices].tolist() for name, indices in one.signals.items() if (names[indices] != "").any()}
     further = {"place": one.place, "states": states}
     return Record("Plasticity", fields | {name: value for name, value in further.items() if value})
 
