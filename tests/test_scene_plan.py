@@ -505,4 +505,4 @@ def test_all_lengths_of_a_shape_are_scaled(kind: type) -> None:
     """A field that holds numbers is a length or a place, but for directions and shares."""
     measures = float, Point, tuple[Point, ...], tuple[float, ...]
     names = {name for name, said in get_type_hints(kind).items() if said in measures}
-    assert names - {"direction", "opacity"} == names & _MEASURED
+    assert names - {"direction", "back", "opacity"} == names & _MEASURED
