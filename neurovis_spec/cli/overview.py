@@ -16,9 +16,9 @@ from neurovis_spec.cli.tables import number, spread, table
 from neurovis_spec.compiler.flows import ports_read_by
 from neurovis_spec.compiler.network import PLAIN_ROUTE
 from neurovis_spec.compiler.program import (
-    Check,
     Definition,
     Diffuse,
+    Hidden,
     Integrate,
     Operation,
     Receive,
@@ -222,7 +222,7 @@ def _rows(network: Network, operation: Operation) -> Iterator[tuple[str, str, st
                 yield "integrate", _connected(network, one), _flows(network.projections[one].use.definition, how)
         case Receive(projection=one, phases=phases):
             states = network.projections[one].during(phases).use.definition.state
-            once = [one.name for one in states if (one.each_step or one.each_episode) and not isinstance(one, Check)]
+            once = [one.name for one in states if one.stepped and not isinstance(one, Hidden)]
             if once:
                 yield "receive", _connected(network, one), ", ".join(once)
         case SendAhead(population=one, names=names):

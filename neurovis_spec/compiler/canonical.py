@@ -26,6 +26,7 @@ from neurovis_spec.compiler.program import (
     RULE,
     SYNAPSE,
     Definition,
+    Hidden,
     Population,
     Projection,
     Quantity,
@@ -48,7 +49,8 @@ SCHEMA: Mapping[type, Content] = {
     ),
     Input: content("Input", "name start size expression table", "slots parts hold"),
     Output: content("Output", "name neurons scalar", "states"),
-    Quantity: content("Quantity", "name initial each_step each_episode", "derivative noise unit"),
+    Quantity: content("Quantity", "name initial each_step each_episode", "derivative noise unit acts"),
+    Hidden: content("Quantity", "name initial each_step each_episode", "derivative noise unit acts"),
     Noise: content("Noise", "name members start expression parameters", "slots widths port state"),
 }
 
@@ -148,7 +150,7 @@ def _definition(made: Definition) -> Record:
     named = {"name": made.name, "parameters": sorted(made.parameters)}
     if made.kind == ACTIVATION:
         return Record("Activation", {**named, "value": made.given.each_step})
-    inner = {"let": made.let, "state": sorted(made.state, key=lambda state: state.name)}
+    inner = {"let": made.let, "state": sorted(made.state, key=_named)}
     if made.kind == MODEL:
         return Record("Model", {**named, **inner, "activity": made.given.each_step, **_beyond(made)})
     if made.kind == RULE:
@@ -159,15 +161,21 @@ def _definition(made: Definition) -> Record:
     raise TypeError(f"no schema says what of a {made.kind.name} is content")
 
 
+def _named(one: Quantity) -> str:
+    return one.name
+
+
 def _beyond(made: Definition) -> dict[str, object]:
     """What of a definition is content that the first ones had not: as far as it is there."""
     found: dict[str, object] = {
-        "flows": [(one.name, one.derivative, one.noise) for one in sorted(made.flows, key=lambda one: one.name)],
+        "flows": [(one.name, one.derivative, one.noise) for one in sorted(made.flows, key=_named)],
         "ports": sorted((port.name, port.combine) for port in made.ports),
-        "outputs": [(one.name, one.each_step) for one in sorted(made.outputs, key=lambda one: one.name)],
+        "outputs": [(one.name, one.each_step) for one in sorted(made.outputs, key=_named)],
         "send": made.send,
         "derivative": made.given.derivative,
         "gives": "" if made.given.name == made.kind.gives else made.given.name,
         "per_second": None if made.per_second == 1 else made.per_second,
+        "acts": [(one.name, *act) for one in sorted((*made.gives, *made.state), key=_named) for act in one.acts],
+        "fires": made.fires,
     }
     return {name: value for name, value in found.items() if value}

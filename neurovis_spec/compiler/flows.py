@@ -40,11 +40,17 @@ def reads(definition: Definition, trees: Iterable[Tree | None]) -> frozenset[str
 
 class PortsRead(NamedTuple):
     """The ports that are read: by ``flow``, derivatives and noise; by ``update``, what is made anew at the end of a
-    step; and by each of its outputs and the activity."""
+    step, ``jump`` apart; by each of its outputs and the activity; and by ``jump``."""
 
     flow: frozenset[str]
     update: frozenset[str]
     outputs: Mapping[str, frozenset[str]]
+    jump: frozenset[str] = frozenset()
+
+    @property
+    def once(self) -> frozenset[str]:
+        """All that are read once a step."""
+        return self.update | self.jump
 
 
 def ports_read_by(definition: Definition) -> PortsRead:
@@ -52,9 +58,11 @@ def ports_read_by(definition: Definition) -> PortsRead:
     ports = frozenset(ports_of(definition))
     flow = reads(definition, (tree for one in definition.flows for tree in (one.derivative, one.noise)))
     stepped = (tree for one in definition.state for tree in (one.each_step, one.each_episode))
+    jumps = [tree for one in definition.state for phase, tree in one.acts if phase == "jump"]
+    further = [tree for one in definition.state for phase, tree in one.acts if not phase.startswith("jump")]
     outputs = {one.name: reads(definition, [one.each_step]) & ports for one in definition.gives}
-    update = (reads(definition, stepped) & ports).union(*outputs.values())
-    return PortsRead(flow & ports, update, outputs)
+    update = (reads(definition, (*stepped, *further)) & ports).union(*outputs.values())
+    return PortsRead(flow & ports, update, outputs, reads(definition, jumps) & ports)
 
 
 def sent_by(model: Definition, sends: str) -> str:
@@ -66,7 +74,7 @@ def flows_by(definition: Definition, sent: str) -> frozenset[str] | None:
     """The ports that have to flow so that something flows that a model sends: a state or an output by its name, ""
     what it sends unless a connection says otherwise. None where it does not flow, whatever arrives."""
     sent = sent_by(definition, sent)
-    held = {one.name for one in definition.state if one.derivative is None and (one.each_step or one.each_episode)}
+    held = {one.name for one in definition.state if one.derivative is None and one.stepped}
     if any(one.name == sent for one in definition.state):
         return None if sent in held else frozenset()
     read = reads(definition, [one.each_step for one in definition.gives if one.name == sent])
@@ -84,7 +92,7 @@ def known_behind_flow(definition: Definition, sent: str = "") -> bool:
     if not plain_flow(definition, sent):
         return False
     sent = sent_by(definition, sent)
-    changed = {one.name for one in definition.state if one.each_step or one.each_episode}
+    changed = {one.name for one in definition.state if one.stepped}
     read = reads(definition, [one.each_step for one in definition.gives if one.name == sent])
     return changed.isdisjoint(read | {sent})
 

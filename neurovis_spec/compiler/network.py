@@ -25,9 +25,9 @@ from neurovis_spec.compiler.program import (
     DRIVE,
     RULE,
     SYNAPSE,
-    Check,
     Definition,
     Each,
+    Hidden,
     Holder,
     Integrate,
     Operation,
@@ -539,7 +539,7 @@ class Network:
         place = len(self.neurons)
         for number, population in enumerate(self.populations):
             for one in population.model.definition.state:
-                if not isinstance(one, Check):
+                if not isinstance(one, Hidden):
                     found[number, one.name] = place
                     place += len(population.members)
         return found

@@ -15,9 +15,14 @@ from neurovis_spec.language.expressions.tree import Call, Chain, Name, Number, T
 from neurovis_spec.language.words import Combine, Method
 
 _ZERO = Number(0.0)
-#: What of a rule is carried out together: what each step changes, derivatives among it, and an episode's end.
-Phase: TypeAlias = Literal["each_step", "each_episode"]
+#: What of a definition is carried out together: what each step changes, derivatives of what it gives among it, and an
+#: episode's end.
+Phase: TypeAlias = Literal["on_pre", "on_post", "jump", "fire", "settle", "jump_now", "each_step", "each_episode"]
 PHASES: Final[tuple[Phase, ...]] = ("each_step", "each_episode")
+#: Of synapses and rules: what a spike changes that arrives, or that the target has fired, before ``PHASES``.
+AT_SPIKES: Final[tuple[Phase, ...]] = ("on_pre", "on_post")
+#: The state of a model with a spike block that is 1 in the step in which the neuron fires, else 0.
+SPIKE: Final = "spike"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,15 +42,38 @@ class Quantity:
     noise: Tree | None = None
     #: as it is written, to be shown
     unit: str = ""
+    #: its values in phases that few definitions have, beside ``each_step`` and ``each_episode``
+    acts: tuple[tuple[Phase, Tree], ...] = ()
 
     def during(self, phases: Collection[Phase]) -> Quantity:
-        """The same with what becomes of it in these phases."""
+        """The same with what becomes of it in these phases: those of a step, or one of ``acts`` as its ``each_step``,
+        perhaps with the episode's end."""
         one = self if "each_step" in phases else replace(self, each_step=None, derivative=None)
-        return one if "each_episode" in phases else replace(one, each_episode=None)
+        for phase, tree in self.acts:
+            if phase in phases:
+                one = replace(one, each_step=tree)
+        return replace(one, acts=(), each_episode=self.each_episode if "each_episode" in phases else None)
+
+    def has(self, phase: Phase) -> bool:
+        """Whether anything becomes of it in a phase."""
+        if phase == "each_step":
+            return self.each_step is not None
+        return self.each_episode is not None if phase == "each_episode" else phase in dict(self.acts)
+
+    @property
+    def stepped(self) -> bool:
+        """Whether anything changes it once a step, or at some."""
+        return bool(self.each_step or self.each_episode or self.acts)
 
 
 @dataclass(frozen=True, slots=True)
-class Check(Quantity):
+class Hidden(Quantity):
+    """A state of ours, which no author names or sees: of a spike block whether the neuron is armed, and how long it
+    rests."""
+
+
+@dataclass(frozen=True, slots=True)
+class Check(Hidden):
     """A state of ours, which nothing reads: an infinity after a step in which something undefined was computed that no
     other number shows (``compiler/run_checks.py``), else 0. ``name`` says it: ``the model 'm' divides by 0``."""
 
@@ -142,6 +170,25 @@ class Definition:
     #: of a synapse what says how its line ends: above 0 in an arrow, below 0 in a bar, at 0 in nothing; None: as its
     #: weight does
     sign: Tree | None = None
+    #: of a model whether it has a spike block: a state SPIKE, and the phases "fire" and "settle"
+    fires: bool = False
+
+    def during(self, phases: Collection[Phase]) -> Definition:
+        """The same with what is carried out of it in these phases."""
+        if set(phases) == set(PHASES) and not any(one.acts for one in (*self.gives, *self.state)):
+            return self
+        lasting = self.kind.lasting
+        gives = tuple(one.during(phases) for one in self.gives) if lasting else self.gives
+        return replace(self, gives=gives, state=tuple(one.during(phases) for one in self.state))
+
+    def has(self, phase: Phase) -> bool:
+        """Whether anything that lasts changes in a phase."""
+        return any(one.has(phase) for one in self.lasting)
+
+    @property
+    def at_update(self) -> Definition:
+        """Of a model what its Update carries out, behind what is carried out in advance."""
+        return self.during(("settle", "each_episode") if self.fires else PHASES)
 
     @property
     def outputs(self) -> tuple[Quantity, ...]:
@@ -195,7 +242,7 @@ class Definition:
         it, of a rule, whose steps are taken there, what a derivative changes."""
         if self.kind.lasting:
             return frozenset(one.name for one in self.gives if one.derivative is not None)
-        return frozenset(one.name for one in self.lasting) if self.flows else frozenset()
+        return frozenset(one.name for one in self.lasting) if self.flows or self.fires else frozenset()
 
     @property
     def fleeting(self) -> tuple[Quantity, ...]:
@@ -214,6 +261,7 @@ class Definition:
         for one in (*self.state, *self.gives):
             parts = one.each_step, one.each_episode, one.derivative, one.noise
             yield from (tree for tree in parts if tree is not None)
+            yield from (tree for _, tree in one.acts)
 
     @property
     def read(self) -> frozenset[str]:
@@ -291,6 +339,9 @@ class Port:
     #: which of them are made anew at each stage of the integration, since what they bring flows: positions in
     #: ``incoming``; the others are held over a step
     staged: Indices | None = None
+    #: which of them bring spikes of the same step that act behind all spikes of the step ("jump_now"), where the port
+    #: holds these alone: positions in ``incoming``; None where there are none
+    now: Indices | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -335,6 +386,9 @@ class Projection:
     place: int = 0
     #: the names of the states and outputs that are among its signals
     signal_names: frozenset[str] = frozenset()
+    #: the name of an end (``pre.spike``, ``post.spike``) that must not be 0 of a connection for anything of it to be
+    #: carried out; "" where all are
+    when: str = ""
 
     @property
     def asks(self) -> frozenset[str]:
@@ -348,11 +402,12 @@ class Projection:
 
     def during(self, phases: Collection[Phase]) -> Projection:
         """The same with what of its definition is carried out in these phases."""
-        if set(phases) == set(PHASES):
+        made = self.use.definition.during(phases)
+        if made is self.use.definition:
             return self
-        made = self.use.definition
-        gives, state = (tuple(one.during(phases) for one in some) for some in (made.gives, made.state))
-        return replace(self, uses=(replace(self.use, definition=replace(made, gives=gives, state=state)),))
+        when = {"on_pre": f"pre.{SPIKE}", "on_post": f"post.{SPIKE}"}
+        guard = next((end for phase, end in when.items() if phase in phases), "")
+        return replace(self, uses=(replace(self.use, definition=made),), when=guard)
 
     @property
     def use(self) -> Use:
@@ -389,9 +444,11 @@ class ReadInputs(Operation):
 @dataclass(frozen=True, slots=True)
 class Gather(Operation):
     """What each port of a population is: what arrives there, combined, + bias + input + noise. Delay 0 reads what is
-    sent in this step, the rest the signals under way."""
+    sent in this step, the rest the signals under way. ``now``: the spikes of ``Port.now`` alone, and nothing is
+    added; else all but these."""
 
     population: int
+    now: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -400,6 +457,16 @@ class Update(Operation):
     instead."""
 
     population: int
+
+
+@dataclass(frozen=True, slots=True)
+class Advance(Operation):
+    """What becomes of the states of a population in a phase before its Update, from old values, by its ports as they
+    were gathered last: "jump", "each_step", "fire"; "jump_now" behind all spikes of the step. Nothing at step 0. A
+    population with a spike block has "settle" in place of ``each_step`` in its Update."""
+
+    population: int
+    phase: Phase
 
 
 @dataclass(frozen=True, slots=True)

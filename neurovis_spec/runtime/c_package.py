@@ -166,7 +166,7 @@ def _of_synapses(network: Network) -> int:
         changes = [tree for state in definition.state for tree in (state.each_step, state.each_episode)]
         functions += _calls([*(tree for _, tree in unfolded(definition.let, changes).let), *changes]) * len(one.members)
     for population in network.populations:
-        read = ports_read_by(population.model.definition).update
+        read = ports_read_by(population.model.definition).once
         ports = [(port, np.arange(len(port.incoming))) for port in population.ports if port.name in read]
         functions += _signals(network, {number: signal_of(one) for number, one in synapses.items()}, ports)
     return functions

@@ -75,7 +75,7 @@ def _read(operation: ReadInputs, step: Step) -> None:
 def _gather(operation: Gather, step: Step) -> None:
     """What is at each port of a population that its step reads."""
     population = step.network.populations[operation.population]
-    read = ports_read_by(population.model.definition).update
+    read = ports_read_by(population.model.definition).once
     step.ports[operation.population] = {
         port.name: gathered(step, operation.population, port) for port in population.ports if port.name in read
     }
