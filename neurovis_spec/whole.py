@@ -8,9 +8,12 @@ of the network, and lies where its files are.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TypeAlias
+
+import numpy as np
 
 from neurovis_spec.compiler.compile import Request
 from neurovis_spec.diagnostics import Findings
@@ -116,7 +119,8 @@ class _Reader:
 
 def _rows(edges: EdgeTable) -> Iterable[Plain]:
     """Edges as a spec writes them."""
-    weights, delays = edges.weights.tolist(), edges.delays.tolist()
-    for source, target, weight, delay in zip(edges.sources, edges.targets, weights, delays, strict=True):
-        row: list[Plain] = [source, target, weight]
-        yield row if delay < 0 else [*row, delay]
+    seconds = np.full(len(edges), np.nan) if edges.seconds is None else edges.seconds
+    columns = edges.weights.tolist(), edges.delays.tolist(), seconds.tolist()
+    for source, target, weight, steps, time in zip(edges.sources, edges.targets, *columns, strict=True):
+        delay: list[Plain] = [] if steps < 0 else [steps]
+        yield [source, target, weight, *(delay if math.isnan(time) else [f"{time!r} s"])]

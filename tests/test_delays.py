@@ -62,6 +62,15 @@ def test_delays_of_edges_go_before_that_of_the_entry(tmp_path: Path) -> None:
     assert delays("edges: {file: steps.csv}", tmp_path) == [4, 1]
 
 
+def test_delays_of_files_are_in_the_text_of_the_whole_spec(tmp_path: Path) -> None:
+    """In seconds they count as they are, to the last bit."""
+    (tmp_path / "edges.csv").write_text("from,delay_seconds,to,delay\nA1,1e-5,B1,\nA2,,B1,9\nA3,,B2,\nA1,2.3e-3,B2,\n")
+    text = f"neurovis: 1\nname: x\n{GROUPS}connections: {{A -> B: {{edges: {{file: edges.csv}}}}}}\n"
+    made = nv.compile_text(text, folder=tmp_path)
+    assert made.network.connections.delays.tolist() == [1, 9, 1, 2]
+    assert nv.compile_text(made.text(), folder=tmp_path / "elsewhere").network.hash == made.network.hash
+
+
 @pytest.mark.parametrize(
     ("rows", "message"),
     [
