@@ -35,6 +35,7 @@ synapses:
   graded: {signal: weight*pre.through}
   divided: {signal: "weight*clip(1/pre, -1, 1)"}
   timed: {signal: weight*post.v*sin(t)}
+  fixed: {state: {share: {initial: 0.5}}, signal: weight*share*pre.v}
   sampled: {signal: weight*pre.v*k}
 rules:
   approach: {state: {q: {each_step: 0.5*q + post.tau*pre.v}}, weight: {each_step: weight + 0.1*q}}
@@ -271,6 +272,12 @@ def test_what_does_not_flow_is_held_on_its_way(synapse: str) -> None:
     assert network.connections.targets[port.incoming[port.staged]].tolist() == [1]
     with pytest.raises(nv.SpecError, match="within one step: the integration -> B1 -> the integration"):
         network_of(entries[0], entries[1] % synapse)
+
+
+def test_a_state_without_a_formula_holds_nothing() -> None:
+    """It is as a parameter: neurons whose outputs read the port may drive each other in a stage."""
+    there, back = "A1 -> B1: {synapse: fixed}", "B1 -> A1: {send: through, delay: 0}"
+    assert network_of(there, back).connections.delays.tolist() == [0, 0]
 
 
 def test_delayed_signals_take_no_slots_and_are_remembered() -> None:

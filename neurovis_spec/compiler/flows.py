@@ -73,12 +73,17 @@ def sent_by(model: Definition, sends: str) -> str:
 def flows_by(definition: Definition, sent: str) -> frozenset[str] | None:
     """The ports that have to flow so that something flows that a model sends: a state or an output by its name, ""
     what it sends unless a connection says otherwise. None where it does not flow, whatever arrives."""
-    sent = sent_by(definition, sent)
-    held = {one.name for one in definition.state if one.derivative is None and one.stepped}
+    sent, held = sent_by(definition, sent), _held(definition)
     if any(one.name == sent for one in definition.state):
         return None if sent in held else frozenset()
     read = reads(definition, [one.each_step for one in definition.gives if one.name == sent])
     return None if "k" in read or read & held else read.intersection(ports_of(definition))
+
+
+def _held(definition: Definition) -> frozenset[str]:
+    """The states that steps change and no derivative: they are the same over a step."""
+    changed = (one for one in definition.state if one.stepped)
+    return frozenset(one.name for one in changed if one.derivative is None)
 
 
 def plain_flow(definition: Definition, sent: str = "") -> bool:
@@ -129,10 +134,9 @@ def slope_by(definition: Definition, tree: Tree, name: str) -> Slope:
 
 
 def signal_flows(synapse: Definition) -> bool:
-    """Whether the signal of a synapse flows where all does that it reads of its ends: all of its states have a
-    derivative, and it does not read the step."""
-    held = {one.name for one in synapse.state if one.derivative is None}
-    return reads(synapse, [synapse.given.each_step]).isdisjoint({"k", *held})
+    """Whether the signal of a synapse flows where all does that it reads of its ends: it reads neither the step nor a
+    state that steps change."""
+    return reads(synapse, [synapse.given.each_step]).isdisjoint({"k", *_held(synapse)})
 
 
 class Jacobian(NamedTuple):
