@@ -203,6 +203,15 @@ def test_the_delay_is_0_where_all_that_is_read_of_the_source_flows(entry: str, d
     assert network.connections.undelayed == ((0,) if delay == 0 else ())
 
 
+def test_edges_with_delays_of_their_own_have_none_by_default() -> None:
+    network = network_of(
+        "A -> B: {synapse: gap, edges: [[A1, B1, 1, 2], [A2, B2, 1, 0]]}",
+        "B -> A: {synapse: gap, edges: [[B1, A1, 1, 2], [B2, A2]]}",
+    )
+    assert network.connections.delays.tolist() == [2, 0, 2, 0]
+    assert network.connections.undelayed == (1,)
+
+
 # Levels
 
 

@@ -135,6 +135,11 @@ class _Shape(NamedTuple):
     #: which of its weights follow parameters
     parts: tuple[Part, ...] = ()
 
+    @property
+    def has_delay(self) -> BoolArray:
+        """For each pair whether its shape says a delay."""
+        return np.asarray(self.delays.steps >= 0) if self.delays is not None else np.zeros(len(self.i), dtype=np.bool_)
+
     def some(self, kept: IntArray) -> _Shape:
         """Some of its pairs."""
         weights = None if self.weights is None else self.weights[kept]
@@ -274,7 +279,7 @@ class EntryBuilder:
             label=None if body.label is None else body.label.value,
             empty=None if len(shape.i) else (self.sources, self.targets),
             route=route,
-            undelayed=written is None and not np.all(unsaid),
+            undelayed=written is None and not np.all(np.asarray(unsaid) | shape.has_delay),
             timing=None if delays.exact is None else delays,
             synapse=synapse,
         )
