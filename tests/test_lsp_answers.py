@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import suppress
 from pathlib import Path
 
@@ -106,6 +107,9 @@ def offered(text: str) -> dict[str, Completion]:
         (BASE + "connections:\n  K -> O: {plasticity: {delta: {rate: ¦", ["alpha", "beta", "i", "n_to"], ["K", "n"]),
         (BASE + "connections:\n  K -> O: {plasticity: {delta: {target: ¦", ["T", "go", "K1", "K5"], ["alpha"]),
         (BASE + "connections:\n  K -> O: {plasticity: {delta: {target: [K1, ¦", ["T", "go", "K2"], ["alpha"]),
+        (BASE + "connections:\n  K -> O: {plasticity: {delta: {target: {from: ¦", ["T", "go", "K1"], ["alpha"]),
+        (BASE + "connections:\n  K -> O: {plasticity: [oja, {delta: {target: {from: [K1, ¦", ["T", "K2"], ["alpha"]),
+        (FLOW + "connections: {A -> A: {plasticity: {delta: {target: A.¦", ["v", "current"], ["tau"]),
         (BASE + "connections:\n  K -> O: {pattern: ¦", ["all_to_all", "random"], ["alpha"]),
         (BASE + "connections:\n  K -> O: {pattern: {¦", ["ring", "random", "band"], ["probability"]),
         (BASE + "connections:\n  K -> O: {pattern: {random: {¦", ["probability"], ["random", "count"]),
@@ -415,6 +419,35 @@ def renamed(text: str, new: str) -> str:
 def test_renaming_a_group_renames_it_in_lists_of_signals() -> None:
     text = (BASE + REST).replace("K1 + K3..K5 -> O", "O -> K1 + K2").replace("target: T", "target: [K4, T]")
     assert "target: [Leg4, T]" in renamed(text.replace("arrange: {K3..K4", "arrange: {K3..K¦4"), "Leg")
+
+
+SIGNALS = """neurovis: 1
+name: signals
+rules: {r: {signals: [err, source], weight: {each_step: weight + 0.1*err*source}}}
+modules:
+  leg:
+    neurons: {K: {count: 2, model: izhikevich}, O: {model: adaptive}}
+    connections:
+      K -> O: {plasticity: {r: {err: O.b, source: {from: K.v}}}}
+instances: {left: {module: leg}}
+neurons: {A: {count: 2, model: adaptive}}
+connections:
+  A -> left.O: {plasticity: [oja, {r: {err: left.K1.u, source: {from: [A1.b, A2]}}}]}
+"""
+
+
+@pytest.mark.parametrize(("at", "new"), [("K: {", "Knee"), ("A: {", "Arm"), ("O: {", "Out"), ("left: {", "front")])
+def test_renaming_renames_in_signals_of_states_and_of_sources(at: str, new: str) -> None:
+    old = at.partition(":")[0]
+    expected = re.sub(rf"\b{old}(?=[12]?\b)", new, SIGNALS)
+    assert renamed(SIGNALS.replace(at, f"{old}¦: {{", 1), new) == expected
+
+
+def test_the_owner_of_a_state_that_is_a_signal_leads_to_its_group() -> None:
+    document, place = marked(SIGNALS.replace("from: K.v", "from: K¦.v"))
+    found = definition(document, place)
+    assert found is not None
+    assert (found.span.line, document.text.part(found.span)) == (6, "K")
 
 
 def test_renaming_a_group_renames_its_neurons_and_ranges() -> None:

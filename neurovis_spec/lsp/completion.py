@@ -26,7 +26,7 @@ from neurovis_spec.language.yaml.source import Scalar
 from neurovis_spec.lsp.definitions import Definition, definitions, known
 from neurovis_spec.lsp.document import Document, described, ports_of
 from neurovis_spec.lsp.index import Index
-from neurovis_spec.lsp.names import SECTIONS, Name, Scope, scope_of
+from neurovis_spec.lsp.names import SECTIONS, Name, Scope, scope_of, setting_of
 from neurovis_spec.lsp.outline import Path, nodes_at
 from neurovis_spec.lsp.text import Place, Text
 from neurovis_spec.manual.words import functions_of
@@ -458,15 +458,15 @@ def _definitions(found: Iterable[Definition]) -> Iterator[_Offer]:
 def _settings(role: Role, scope: Scope, path: Path, front: str, index: Index, place: Place) -> Iterator[_Offer]:
     """The settings of a definition; the value of one: a reference for a signal, else an expression."""
     assert role.kind is not None
-    if isinstance(path[-1], int):  # one of a list
-        path = path[:-1]
-    definition = known(role.kind, index.all_items).get(str(path[-2]))
+    owner, setting = setting_of(path)
+    definition = known(role.kind, index.all_items).get(owner)
     if role.use == "setting":
         for parameter in () if definition is None else definition.parameters:
             yield _Offer(parameter.name, "parameter", f"= {parameter.default}", parameter.description)
         for signal in () if definition is None else definition.signals:
             yield _Offer(signal, "input", "signal: neurons or an input")
-    elif definition is not None and path[-1] in definition.signals:
+    elif definition is not None and setting in definition.signals:
         yield from _neurons(scope, front, index, signals=True)
+        yield from _states(scope, front, index)
     else:
         yield from _formula(role, Scope(scope.module), path, index, place)

@@ -97,13 +97,12 @@ def _names(item: Item, role: Role, scope: Scope, text: Text, lookup: Lookup) -> 
         case "formula" | "template":
             yield from _formula(item, role, scope, text, lookup)
         case "setting value":
-            rule, setting = item.path[-2:] if isinstance(item.path[-1], str) else item.path[-3:-1]
-            if role.kind == "rule" and lookup.is_signal(str(rule), str(setting)):
-                yield from _references(item, scope, text, lookup)
+            if role.kind == "rule" and lookup.is_signal(*setting_of(item.path)):
+                yield from _references(item, scope, text, lookup, stately=True)
             else:
                 yield from _formula(item, role, scope, text, lookup)
         case "ends" | "references":
-            yield from _references(item, scope, text, lookup)
+            yield from _references(item, scope, text, lookup, stately=item.path[:1] == ("outputs",))
         case "setting":
             assert role.kind is not None
             definition = Scope(None, (SECTIONS[role.kind], str(item.path[-2])))
@@ -121,6 +120,17 @@ def _names(item: Item, role: Role, scope: Scope, text: Text, lookup: Lookup) -> 
             if role.kind == "module" or role.kind in SECTIONS:
                 scope = Scope()
             yield _whole(item, role.kind, scope, text, declares)
+
+
+def setting_of(path: Path) -> tuple[str, str]:
+    """The definition, and that setting of it of which the text at a path is the value or one of several.
+
+    >>> setting_of(("modules", "leg", "connections", "K -> O", "plasticity", 0, "delta", "target", "from", 1))
+    ('delta', 'target')
+    """
+    keys = [part for part in path if isinstance(part, str)]
+    behind = 5 if keys[0] == "modules" else 3
+    return keys[behind], keys[behind + 1]
 
 
 def _whole(item: Item, kind: Kind, scope: Scope, text: Text, declares: bool = False) -> Name:
@@ -155,11 +165,11 @@ def _of_ends(item: Item, text: Text, lookup: Lookup) -> Iterator[Name]:
         yield Name("local", match[1], span, Scope(None, (SECTIONS["model"], model)), item, False, exact)
 
 
-def _references(item: Item, scope: Scope, text: Text, lookup: Lookup) -> Iterator[Name]:
+def _references(item: Item, scope: Scope, text: Text, lookup: Lookup, stately: bool = False) -> Iterator[Name]:
+    """The names of neurons and instances; where it is ``stately`` the last one may be a state of these."""
     written = list(_dotted(parse(item.text)))
     steps = [(step.start, step.end) for name, _ in written for step in name.steps]
     places = iter(_inside(item, text, steps))
-    stately = item.path[:1] == ("outputs",)
     way: list[tuple[Scope | None, Name | None]] = []  # where the instances of the name before lead
     for name, shared in written:
         way = way[:shared]
