@@ -119,6 +119,7 @@ def flowing_specs(draw: st.DrawFn, exact: bool = False, synapses: bool = True) -
     neurons: dict[str, Plain] = {name: _group(chooser, kind, sizes[name]) for name, kind in kinds.items()}
     connections: dict[str, Plain] = {}
     joined: dict[str, Plain] = {}
+    states: list[str] = []
     for source in kinds:
         for target in kinds:
             if chooser.random() < 0.6:
@@ -126,7 +127,9 @@ def flowing_specs(draw: st.DrawFn, exact: bool = False, synapses: bool = True) -
                 connections[f"{source} -> {target}"] = body
                 if synapses and _can_have_synapse(body) and chooser.random() < 0.5:
                     name = f"s{len(joined)}"
-                    joined[name] = _synapse(chooser, kinds[source], kinds[target], exact)
+                    joined[name] = made = _synapse(chooser, kinds[source], kinds[target], exact)
+                    if isinstance(body.get("pattern"), str):  # else there may be none
+                        states += [f"({source} -> {target}).{state}" for state in _states_of(made)]
                     body["synapse"] = {name: {"E": "level"}} if "E" in str(joined[name]) else name
     method = chooser.choice(EXACT if exact else METHODS)
     spec: Spec = {
@@ -154,6 +157,7 @@ def flowing_specs(draw: st.DrawFn, exact: bool = False, synapses: bool = True) -
             {"from": 5, "to": 8, "clamp": {f"Ga.{_STATES[kinds['Ga']]}": "level"}},
             {"at": 6, "lesion": [list(kinds)[-1]]},
             {"at": 9, "mend": [list(kinds)[-1]]},
+            *_held(states),
             *_loss(connections),
         ],
     }  # fmt: skip
@@ -163,6 +167,11 @@ def flowing_specs(draw: st.DrawFn, exact: bool = False, synapses: bool = True) -
 def _loss(connections: dict[str, Plain]) -> list[Plain]:
     """The events by which the first connection is lesioned for a while."""
     return [{"at": at, what: [first]} for first in islice(connections, 1) for at, what in ((2, "lesion"), (7, "mend"))]
+
+
+def _held(states: list[str]) -> list[Plain]:
+    """The event by which some states of synapses are held for a while."""
+    return [{"from": 5, "to": 9, "clamp": dict.fromkeys(states, "level")}] if states else []
 
 
 def _without_functions(spec: Spec) -> Spec:
@@ -205,6 +214,11 @@ def _synapse(chooser: random.Random, source: str, target: str, exact: bool) -> P
     pre, post = chooser.choice(READ[source]), chooser.choice(READ[target])
     synapse: Plain = json.loads(made.replace("pre.X", f"pre.{pre}").replace("post.Y", f"post.{post}"))
     return synapse
+
+
+def _states_of(synapse: Plain) -> list[str]:
+    states = synapse.get("state") if isinstance(synapse, dict) else None
+    return [*states] if isinstance(states, dict) else []
 
 
 def _connection(

@@ -57,6 +57,15 @@ _RULES: dict[str, Plain] = {
         "weight": {"each_step": "weight + step*both"},
     },
 }
+#: what clamps can hold of each
+_HELD = {
+    "chase": ["seen"],
+    "fade": ["mean"],
+    "follow": ["a", "b", "c"],
+    "near": ["apart"],
+    "move": ["centre"],
+    "grow": [],
+}
 
 
 @st.composite
@@ -86,16 +95,20 @@ def learning_specs(draw: st.DrawFn) -> Spec:
     return {
         "neurovis": 1, "name": "learning", "seed": chooser.randrange(100), "time": time, "inputs": {"wave": wave},
         "models": _MODELS, "rules": _RULES, "neurons": {**neurons}, "connections": {**connections},
-        "events": _events(chooser, [*sizes], [name for name, body in connections.items() if "plasticity" in body]),
+        "events": _events(chooser, [*sizes], connections),
     }  # fmt: skip
 
 
-def _events(chooser: random.Random, groups: list[str], learning: list[str]) -> list[Plain]:
+def _events(chooser: random.Random, groups: list[str], connections: dict[str, Spec]) -> list[Plain]:
+    learning = [name for name, body in connections.items() if "plasticity" in body]
     events: list[Plain] = []
     if learning:
         name = chooser.choice(learning)
         events += [{"at": 2, "learning": {name: False}}, {"at": 5, "learning": {name: True}}]
         events += [{"at": 3, "lesion": chooser.choice(learning)}] if chooser.random() < 0.5 else []
+        rules = str(connections[name]["plasticity"])
+        states = [f"({name}).{state}" for rule, own in _HELD.items() if f"'{rule}'" in rules for state in own]
+        events += [{"from": 3, "to": 6, "clamp": {chooser.choice(states): 0.2}}] if states else []
     lost = chooser.choice(groups)
     return [*events, {"at": 4, "lesion": lost}, {"at": 6, "mend": lost}, {"from": 5, "to": 7, "clamp": {lost: 0.3}}]
 

@@ -27,9 +27,9 @@ from neurovis_spec.compiler.program import (
     SYNAPSE,
     Definition,
     Each,
-    Hidden,
     Holder,
     Integrate,
+    Key,
     Operation,
     Population,
     Projection,
@@ -532,31 +532,40 @@ class Network:
         return tuple(one for one in found if one.size)
 
     @cached_property
-    def state_places(self) -> Mapping[tuple[int, str], int]:
-        """What can be clamped beside the activities of all n neurons: the states of models. By the number of the
-        population and the name of the state, where those of its members begin among all that can be; from n on."""
-        found: dict[tuple[int, str], int] = {}
+    def state_places(self) -> Mapping[Key, int]:
+        """What can be clamped beside the activities of all n neurons: the states of models, then those of rules and
+        synapses. By whose state it is and its name, where those of the members begin among all that can be; from n
+        on."""
+        found: dict[Key, int] = {}
         place = len(self.neurons)
-        for number, population in enumerate(self.populations):
-            for one in population.model.definition.state:
-                if not isinstance(one, Hidden):
-                    found[number, one.name] = place
-                    place += len(population.members)
+        for holder, use in self.uses:
+            for one in use.definition.holdable:
+                found[Key(use.owner, one.name)] = place
+                place += len(holder.members)
         return found
 
     def clamp_places(self, what: IntArray | StateOf) -> IntArray:
-        """Where neurons, or the states of some, stand among all that can be clamped."""
+        """Where neurons, or the states of some neurons or connections, stand among all that can be clamped."""
         if not isinstance(what, StateOf):
             return what
-        _, numbers, positions = self.located("neuron")
-        starts = [self.state_places[number, what.state] for number in numbers[what.neurons].tolist()]
-        return np.array(starts, dtype=np.int64) + positions[what.neurons]
+        each: Each = "connection" if len(what.connections) else "neuron"
+        members, result = getattr(what, f"{each}s"), np.full(what.size, -1, dtype=np.int64)
+        for holder, use in self.uses:
+            start = self.state_places.get(Key(use.owner, what.state))
+            if start is not None and use.definition.kind.each == each:
+                there = np.isin(members, holder.members)
+                result[there] = start + np.searchsorted(holder.members, members[there])
+        return result
+
+    @cached_property
+    def clampable_of_neurons(self) -> int:
+        """How many numbers of neurons can be clamped: activities, then states of models."""
+        return len(self.neurons) + _holdable_in(self.populations)
 
     @cached_property
     def clampable(self) -> int:
-        """How many numbers can be clamped: activities, then states of models."""
-        states = (len(self.populations[number].members) for number, _ in self.state_places)
-        return len(self.neurons) + sum(states)
+        """How many numbers can be clamped: those of neurons, then states of rules and synapses."""
+        return self.clampable_of_neurons + _holdable_in(self.projections)
 
     @cached_property
     def mark(self) -> str:
@@ -658,3 +667,8 @@ class Network:
     def input_index(self) -> Mapping[str, Input]:
         """Input name to input."""
         return {entry.name: entry for entry in self.inputs}
+
+
+def _holdable_in(holders: Iterable[Holder]) -> int:
+    """How many numbers their states are, one a member."""
+    return sum(len(holder.members) * len(use.definition.holdable) for holder in holders for use in holder.uses)

@@ -201,6 +201,12 @@ class Definition:
         return (*self.state, *self.outputs, *(self.gives if self.moves_centre else ()))
 
     @property
+    def holdable(self) -> tuple[Quantity, ...]:
+        """What a clamp can hold: states, and the centre that a rule changes; no output, which is made anew."""
+        own = (*self.state, *(self.gives if self.moves_centre else ()))
+        return tuple(one for one in own if not isinstance(one, Hidden))
+
+    @property
     def moves_centre(self) -> bool:
         """Whether it is a rule that changes the centre of a connection, in place of the weight."""
         return self.kind.lasting and self.given.name == CENTRE

@@ -427,7 +427,10 @@ class EventModel(Model):
             "bad-event",
         ),
         Needs(("from", "at"), "a clamp needs 'from'", "write from: STEP", "bad-event"),
-    ] = Field(default_factory=dict, description="{neurons: activity}, or {K.v: value of the state v}.")
+    ] = Field(
+        default_factory=dict,
+        description="{neurons: activity}, or {K.v: value of the state v}, {(K -> O).g: of a synapse's or rule's}.",
+    )
     lesion: Annotated[PartsField, Filled("a neuron or a connection"), ENDS, _AT] = Field(
         default=(), description="Neurons and connections (FROM -> TO) that are removed."
     )

@@ -260,7 +260,7 @@ def _functions(small: bool, watched: bool) -> tuple[_Function, ...]:
     """The functions that ``nv_once`` and ``nv_run`` call. Those of type double give ``odd``."""
     of_inputs, of_step = ", int64_t k, double *restrict s", ", int64_t k, const double *restrict s"
     plain = Form(written_out=small, follows=True, watched=watched)
-    general = Form(first=True, held=True, fixed=True, gone=True, still=True, lost=True)
+    general = Form(first=True, held=True, fixed=True, fixed_joined=True, gone=True, still=True, lost=True)
     fused = Form(follows=True, fused=True)
     return (
         _Function("double", "nv_read", Form(watched=True), StepCode.read, of_inputs),

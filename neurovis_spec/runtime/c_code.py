@@ -122,6 +122,8 @@ class Form:
     held: bool = False
     #: so do states of models, whose bytes and numbers stand behind those of all neurons (``Network.state_places``)
     fixed: bool = False
+    #: so do those of rules and synapses, behind these
+    fixed_joined: bool = False
     #: connections whose byte of ``gone`` is set are left out
     gone: bool = False
     #: connections whose byte of ``still`` is set do not learn

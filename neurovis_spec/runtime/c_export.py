@@ -99,9 +99,11 @@ class Exported:
         #: whether any phase holds neurons
         self.holding = any(any(order >= 0 for order in phase.order) or phase.lesioned.any() for phase in self.phases)
         n = len(network.neurons)
-        #: whether any holds states of models, and how many numbers can be held
-        self.fixing = any(order >= 0 for phase in self.phases for order in phase.order[n:])
-        self.clampable = network.clampable if self.fixing else n
+        of_neurons = network.clampable_of_neurons
+        #: whether any holds states of models, and of rules and synapses, and how many numbers can be held
+        self.fixing = any(order >= 0 for phase in self.phases for order in phase.order[n:of_neurons])
+        self.fixing_joined = any(order >= 0 for phase in self.phases for order in phase.order[of_neurons:])
+        self.clampable = network.clampable if self.fixing_joined else of_neurons if self.fixing else n
         self.plan = c_plan.plan_of(self.network)
         self.members = self._members()
 
@@ -165,7 +167,7 @@ class Exported:
             Member("work", np.zeros(c_plan.work_size(self.plan)), "what an integration keeps between stages"),
         ]
         if self.holding:
-            about = "what neurons are held at" + (", then states" if self.fixing else "")
+            about = "what neurons are held at" + (", then states" if self.clampable > len(self.network.neurons) else "")
             members.append(Member("holding", np.zeros(self.clampable), about))
         return [member for member in members if len(member.begin) or member.name in ("activity", "weights")]
 
@@ -250,7 +252,7 @@ void {name}_step({name}_state *state, const {name}_inputs *in, {name}_outputs *o
         if len(self.phases) > 1:
             fields.append("int32_t phase; /* events that have happened */")
         if self.holding:
-            about = "neurons that are held" + (", then states" if self.fixing else "")
+            about = "neurons that are held" + (", then states" if self.clampable > len(self.network.neurons) else "")
             fields.append(f"unsigned char held[{self.clampable}]; /* {about} */")
             if self.network.outlets:
                 fields.append(f"unsigned char lesioned[{len(self.network.neurons)}]; /* neurons that are lesioned */")
@@ -366,6 +368,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             first=self.takes_initial,
             held=self.holding,
             fixed=self.fixing,
+            fixed_joined=self.fixing_joined,
             gone="gone" in left_out,
             still="still" in left_out,
             lost="lost" in left_out,

@@ -134,7 +134,7 @@ class _Integration:
 
             def copied(place: Place, totals: Mapping[int, str], one: FlowState = one) -> None:
                 now = cell = self.step.states(one.use, place)[one.name]
-                held = self.step.held(one.part.number, one.name, place) if isinstance(one.part, Part) else ""
+                held = self.step.held(one.use, one.name, place) if isinstance(one.part, Part) else ""
                 if held:
                     now = f"held[{held}] ? holding[{held}] : {cell}"
                 if back and isinstance(one.part, Contacts) and (idle := self.idle(one.part, one.name, place)):
@@ -367,13 +367,16 @@ class _Integration:
 
     def idle(self, part: Part | Contacts, name: str, place: Place) -> str:
         """The code of whether a flow state is held, or its connection does nothing; "" where it never is."""
-        if isinstance(part, Part):
-            held = self.step.held(part.number, name, place)
-            return f"held[{held}]" if held else ""
-        form, connection = self.step.form, self.code.at(part.projection.members, place)
-        if part.projection.kind == SYNAPSE:
-            return f"gone[{connection}]" if form.gone else ""
-        return f"still[{connection}]" if form.still else ""
+        use = part.population.model if isinstance(part, Part) else part.projection.use
+        held = self.step.held(use, name, place)
+        found = [f"held[{held}]"] if held else []
+        if isinstance(part, Contacts):
+            form, connection = self.step.form, self.code.at(part.projection.members, place)
+            if part.projection.kind == SYNAPSE:
+                found += [f"gone[{connection}]"] if form.gone else []
+            else:
+                found += [f"still[{connection}]"] if form.still else []
+        return found[0] if len(found) == 1 else f"({' || '.join(found)})" if found else ""
 
     def joined(self, contacts: Contacts, place: Place, totals: Mapping[int, str]) -> None:
         """The derivatives of the states of a connection, or what these change by."""
@@ -523,7 +526,7 @@ def _send_ahead(operation: SendAhead, step: StepCode) -> None:
     use = population.model
 
     def shown(place: Place, totals: Mapping[int, str]) -> None:
-        step.hold_states(number, place)
+        step.hold_states(use, place)
         neuron, functions = code.at(population.members, place), step.activation(population, place)
         seen: Mapping[str, Value] = {
             **code.parameters(use, place), **step.sight.clock(use.definition), **step.states(use, place),
@@ -557,12 +560,11 @@ def _diffuse(operation: Diffuse, step: StepCode) -> None:
                 place: Place,
                 totals: Mapping[int, str],
                 one: FlowState = one,
-                number: int = part.number,
                 drawn: IntArray = drawn,
                 root: str = root,
             ) -> None:
                 cell, spread = step.states(one.use, place)[one.name], f"fg[{plus(one.start, place)}]"
-                if held := step.held(number, one.name, place):
+                if held := step.held(one.use, one.name, place):
                     code.line(f"if (!held[{held}])")
                 code.line(f"{cell} = {cell} + {spread}*{root}*s[{code.at(drawn, place)}];")
 

@@ -33,6 +33,7 @@ from neurovis_spec.compiler.program import (
     SYNAPSE,
     Definition,
     Gather,
+    Holder,
     Key,
     Learn,
     Operation,
@@ -147,6 +148,9 @@ class StepCode:
         """All operations in order."""
         if self.form.watched:
             self.code.line(f"{self.code.real} odd = {self.code.text(0.0)};")
+        for projection in self.network.projections if self.form.fixed_joined else ():
+            if projection.use.definition.holdable:
+                self.hold_all(projection, projection.use)
         for operation in self.network.program:
             write(operation, self)
 
@@ -199,10 +203,13 @@ class StepCode:
 
     def hold_ahead(self, number: int) -> None:
         """The states of a population that are held, before synapses read them."""
-        model = self.network.populations[number].model.definition
-        if self.form.fixed and model.flows:
-            members = self.network.populations[number].members
-            self.each(len(members), _NO_ARRIVALS, lambda place, totals: self.hold_states(number, place))
+        use = self.network.populations[number].model
+        if self.form.fixed and use.definition.flows:
+            self.hold_all(self.network.populations[number], use)
+
+    def hold_all(self, holder: Holder, use: Use) -> None:
+        """The states of all members that are held, at what they are held at."""
+        self.each(len(holder.members), _NO_ARRIVALS, lambda place, totals: self.hold_states(use, place))
 
     def each(
         self, count: int, arrivals: Mapping[int, Arrivals], body: Callable[[Place, Mapping[int, str]], None]
@@ -366,30 +373,31 @@ class StepCode:
         made, stored = population.model.definition, self.states(population.model, place)
         seen: Mapping[str, Value] = {**code.parameters(population.model, place), **self.sight.clock(made), **ports}
         states = {one.name: stored[one.name] for one in made.state}
-        self.hold_states(number, place)
-
-        def fixed(name: str, value: Value) -> Value:
-            at = self.held(number, name, place)
-            return code.let("n", f"held[{at}] ? holding[{at}] : {code.text(value)}") if at else value
-
-        functions = self.activation(population, place)
-        new, given = self.change(made, seen, states, functions, fixed, begins=self.form.first)
+        self.hold_states(population.model, place)
+        functions, kept = self.activation(population, place), partial(self.unless_held, population.model, place)
+        new, given = self.change(made, seen, states, functions, kept, begins=self.form.first)
         self.store([(stored[name], value) for name, value in new.items()])
         self.store([(stored[one.name], given[one.name]) for one in made.outputs])
         self.store([(f"activity[{neuron}]", given["activity"])])
 
-    def hold_states(self, number: int, place: Place) -> None:
-        """The states of a member of a population that are held, at what they are held at."""
-        use = self.network.populations[number].model
+    def hold_states(self, use: Use, place: Place) -> None:
+        """The states of one member that are held, at what they are held at."""
         stored = self.states(use, place)
-        for one in use.definition.state:
-            if at := self.held(number, one.name, place):
+        for one in use.definition.holdable:
+            if at := self.held(use, one.name, place):
                 self.code.line(f"if (held[{at}])")
                 self.code.line(f"    {stored[one.name]} = holding[{at}];")
 
-    def held(self, number: int, name: str, place: Place) -> str:
-        """The code of where a state of a member of a population stands among what can be held; "" where none is."""
-        start = self.network.state_places.get((number, name)) if self.form.fixed else None
+    def unless_held(self, use: Use, place: Place, name: str, value: Value) -> Value:
+        """The new value of a state of one member, or what it is held at."""
+        at = self.held(use, name, place)
+        return self.code.let("n", f"held[{at}] ? holding[{at}] : {self.code.text(value)}") if at else value
+
+    def held(self, use: Use, name: str, place: Place) -> str:
+        """The code of where a state of one member stands among what can be held; "" where none is."""
+        form, of_neurons = self.form, use.definition.kind.each == "neuron"
+        is_held = form.fixed if of_neurons else form.fixed_joined
+        start = self.network.state_places.get(Key(use.owner, name)) if is_held else None
         return "" if start is None else str(plus(start, place))
 
     def activation(self, population: Population, place: Place) -> dict[str, Made]:
@@ -550,7 +558,8 @@ class StepCode:
             left_out = f"if (!gone[{code.at(members, place)}])" if self.form.gone else ""
             with code.block(left_out) if left_out else nullcontext():
                 stored, seen = self.sight.states(some), self.sight.known(some, read)
-                new, _ = self.change(made, seen, stored, begins=self.form.first)
+                kept = partial(self.unless_held, projection.use, place)
+                new, _ = self.change(made, seen, stored, bounded=kept, begins=self.form.first)
                 self.store([(stored[name], value) for name, value in new.items()])
 
         self.each(len(members), _NO_ARRIVALS, received)
@@ -644,7 +653,9 @@ class StepCode:
             stored["weight"] = f"weights[{connection}]"
 
         def bounded(name: str, value: Value) -> Value:
-            return self.bounded(projection, place, value) if name == "weight" else value
+            if name == "weight":
+                return self.bounded(projection, place, value)
+            return self.unless_held(rule, place, name, value)
 
         new, _ = self.change(rule.definition, seen, stored, bounded=bounded, begins=self.form.first)
         return [(stored[name], value) for name, value in new.items()]

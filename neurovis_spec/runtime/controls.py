@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -136,13 +137,16 @@ class Controls:
         now.holds = tuple(holds)
 
     def _fixed(self, held: Held) -> dict[Key, tuple[IntArray, FloatArray]]:
-        """The states of models that are held."""
+        """The states that are held."""
+        places = self.network.state_places
+        starts = np.fromiter(places.values(), dtype=np.int64)
+        held_places = np.flatnonzero(held.order[starts[0] :] >= 0) + starts[0]
+        ends = np.searchsorted(held_places, [*starts, self.network.clampable])
         fixed: dict[Key, tuple[IntArray, FloatArray]] = {}
-        for (number, state), start in self.network.state_places.items():
-            population = self.network.populations[number]
-            positions = np.flatnonzero(held.order[start : start + len(population.members)] >= 0)
-            if len(positions):
-                fixed[Key(population.model.owner, state)] = positions, held.value[start + positions]
+        for key, start, (begin, end) in zip(places, starts, pairwise(ends), strict=True):
+            own = held_places[begin:end]
+            if len(own):
+                fixed[key] = own - start, held.value[own]
         return fixed
 
     def restructure(self, state: State) -> None:

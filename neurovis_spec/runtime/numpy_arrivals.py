@@ -241,7 +241,7 @@ def seen_before_update(step: Step, projection: Projection, read: Collection[str]
     at = np.searchsorted(target.members, network.connections.targets[projection.members])
     for name in (one for one in states if one in read):
         if not seen:
-            code.line(f"if fixed: hold_cells(fixed, {code.constant(target.model.owner)}, cells)")
+            code.line(f"if fixed: hold_cells(fixed, {code.constant((target.model.owner,))}, cells)")
         cells = code.state(target.model, states[name])
         seen[name] = code.let("a", code.select(cells, at, len(target.members), broadcast=True))
     seen["weight"] = code.select("weights", projection.members, len(network.connections))

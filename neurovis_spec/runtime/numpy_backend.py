@@ -88,6 +88,8 @@ def step_code(network: Network, structure: Structure, own_signals: bool = False)
         network = replace(network, populations=populations)
     code = Code(network.dt, network.settable.variables)
     step = Step(code, whole, network, structure, layout, history_depth(network), lags_of(network), {})
+    if stateful := tuple(one.use.owner for one in network.projections if one.use.definition.holdable):
+        code.line(f"if fixed: hold_cells(fixed, {code.constant(stateful)}, cells)")
     for operation in network.program:
         emit(operation, step)
     return code

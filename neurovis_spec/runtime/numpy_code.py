@@ -329,28 +329,43 @@ class _Change(NamedTuple):
         return given
 
 
-def held_at(fixed: Fixed, key: Key, value: FloatArray | float, count: int) -> FloatArray | float:
-    """The new value of a state of so many members, in whose places of those that are held."""
+def held_at(
+    fixed: Fixed, key: Key, value: FloatArray | float, count: int, some: IntArray | None = None
+) -> FloatArray | float:
+    """The new value of a state of so many members, ``some`` of all or all, in whose places of those that are held."""
     if key not in fixed:
         return value
     result = np.array(np.broadcast_to(value, (count,)))
-    positions, values = fixed[key]
+    positions, values = _among(some, *fixed[key])
     result[positions] = values
     return result
 
 
-def hold_cells(fixed: Fixed, owner: Owner, cells: Cells) -> None:
-    """Have the states of an owner that are held what they are held at."""
-    for key, (positions, values) in fixed.items():
-        if key.owner == owner:
-            cells[owner][key.name][positions] = values
+def hold_cells(fixed: Fixed, owners: Collection[Owner], cells: Cells) -> None:
+    """Have the states of some owners that are held what they are held at."""
+    for (owner, name), (positions, values) in fixed.items():
+        if owner is not None and owner in owners:
+            cells[owner][name][positions] = values
 
 
-def held_among(fixed: Fixed, starts: Mapping[Key, int]) -> tuple[IntArray, FloatArray]:
-    """Where those of some states that lie one behind the other are held, and at what."""
-    places = [start + fixed[key][0] for key, start in starts.items() if key in fixed]
-    values = [fixed[key][1] for key in starts if key in fixed]
-    return np.concatenate([np.zeros(0, dtype=np.int64), *places]), np.concatenate([np.zeros(0), *values])
+def held_among(fixed: Fixed, starts: Mapping[Key, tuple[int, IntArray | None]]) -> tuple[IntArray, FloatArray]:
+    """Where those of some states that lie one behind the other are held, and at what; of each state where it starts,
+    and of which members it is, None for all."""
+    places, held = [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
+    for key, (start, some) in starts.items():
+        if key in fixed:
+            positions, values = _among(some, *fixed[key])
+            places.append(start + positions)
+            held.append(values)
+    return np.concatenate(places), np.concatenate(held)
+
+
+def _among(some: IntArray | None, positions: IntArray, values: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Which of ``some`` members, None for all, are at these positions, and what is held there."""
+    if some is None:
+        return positions, values
+    there = np.isin(positions, some)
+    return np.searchsorted(some, positions[there]), values[there]
 
 
 def _may_alias(tree: Tree) -> bool:

@@ -32,7 +32,7 @@ import numpy as np
 
 from neurovis_spec.arrays import BoolArray, Indices, IntArray
 from neurovis_spec.compiler.flows import BY_SLOPE
-from neurovis_spec.compiler.program import Diffuse, Integrate, Key, Port, Projection, Use
+from neurovis_spec.compiler.program import Diffuse, Integrate, Key, Owner, Port, Projection, Use
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.words import Method
@@ -95,7 +95,7 @@ def diffuse(operation: Diffuse, step: Step) -> None:
                     cells = code.state(population.model, one.name)
                     numbers = code.select("s", drawn, network.vector_size)
                     code.line(f"{cells} += ({step.spread[number, one.name]} * {root!r}) * {numbers}")
-            code.line(f"if fixed: hold_cells(fixed, {code.constant(population.model.owner)}, cells)")
+            code.line(f"if fixed: hold_cells(fixed, {code.constant((population.model.owner,))}, cells)")
 
 
 @contextmanager
@@ -243,7 +243,8 @@ class _Flow:
 
     def emit_fixed(self) -> None:
         """Which of the flow states are held, and at what."""
-        starts = {key: place.start for key, place in self.places.items()}
+        some: dict[Owner | None, IntArray | None] = {one.use.owner: one.some for one in self.contacts.values()}
+        starts = {key: (place.start, some.get(key.owner)) for key, place in self.places.items()}
         self.code.line("if fixed:")
         self.code.line(f"    held, values = held_among(fixed, {self.code.constant(starts)})")
         self.code.line(f"    {self.x}[held] = values")

@@ -25,6 +25,7 @@ from functools import singledispatch
 
 import numpy as np
 
+from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.events.settable import HIGH, LOW
 from neurovis_spec.compiler.flows import ports_read_by
 from neurovis_spec.compiler.network import Network, Outlet
@@ -102,12 +103,7 @@ def _receive(operation: Receive, step: Step) -> None:
     trees = (tree for one in definition.state for tree in (one.each_step, one.each_episode))
     read = unfolded(definition.let, trees).names
     seen = code.parameters(projection.use, some) | seen_before_update(step, projection, read)
-    place = "" if some is None else f"[{code.constant(some)}]"
-    cells = {
-        one.name: Cell(f"{cell}{place}", f"{cell}{place or '[:]'}")
-        for one in definition.state
-        for cell in [code.state(projection.use, one.name)]
-    }
+    cells = _cells_of(code, projection, some)
     emit_change(code, definition, seen, cells, step.network.episode)
 
 
@@ -137,7 +133,7 @@ def _update(operation: Update, step: Step) -> None:
         )
 
     if model.definition.state:
-        code.line(f"if fixed: hold_cells(fixed, {code.constant(model.owner)}, cells)")
+        code.line(f"if fixed: hold_cells(fixed, {code.constant((model.owner,))}, cells)")
     seen = code.parameters(model) | step.ports[number]
     cells = {one.name: cell(one.name) for one in model.definition.kept}
     functions = code.functions(activation)
@@ -170,7 +166,7 @@ def _send_ahead(operation: SendAhead, step: Step) -> None:
     code, network, number = step.code, step.network, operation.population
     population = network.populations[number]
     model = population.model
-    code.line(f"if fixed: hold_cells(fixed, {code.constant(model.owner)}, cells)")
+    code.line(f"if fixed: hold_cells(fixed, {code.constant((model.owner,))}, cells)")
     states = {one.name: code.state(model, one.name) for one in model.definition.state}
     functions = code.functions(population.activation)
     for name in operation.names:
@@ -238,10 +234,9 @@ def _learn(operation: Learn, step: Step) -> None:
     projection = whole.during(operation.phases)
     if not len(projection.members):
         return
-    rule, place = projection.rule, "" if learning is None else f"[{code.constant(learning)}]"
+    rule = projection.rule
     seen = code.parameters(rule, learning) | seen_at(step, projection)
-    states = {one.name: code.state(rule, one.name) for one in rule.definition.kept}
-    cells = {name: Cell(f"{state}{place}", f"{state}{place or '[:]'}") for name, state in states.items()}
+    cells = _cells_of(code, projection, learning)
     count = len(network.connections)
     if not rule.definition.moves_centre:
         cells["weight"] = Cell(
@@ -250,6 +245,19 @@ def _learn(operation: Learn, step: Step) -> None:
             lambda weight: _bounded(code, network, projection, weight),
         )
     emit_change(code, rule.definition, seen, cells, network.episode)
+
+
+def _cells_of(code: Code, projection: Projection, some: IntArray | None) -> dict[str, Cell]:
+    """What is kept of a synapse or a rule at the connections of a projection, which are ``some`` of all or all."""
+    use, count = projection.use, len(projection.members)
+    place, which = ("", None) if some is None else (f"[{code.constant(some)}]", code.constant(some))
+
+    def cell(name: str) -> Cell:
+        now, key = code.state(use, name), code.constant(Key(use.owner, name))
+        held = f"held_at(fixed, {key}, {{}}, {count}, {which})".format
+        return Cell(f"{now}{place}", f"{now}{place or '[:]'}", held=held)
+
+    return {one.name: cell(one.name) for one in use.definition.kept}
 
 
 def _bounded(code: Code, network: Network, projection: Projection, weight: str) -> str:

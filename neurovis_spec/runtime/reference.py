@@ -82,13 +82,15 @@ class ReferenceStepper(Seen):
 
     def step(self, state: State, inputs: FloatArray, /) -> None:
         """Execute the operations of the program in order."""
+        for projection in self.network.projections:
+            self.hold_states(projection.use, state)
         for operation in self.network.program:
             perform(operation, self, state, inputs)
         state.k += 1
 
     def gather(self, population: Population, state: State, inputs: FloatArray) -> dict[str, list[float]]:
         """What each member is given at each port: what arrives, combined, + bias + input + noise."""
-        self.hold_states(population, state)
+        self.hold_states(population.model, state)
         return {
             port.name: self.given(
                 population, port, self.signals(port, range(len(port.incoming)), state), state, inputs.tolist()
@@ -101,7 +103,7 @@ class ReferenceStepper(Seen):
         what of these is sent."""
         network = self.network
         population = network.populations[number]
-        self.hold_states(population, state)
+        self.hold_states(population.model, state)
         for position, neuron in enumerate(population.members.tolist()):
             initial = float(network.neurons.initial[neuron])
             if is_first(state) and not math.isnan(initial):
@@ -116,10 +118,10 @@ class ReferenceStepper(Seen):
             if outlet.population == number:
                 self.let_out(outlet, state.cells[population.model.owner][outlet.name], state)
 
-    def hold_states(self, population: Population, state: State) -> None:
-        """The states of a population that are held, at what they are held at."""
+    def hold_states(self, use: Use, state: State) -> None:
+        """The states of a definition in use that are held, at what they are held at."""
         for (owner, name), (positions, values) in (state.conditions.fixed or {}).items():
-            if owner == population.model.owner:
+            if owner == use.owner:
                 state.cells[owner][name][positions] = values
 
     def let_out(self, outlet: Outlet, values: FloatArray, state: State) -> None:
@@ -130,7 +132,7 @@ class ReferenceStepper(Seen):
     def send_ahead(self, operation: SendAhead, state: State) -> None:
         """What connections take of a population, where flow states are all that it is made of."""
         population = self.network.populations[operation.population]
-        self.hold_states(population, state)
+        self.hold_states(population.model, state)
         own = {name: values.tolist() for name, values in state.cells[population.model.owner].items()}
         trees = [(name, given(population.model.definition, name)) for name in operation.names]
         for name, values in self.values(population, formulas_of(population, trees), own, state).items():
@@ -182,7 +184,7 @@ class ReferenceStepper(Seen):
     def fixed(self, use: Use, position: int, state: State) -> dict[str, float]:
         """The states of a member that are held, and at what."""
         found: dict[str, float] = {}
-        for one in use.definition.state if state.conditions.fixed else ():
+        for one in use.definition.holdable if state.conditions.fixed else ():
             at = state.conditions.fixed_in(use.owner, one.name)
             if position in at:
                 found[one.name] = at[position]
@@ -208,7 +210,7 @@ class ReferenceStepper(Seen):
     def receive(self, operation: Receive, state: State) -> None:
         """The states of synapses from old values."""
         projection = self.network.projections[operation.projection].during(operation.phases)
-        self.hold_states(self.behind[operation.projection][0], state)
+        self.hold_states(self.behind[operation.projection][0].model, state)
         for position, connection in enumerate(projection.members.tolist()):
             if not state.conditions.structure.gone[connection]:
                 seen = self.known(projection.use, position, state) | self.before_update(projection, position, state)

@@ -130,14 +130,15 @@ class Flow:
                         values[position] += (g * root) * float(inputs[drawn[position]])
 
     def still(self, cells: Mapping[Place, FloatArray], state: State) -> Still:
-        """The states of neurons that are held, and those of connections whose synapse or rule does nothing, which stay
-        what they are."""
+        """The states that are held, and those of connections whose synapse or rule does nothing, which stay what they
+        are."""
         found = {place: state.conditions.fixed_in(place.owner, place.name) for place in cells}
         for one in self.contacts.values():
             idle = state.conditions.structure.idle(one.projection)
             for name in one.flows:
                 place = Place(one.projection.use.owner, name)
-                found[place] = {position: float(cells[place][position]) for position in np.flatnonzero(idle).tolist()}
+                stay = {position: float(cells[place][position]) for position in np.flatnonzero(idle).tolist()}
+                found[place] = {**found[place], **stay}
         return found
 
     def stage(self, state: State, still: Still, x: Numbers, at: Moment, inputs: FloatArray) -> Stage:

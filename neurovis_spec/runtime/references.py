@@ -70,12 +70,16 @@ def find_states(network: Network, reference: str, names: Names | None = None) ->
     return tuple(_state(network, part, names) for part in parse_sum(reference))
 
 
-def find_model_state(network: Network, reference: str) -> StateOf | None:
-    """The state of models that ``K.v`` names, which lasts, as outputs do not; None for what is no such reference.
-    Raises KeyError with the nearest names."""
+def find_lasting_state(network: Network, reference: str) -> StateOf | None:
+    """The state of models that ``K.v`` names, or of rules and synapses (``(K -> O).g``), which lasts, as outputs do
+    not; None for what is no such reference. Raises KeyError with the nearest names."""
     part, *others = parse_sum(reference)
     name, names = None if others else state_of(part), names_of(network)
-    if name is None or isinstance(name.owner, Arrow) or isinstance(names.find(name.owner.text), str):
+    if name is None:
+        return None
+    if isinstance(name.owner, Arrow):
+        return _state(network, part, names)
+    if isinstance(names.find(name.owner.text), str):
         return None
     neurons = find_neurons(name.owner.text, names)
     if any(name.state in one.outputs and np.isin(neurons, one.members).any() for one in _holders_of(network, MODEL)):

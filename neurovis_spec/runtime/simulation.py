@@ -40,7 +40,7 @@ from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.record import end_values
 from neurovis_spec.runtime.recording import Recording
-from neurovis_spec.runtime.references import find_model_state, find_neurons, find_parts
+from neurovis_spec.runtime.references import find_lasting_state, find_neurons, find_parts
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.rows import After
 from neurovis_spec.runtime.state import State, initial_state
@@ -373,8 +373,9 @@ class Simulation:
 
     def clamp(self, neurons: str, value: float) -> None:
         """Hold neurons (``K1..K3``, ``K + O``, ``left.K``) at a value from step k on, whatever their model says; its
-        states go on. ``K.v`` holds the state v of their model instead. Raises KeyError for a name that there is not,
-        ValueError for a value that is not finite, BackendError where the backend holds no states."""
+        states go on. ``K.v`` holds the state v of their model instead, ``(K -> O).g`` one of synapses or rules. Raises
+        KeyError for a name that there is not, ValueError for a value that is not finite, BackendError where the backend
+        holds no states."""
         number = arguments.finite(value)
         if number is None:
             raise ValueError(f"a neuron is clamped to a finite number, not {reprlib.repr(value)}")
@@ -417,9 +418,11 @@ class Simulation:
         self._controls.learn(self._state, members, arguments.truth("on", on))
 
     def _clampable(self, text: str) -> IntArray:
-        """Neurons or states of models, among all that can be clamped."""
+        """Neurons or states, among all that can be clamped."""
         reference = arguments.text("reference", text)
-        state = None if not isinstance(self._names.find(reference), str) else find_model_state(self.network, reference)
+        state = (
+            None if not isinstance(self._names.find(reference), str) else find_lasting_state(self.network, reference)
+        )
         if state is None:
             return self._neurons(text)
         self._backend.check_clamp(f"the state '{text}'")

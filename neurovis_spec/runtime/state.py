@@ -94,7 +94,7 @@ class Conditions:
     #: per population the neurons that are held, and at what (lesioned ones at 0); None for a population without any,
     #: and as a whole where nothing is held
     holds: tuple[tuple[IntArray, FloatArray] | None, ...] | None = None
-    #: the states of models that are held, by owner and name: of which members (their positions), and at what; None
+    #: the states that are held, by owner and name: of which members (their positions, ascending), and at what; None
     #: where none is
     fixed: Mapping[Key, tuple[IntArray, FloatArray]] | None = None
 

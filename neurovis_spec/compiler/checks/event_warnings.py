@@ -14,7 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.names.references import Directory, key_of, resolve_part, resolve_sum
+from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.located import Formula, Located
@@ -24,13 +26,14 @@ from neurovis_spec.language.unknown import known
 
 
 class _Clamp(NamedTuple):
-    """A key of a clamp: its neurons, or whose ``state`` ("" for the activity), and from which step (inclusive) to which
-    (exclusive) it holds; ``number`` counts the keys in the order written."""
+    """A key of a clamp: its neurons, or whose ``state`` ("" for the activity), neurons or ``connections``, and from
+    which step (inclusive) to which (exclusive) it holds; ``number`` counts the keys in the order written."""
 
     number: int
     key: Located[str]
     state: str
-    neurons: IntArray
+    connections: bool
+    members: IntArray
     begin: float
     end: float
 
@@ -43,12 +46,11 @@ class _Lesions(NamedTuple):
     places: list[Span]
 
 
-def check_events(
-    models: tuple[EventModel, ...], directory: Directory, constants: Constants, steps: int | None, findings: Findings
-) -> None:
+def check_events(models: tuple[EventModel, ...], seen: Compiled, steps: int | None, findings: Findings) -> None:
     """Warn of events that change nothing, or are lost among others. ``steps``: the length of a run, if the spec has
     it."""
-    reader = _Reader(directory, replace(constants, findings=Findings(), structural=set()))
+    constants = replace(seen.scopes[0].constants, findings=Findings(), structural=set())
+    reader = _Reader(seen.network, seen.census.directory, constants)
     if steps is not None:
         for model in models:
             _check_beyond(model, reader, steps, findings)
@@ -56,8 +58,9 @@ def check_events(
     _check_learning(models, reader, findings)
     lesions = _lesions(models, reader, findings)
     clamps = [clamp for clamp in reader.clamps(models) if not _is_lesioned(clamp, lesions, findings)]
-    for state in dict.fromkeys(clamp.state for clamp in clamps):
-        _check_overlaps([clamp for clamp in clamps if clamp.state == state], reader.count, findings)
+    count = max(reader.count, len(reader.network.connections))
+    for what in dict.fromkeys((clamp.state, clamp.connections) for clamp in clamps):
+        _check_overlaps([clamp for clamp in clamps if (clamp.state, clamp.connections) == what], count, findings)
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,7 @@ class _Reader:
     """Evaluates events that were found valid before; ``constants`` therefore report into findings that are thrown
     away."""
 
+    network: Network
     directory: Directory
     constants: Constants
     known: dict[str, IntArray] = field(default_factory=dict)
@@ -83,14 +87,20 @@ class _Reader:
         found = parse(text.value)
         return self._of(found, text) if isinstance(found, Sum) else np.zeros(0, dtype=np.int64)
 
-    def clamped(self, text: Located[str]) -> tuple[str, IntArray]:
-        """The state that a key of a clamp names, "" for the activity, and whose it is."""
+    def clamped(self, text: Located[str]) -> tuple[str, bool, IntArray]:
+        """The state that a key of a clamp names, "" for the activity, whether it is one of connections, and whose it
+        is."""
         part, *others = parse_sum(text.value)
         name = None if others else self.directory.name_of_state(part)
-        if name is None or isinstance(name.owner, Arrow):
-            return "", self.neurons(text)
+        if name is None:
+            return "", False, self.neurons(text)
+        if isinstance(name.owner, Arrow):
+            connections, ends = self.network.connections, (name.owner.sources, name.owner.targets)
+            sources, targets = (self._of(end, text) for end in ends)
+            there = np.isin(connections.sources.whole(), sources) & np.isin(connections.targets.whole(), targets)
+            return name.state, True, np.flatnonzero(there)
         found = known(resolve_part(name.owner, text, self.directory, self.constants.findings), ())
-        return name.state, np.array(found, dtype=np.int64)
+        return name.state, False, np.array(found, dtype=np.int64)
 
     def ends(self, text: Located[str]) -> tuple[IntArray, ...]:
         """The neurons of a reference, or those of either end of a connection."""
@@ -112,8 +122,7 @@ class _Reader:
             begin, end = self.step(model.from_), self.step(model.to)
             for name in model.clamp if begin is not None else ():
                 key = key_of(model.source, "clamp", name)
-                state, neurons = self.clamped(key)
-                yield _Clamp(number, key, state, neurons, begin or 0.0, math.inf if end is None else end)
+                yield _Clamp(number, key, *self.clamped(key), begin or 0.0, math.inf if end is None else end)
                 number += 1
 
 
@@ -201,9 +210,9 @@ def _last(lesions: _Lesions, neurons: IntArray) -> tuple[float, Span]:
 
 def _is_lesioned(clamp: _Clamp, lesions: _Lesions, findings: Findings) -> bool:
     """Whether the neurons of a clamp are all lesioned before it begins, whose states go on; a warning if so."""
-    if clamp.state or not len(clamp.neurons) or (lesions.since[clamp.neurons] > clamp.begin).any():
+    if clamp.state or not len(clamp.members) or (lesions.since[clamp.members] > clamp.begin).any():
         return False
-    since, place = _last(lesions, clamp.neurons)
+    since, place = _last(lesions, clamp.members)
     message = f"'{shorten(clamp.key.value)}' is lesioned from step {since:.0f} on ({place.seen_from(clamp.key.span)})"
     findings.warning("no-effect", clamp.key.span, f"{message}: clamping it changes nothing", "remove it")
     return True
@@ -216,12 +225,12 @@ def _check_overlaps(clamps: list[_Clamp], count: int, findings: Findings) -> Non
     order = sorted(clamps, key=lambda one: one.begin)
     told: set[int] = set()
     for number, clamp in enumerate(order):
-        for other in np.unique(owner[clamp.neurons[end[clamp.neurons] > clamp.begin]]).tolist():
+        for other in np.unique(owner[clamp.members[end[clamp.members] > clamp.begin]]).tolist():
             first, second = sorted((order[other], clamp), key=lambda one: one.number)
             if second.number not in told:
                 told.add(second.number)
                 _tell(first, second, findings)
-        longer = clamp.neurons[end[clamp.neurons] < clamp.end]
+        longer = clamp.members[end[clamp.members] < clamp.end]
         end[longer], owner[longer] = clamp.end, number
 
 

@@ -63,10 +63,9 @@ def _events(compiled: Compiled, findings: Findings) -> None:
     """Events that come too late, or are lost among others. Most specs have none: nothing is imported then."""
     from neurovis_spec.compiler.checks.event_warnings import check_events
 
-    spec, network = compiled.spec, compiled.network
-    steps = None if spec.time is None or spec.time.steps is None else network.steps
-    directory, constants = compiled.census.directory, compiled.scopes[0].constants
-    check_events(spec.events, directory, constants, steps, findings)
+    spec = compiled.spec
+    steps = None if spec.time is None or spec.time.steps is None else compiled.network.steps
+    check_events(spec.events, compiled, steps, findings)
 
 
 def _inputs(compiled: Compiled, findings: Findings) -> None:

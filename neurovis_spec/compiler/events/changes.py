@@ -20,9 +20,9 @@ NO_INDICES: IntArray = frozen(np.zeros(0, dtype=np.int64))
 
 
 class Clamp(NamedTuple):
-    """Neurons held at a value, which follows the parameters; or states of models: indices from the number of neurons on
-    are those of ``Network.state_places``. Of several clamps of a neuron the one of the highest ``order`` holds: the one
-    written last, or by hand after that. ``event`` is what ends it."""
+    """Neurons held at a value, which follows the parameters; or states, of models, rules and synapses: indices from the
+    number of neurons on are those of ``Network.state_places``. Of several clamps of a neuron the one of the highest
+    ``order`` holds: the one written last, or by hand after that. ``event`` is what ends it."""
 
     order: int
     event: int

@@ -32,7 +32,7 @@ class Event:
     to: int | None = None
     #: parameters, and what each is set to
     set: Mapping[str, Formula] = field(default_factory=dict)
-    #: neurons or states of some, and what they are clamped to
+    #: neurons or states, and what they are clamped to
     clamp: tuple[tuple[IntArray | StateOf, Formula], ...] = ()
     lesioned_neurons: tuple[IntArray, ...] = ()
     lesioned_connections: tuple[IntArray, ...] = ()

@@ -108,11 +108,11 @@ class Finder:
         return self._refused(one, state.span) if isinstance(one, Refusal) else one.neurons
 
     def clamped(self, text: Located[str]) -> IntArray | StateOf | Unknown:
-        """What a key of ``clamp`` names: neurons, or a state of some; UNKNOWN where it is neither, which is
-        reported."""
+        """What a key of ``clamp`` names: neurons, or a state of some neurons or connections; UNKNOWN where it is
+        neither, which is reported."""
         part, *others = parse_sum(text.value)
         name = None if others else self.directory.name_of_state(part)
-        if name is None or name.of_rule:
+        if name is None:
             return self.neurons(text)
         return self.state(name, part, text, self.lasting)
 
