@@ -19,6 +19,7 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.simulated import SimulatedSource
+from neurovis_spec.live.turns import Set
 from neurovis_spec.live.view import BAR, LEVELS, NEGATIVE, view_of
 from neurovis_spec.runtime.columns import Keep, columns_of
 from neurovis_spec.runtime.formats import load
@@ -229,7 +230,8 @@ def test_lines_end_as_the_sign_of_their_synapse_says() -> None:
     )
     later = np.stack([weights, np.full(7, 0.75)])
     assert ends_of(network.network, later)[1].tolist() == [1, -1, 0, 1, 1, -1, -1]
-    assert effects_of(network.network, weights).tolist() == [1, -1, 1, -2, 3, 0.2, 0.5]
+    effects = effects_of(network.network, weights, ends_of(network.network, weights))
+    assert effects.tolist() == [1, -1, 1, -2, 3, 0.2, 0.5]
 
 
 def heads(scene: Scene) -> dict[str, Arrowhead]:
@@ -258,6 +260,61 @@ def test_stills_films_glances_and_legends_show_ends(suffix: str, tmp_path: Path)
     assert in_page == [of_ends[end] for end in WANTED.values()]
     network.render(tmp_path / f"a{suffix}", recording=made, view=["network", "matrix"])
     assert (tmp_path / f"a{suffix}").stat().st_size > 1000
+
+
+#: the reversal of the one is a parameter, that of the other compared with one of the target's model
+REVERSING = """time: {dt: 0.1, steps: 10}
+parameters: {reversal: 0, rest: -60}
+models: {cell: {parameters: {rest: -60}, state: {v: {derivative: drive - v}}, activity: v}}
+synapses:
+  graded: {parameters: {E: 0}, signal: weight*pre.v*(E - post.v), sign: E - post.rest}
+neurons: {A: {model: cell}, B: {model: {cell: {rest: rest}}}, C: {model: cell}}
+connections:
+  - A -> B: {synapse: graded}
+  - A -> C: {synapse: {graded: {E: reversal}}}
+  - C -> A: -1
+events: [{at: 2, set: {rest: 50}}, {at: 5, set: {reversal: -80}}, {at: 7, set: {rest: 0}}]
+"""
+REVERSED = [[1, 1], [1, 1], *[[-1, 1]] * 3, *[[-1, -1]] * 2, *[[0, -1]] * 3]
+
+
+def test_ends_follow_parameters_that_are_set_in_a_run() -> None:
+    """Of a recording by its events, of a run as it is, also where it is turned by hand."""
+    network = compiled(REVERSING)
+    recording = network.run()
+    assert film_of(network, list(snapshots_of(network.network, recording, range(10)))).line_ends[:, :2].tolist() == (
+        REVERSED
+    )
+    followed = snapshots_of_run(Simulation(network.network), Look(network.network.render, first=0, count=10))
+    assert [one.ends[:2].tolist() for one in followed if one.ends is not None] == REVERSED
+    view, source = view_of(network, network.gains), SimulatedSource(Simulation(network.network))
+    while source.step < 2:
+        source.advance()
+    source.turn(Set({"reversal": -90.0}))
+    for end in (1, -1, -1):  # it has its effect from the next step on
+        kinds = view.glance(source.seen()).kinds[:2].tolist()
+        assert [(bool(kind & BAR), bool(kind & NEGATIVE)) for kind in kinds] == [(True, True), (end < 0, end < 0)]
+        source.advance()
+
+
+def test_legends_and_matrices_have_the_ends_that_events_lead_to(tmp_path: Path) -> None:
+    network = compiled(REVERSING)
+    made = network.run()
+    scene = scene_of(network, at(network, made, 0))
+    assert {shape.text for shape in scene.shapes() if isinstance(shape, Text)} >= {"excites", "inhibits", "neither"}
+    assert {name: shape.kind for name, shape in heads(scene).items()} == {
+        "A -> B": "arrow",
+        "A -> C": "arrow",
+        "C -> A": "bar",
+    }
+    drawn = gathered(network.network, [("both", (1, 2))])
+    first, last = (drawn.ends(one.weights, one.ends).tolist() for one in snapshots_of(network.network, made, [0, 6]))
+    assert [first[0], last[0]] == [1, -1]
+    pictures = []
+    for step in (0, 9):
+        network.render(tmp_path / "a.svg", recording=made, step=step, view="matrix")
+        pictures.append((tmp_path / "a.svg").read_text())
+    assert pictures[0].replace("step 0", "step 9") != pictures[1]
 
 
 def test_glyphs_end_as_what_they_hold_does() -> None:

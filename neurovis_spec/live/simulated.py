@@ -43,6 +43,7 @@ from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.runtime.rows import After
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
 from neurovis_spec.runtime.state import State
+from neurovis_spec.scene.ends import SetEnds
 from neurovis_spec.scene.fading import Fading
 from neurovis_spec.scene.shown_states import ShownStates
 from neurovis_spec.scene.signals import Signals
@@ -69,6 +70,7 @@ class SimulatedSource:
         self._simulation, self._room = simulation, room
         self._probe = columns_of(self.network).probe
         self._shown, self._signals = ShownStates(self.network), Signals(self.network)
+        self._ends = SetEnds(self.network)
         self._signals.follow(simulation)
         self._origin = simulation.state() if origin is None else origin
         self._begin(self._origin if begin is None else begin, turned, fed or {})
@@ -306,7 +308,7 @@ class SimulatedSource:
         """Compute a step; ``before`` is what was seen of the one before it."""
         run = self._simulation
         step, weights, lesioned, held = run.k, run.connection_weights, run.lesioned, run.held
-        pose = run.pose
+        pose, ends = run.pose, self._ends.of_run(run)
         try:
             run.step({name: values if len(values) > 1 else values[0] for name, values in self._fed.items()})
         except ParameterError as error:  # what events set does not go with what was turned: the step was made without
@@ -317,7 +319,7 @@ class SimulatedSource:
         self.history.note(step, activity if shown is None else shown, weights)
         seen = self._fading.follow(np.array([step]), activity[None]) if self._fading else None
         sent = self._signals.of_run(run)
-        snapshot = Snapshot(step, activity, weights, previous, seen, pose, run.sensed, shown, sent)
+        snapshot = Snapshot(step, activity, weights, previous, seen, pose, run.sensed, shown, sent, ends)
         return Seen(snapshot, *lesioned, held, run.probed(self._probe))
 
 

@@ -87,7 +87,7 @@ class View:
         """What a step looks like."""
         whole, drawn = seen.snapshot, self.drawn
         snapshot = drawn.snapshot(whole)
-        ends = drawn.ends(whole.weights)
+        ends = drawn.ends(whole.weights, whole.ends)
         shown = looks(drawn.network, snapshot, self.gains, self.plan.frame.widest, drawn.signals(whole), ends)
         words = self.plan.caption_shape(caption(drawn.whole, whole.step, whole.activity))
         neurons, lines = self.lesioned(seen)

@@ -16,7 +16,7 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import SYNAPSE, Key, Projection
+from neurovis_spec.compiler.program import SYNAPSE, Key, Projection, Use
 from neurovis_spec.language.expressions.evaluate import Given, evaluate_array
 from neurovis_spec.language.expressions.functions import NUMPY, Library
 from neurovis_spec.runtime.lags import lags_of
@@ -82,8 +82,7 @@ class Forming:
         network, use, members, delays = self._network, of.projection.use, of.projection.members, of.delays
         unit, k = use.definition.per_second, state.k - 1
         known: dict[str, Given] = {**constants(network.dt * unit), "k": float(k), "t": k * network.dt * unit}
-        for name, values in use.parameters.items():
-            known[name] = _as_set(network, Key(use.owner, name), values, state)
+        known |= parameters_of(network, use, state.conditions.variables)
         known |= state.cells[use.owner]
         known["weight"] = weights[members]
         left = k - delays if state.continued else np.maximum(k - delays, of.first)
@@ -99,10 +98,13 @@ class Forming:
         return np.broadcast_to(evaluate_array(tree, known, by=self._by), members.shape)
 
 
-def _as_set(network: Network, key: Key, values: FloatArray, state: State) -> FloatArray:
-    """An array of the network as it is by now, where it can be set in a run."""
-    variable = network.settable.variables.get(key)
-    if variable is None:
-        return values
-    now = state.conditions.variables[variable.start : variable.start + variable.size]
-    return np.broadcast_to(now, values.shape)
+def parameters_of(network: Network, use: Use, variables: FloatArray | None) -> dict[str, FloatArray]:
+    """The parameters of a definition in use, one number a member: those that can be set in a run as the ``variables``
+    of its conditions have them, where these are given."""
+    found = dict(use.parameters)
+    for name, values in use.parameters.items():
+        variable = network.settable.variables.get(Key(use.owner, name))
+        if variable is not None and variables is not None:
+            now = variables[variable.start : variable.start + variable.size]
+            found[name] = np.broadcast_to(now, values.shape)
+    return found

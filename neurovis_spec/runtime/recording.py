@@ -43,7 +43,8 @@ class Snapshot:
     ``previous_weights`` (m,) is w[t−1], None at step 0 and where step t − 1 was not recorded. ``seen`` (n,) is what a
     picture shows in place of the activity, where neurons have a trace; ``shown`` (n,) has the states in place of the
     activities of the neurons that show one (``render: show``), None where none does. ``sent`` is what connections take
-    beside activities (``Network.sent``), None where they take none, and where it is not known.
+    beside activities (``Network.sent``), None where they take none, and where it is not known. ``ends`` (m,) is how
+    lines end (``scene/ends.py``), None where that follows from the network and the weights alone.
     """
 
     step: int
@@ -57,6 +58,7 @@ class Snapshot:
     sensors: FloatArray | None = None
     shown: FloatArray | None = None
     sent: FloatArray | None = None
+    ends: npt.NDArray[np.int8] | None = None
 
     @property
     def told(self) -> FloatArray:

@@ -248,6 +248,12 @@ class Simulation:
         slots = self.network.settable.index
         return {name: float(self._state.conditions.parameters[slots[name]]) for name in self.network.parameters}
 
+    @property
+    def variables(self) -> FloatArray:
+        """The numbers that follow parameters, as ``Settable.variables`` lays them out, as they are for the next step; a
+        copy."""
+        return self._state.conditions.variables.copy()
+
     def weight(self, name: str) -> float:
         """w[k] of any connection by name. Raises KeyError with the nearest names."""
         index = self.network.connection_index.get(arguments.text("name", name))

@@ -115,10 +115,10 @@ class Gathered:
             total = self.total(sent.value)
         return Signal(total, np.ones_like(total))
 
-    def ends(self, weights: FloatArray) -> EndArray:
-        """How the lines that are drawn end where the weights of the whole are these: of what is added up as its sum
-        does, in which each counts by how it ends."""
-        own = ends_of(self.whole, weights)
+    def ends(self, weights: FloatArray, own: EndArray | None = None) -> EndArray:
+        """How the lines that are drawn end where the weights of the whole are these, and its lines end as ``own``, by
+        default as the network says: of what is added up as its sum does, in which each counts by how it ends."""
+        own = ends_of(self.whole, weights) if own is None else own
         if not self.any:
             return own
         with np.errstate(over="ignore", invalid="ignore"):

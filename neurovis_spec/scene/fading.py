@@ -15,6 +15,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.recording import Recording, Snapshot
+from neurovis_spec.scene.ends import SetEnds
 from neurovis_spec.scene.film_size import frames_a_second
 from neurovis_spec.scene.shown_states import ShownStates
 from neurovis_spec.scene.signals import Signals
@@ -82,6 +83,7 @@ def snapshots_of(network: Network, recording: Recording, steps: Iterable[int]) -
     was before. Raises RecordingError."""
     fading, states, done = Fading(network), ShownStates(network), 0
     columns, sending = states.columns(recording), Signals(network).recorded(recording)
+    ends = SetEnds(network).by_events()
     for step in steps:
         snapshot = recording.snapshot(step)
         if states:
@@ -91,6 +93,8 @@ def snapshots_of(network: Network, recording: Recording, steps: Iterable[int]) -
             row = recording.row(step)
             (sent,) = sending.rows(slice(row, row + 1))
             snapshot = replace(snapshot, sent=sent)
+        if ends is not None:
+            snapshot = replace(snapshot, ends=ends.at(step, snapshot.weights))
         if fading:
             row = recording.row(step)
             done = max(done, int(np.searchsorted(recording.step, step - fading.reach)))

@@ -100,7 +100,8 @@ def filmed(drawn: Gathered, planned: Plan, snapshots: Collection[Snapshot], gain
     captions, titles, steps, low, high = list[str](), list[str](), list[int](), None, None
     for frame, step in enumerate(snapshots):
         snapshot = drawn.snapshot(step)
-        seen = looks(network, snapshot, gains, planned.frame.widest, drawn.signals(step), drawn.ends(step.weights))
+        own_ends = drawn.ends(step.weights, step.ends)
+        seen = looks(network, snapshot, gains, planned.frame.widest, drawn.signals(step), own_ends)
         fill_values[frame], line_values[frame] = seen.discs, seen.lines
         widths[frame], glows[frame], ends[frame] = seen.widths, seen.glows, seen.ends
         steps.append(snapshot.step)

@@ -24,7 +24,7 @@ from neurovis_spec.scene import delays, encoding, legend, texts
 from neurovis_spec.scene.boxes import Box, boxes_of, entitled
 from neurovis_spec.scene.caption import CAPTION, CAPTION_Y, HEADER, TITLE, caption_text, title_text
 from neurovis_spec.scene.collapse import Gathered
-from neurovis_spec.scene.ends import EndArray, signed
+from neurovis_spec.scene.ends import EndArray, SetEnds, signed
 from neurovis_spec.scene.fading import seconds_of
 from neurovis_spec.scene.frame import MARGIN, MOST, Frame, Margins, fit, unit_for
 from neurovis_spec.scene.gains import Gains, in_pages
@@ -530,7 +530,8 @@ def _least_and_most(seconds: FloatArray) -> tuple[float, ...]:
 def _ends(drawn: Gathered) -> legend.Ends:
     """Which ends there are: bars where a weight is negative, or may become so by learning, and what synapses say."""
     network, said = drawn.network, signed(drawn.whole)
-    kinds = {*np.unique(drawn.ends(drawn.whole.connections.weights.whole())).tolist()}
+    weights = drawn.whole.connections.weights.whole()
+    kinds = {kind for own in SetEnds(drawn.whole).kinds() for kind in np.unique(drawn.ends(weights, own)).tolist()}
     free = network.changing if drawn.any else np.setdiff1d(network.changing, said)
     if (network.connections.low[free] < 0).any():
         kinds.add(-1)

@@ -20,6 +20,7 @@ from neurovis_spec.runtime.fitting import fitted
 from neurovis_spec.runtime.inputs import InputError
 from neurovis_spec.runtime.recording import Recording, Snapshot
 from neurovis_spec.runtime.simulation import Simulation
+from neurovis_spec.scene.ends import SetEnds
 from neurovis_spec.scene.fading import Fading, snapshots_of
 from neurovis_spec.scene.look import Look
 from neurovis_spec.scene.shown_states import ShownStates
@@ -97,16 +98,17 @@ def snapshots_of_run(run: Simulation, look: Look) -> Iterator[Snapshot]:
     """Those of the frames of a film, of a run that is made while they are asked for."""
     network, start = run.network, look.first or 0
     fading, states, signals, seen = Fading(network), ShownStates(network), Signals(network), None
+    set_ends = SetEnds(network)
     signals.follow(run)
     before, weights = None, run.connection_weights
     for step in range(start + look.count):
-        pose = run.pose
+        pose, ends = run.pose, set_ends.of_run(run)
         run.step()
         if fading:
             seen = fading.follow(np.array([step]), run.activity[None])
         if step >= start and (step - start) % look.every == 0:
             shown, sent = states.of_run(run), signals.of_run(run)
-            yield Snapshot(step, run.activity, weights, before, seen, pose, run.sensed, shown, sent)
+            yield Snapshot(step, run.activity, weights, before, seen, pose, run.sensed, shown, sent, ends)
         before, weights = weights, run.connection_weights if len(network.changing) else weights
 
 

@@ -18,7 +18,7 @@ from neurovis_spec.compiler.network import Network, StepLength
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene import body, encoding, strips
 from neurovis_spec.scene.encode import tooltips
-from neurovis_spec.scene.ends import effects_of, signed
+from neurovis_spec.scene.ends import effects_of, ends_of, signed
 from neurovis_spec.scene.frame import MARGIN
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.gains import Scale as Own
@@ -320,7 +320,9 @@ class Maker:
                 return Note(f"every |w| is below {number(self.min_weight)}")
         full, used = _full_at(weights, self.gains.thickness[connections], self.gains.thickness_scales)
         every = np.stack([snapshot.weights for snapshot in snapshots])
-        effects, said = effects_of(network, every)[:, connections], len(signed(network)) > 0
+        ends_at = [ends_of(network, one.weights) if one.ends is None else one.ends for one in snapshots]
+        effects = effects_of(network, every, np.stack(ends_at))[:, connections]
+        said = len(signed(network)) > 0
         with np.errstate(over="ignore", invalid="ignore"):
             values = np.clip(effects / full, -1.0, 1.0)
         lows, highs = weights.min(axis=0), weights.max(axis=0)
