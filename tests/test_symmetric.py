@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from neurovis_layouts.wiring import wiring_of
 from scenes import film_of, scene_of
 from small_specs import compiled
 
@@ -143,6 +144,29 @@ def test_both_are_one_line() -> None:
     assert made.gains.signal.tolist()[:2] == [7, 7]
     (title,) = [group.title for group in scene.groups if group.data.get("connection") == "M1 -> M2"]
     assert title.startswith("M1 ↔ M2\n")
+
+
+@pytest.mark.parametrize(
+    ("groups", "pairs"),
+    [
+        ("N: {count: 5}", [("N1", "N2"), ("N2", "N3"), ("N3", "N4"), ("N4", "N5"), ("N5", "N1")]),
+        ("N: {count: 3}, A: {}", [("N1", "N2"), ("N2", "N3"), ("A", "N1")]),
+        ("A: {}, B: {}", [("A", "B")]),
+    ],
+)
+def test_neurons_stand_where_they_would_if_both_ways_were_written(groups: str, pairs: list[tuple[str, str]]) -> None:
+    """A ring is drawn as one, a half-centre side by side."""
+    both = ", ".join(f"'{a} -> {b}': {{symmetric: true}}" for a, b in pairs)
+    each = ", ".join(f"'{a} -> {b}': {{}}, '{b} -> {a}': {{}}" for a, b in pairs)
+    specs = [f"neurons: {{{groups}}}\nconnections: {{{some}}}\n" for some in (both, each)]
+    symmetric, written = (compiled(spec).layout().positions for spec in specs)
+    assert symmetric == written
+
+
+def test_a_symmetric_line_gives_the_organic_engine_no_direction() -> None:
+    for both, arcs in (("true", 0), ("false", 5)):
+        problem = problem_of(network(f"N -> N: {{pattern: chain, symmetric: {both}}}").network)
+        assert len(wiring_of(problem, np.arange(9)).above) == arcs
 
 
 def test_glyphs_are_joined_by_one_line_where_all_between_them_is_symmetric() -> None:

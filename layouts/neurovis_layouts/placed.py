@@ -179,7 +179,7 @@ class Blocks:
             frames += [
                 (tuple(here[m] for m in inside), shifted(r, (sx, sy))) for inside, r in (*around, *drawing.frames)
             ]
-        local = [LayoutEdge(e.name, place[e.source], place[e.target], e.delay) for e in edges]
+        local = [replace(e, source=place[e.source], target=place[e.target]) for e in edges]
         title = self._titles[number] if number >= 0 else 0.0
         labels = self._labels(members, places, sides)
         return routed(
@@ -205,7 +205,7 @@ class Blocks:
         at = {member: i for i, member in enumerate(self._problem.modules[number].members)}
         x, y = places[here[0]]
         there = tuple((places[i][0] - x, places[i][1] - y) for i in here)
-        inside = [LayoutEdge(e.name, at[e.source], at[e.target], e.delay) for e in self._inside.get(number, ())]
+        inside = [replace(e, source=at[e.source], target=at[e.target]) for e in self._inside.get(number, ())]
         return {
             (here[a], here[b], k): tuple((px + x, py + y) for px, py in route)
             for (a, b, k), route in routed(Drawing(there, {}), inside).routes.items()

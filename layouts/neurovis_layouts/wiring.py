@@ -47,7 +47,7 @@ def wiring_of(problem: LayoutProblem, image: IntArray) -> Wiring:
     """The wiring of a problem whose neurons have these images (n,)."""
     neurons = len(problem.neurons)
     ends = np.array([(edge.source, edge.target) for edge in problem.edges], dtype=np.int64).reshape(-1, 2)
-    arcs, pull = _arcs(_loops(neurons, ends), ends)
+    arcs, pull = _arcs(_loops(problem), ends)
     links, spokes = ends, _spokes(problem)
     paired = np.flatnonzero(image != np.arange(neurons))
     if len(paired):
@@ -130,14 +130,14 @@ def _spokes(problem: LayoutProblem) -> IntArray:
     return np.array(spokes, dtype=np.int64).reshape(-1, 2)
 
 
-def _loops(neurons: int, ends: IntArray) -> IntArray:
+def _loops(problem: LayoutProblem) -> IntArray:
     """(neurons,) which loop (strongly connected component) each neuron is part of."""
     import networkx as nx  # only here
 
     graph: nx.DiGraph[int] = nx.DiGraph()
-    graph.add_nodes_from(range(neurons))
-    graph.add_edges_from(ends.tolist())
-    loops = np.zeros(neurons, dtype=np.int64)
+    graph.add_nodes_from(range(len(problem.neurons)))
+    graph.add_edges_from(way for edge in problem.edges for way in edge.ways)
+    loops = np.zeros(len(problem.neurons), dtype=np.int64)
     for number, part in enumerate(nx.strongly_connected_components(graph)):
         loops[list(part)] = number
     return loops

@@ -158,7 +158,7 @@ def _in_layers(problem: LayoutProblem) -> bool:
     if len(problem.edges) > _MOST_IN_LAYERS or 2 * len(problem.groups) > len(problem.neurons):
         return False
     group = {m: number for number, members in enumerate(problem.groups) for m in members.members}
-    between = {(group.get(edge.source, -1), group.get(edge.target, -1)) for edge in problem.edges}
+    between = {(group.get(a, -1), group.get(b, -1)) for edge in problem.edges for a, b in edge.ways}
     import networkx as nx  # only here, for few networks
 
     return bool(nx.is_directed_acyclic_graph(nx.DiGraph(sorted(between))))
@@ -174,7 +174,7 @@ def _tangled(problem: LayoutProblem) -> bool:
     import networkx as nx  # only here, for few networks
 
     graph: nx.DiGraph[int] = nx.DiGraph()
-    graph.add_edges_from((edge.source, edge.target) for edge in problem.edges)
+    graph.add_edges_from(way for edge in problem.edges for way in edge.ways)
     largest: set[int] = max(nx.strongly_connected_components(graph), key=len)
     inside = sum(edge.source in largest and edge.target in largest for edge in loops)
     return len(largest) >= _LARGE and inside >= _DENSE * len(largest)

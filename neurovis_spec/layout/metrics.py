@@ -197,7 +197,7 @@ def _flow(layout: Layout, problem: LayoutProblem) -> float:
     none."""
     graph: nx.DiGraph[int] = nx.DiGraph()
     graph.add_nodes_from(range(len(problem.neurons)))
-    graph.add_edges_from((edge.source, edge.target) for edge in problem.edges)
+    graph.add_edges_from(way for edge in problem.edges for way in edge.ways)
     component = {node: number for number, part in enumerate(nx.strongly_connected_components(graph)) for node in part}
     dx, dy = _ALONG[problem.direction]
     along = [dx * x + dy * y for x, y in (layout.positions[name] for name in problem.neurons)]

@@ -47,6 +47,14 @@ class LayoutEdge:
     source: int
     target: int
     delay: int
+    #: it leads back as well: two connections that are drawn as one line
+    symmetric: bool = False
+
+    @property
+    def ways(self) -> tuple[tuple[int, int], ...]:
+        """From where to where signals run along it: of what is symmetric both ways."""
+        there = self.source, self.target
+        return (there, there[::-1]) if self.symmetric else (there,)
 
 
 @dataclass(frozen=True, slots=True)

@@ -75,6 +75,8 @@ class NamedProblem:
     #: how wide and high the labels are that discs cannot hold
     labels: Mapping[str, Point] = field(default_factory=dict)
     memory: Layout | None = None
+    #: the names of edges that lead back as well
+    symmetric: Iterable[str] = ()
     #: the width of the page by its height, where one is asked for
     aspect: float | None = None
 
@@ -89,6 +91,7 @@ class NamedProblem:
 
         pins = {index[name]: (float(x), float(y)) for name, (x, y) in self.pins.items()}
         boxes = _merged((name, members(of)) for name, of in self.boxes)
+        back = frozenset(self.symmetric)
         free = LayoutProblem(
             network=self.network,
             neurons=names,
@@ -96,7 +99,9 @@ class NamedProblem:
                 LayoutGroup(name, tuple(index[member] for member in of))
                 for name, of in sorted(self.groups, key=lambda group: natural_key(group[0]))
             ),
-            edges=_in_order(LayoutEdge(name, index[a], index[b], delay) for name, a, b, delay in self.edges),
+            edges=_in_order(
+                LayoutEdge(name, index[a], index[b], delay, name in back) for name, a, b, delay in self.edges
+            ),
             pins=dict(sorted(pins.items())),
             direction=self.direction,
             arrange=tuple(sorted((tuple(index[member] for member in of), how) for of, how in self.arrange)),
@@ -176,7 +181,9 @@ def _inside(problem: LayoutProblem, paths: Sequence[str], ways: Sequence[Sequenc
     """For each instance the connections, groups, arrangements and boxes that are all in it, by the names within.
     ``ways`` are the instances that each neuron is in."""
     inside: list[list[object]] = [[] for _ in paths]
-    parts: list[tuple[Sequence[int], object]] = [((e.source, e.target), ("edge", e.delay)) for e in problem.edges]
+    parts: list[tuple[Sequence[int], object]] = [
+        ((e.source, e.target), ("edge", e.delay, e.symmetric)) for e in problem.edges
+    ]
     parts += [(group.members, "group") for group in problem.groups]
     parts += [*problem.arrange, *((members, "box") for _, members in problem.boxes)]
     for ends, what in parts:
@@ -251,8 +258,15 @@ def problem_of(network: Network, memory: Layout | None = None) -> LayoutProblem:
         places=_places(network),
         labels=dict(zip(names, label_room(network), strict=False)),
         memory=memory,
+        symmetric=_symmetric(network),
         aspect=None if network.render.size is None else network.render.size[0] / network.render.size[1],
     ).canonical()
+
+
+def _symmetric(network: Network) -> list[str]:
+    """The names of the lines of symmetric pairs."""
+    second, twins = network.connections.second, network.connections.twins
+    return [] if twins is None else [network.connection_names[i] for i in twins[second].tolist()]
 
 
 def _places(network: Network) -> dict[str, Point]:

@@ -206,7 +206,7 @@ def _ranks(part: RankProblem) -> list[list[int]]:
     problem, units, bonds = part.problem, part.units, part.bonds
     numbers = {bond: number for number, bond in enumerate(dict.fromkeys(bonds))}
     owner = {m: numbers[bond] for unit, bond in zip(units, bonds, strict=True) for m in unit.members}
-    wired: nx.DiGraph[int] = nx.DiGraph((problem.edges[i].source, problem.edges[i].target) for i in part.edges)
+    wired: nx.DiGraph[int] = nx.DiGraph(way for i in part.edges for way in problem.edges[i].ways)
     loop_of = {neuron: k for k, loop in enumerate(nx.strongly_connected_components(wired)) for neuron in loop}
     arcs: dict[tuple[int, int], float] = {}
     along: set[tuple[int, int]] = set()

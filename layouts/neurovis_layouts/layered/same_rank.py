@@ -86,9 +86,7 @@ def bonded(
 def _flow(problem: LayoutProblem, units: Sequence[Unit], owner: Mapping[int, int]) -> nx.DiGraph[int]:
     graph: nx.DiGraph[int] = nx.DiGraph()
     graph.add_nodes_from(range(len(units)))
-    graph.add_edges_from(
-        (owner[e.source], owner[e.target]) for e in problem.edges if owner[e.source] != owner[e.target]
-    )
+    graph.add_edges_from((owner[a], owner[b]) for e in problem.edges for a, b in e.ways if owner[a] != owner[b])
     return graph
 
 

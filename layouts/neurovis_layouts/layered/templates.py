@@ -203,19 +203,19 @@ def _connected(
     """What connects neurons of a copy, by their places in it, with the delay in the first copy that has it; and who is
     entered from outside of a copy, and left to there, in any."""
     where = {neuron: (number, i) for number, own in enumerate(copies) for i, neuron in enumerate(own)}
-    edges: dict[Key, int] = {}
+    edges: dict[Key, LayoutEdge] = {}
     entries = {where[n][1] for n in problem.entries if n in where}
     exits = {where[n][1] for n in problem.exits if n in where}
     for edge, (a, b, times) in zip(problem.edges, keys_of(problem.edges), strict=True):
         source, target = where.get(a), where.get(b)
         if source and target and source[0] == target[0]:
-            edges.setdefault((source[1], target[1], times), edge.delay)
+            edges.setdefault((source[1], target[1], times), edge)
             continue
         if source:
             exits.add(source[1])
         if target:
             entries.add(target[1])
-    found = tuple(LayoutEdge(f"{key}", key[0], key[1], delay) for key, delay in sorted(edges.items()))
+    found = tuple(replace(edges[key], name=f"{key}", source=key[0], target=key[1]) for key in sorted(edges))
     return found, entries, exits
 
 

@@ -94,7 +94,7 @@ def _graph(problem: LayoutProblem, members: Iterable[int]) -> nx.DiGraph[int]:
     graph.add_nodes_from(sorted(members))
     for edge in problem.edges:
         if edge.source != edge.target and edge.source in graph and edge.target in graph:
-            graph.add_edge(edge.source, edge.target)
+            graph.add_edges_from(edge.ways)
     return graph
 
 
@@ -117,7 +117,8 @@ def _of_lone(problem: LayoutProblem, lone: Sequence[int]) -> list[Unit]:
     inside = set(lone)
     for edge in problem.edges:
         if edge.source in inside and edge.target in inside and edge.source != edge.target:
-            kinds.setdefault((edge.source, edge.target), set()).add(edge.delay == 0)
+            for way in edge.ways:
+                kinds.setdefault(way, set()).add(edge.delay == 0)
     pairs: nx.Graph[int] = nx.Graph()
     pairs.add_nodes_from(lone)
     pairs.add_edges_from((a, b) for (a, b), kind in kinds.items() if a < b and kinds.get((b, a)) == kind)
@@ -286,7 +287,7 @@ def _without_needless_loops(problem: LayoutProblem, found: list[Unit], lines: Ma
     owner = {member: i for i, unit in enumerate(found) for member in unit.members}
     # a rigid unit is drawn as one piece, as if it were a neuron
     rigid = {member: -1 - i for i, unit in enumerate(found) if unit.places is not None for member in unit.members}
-    wired = [(e.source, e.target) for e in problem.edges if e.source in owner and e.target in owner]
+    wired = [way for e in problem.edges if e.source in owner and e.target in owner for way in e.ways]
     pieces: nx.DiGraph[int] = nx.DiGraph()
     pieces.add_nodes_from(rigid.get(member, member) for member in owner)
     pieces.add_edges_from((rigid.get(a, a), rigid.get(b, b)) for a, b in wired)
