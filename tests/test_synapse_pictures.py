@@ -250,7 +250,8 @@ def test_stills_films_glances_and_legends_show_ends(suffix: str, tmp_path: Path)
     }
     plain = heads(scene)["B1 -> C"]
     assert plain.half_width == plain.width / 2
-    assert {shape.text for shape in scene.shapes() if isinstance(shape, Text)} >= {"excites", "inhibits", "neither"}
+    said = {"excites", "inhibits", "neither excites nor inhibits"}
+    assert {shape.text for shape in scene.shapes() if isinstance(shape, Text)} >= said
     themed = compiled(SIGNS + "render: {theme: {ends: arrows}}\n")
     assert {shape.kind for shape in heads(scene_of(themed, at(themed, made, 3))).values()} == {"arrow"}
     view = view_of(network, network.gains)

@@ -141,19 +141,25 @@ def _ends_in(ends: Ends, theme: Theme) -> LegendEntry:
     """Lines that end in an arrowhead, in a bar, and in neither."""
     words, samples = "line: sign of w", [("w ≥ 0", 1), ("w < 0", -1)]
     if ends.said:
-        called = {1: "excites", 0: "neither", -1: "inhibits"}
+        called = {1: "excites", 0: "neither excites nor inhibits", -1: "inhibits"}
         words, samples = "line: what it does", [(called[kind], kind) for kind in ends.kinds]
-    every = len(samples) * (_STROKE + _STROKE_GAP) - _STROKE_GAP
+    wide = [_room(texts.width(sign, SMALL)) for sign, _ in samples]
+    every = sum(wide) + (len(wide) - 1) * _STROKE_GAP
     across = max(every, texts.width(words, SMALL))
     shapes: list[Shape] = [heading("End", theme)]
     for place, (sign, kind) in enumerate(samples):
-        x = (across - every) / 2 + place * (_STROKE + _STROKE_GAP)
+        x = (across - every + wide[place] - _STROKE) / 2 + sum(wide[:place]) + place * _STROKE_GAP
         end = Arrowhead((x + _STROKE, SAMPLE_Y), (1.0, 0.0), _HEAD, 0.0, "")
         end = ended(end, 2.0, theme.muted, kind)
         shapes += [stroke(x, end.notch[0] - x, theme.muted, 2.0), end]
         shapes.append(Text((x + _STROKE / 2, FIRST_Y), sign, SMALL, theme.muted, "middle"))
     shapes.append(Text((across / 2, SECOND_Y), words, SMALL, theme.muted, "middle"))
     return LegendEntry(tuple(shapes), across)
+
+
+def _room(word: float) -> float:
+    """How much room there is across for a sample with a word beneath it: words of about its width stand in the gaps."""
+    return _STROKE if word <= _STROKE + _STROKE_GAP else word + _STROKE_GAP
 
 
 def _dotted(words: str, theme: Theme) -> LegendEntry:
