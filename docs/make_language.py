@@ -13,6 +13,7 @@ from pathlib import Path
 from neurovis_spec.language.patterns import PATTERNS
 from neurovis_spec.manual.builtins import Builtin, builtins
 from neurovis_spec.manual.keys import keys_of
+from neurovis_spec.manual.networks import starts
 from neurovis_spec.manual.words import functions, names
 
 PAGE = Path(__file__).parent / "language.md"
@@ -86,6 +87,12 @@ def name_table(_: str) -> str:
     return table(("name", "is"), [(code(one.usage), one.about) for one in names()])
 
 
+def network(name: str) -> str:
+    """A network to start from."""
+    (spec,) = (one.spec for one in starts() if one.name == name)
+    return f"```yaml\n{spec}```"
+
+
 PARTS: Mapping[str, Callable[[str], str]] = {
     "keys": key_table,
     "activations": activation_table,
@@ -93,6 +100,7 @@ PARTS: Mapping[str, Callable[[str], str]] = {
     "patterns": pattern_table,
     "functions": function_table,
     "names": name_table,
+    "network": network,
 }
 
 

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from textwrap import dedent
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.language.patterns import PATTERNS, Pattern
 from neurovis_spec.manual.builtins import builtins
 from neurovis_spec.manual.keys import Key, example, examples, keys
+from neurovis_spec.manual.networks import Start
 from neurovis_spec.manual.topics import find, near, topics
 from neurovis_spec.manual.words import functions, names
 
@@ -181,6 +183,26 @@ def test_every_name_in_the_contents_can_be_looked_up() -> None:
     assert listed == {name for name in topics() if "." not in name}
     for name in topics():
         assert name.rpartition(".")[2] in text_of(find(name))
+
+
+@pytest.mark.parametrize(
+    ("asked", "name"),
+    [
+        ("FORCE", "force"),
+        ("rls", "force"),
+        ("Least Squares", "force"),
+        ("kohonen", "kohonen"),
+        ("Sanger", "sanger"),
+        ("NCP", "policy"),
+    ],
+)
+def test_networks_to_start_from_are_found_by_what_they_are_known_as(asked: str, name: str) -> None:
+    (start,) = find(asked)
+    assert isinstance(start, Start)
+    assert start.spec.startswith(f"neurovis: 1\nname: {name}\n")
+    told = text_of((start,))
+    assert told.startswith(f"{name}, a network to start from: {start.title}\n")
+    assert dedent(told[told.index("  neurovis: 1") :]) == start.spec.rstrip()
 
 
 def test_a_name_of_two_things_is_explained_twice() -> None:

@@ -68,6 +68,7 @@ def test_the_wheel_holds_the_packages_the_library_and_the_examples(wheel: Path) 
         "neurovis_renderers/fonts/LICENSE",
         "neurovis_spec/library/activations.yaml",
         "neurovis_spec/manual/examples.yaml",
+        "neurovis_spec/manual/networks.yaml",
         "neurovis_spec/cli/starter.yaml",
         "neurovis_spec/examples/cpg_rbf.yaml",
         "neurovis_spec/examples/data/centres.csv",

@@ -1,4 +1,4 @@
-"""``neurovis docs``: what a built-in, a key, a function or a pattern is."""
+"""``neurovis docs``: what a built-in, a key, a function, a pattern or a network to start from is."""
 
 from __future__ import annotations
 
@@ -22,15 +22,16 @@ def _names() -> Iterable[str]:
         "neurovis docs izhikevich",
         "neurovis docs connections.delay",
         "neurovis docs tanh",
+        "neurovis docs force",
     )
 )
 @click.argument("name", metavar="[NAME]", required=False, shell_complete=one_of(_names))
 def command(name: str | None) -> None:
-    """Explain a built-in, a key of the language, a function or a pattern.
+    """Explain a built-in, a key of the language, a function or a pattern, or show a network to start from.
 
-    NAME is an activation, a model, a rule, a pattern, a function or name of expressions, or a key, with its section
-    (connections.delay) or without (delay). What several things are called is explained for all of them. Without NAME
-    there is a table of contents.
+    NAME is an activation, a model, a rule, a synapse, a pattern, a function or name of expressions, a network to start
+    from, or a key, with its section (connections.delay) or without (delay). What several things are called is explained
+    for all of them. Without NAME there is a table of contents.
     """
     from neurovis_spec.cli.topics import contents, text_of
     from neurovis_spec.manual.topics import find, near

@@ -14,6 +14,7 @@ from neurovis_spec.language.grammar import Role
 from neurovis_spec.language.patterns import PATTERNS, Pattern
 from neurovis_spec.manual.builtins import Builtin, builtins
 from neurovis_spec.manual.keys import Key, example, keys, keys_of
+from neurovis_spec.manual.networks import Start, starts
 from neurovis_spec.manual.topics import Topic
 from neurovis_spec.manual.words import Word, functions, names
 
@@ -50,6 +51,10 @@ def explained(topic: Topic) -> str:
         case Word():
             kind = "a function of expressions" if "(" in topic.usage else "a name in expressions"
             return f"{topic.usage}, {kind}\n\n{filled(topic.about)}"
+        case Start():
+            also = [filled(f"also: {', '.join(topic.called)}")] if topic.called else []
+            head = f"{topic.name}, a network to start from: {topic.title}"
+            return "\n\n".join([head, filled(topic.about), *also, indented(topic.spec.rstrip())])
 
 
 def _builtin(builtin: Builtin) -> str:
@@ -103,6 +108,7 @@ def contents() -> str:
     parts.append(_listed("patterns", PATTERNS))
     parts.append(_listed("functions", (one.name for one in functions())))
     parts.append(_listed("names in expressions", (one.name for one in names())))
+    parts.append(_listed("networks to start from", (name for one in starts() for name in (one.name, *one.called))))
     return "\n".join([*parts, "", "'neurovis docs NAME' explains each of them."])
 
 

@@ -25,7 +25,7 @@ from neurovis_spec.language.sections import ConnectionModel, GroupModel, InputMo
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.language.values import ParameterModel
 from neurovis_spec.language.yaml.reader import read_text
-from neurovis_spec.language.yaml.source import Mapping, Scalar
+from neurovis_spec.language.yaml.source import Entry, Mapping, Scalar
 
 _DEFAULT = re.compile(r" \(default ([^()]*)\)")
 #: Where a mapping of the author's names stands between a section and its keys, as in ``neurons.GROUP.count``.
@@ -148,17 +148,22 @@ def _word(fits: object) -> str:
 @cache
 def examples() -> dict[str, str]:
     """Path of a key to a part of a spec, in the order of the file."""
-    text = files("neurovis_spec.manual").joinpath("examples.yaml").read_text(encoding="utf-8")
+    return {
+        entry.name: str(entry.value.value).rstrip()
+        for entry in written_in("examples.yaml")
+        if isinstance(entry.value, Scalar)
+    }
+
+
+def written_in(file: str) -> tuple[Entry, ...]:
+    """What a file beside this module says."""
+    text = files("neurovis_spec.manual").joinpath(file).read_text(encoding="utf-8")
     findings = Findings()
-    document = read_text(text, "examples.yaml", findings)
+    document = read_text(text, file, findings)
     findings.check()
     assert document is not None
     assert isinstance(document.root, Mapping)
-    return {
-        entry.name: str(entry.value.value).rstrip()
-        for entry in document.root.entries
-        if isinstance(entry.value, Scalar)
-    }
+    return document.root.entries
 
 
 def example(path: str) -> str | None:
