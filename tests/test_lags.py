@@ -295,6 +295,35 @@ def test_a_run_goes_on_from_a_recording(cut: int, backend: str, tmp_path: Path) 
     np.testing.assert_array_equal(rest.activity, whole.activity[cut:])
 
 
+READ = """neurovis: 1
+name: read
+time: {dt: 0.1}
+models: {m: {state: {x: {derivative: -x + drive}}, activity: x}}
+synapses: {pull: {signal: weight*(pre.x - post.x)}}
+rules: {drawn: {state: {c: {each_step: pre.x - pre}}, weight: {each_step: weight + 0.1*pre*post - 0.01*c}}}
+neurons: {A: {count: 3, model: m, initial: {x: 1 + i}}, B: {model: m, initial: {x: -1}}}
+connections:
+- A -> B: {weight: 0.5, synapse: pull, delay: {seconds: 0.25 + 0.3*i}}
+- A -> B: {weight: 0.1*(1 + i), delay: {seconds: 0.35}, plasticity: drawn}
+- B -> A: {weight: 0.4, synapse: pull, delay: 2 + 2*j}
+- B -> A: {weight: 0.1, delay: 5, plasticity: drawn}
+"""
+
+
+@pytest.mark.parametrize("backend", ["reference", "numpy", pytest.param("c", marks=pytest.mark.compiler)])
+@pytest.mark.parametrize("cut", [1, 3, 5, 9])
+def test_what_synapses_and_rules_read_of_the_past_goes_on_from_a_recording(cut: int, backend: str) -> None:
+    """From one that is shorter than the delays, too: with a continuous one what was before is the initial output, with
+    one in steps 0."""
+    network = nv.compile_text(READ)
+    whole = network.run(20, backend=backend, states="all")
+    first = network.run(cut, backend=backend, states="all")
+    rest = network.run(20 - cut, backend=backend, states="all", start=first)
+    np.testing.assert_array_equal(rest.states, whole.states[cut:])
+    np.testing.assert_array_equal(rest.weights, whole.weights[cut:])
+    np.testing.assert_array_equal(rest["(B -> A).signal"], whole["(B -> A).signal"][cut:])
+
+
 def test_halving_the_step_keeps_the_delay() -> None:
     network = nv.compile_text(LOOP).network
     found = {one.name: (one.order, one.why) for one in check_step(network, Course(60)).errors}

@@ -6,8 +6,8 @@ What was learned and what was changed is kept, unless it is given anew. The last
 weights after the last step become w[0] of the connections that learned. Parameters that were set (by ``--set``, an
 event or a caller) keep their values, and all that follows them with them; one that this network is given (``--set``)
 goes before that. Lesions stay. The signals under way are formed again from the activities and the weights of the last
-rows, as far back as the delays reach and consecutive steps were recorded (what lies before is 0). ``initial`` is not
-taken again.
+rows, as far back as the delays reach and consecutive steps were recorded (what lies before is 0, on connections with a
+continuous delay what was sent at the first of these steps). ``initial`` is not taken again.
 
 Steps count from 0, so inputs, events and episodes begin anew; random numbers go on behind the steps that were made.
 Clamps and stopped rules are no part of a recording. States of models and rules begin anew, but where something flows:
@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -33,6 +34,7 @@ from neurovis_spec.runtime.controls import Controls, lose
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.fitting import of_table
 from neurovis_spec.runtime.lags import lags_of, ring_lengths
+from neurovis_spec.runtime.presynaptic import remembering
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.signals import SignalLayout, signal_layout
 from neurovis_spec.runtime.stages import taken_by
@@ -212,7 +214,7 @@ def _send(
 
 def _prolong(network: Network, layout: SignalLayout, state: State, known: int) -> None:
     """What was sent on connections with a continuous delay before the steps that are known, as many as these are, is
-    what was sent at the first of them, as it is before the first step of all."""
+    what was sent at the first of them, as it is before the first step of all; with any other delay it is 0."""
     lags = lags_of(network)
     if lags is None:
         return
@@ -220,6 +222,13 @@ def _prolong(network: Network, layout: SignalLayout, state: State, known: int) -
         members = np.flatnonzero(lags.there & (layout.lengths >= ago))
         offsets, lengths = layout.offsets[members].astype(np.int64), layout.lengths[members].astype(np.int64)
         state.signals[offsets + -ago % lengths] = state.signals[offsets + -known % lengths]
+    depth = len(state.history)
+    if known < depth:
+        state.history[-np.arange(known + 1, depth + 1) % depth] = state.history[-known % depth]
+        others = remembering(network) & ~lags.there & (network.connections.delays.whole() > known)
+        if others.any():
+            lost = np.where(others, -known, state.conditions.structure.lost)
+            state.conditions.structure = replace(state.conditions.structure, lost=lost)
 
 
 def _matching_neurons(network: Network, recording: Recording) -> IntArray:
