@@ -121,9 +121,9 @@ def network_of(compiled: CompiledNetwork) -> Plain:
                 **{
                     CALLED.get(field.name, field.name): getattr(one, field.name)
                     for field in fields(one)
-                    if field.name != "phases"
+                    if field.name != "phases" and getattr(one, field.name) is not False
                 },
-            )  # no golden network has connections of several rules
+            )  # no golden network has connections of several rules, or spikes
             for one in network.program
         ],
     }

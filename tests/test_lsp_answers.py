@@ -75,7 +75,7 @@ def offered(text: str) -> dict[str, Completion]:
         ("neurons:\n  K: {model: {adaptive: {leak: 1}}, initial: {v: 1, ¦", ["activity", "b"], ["leak"]),
         (BASE + "  L: {model: izhikevich, initial: {v: ¦", ["alpha", "normal", "i"], ["v", "k"]),
         ("neurons:\n  K: {combine: ¦", ["sum", "product", "distance"], ["alpha"]),
-        ("models:\n  m: {state: {v: {¦", ["derivative", "noise", "unit", "each_step"], ["jump"]),
+        ("models:\n  m: {state: {v: {¦", ["derivative", "noise", "unit", "each_step", "jump"], ["on_pre"]),
         ("models:\n  m: {time: ¦", ["s", "ms"], []),
         ("models:\n  m: {ports: {a: ¦", ["sum", "product"], []),
         ("models:\n  m: {ports: {a: {¦", ["combine", "unit"], []),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Final, Literal, NamedTuple, TypeAlias
 
 from neurovis_spec.arrays import FloatArray, Indices, IntArray
@@ -19,10 +20,11 @@ _ZERO = Number(0.0)
 #: episode's end.
 Phase: TypeAlias = Literal["on_pre", "on_post", "jump", "fire", "settle", "jump_now", "each_step", "each_episode"]
 PHASES: Final[tuple[Phase, ...]] = ("each_step", "each_episode")
-#: Of synapses and rules: what a spike changes that arrives, or that the target has fired, before ``PHASES``.
-AT_SPIKES: Final[tuple[Phase, ...]] = ("on_pre", "on_post")
 #: The state of a model with a spike block that is 1 in the step in which the neuron fires, else 0.
 SPIKE: Final = "spike"
+#: Of synapses and rules: what a spike changes that arrives, or that the target has fired, before ``PHASES``; what is
+#: read of an end to know that.
+AT_SPIKE: Final[Mapping[Phase, str]] = MappingProxyType({"on_pre": f"pre.{SPIKE}", "on_post": f"post.{SPIKE}"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,8 +273,9 @@ class Definition:
 
     @property
     def read(self) -> frozenset[str]:
-        """All names that its formulas read in a run."""
-        return frozenset().union(*map(names, self.formulas))
+        """All names that its formulas read in a run, and whether a spike has come, where that changes something."""
+        phases = {phase for one in (*self.state, *self.gives) for phase, _ in one.acts}
+        return frozenset(AT_SPIKE[phase] for phase in phases & AT_SPIKE.keys()).union(*map(names, self.formulas))
 
     @property
     def end_names(self) -> tuple[EndName, ...]:
@@ -404,16 +407,16 @@ class Projection:
     @property
     def read(self) -> frozenset[str]:
         """All names that its definitions read in a run."""
-        return frozenset().union(*(use.definition.read for use in self.uses))
+        when = (self.when,) if self.when else ()
+        return frozenset(when).union(*(use.definition.read for use in self.uses))
 
     def during(self, phases: Collection[Phase]) -> Projection:
         """The same with what of its definition is carried out in these phases."""
         made = self.use.definition.during(phases)
         if made is self.use.definition:
             return self
-        when = {"on_pre": f"pre.{SPIKE}", "on_post": f"post.{SPIKE}"}
-        guard = next((end for phase, end in when.items() if phase in phases), "")
-        return replace(self, uses=(replace(self.use, definition=made),), when=guard)
+        when = next((end for phase, end in AT_SPIKE.items() if phase in phases), "")
+        return replace(self, uses=(replace(self.use, definition=made),), when=when)
 
     @property
     def use(self) -> Use:

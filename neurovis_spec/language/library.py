@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping as AnyMapping
-from typing import Annotated, ClassVar, Final, NamedTuple
+from types import MappingProxyType
+from typing import Annotated, ClassVar, Final, Literal, NamedTuple, TypeAlias, cast
 
 from pydantic import Field, ValidationInfo
 
@@ -35,6 +36,7 @@ from neurovis_spec.language.located import (
     Located,
     TextField,
     TextsField,
+    TimeField,
     as_integer,
     findings_of,
     give_up,
@@ -68,13 +70,25 @@ def version_field(node: Node, info: ValidationInfo) -> Located[int]:
 
 
 class Flow(NamedTuple):
-    """What is written of a state beside what becomes of it at each step."""
+    """What is written of a state beside what becomes of it at each step. ``acts`` are what spikes do to it, by their
+    phases, as the program calls them: ``jump``, ``on_pre``, ``on_post``."""
 
     derivative: Formula | None = None
     noise: Formula | None = None
     unit: str = ""
+    acts: AnyMapping[Act, Formula] = MappingProxyType({})
 
 
+#: What spikes do to something, a key.
+Act: TypeAlias = Literal["jump", "on_pre", "on_post"]
+
+
+def _acts(**written: Formula | None) -> AnyMapping[Act, Formula]:
+    return {cast(Act, name): formula for name, formula in written.items() if formula is not None}
+
+
+_ON_PRE: Final = "Its new value when a spike arrives."
+_ON_POST: Final = "Its new value when the target fires."
 _DERIVATIVE: Final = "What it changes by, per second (or millisecond: time): what an equation has behind dx/dt."
 #: What a rule changes step by step it does not change within a step.
 _WITHOUT_STEPS: Final = NotWith(
@@ -105,27 +119,37 @@ class StateModel(Model):
     def _foreign(cls, name: str) -> tuple[str, str] | None:
         if name in ("noise", "jump"):
             return f"'{name}' is of the states of models alone", "leave it out"
-        return None
+        return _elsewhere(name)
 
 
 class RuleStateModel(StateModel):
     """A state of a rule."""
 
+    on_pre: FormulaField | None = Field(None, description=_ON_PRE)
+    on_post: FormulaField | None = Field(None, description=_ON_POST)
     derivative: Annotated[FormulaField | None, _WITHOUT_STEPS] = Field(None, description=_DERIVATIVE)
 
-    @classmethod
-    def _foreign(cls, name: str) -> tuple[str, str] | None:
-        return not_yet(name, "on_pre", "on_post") or super()._foreign(name)
+    @property
+    def flow(self) -> Flow:
+        """How it changes over the time of a step, and at spikes."""
+        return super().flow._replace(acts=_acts(on_pre=self.on_pre, on_post=self.on_post))
 
 
 class SynapseStateModel(StateModel):
     """A state of a synapse."""
 
+    on_pre: FormulaField | None = Field(None, description=_ON_PRE)
+
+    @property
+    def flow(self) -> Flow:
+        """How it changes over the time of a step, and at spikes."""
+        return super().flow._replace(acts=_acts(on_pre=self.on_pre))
+
     @classmethod
     def _foreign(cls, name: str) -> tuple[str, str] | None:
         if name == "on_post":
             return "'on_post' is of rules: a synapse does not learn", "make a rule of it, with plasticity: …"
-        return not_yet(name, "on_pre") or super()._foreign(name)
+        return super()._foreign(name)
 
 
 class NeuronStateModel(StateModel):
@@ -141,14 +165,27 @@ class NeuronStateModel(StateModel):
         Needs(("derivative",), "'noise' disturbs what has a 'derivative'", "add derivative: 0, or what it changes by"),
     ] = Field(None, description="What white noise is multiplied by that is added to the derivative.")
 
+    jump: FormulaField | None = Field(
+        None, description="What is added when spikes arrive: an expression in which each port is multiplied once."
+    )
+
     @property
     def flow(self) -> Flow:
-        """How it changes over the time of a step."""
-        return super().flow._replace(noise=self.noise)
+        """How it changes over the time of a step, and at spikes."""
+        return super().flow._replace(noise=self.noise, acts=_acts(jump=self.jump))
 
     @classmethod
     def _foreign(cls, name: str) -> tuple[str, str] | None:
-        return not_yet(name, "jump")
+        return _elsewhere(name)
+
+
+def _elsewhere(name: str) -> tuple[str, str] | None:
+    """What is said of a key of spikes that is of states of something else."""
+    if name in ("on_pre", "on_post"):
+        return f"'{name}' is of synapses and rules", "in a model, what arriving spikes add is jump: PORT"
+    if name in ("refractory", "when", "set", "hold"):
+        return f"'{name}' is of the spike, not of a state", "write spike: {when: …, set: {…}} beside 'state'"
+    return None
 
 
 def not_yet(name: str, *later: str) -> tuple[str, str] | None:
@@ -167,6 +204,7 @@ class Parts(NamedTuple):
     each_episode: Formula | None = None
     derivative: Formula | None = None
     gives: str = ""
+    acts: AnyMapping[Act, Formula] = MappingProxyType({})
     state: AnyMapping[str, StateModel] | None = None
     signals: tuple[Located[str], ...] = ()
     spikes: bool = False
@@ -175,6 +213,7 @@ class Parts(NamedTuple):
     send: Located[str] | None = None
     time: TimeUnit = "s"
     sign: Formula | None = None
+    spike: SpikeModel | None = None
 
 
 class DefinitionModel(Model):
@@ -217,8 +256,37 @@ class TimedModel(DefinitionModel):
         return value_or(self.time, "s")
 
 
+class SpikeModel(Model):
+    """When a neuron fires, and what becomes of its states then."""
+
+    BARE: ClassVar[str] = "when"
+    ELSEWHERE: ClassVar[AnyMapping[str, str]] = {
+        **dict.fromkeys(("threshold", "if", "condition"), "when"),
+        **dict.fromkeys(("reset", "resets", "then", "do"), "set"),
+        **dict.fromkeys(("refractory_period", "t_ref", "tau_ref", "dead_time"), "refractory"),
+        **dict.fromkeys(("clamp", "freeze", "held"), "hold"),
+    }
+
+    when: FormulaField = Field(description="It fires where this is true, as v >= threshold.")
+    set: Annotated[Named[FormulaField], naming("local")] = Field(
+        default_factory=dict, description="New values of states, all from old ones."
+    )
+    refractory: TimeField | None = Field(
+        None, description="How long it cannot fire again: an expression in its unit of time, or a time such as 5 ms."
+    )
+    hold: Annotated[TextsField, naming("local")] = Field(
+        default=(), description="States that stay as they are for so long."
+    )
+
+
 class ModelModel(TimedModel):
     """A neuron model of one's own: how the activity follows from the drive."""
+
+    ONE_OF: ClassVar[OneOf | None] = OneOf(
+        ("activity", "spike"),
+        "the key 'activity' is missing",
+        "add activity: …, an expression of drive and the states; or spike: {when: …}, which it is then",
+    )
 
     parameters: Annotated[Named[ParameterField], LOCAL] = Field(default_factory=dict, description="Names and defaults.")
     ports: Annotated[PortsField, LOCAL] = Field(
@@ -233,8 +301,12 @@ class ModelModel(TimedModel):
     outputs: Annotated[Named[Annotated[FormulaField, IN_MODEL]], LOCAL] = Field(
         default_factory=dict, description="Further values that can be sent, shown and recorded, as states can."
     )
-    activity: Annotated[FormulaField, IN_MODEL] = Field(
-        description="The activity; f(…) is the neuron's activation, drive is u[t]."
+    spike: Annotated[SpikeModel, IN_MODEL] | None = Field(
+        None, description="When it fires, and what becomes of its states then."
+    )
+    activity: Annotated[FormulaField, IN_MODEL] | None = Field(
+        None,
+        description="The activity; f(…) is the neuron's activation, drive is u[t] (default spike, where it has one).",
     )
     send: Annotated[TextField | None, naming("local")] = Field(
         None, description="The state or output that connections take unless they say otherwise (default activity)."
@@ -257,11 +329,8 @@ class ModelModel(TimedModel):
             outputs=self.outputs,
             send=self.send,
             time=self.unit_of_time,
+            spike=self.spike,
         )
-
-    @classmethod
-    def _foreign(cls, name: str) -> tuple[str, str] | None:
-        return not_yet(name, "spike")
 
 
 class ChangeModel(Model):
@@ -269,13 +338,16 @@ class ChangeModel(Model):
 
     ELSEWHERE: ClassVar[AnyMapping[str, str]] = _CHANGES
 
+    on_pre: Annotated[FormulaField, IN_RULE] | None = None
+    on_post: Annotated[FormulaField, IN_RULE] | None = None
     each_step: Annotated[FormulaField, IN_RULE] | None = None
     each_episode: Annotated[FormulaField, IN_RULE] | None = None
     derivative: Annotated[Annotated[FormulaField, IN_RULE] | None, _WITHOUT_STEPS] = None
 
-    @classmethod
-    def _foreign(cls, name: str) -> tuple[str, str] | None:
-        return not_yet(name, "on_pre", "on_post")
+    @property
+    def acts(self) -> AnyMapping[Act, Formula]:
+        """What spikes make of it."""
+        return _acts(on_pre=self.on_pre, on_post=self.on_post)
 
 
 _NO_CHANGE: Final = "a rule says how the weight changes: add weight: {each_step: …}, or {each_episode: …}"
@@ -283,8 +355,9 @@ _NO_CHANGE: Final = "a rule says how the weight changes: add weight: {each_step:
 
 def _one_change(what: str) -> OneOf:
     return OneOf(
-        ("each_step", "each_episode", "derivative"),
+        ("each_step", "each_episode", "derivative", "on_pre", "on_post"),
         f"a rule changes the {what} in 'each_step' or in 'each_episode', or says its 'derivative'",
+        f"for spikes write on_pre: … or on_post: …, the {what} when one arrives, or when the target fires",
     )
 
 
@@ -293,6 +366,8 @@ class WeightModel(ChangeModel):
 
     ONE_OF: ClassVar[OneOf | None] = _one_change("weight")
 
+    on_pre: Annotated[FormulaField, IN_RULE] | None = Field(None, description=_ON_PRE)
+    on_post: Annotated[FormulaField, IN_RULE] | None = Field(None, description=_ON_POST)
     each_step: Annotated[FormulaField, IN_RULE] | None = Field(
         None, description="w[t+1], an expression of weight, pre, post, …."
     )
@@ -307,6 +382,8 @@ class CentreModel(ChangeModel):
 
     ONE_OF: ClassVar[OneOf | None] = _one_change("centre")
 
+    on_pre: Annotated[FormulaField, IN_CENTRE] | None = Field(None, description=_ON_PRE)
+    on_post: Annotated[FormulaField, IN_CENTRE] | None = Field(None, description=_ON_POST)
     each_step: Annotated[FormulaField, IN_CENTRE] | None = Field(
         None, description="The centre after a step, an expression of centre, pre, post, …."
     )
@@ -353,6 +430,7 @@ class RuleModel(TimedModel):
             None if change is None else change.each_episode,
             None if change is None else change.derivative,
             "centre" if isinstance(change, CentreModel) else "",
+            {} if change is None else change.acts,
             state=self.state,
             signals=self.signals,
             time=self.unit_of_time,
@@ -391,7 +469,9 @@ class SynapseModel(TimedModel):
     def _foreign(cls, name: str) -> tuple[str, str] | None:
         if name == "ports":
             return "'ports' are of models; the connection says to which its synapse goes", "write port: … there"
-        return not_yet(name, "shared", "spike", "on_pre")
+        if name in ("spike", "on_pre"):
+            return f"'{name}' is no key of a synapse", "write on_pre: … at a state, what becomes of it at a spike"
+        return not_yet(name, "shared")
 
 
 class Library(Model):

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from typing import Final
 
 from neurovis_spec.compiler.values.builtin import libraries
 from neurovis_spec.language.grammar import Kind
@@ -112,6 +113,9 @@ def _definition(section: str, name: str, texts: Mapping[tuple[str, ...], str]) -
     )
 
 
+_AT_SPIKES: Final = {"on_pre": "when a spike arrives", "on_post": "when the target fires"}
+
+
 def _equations(section: str, texts: Mapping[tuple[str, ...], str]) -> tuple[str, ...]:
     lines: list[str] = []
     late: list[str] = []
@@ -123,6 +127,18 @@ def _equations(section: str, texts: Mapping[tuple[str, ...], str]) -> tuple[str,
                 lines.append(f"d{name}/dt = {text}")
             case ("state", name, "noise"):
                 late.append(f"d{name}/dt with noise of {text}")
+            case ("state", name, "jump"):
+                lines.append(f"{name} = {name} + {text} where spikes arrive")
+            case ("state", name, "on_pre" | "on_post" as when):
+                lines.append(f"{name} = {text} {_AT_SPIKES[when]}")
+            case ("weight" | "centre" as what, "on_pre" | "on_post" as when):
+                lines.append(f"{what} = {text} {_AT_SPIKES[when]}")
+            case ("spike", "when"):
+                late.append(f"it fires where {text}")
+            case ("spike", "set", name):
+                late.append(f"{name} = {text} when it fires")
+            case ("spike", "refractory"):
+                late.append(f"it rests for {text} then")
             case ("state", name, "initial"):
                 late.append(f"{name} = {text} at the beginning")
             case ("state", name, "each_step"):

@@ -91,7 +91,8 @@ def _parts_of(definition: DefinitionModel, written: Parts) -> dict[str, _Part]:
         reads["let", name] = _names_read(formula)
     for name, state in (written.state or {}).items():
         flow = state.flow
-        read = _names_read(state.initial, state.each_step, state.each_episode, flow.derivative, flow.noise)
+        became = state.each_step, state.each_episode, flow.derivative, flow.noise, *flow.acts.values()
+        read = _names_read(state.initial, *became)
         reads["state", name] = read
     flowing = {name for name, state in (written.state or {}).items() if state.flow.derivative is not None}
     found = {
@@ -145,9 +146,11 @@ def _check_parts(
 
 
 def _given(written: Parts) -> frozenset[str]:
-    """What the formulas read that say what a definition gives, and how lines end."""
-    given = written.each_step, written.each_episode, written.derivative, written.sign
-    return _names_read(*given, *(written.outputs or {}).values())
+    """What the formulas read that say what a definition gives, when it fires, and how lines end."""
+    given = written.each_step, written.each_episode, written.derivative, written.sign, *written.acts.values()
+    spike = written.spike
+    fires = () if spike is None else (spike.when, spike.refractory, *spike.set.values())
+    return _names_read(*given, *fires, *(written.outputs or {}).values())
 
 
 # Derivatives

@@ -18,7 +18,7 @@ from neurovis_spec.compiler.checks.compiled import Compiled, WrittenEntry
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.connections.plasticity import Learning
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Definition
+from neurovis_spec.compiler.program import AT_SPIKE, PHASES, Definition
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.expressions.evaluate import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
@@ -63,8 +63,8 @@ def _check_rule(used: _Used, network: Network, findings: Findings) -> None:
     for signal in rule.signals:
         if all(_is_own(bundle, used.place, signal) for bundle in used.entry.bundles):
             _check_signal(used, signal, network, findings)
-    what, changes_within = rule.given.name, rule.given.each_step or rule.given.derivative
-    if network.episode is None and changes_within is None:
+    what, given = rule.given.name, rule.given
+    if network.episode is None and not (given.each_step or given.derivative or given.acts):
         message = f"'{rule.name}' changes {what}s at the end of an episode, and there are none: no {what} will change"
         hint = "say how many steps an episode has, as in time: {episode: 100}"
         findings.warning("no-effect", used.choice.name.span, message, hint)
@@ -83,15 +83,15 @@ def changes(rule: Definition, parameters: Mapping[str, FloatArray], own: Collect
         for name in (*ACTIVITIES, *rule.signals, *(end.text for end in rule.end_names)):
             values[name] = generator.uniform(-2.0, 2.0, _POINTS) * 10.0 ** (k % 3)
         values |= dict.fromkeys(own, values["post"])
-        for episode in (False, True):
+        for phase in (*AT_SPIKE, *PHASES):
             new: dict[str, Value] = {}
             for name, tree in rule.let:
                 values[name] = evaluate_array(tree, values)
-            for one in (*rule.state, given):
-                change = one.each_episode if episode else one.each_step
+            for one in (quantity.during((phase,)) for quantity in (*rule.state, given)):
+                change = one.each_episode if phase == "each_episode" else one.each_step
                 if change is not None:
                     new[one.name] = evaluate_array(change, values)
-                elif one.derivative is not None and not episode:
+                elif one.derivative is not None:
                     new[one.name] = values[one.name] + 0.5 * evaluate_array(one.derivative, values)
             if given.name in new and not np.array_equal(new[given.name], values[given.name]):
                 return True

@@ -301,13 +301,13 @@ def as_states(given: Initial, model: Definition, findings: Findings) -> Initial:
     """What neurons begin with, in states alone where their model has a derivative: the activity follows from these. One
     that is a state is given by that; else there is a finding."""
     written = given.activity
-    if written is None or not model.flows:
+    if written is None or not (model.flows or model.fires):
         return given
     activity = model.given.each_step
     state = next((one.name for one in model.state if isinstance(activity, Name) and one.name == activity.name), None)
     if state is None:
         message = f"the activity of the model '{model.name}' follows from its states"
-        findings.error("initial-activity", written.span, message, f"write initial: {{{model.flows[0].name}: …}}")
+        findings.error("initial-activity", written.span, message, f"write initial: {{{model.state[0].name}: …}}")
     elif any(name.value == state for name, _ in given.states):
         message = f"the activity of the model '{model.name}' is the state '{state}', which is given, too"
         findings.error("conflicting-keys", written.span, message, "leave one of them out")

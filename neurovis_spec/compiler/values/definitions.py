@@ -16,8 +16,22 @@ from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
+from neurovis_spec.compiler.flows import reads
 from neurovis_spec.compiler.limits import PATIENCE
-from neurovis_spec.compiler.program import ACTIVATION, DRIVE, MODEL, RULE, SYNAPSE, Definition, Kind, PortOf, Quantity
+from neurovis_spec.compiler.program import (
+    ACTIVATION,
+    DRIVE,
+    MODEL,
+    RULE,
+    SPIKE,
+    SYNAPSE,
+    Definition,
+    EndName,
+    Kind,
+    Phase,
+    PortOf,
+    Quantity,
+)
 from neurovis_spec.compiler.values.constants import (
     ALWAYS,
     Outside,
@@ -28,6 +42,7 @@ from neurovis_spec.compiler.values.constants import (
     parse_formula,
     value_of,
 )
+from neurovis_spec.compiler.values.spikes import Spike, jumping, share_of, with_spike
 from neurovis_spec.diagnostics import Findings, Home, Span, shorten
 from neurovis_spec.language.expressions.evaluate import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS, meaning
@@ -40,23 +55,27 @@ from neurovis_spec.language.expressions.tree import (
     calls,
     check_extent,
     names,
+    put,
     substitute,
     walk,
     with_products,
 )
 from neurovis_spec.language.grammar import IN_SIGN, Role
 from neurovis_spec.language.library import (
+    Act,
     ActivationModel,
     DefinitionModel,
     Library,
     ModelModel,
     RuleModel,
+    SpikeModel,
     StateModel,
     SynapseModel,
 )
 from neurovis_spec.language.located import IDENTIFIER, Formula, Located, bad_name, name_hint
 from neurovis_spec.language.model import names_of, unread
 from neurovis_spec.language.places import formula_at
+from neurovis_spec.language.units import Seconds, measured, number_in
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.values import ParameterModel, WrittenPort
 from neurovis_spec.language.words import TimeUnit
@@ -110,13 +129,12 @@ class Definitions:
 class Reading(NamedTuple):
     """How definitions of a kind are read: what their formulas see (``role``), whether intermediate values are put into
     what is given (``inlined``), whether x^3 and x^4 are products in all of them (``products``), not only where
-    something is integrated, and which names are to mean something in a later version (``later``)."""
+    something is integrated or spikes."""
 
     kind: Kind
     role: Role
     inlined: bool = False
     products: bool = False
-    later: tuple[str, ...] = ()
 
 
 #: The built-in definitions that came when specs may have had one of their own of this name, which replaces it.
@@ -131,15 +149,13 @@ _READINGS = (
     Reading(ACTIVATION, formula_at(ActivationModel, "value"), inlined=True),
     Reading(MODEL, formula_at(ModelModel, "activity")),
     Reading(RULE, formula_at(RuleModel, "weight", "each_step")),
-    Reading(SYNAPSE, formula_at(SynapseModel, "signal"), products=True, later=("spike",)),
+    Reading(SYNAPSE, formula_at(SynapseModel, "signal"), products=True),
 )
 
 #: Keys of a definition that declare what is named where it is used, and those that declare names for its formulas.
 _NAMED = frozenset({"parameters", "signals", "ports", "outputs", "state"})
 _SECTIONS = ("parameters", "signals", "let", "state")
 _DECLARING = frozenset({*_SECTIONS, "ports"})
-#: Keys that are not there yet, and are to declare names: what reads these is not to blame.
-_LATER = ("spike",)
 #: How many of its unit of time a second has.
 _PER_SECOND: Final[Mapping[TimeUnit, float]] = {"s": 1.0, "ms": 1000.0}
 #: Names that no output has: what is sent and shown by these is something else.
@@ -152,8 +168,9 @@ _NOT_OF_ENDS: Final[Mapping[str, tuple[str, str]]] = {
         "is a port, where what connections bring is only being put together",
         "read a state or an output: outputs: {rate: f(drive)} in the model there is post.rate",
     ),
-    "spike": ("is not there yet", "a later version of the language has it"),
 }
+#: What a spike is called in the formulas of synapses and rules, as what of the source.
+_ARRIVING: Final = EndName("pre", SPIKE).text
 
 #: What to do where a definition reads a parameter of the spec.
 _OUTSIDE = "a definition sees its own parameters alone: declare '{0}' among them, and set it where it is used"
@@ -195,14 +212,21 @@ class _Checker:
         self.known = Names[Span | None](dict.fromkeys((*ALWAYS, *given)), not model.unknown.isdisjoint(_DECLARING))
         #: of connections it knows what there is at their ends
         self.naming: Naming = "ends" if reading.role.ends else ""
-        for key in (entry.key for entry in model.source.entries if entry.name in _LATER):
-            self.known.declared[str(key.value)] = key.span
-        self.later = reading.later
+        flows = [one.flow for one in (self.parts.state or {}).values()]
+        acts = {act for one in (self.parts.acts, *(flow.acts for flow in flows)) for act in one}
+        #: whether ``spike`` is what arrives
+        self.arriving = reading.kind == SYNAPSE or not acts.isdisjoint(("on_pre", "on_post"))
+        if self.arriving:
+            self.known.declared[SPIKE] = None
+        for key in (entry.key for entry in model.source.entries if entry.name == SPIKE and reading.kind == MODEL):
+            self.known.declared[SPIKE] = key.span
         #: whether x^3 and x^4 are products
         self.products = (
             reading.products
             or self.parts.derivative is not None
-            or any(one.flow.derivative is not None for one in (self.parts.state or {}).values())
+            or self.parts.spike is not None
+            or "jump" in acts
+            or any(flow.derivative is not None for flow in flows)
         )
 
     def declare(self, section: str, name: str) -> None:
@@ -211,9 +235,6 @@ class _Checker:
 
     def declare_at(self, span: Span, name: str) -> None:
         """The same of one that is declared at a place."""
-        if name in self.later:
-            message = f"'{name}' is to mean something here in a later version of the language"
-            self.findings.error("reserved-name", span, message, f"choose another name, such as '{name}_0'")
         if name in self.known.declared:
             such = "" if isinstance(self.known[name], Span) else f", such as '{name}_0'"
             self.findings.error("duplicate-name", span, self.taken(name), f"choose another name{such}")
@@ -234,12 +255,7 @@ class _Checker:
         return f"'{name}' already means something here: {meaning(name)}"
 
     def _key(self, section: str, name: str) -> Span:
-        node = self.model.source.get(section)
-        if isinstance(node, SourceMapping):
-            entry = node.entry(name)
-            if entry is not None:
-                return entry.key.span
-        return self.model.source.span if node is None else node.span
+        return _key_in(self.model.source, section, name)
 
     def optional(self, formula: Formula | None, functions: Mapping[str, int] = _NO_FUNCTIONS) -> Tree | None:
         """The tree of a formula that may be left out."""
@@ -275,6 +291,8 @@ class _Checker:
         tree = parse_formula(formula, sight, self.findings, functions=functions, naming=self.naming)
         if tree is UNKNOWN or not self._has_ends(tree, formula):
             return UNKNOWN
+        if self.arriving and SPIKE in names(tree):
+            tree = put(tree, {SPIKE: Name(_ARRIVING)})
         if not self.products:
             return tree
         try:
@@ -433,9 +451,82 @@ class _Checker:
                 self.optional(model.flow.derivative, self.functions),
                 self.optional(model.flow.noise),
                 model.flow.unit,
+                self.acts(model.flow.acts),
             )
             for name, model in state.items()
         )
+
+    def acts(self, acts: Mapping[Act, Formula]) -> tuple[tuple[Phase, Tree], ...]:
+        """What arriving spikes and those of the target make of something."""
+        return tuple((act, self.tree(formula)) for act, formula in acts.items() if act != "jump")
+
+    def jumps(self, states: tuple[Quantity, ...], let: tuple[tuple[str, Tree], ...]) -> tuple[Quantity, ...]:
+        """The states with what is added to them when spikes arrive: each port counts once, as a factor."""
+        ports, result = [DRIVE, *(port.name.value for port in self.parts.ports)], list[Quantity]()
+        for state in states:
+            written = (self.parts.state or {}).get(state.name)
+            formula = None if written is None else written.flow.acts.get("jump")
+            if formula is None:
+                result.append(state)
+                continue
+            tree = self.tree(formula, self.functions)
+            if isinstance(formula.value, str) and share_of(tree, ports, dict(let)) == "other":
+                message = "a jump adds what arrives, times something: each term has one port, as a factor"
+                hint = "as in jump: (1 - g)*excitatory; without spikes nothing is added"
+                self.findings.error("jump-not-linear", formula.span, message, hint)
+            result.append(jumping(state, tree))
+        return tuple(result)
+
+    def spike(self, written: SpikeModel) -> Spike:
+        """The spike block: when it fires, and what then becomes of the states."""
+        states = {} if self.parts.state is None else names_of(self.model, "state", self.parts.state)
+        for key in names_of(written, "set", written.set):
+            self._is_state(key, _key_in(written.source, "set", key), states)
+        for one in written.hold:
+            self._is_state(one.value, one.span, states)
+        refractory = written.refractory
+        return Spike(
+            self.tree(written.when, self.functions),
+            {name: self.tree(formula, self.functions) for name, formula in written.set.items()},
+            None if refractory is None else self.tree(self._in_own_time(refractory), self.functions),
+            [one.value for one in written.hold],
+        )
+
+    def _is_state(self, name: str, span: Span, states: Collection[str]) -> None:
+        if name not in states and not self.known.is_open:
+            message = f"'{shorten(name)}' is no state of this model"
+            self.findings.error("unknown-state", span, message, suggest(name, [*states], "its states"))
+
+    def _in_own_time(self, formula: Formula) -> Formula:
+        """A time with a unit as a number in the definition's own unit."""
+        written = measured(str(formula.node.value)) if isinstance(formula.value, Seconds) else None
+        if written is None:
+            return formula
+        return Located(number_in(self.parts.time, written), formula.node)
+
+    def no_spikes(self, definition: Definition) -> None:
+        """Report derivatives, and noise, that read a spike, which lasts no time."""
+        for state in definition.flows:
+            read = reads(definition, (state.derivative, state.noise))
+            spikes = [name for name in (SPIKE, _ARRIVING, EndName("post", SPIKE).text) if name in read]
+            if not spikes or (spikes == [SPIKE] and not definition.fires):
+                continue
+            written = (self.parts.state or {})[state.name].flow.derivative
+            name = "spike" if self.arriving and spikes[0] == _ARRIVING else spikes[0]
+            message = f"'{name}' in a derivative: a spike lasts no time, so that its effect would depend on dt"
+            hint = "read it in 'jump'" if definition.kind == MODEL else "read it in 'on_pre'"
+            place = self.model.source.span if written is None else written.span
+            self.findings.error("spike-in-derivative", place, message, hint)
+
+
+def _key_in(source: SourceMapping, section: str, name: str) -> Span:
+    """Where an entry of a section of a mapping has its name, or the section stands."""
+    node = source.get(section)
+    if isinstance(node, SourceMapping):
+        entry = node.entry(name)
+        if entry is not None:
+            return entry.key.span
+    return source.span if node is None else node.span
 
 
 def check_bounds(
@@ -477,12 +568,21 @@ def definition_of(
         checker.state(key, kind)
     ports = checker.ports(parts.ports)
     let = checker.let(parts.let)
-    state = () if parts.state is None else checker.states(parts.state, defaults)
+    state = () if parts.state is None else checker.jumps(checker.states(parts.state, defaults), let)
+    spike = None if parts.spike is None else checker.spike(parts.spike)
     unfolded = checker.unfolded(let) if reading.inlined else {}
     if unfolded is UNKNOWN:
         return UNKNOWN
     each_step, each_episode = checker.given(parts.each_step), checker.given(parts.each_episode)
-    given = Quantity(checker.given_name, each_step, each_episode, derivative=checker.optional(parts.derivative))
+    if each_step is None and kind == MODEL:  # perhaps the spike is invalid, which is reported
+        each_step = Number(0.0) if spike is None else Name(SPIKE)
+    given = Quantity(
+        checker.given_name,
+        each_step,
+        each_episode,
+        derivative=checker.optional(parts.derivative),
+        acts=checker.acts(parts.acts),
+    )
     if reading.inlined and parts.each_step is not None and each_step is not None:
         let, given = (), replace(given, each_step=checker.with_let(each_step, unfolded, parts.each_step.span))
     outputs = () if parts.outputs is None else checker.outputs(parts.outputs)
@@ -491,16 +591,18 @@ def definition_of(
         name=name,
         parameters=tuple(default.name for default in defaults),
         gives=(given, *outputs),
-        let=let,
-        state=state,
+        let=let if spike is None else (*let, spike.fires),
+        state=state if spike is None else with_spike(state, spike),
         signals=signals,
-        spikes=parts.spikes,
+        spikes=parts.spikes or (spike is not None and each_step == Name(SPIKE)),
         ports=ports,
         send=checker.sent(parts.send),
         per_second=_PER_SECOND[parts.time],
         units=tuple((name, one.unit.value) for name, one in parts.parameters.items() if one.unit is not None),
         sign=checker.sign(parts.sign, defaults),
+        fires=spike is not None,
     )
+    checker.no_spikes(definition)
     return Defined(definition, defaults)
 
 

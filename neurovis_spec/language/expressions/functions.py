@@ -52,6 +52,8 @@ GIVEN: Final[Mapping[str, str]] = {
     "sent": "In a rule or a synapse, what the connection sends in this step.",
     "post": "In a rule or a synapse, the target's activity; post.X is X of the target.",
     "weight": "In a rule, the weight before the step; in a synapse, the weight.",
+    "spike": "In a model with a spike block, 1 in the step in which the neuron fires, else 0; in a synapse, and in a "
+    "rule with on_pre or on_post, 1 in the step in which a spike arrives.",
     "centre": "In a rule that changes the centre, that before the step.",
 }
 #: Names that no parameter may have.

@@ -36,7 +36,7 @@ INSTEAD: Mapping[str, str] = {
     "f": "f(x), the neuron's activation, is known in the 'activity' of a model, its outputs, 'let' and states, but not "
     "in 'initial', 'each_episode' and 'noise'; rules and synapses read what a model gives of it, as pre.rate of "
     "outputs: {rate: f(v)}",
-    "spike": "a later version of the language has it",
+    "spike": "spike is a name, 1 in the step in which a neuron fires: write it without parentheses",
     "relu": "write 'max(x, 0)'",
     "where": "write 'a if condition else b'",
     "sum": "write the terms one by one",

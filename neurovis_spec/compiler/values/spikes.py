@@ -1,0 +1,167 @@
+"""Spikes: what a model writes of them, as formulas of its states, so that whoever computes a step knows states alone.
+
+In: the trees of a spike block, the states that it is about. Out: the states, with what becomes of them in the phases
+"jump", "fire" and "settle", and what these need beside what is written.
+
+A neuron fires where ``when`` holds, it is armed, and it does not rest. It is disarmed by that while ``when`` still
+holds; ``set`` counts as the reset. It rests for r steps, the next one on; what ``hold`` names stays as it is meanwhile.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from typing import Final, Literal, TypeAlias
+
+from neurovis_spec.compiler.program import SPIKE, Hidden, Quantity
+from neurovis_spec.language.expressions.tree import (
+    Binary,
+    Call,
+    Chain,
+    Conditional,
+    Name,
+    Number,
+    Tree,
+    Unary,
+)
+
+#: Whether it may fire again as far as ``when`` goes, and one more than the steps for which it still rests.
+_ARMED: Final = "is armed"
+_RESTS: Final = "rests for"
+#: The intermediate value that is true in the step in which it fires.
+FIRES: Final = "it fires"
+_ZERO, _ONE = Number(0.0), Number(1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Spike:
+    """A spike block: trees, ``set`` by states. ``refractory`` is in the unit of time of the model, as ``dt`` is."""
+
+    when: Tree
+    set: Mapping[str, Tree]
+    refractory: Tree | None = None
+    hold: Collection[str] = ()
+
+    @property
+    def fires(self) -> tuple[str, Tree]:
+        """The intermediate value that is true in the step in which the neuron fires."""
+        return FIRES, Chain(("and", "and"), (self.when, Name(_ARMED), Binary("<=", Name(_RESTS), _ONE)))
+
+
+def when_of(let: Collection[tuple[str, Tree]]) -> Tree | None:
+    """``when`` of a model, from its intermediate values; None where it has no spike block."""
+    return next((tree.parts[0] for name, tree in let if name == FIRES), None)
+
+
+def with_spike(states: tuple[Quantity, ...], spike: Spike) -> tuple[Quantity, ...]:
+    """The states of a model with a spike block, with those that this adds."""
+    made = tuple(_firing(one, spike) for one in states)
+    rest = Call("max", (Chain(("-",), (Name(_RESTS), _ONE)), _ZERO))
+    resting = _if_fires(Chain(("+",), (_ONE, _steps(spike.refractory))), rest)
+    rearmed = Chain(("and",), (Name(_ARMED), Unary("not", Name(SPIKE))))
+    armed = Chain(("or",), (Unary("not", spike.when), rearmed))
+    return (
+        *made,
+        Quantity(SPIKE, acts=(("fire", _if_fires(_ONE, _ZERO)),)),
+        Hidden(_ARMED, initial=_ONE, acts=(("settle", armed),)),
+        Hidden(_RESTS, acts=(("fire", resting),)),
+    )
+
+
+def jumping(state: Quantity, jump: Tree) -> Quantity:
+    """A state to which something is added when spikes arrive: before the threshold is tested, or, for those of the same
+    step, behind all spikes of it."""
+    new = Chain(("+",), (Name(state.name), jump))
+    return replace(state, acts=(("jump", new), ("jump_now", new)))
+
+
+def _firing(state: Quantity, spike: Spike) -> Quantity:
+    """A state with what a spike does to it."""
+    if state.name in spike.hold:
+        state = _held(state)
+    if state.name in spike.set:
+        state = replace(state, acts=(*state.acts, ("fire", _if_fires(spike.set[state.name], Name(state.name)))))
+    return state
+
+
+def _held(state: Quantity) -> Quantity:
+    """A state that stays as it is while the neuron rests."""
+    rests = Binary(">", Name(_RESTS), _ONE)
+    # behind the spikes of a step the count is one less, and one that has fired in it rests from the next step on
+    still = Chain(("and",), (Binary(">=", Name(_RESTS), _ONE), Unary("not", Name(SPIKE))))
+    own = Name(state.name)
+
+    def unless(otherwise: Tree, tree: Tree | None, condition: Tree = rests) -> Tree | None:
+        return None if tree is None else Conditional(condition, otherwise, tree)
+
+    acts = tuple((phase, Conditional(still if phase == "jump_now" else rests, own, tree)) for phase, tree in state.acts)
+    return replace(
+        state,
+        derivative=unless(_ZERO, state.derivative),
+        noise=unless(_ZERO, state.noise),
+        each_step=unless(own, state.each_step),
+        acts=acts,
+    )
+
+
+def _if_fires(then: Tree, otherwise: Tree) -> Tree:
+    return Conditional(Name(FIRES), then, otherwise)
+
+
+def _steps(time: Tree | None) -> Tree:
+    """How many steps a time is, rounded; at least 1 where it is above 0."""
+    if time is None:
+        return _ZERO
+    rounded = Call("floor", (Chain(("+",), (Chain(("/",), (time, Name("dt"))), Number(0.5))),))
+    return Conditional(Binary(">", time, _ZERO), Call("max", (rounded, _ONE)), _ZERO)
+
+
+#: How a formula depends on what arrives: not at all, as a multiple of it, or otherwise.
+Share: TypeAlias = Literal["constant", "multiple", "other"]
+
+
+def share_of(tree: Tree, ports: Collection[str], let: Mapping[str, Tree], functions: Collection[str] = ()) -> Share:
+    """How a formula depends on the ports of its model, which it may read through intermediate values.
+
+    >>> from neurovis_spec.language.expressions.parser import parse
+    >>> [share_of(parse(text), "ab", {}) for text in ("2*x", "x*a + b/2", "a*b", "a + 1")]
+    ['constant', 'multiple', 'other', 'other']
+    """
+
+    def of(tree: Tree) -> Share:
+        return share_of(tree, ports, let, functions)
+
+    if isinstance(tree, Name) and tree.name in let:
+        return of(let[tree.name])
+    if isinstance(tree, Name) and tree.name in ports:
+        return "multiple"
+    parts = tree.parts
+    match tree:
+        case Unary(operator="-" | "+"):
+            return of(tree.operand)
+        case Chain(operators=("*" | "/", *_)) if "%" not in tree.operators:
+            return _product([of(part) for part in parts], [operator == "/" for operator, _ in tree.steps])
+        case Chain(operators=("+" | "-", *_)):
+            return _sum([of(part) for part in parts if not _is_zero(part)])
+        case Conditional():
+            if of(tree.condition) != "constant":
+                return "other"
+            return _sum([of(part) for part in (tree.then, tree.otherwise) if not _is_zero(part)])
+    return "constant" if all(of(part) == "constant" for part in parts) else "other"
+
+
+def _is_zero(tree: Tree) -> bool:
+    return isinstance(tree, Number) and tree.value == 0
+
+
+def _sum(shares: list[Share]) -> Share:
+    found = set(shares)
+    return found.pop() if len(found) == 1 else "constant" if not found else "other"
+
+
+def _product(shares: list[Share], divisors: list[bool]) -> Share:
+    if all(share == "constant" for share in shares):
+        return "constant"
+    under = any(share != "constant" for share, divides in zip(shares[1:], divisors, strict=True) if divides)
+    once = sorted(shares) == ["constant"] * (len(shares) - 1) + ["multiple"]
+    return "multiple" if once and not under else "other"
