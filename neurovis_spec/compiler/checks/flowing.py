@@ -79,9 +79,10 @@ def _held_couplings(compiled: Compiled, method: Method, findings: Findings) -> N
         hint += ", but not all around a loop whose neurons send what reads a port"
     for number in np.unique(entry[would]).tolist():
         bundle = compiled.bundles[number]
+        synapse = None if bundle.synapse is None else bundle.synapse.definition
         body = compiled.entries[bundle.key].body
         span = bundle.key if body.delay is None else body.delay.span
-        if span in told:
+        if span in told or (synapse is not None and not _reads_past(synapse)):
             continue
         told.add(span)
         first = np.flatnonzero(would & (entry == number))[0]
@@ -89,11 +90,15 @@ def _held_couplings(compiled: Compiled, method: Method, findings: Findings) -> N
         some = bool((delays[entry == number] != 1).any())
         whose, its = (f"one of '{bundle.name}'", "that") if some else (f"'{bundle.name}'", "its")
         message = f"{whose} has a delay of one step, over which {method} holds {its} signal: its order is 1 then"
-        synapse = None if bundle.synapse is None else bundle.synapse.definition
         if body.delay is None and census.models.delay(start, end, bundle.route, synapse) == 1:
             source, target = (census.models.different[model] for model in (start, end))
             message += f". That is the default, since {_why_held(source, bundle.route.sends, target, synapse)}"
         findings.warning("held-coupling", span, message, _IN_SECONDS if some and body.delay is not None else hint)
+
+
+def _reads_past(synapse: Definition) -> bool:
+    """Whether a synapse reads what was sent before, not only what is sent now."""
+    return "pre" in synapse.read or any(one.side == "pre" for one in synapse.end_names)
 
 
 def _why_held(source: Definition, sends: str, target: Definition, synapse: Definition | None) -> str:
@@ -102,7 +107,8 @@ def _why_held(source: Definition, sends: str, target: Definition, synapse: Defin
         return f"the model '{source.name}' of its source has no derivative"
     if synapse is not None:
         read = next(name for name in read_at("pre", synapse, sends) if not plain_flow(source, name))
-        text = "pre" if read == sends and "pre" in synapse.read else EndName("pre", read).text
+        what_is_sent = [name for name in ("pre", "sent") if name in synapse.read and read == sends]
+        text = next(iter(what_is_sent), EndName("pre", read).text)
         return f"its synapse reads {text}, which in the model '{source.name}' of its source does not flow by itself"
     if plain_flow(source, sends):
         return f"no derivative of the model '{target.name}' of its target reads it"

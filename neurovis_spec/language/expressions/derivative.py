@@ -158,9 +158,11 @@ def as_derivative(state: str, step: str) -> str | None:
     ('(drive - v)/tau', '(drive - v)*leak/dt')
     >>> as_derivative("v", "v + dt/tau*(drive - v)"), as_derivative("v", "v + 2*drive")
     ('1/tau*(drive - v)', None)
+    >>> as_derivative("g", "g + dt*(pre.v - g)/post.tau")
+    '(pre.v - g)/post.tau'
     """
     try:
-        tree = parse(step, extra_functions={"f": 1})
+        tree = parse(step, extra_functions={"f": 1}, naming="ends")
     except ExpressionError:
         return None
     match tree:
