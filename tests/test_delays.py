@@ -115,6 +115,20 @@ connections:
     )  # fmt: skip
 
 
+def test_an_index_of_one_neuron_is_told_beside_a_parameter_of_an_end() -> None:
+    made = nv.compile_text(
+        """\
+neurovis: 1
+name: x
+models: {m: {parameters: {lag: 2}, activity: lag*drive}}
+neurons: {A: {model: m, bias: 1}, B: {count: 2}}
+connections: {A -> B: {delay: i + pre.lag}}
+"""
+    )
+    (warning,) = made.warnings
+    assert (warning.code, warning.span.line, warning.span.column) == ("lone-index", 5, 31)
+
+
 def test_drawn_delays_are_rounded_and_draw_for_themselves() -> None:
     drawn = np.array(delays('delay: "normal(9, 2)"'))
     assert len(set(drawn.tolist())) > 2

@@ -92,7 +92,7 @@ def _is_one(name: str, compiled: Compiled, place: int) -> bool:
 def _occurrences(formulas: Iterable[Written], wanted: Collection[str]) -> Iterator[tuple[Scalar, Name]]:
     """The places of some names in formulas."""
     for formula in formulas:
-        tree = parse(formula.text, random=True)
+        tree = parse(formula.text, random=True, naming="ends")
         for name in unknown_names(tree, names(tree).difference(wanted)):
             yield formula.node, name
 
