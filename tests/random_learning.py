@@ -1,5 +1,6 @@
 """Random specs of what learns: groups whose models have states and outputs, connections of several rules, which see
-states and outputs of any group and of both ends, and whose own flow; always legal, never explosive."""
+states and outputs of any group and of both ends, and whose own flow, with synapses that read their weights; always
+legal, never explosive."""
 
 from __future__ import annotations
 
@@ -66,6 +67,13 @@ _HELD = {
     "move": ["centre"],
     "grow": [],
 }
+_SYNAPSES: dict[str, Plain] = {
+    "pull": {"signal": "weight*(tanh(pre.v) - 0.1*post.w)"},
+    "slow": {
+        "state": {"g": {"each_step": "0.5*g + 0.5*weight*pre", "each_episode": "g/2"}},
+        "signal": "g - 0.1*weight*post.twice",
+    },
+}
 
 
 @st.composite
@@ -94,7 +102,8 @@ def learning_specs(draw: st.DrawFn) -> Spec:
     time: dict[str, Plain] = {"dt": 0.01, "episode": 4, "integrate": chooser.choice(["heun", "rk4", "exponential"])}
     return {
         "neurovis": 1, "name": "learning", "seed": chooser.randrange(100), "time": time, "inputs": {"wave": wave},
-        "models": _MODELS, "rules": _RULES, "neurons": {**neurons}, "connections": {**connections},
+        "models": _MODELS, "rules": _RULES, "synapses": _SYNAPSES,
+        "neurons": {**neurons}, "connections": {**connections},
         "events": _events(chooser, [*sizes], connections),
     }  # fmt: skip
 
@@ -128,6 +137,8 @@ def _body(chooser: random.Random, sizes: dict[str, int], source: str, target: st
         body["plasticity"] = [_used(chooser, rule, sizes, source, target) for rule in rules]
         if chooser.random() < 0.4 and rules != ["move"]:
             body["bounds"] = [-0.31, 0.31]
+    if not by_distance and chooser.random() < 0.4:
+        body["synapse"] = chooser.choice([*_SYNAPSES])
     return body
 
 

@@ -4,6 +4,8 @@ them."""
 from __future__ import annotations
 
 import warnings
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -18,11 +20,13 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.carry import carried
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.runtime import c_backend
-from neurovis_spec.runtime.backend import Backend
+from neurovis_spec.runtime.backend import Availability, Backend, Stepper
 from neurovis_spec.runtime.c_backend import CBackend
 from neurovis_spec.runtime.controls import Controls
+from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.numpy_backend import NumpyBackend
+from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.reference import ReferenceBackend
 from neurovis_spec.runtime.simulation import Simulation
 from neurovis_spec.runtime.state import State, initial_state
@@ -74,6 +78,33 @@ def test_each_step_in_c_is_the_reference_bit_for_bit(spec: Spec, size: int) -> N
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(c_backend, "SMALL", size)
         follow(spec, CBackend())
+
+
+class _ByStep:
+    """The C backend as one that has nothing but ``step``."""
+
+    name, capabilities = "c", CBackend.capabilities
+
+    def availability(self) -> Availability:
+        return Availability(True)
+
+    def prepare(self, network: Network) -> Stepper:
+        made = CBackend().prepare(network)
+        return cast("Stepper", SimpleNamespace(step=made.step, functions=made.functions))
+
+
+@pytest.mark.compiler
+@settings(max_examples=10, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(spec=learning_specs(), every=st.integers(1, 3))
+def test_a_block_of_steps_in_c_keeps_the_signals_of_the_weights_of_each_step(spec: Spec, every: int) -> None:
+    network = compiled(spec)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(c_backend, "SMALL", 0)
+        by_step, block = (record(network, Course(STEPS, every, backend=one)) for one in (_ByStep(), CBackend()))
+    assert block.state_names == by_step.state_names
+    for found, expected in ((block.states, by_step.states), (block.weights, by_step.weights)):
+        assert found.tobytes() == expected.tobytes()
+    assert block.activity.tobytes() == by_step.activity.tobytes()
 
 
 @settings(max_examples=10, deadline=None, phases=(Phase.explicit, Phase.generate))

@@ -109,10 +109,8 @@ class Runner(Protocol):
 
 @runtime_checkable
 class Probing(Protocol):
-    """A Runner that can keep states of definitions, too."""
-
-    #: whether it forms the signals of synapses, too, as they are at the end of a step
-    forms_signals: bool
+    """A Runner that can keep states of definitions, too, and of a backend with synapses the signals of these, as they
+    are at the end of a step (``runtime/formed.py``)."""
 
     def probe(self, probe: Probe, states: FloatArray) -> None:
         """In the next run put what a probe reads behind each step that is kept into the first rows of ``states``

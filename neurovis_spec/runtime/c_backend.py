@@ -59,7 +59,8 @@ _NEVER: Final = 1 << 62
 #: each are a row of ``rows``, but for those that the step computes, which it puts there. Steps that ``every`` divides
 #: are kept: a row of ``activity``; one of ``weights`` with those that are ``changing``, which lie next to each other if
 #: ``beside``; and one of ``states``, with the ``columns`` numbers that ``probed`` points to, of which signals of
-#: synapses stand in ``formed``. With ``look`` it ends behind the first step after which something is not finite.
+#: synapses stand in ``formed``; where rules change weights that these read, those of the step are kept in ``weighed``.
+#: With ``look`` it ends behind the first step after which something is not finite.
 _HEAD: Final = """#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -84,7 +85,7 @@ typedef struct {
 
 typedef struct {
     int64_t k, steps, every, form, then, look, beside, columns;
-    double *rows, *activity, *weights, *states, *formed;
+    double *rows, *activity, *weights, *states, *formed, *weighed;
     const int64_t *changing;
     const double *const *probed;
 } nv_course;
@@ -137,6 +138,8 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
                     weights[j] = p->weights[c->changing[j]];
             weights += CHANGING;
             wait = c->every;
+            if (c->weighed)
+                memcpy(c->weighed, p->weights, sizeof(double)*CONNECTIONS);
         }
         wait--;
         const int64_t form = i ? c->then : c->form;
@@ -153,7 +156,7 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
             memcpy(activity, p->activity, sizeof(double)*NEURONS);
             activity += NEURONS;
             if (c->formed)
-                nv_signals(p, c->k + i, c->formed);
+                nv_signals(p, c->k + i, c->weighed ? c->weighed : p->weights, c->formed);
             for (int64_t j = 0; j < c->columns; j++)
                 *states++ = *c->probed[j];
         }
@@ -234,8 +237,10 @@ def _write(network: Network, layout: SignalLayout) -> Written:
         if type_ == "double":
             code.line("return odd;" if form.watched and code.lines else "return 0.0;")
         head = f"static {type_} {name}(const nv_state *p{parameters})"
-        bodies += [*function(code, head, pointers | tables.pointer_lines()), ""]
-    counts = {"NEURONS": len(network.neurons), "INPUTS": network.vector_size, "CHANGING": len(network.changing)}
+        named = {name: line for name, line in pointers.items() if f"*restrict {name}" not in parameters}
+        bodies += [*function(code, head, named | tables.pointer_lines()), ""]
+    counts = {"NEURONS": len(network.neurons), "CONNECTIONS": len(network.connections)}
+    counts |= {"INPUTS": network.vector_size, "CHANGING": len(network.changing)}
     defined = [f"#define {name} {value}" for name, value in counts.items()]
     neurons, connections = _look(network)
     defined += [f"#define LOOK_NEURONS ({neurons})", f"#define LOOK_CONNECTIONS ({connections})"]
@@ -259,6 +264,7 @@ def _write(network: Network, layout: SignalLayout) -> Written:
 def _functions(small: bool, watched: bool) -> tuple[_Function, ...]:
     """The functions that ``nv_once`` and ``nv_run`` call. Those of type double give ``odd``."""
     of_inputs, of_step = ", int64_t k, double *restrict s", ", int64_t k, const double *restrict s"
+    of_signals = ", int64_t k, const double *restrict weights, double *restrict formed"
     plain = Form(written_out=small, follows=True, watched=watched)
     general = Form(first=True, held=True, fixed=True, fixed_joined=True, gone=True, still=True, lost=True)
     fused = Form(follows=True, fused=True)
@@ -274,7 +280,7 @@ def _functions(small: bool, watched: bool) -> tuple[_Function, ...]:
             f"{of_step}, int follows",
             of_fused=True,
         ),
-        _Function("void", "nv_signals", Form(gone=True, lost=True), StepCode.signals, ", int64_t k, double *formed"),
+        _Function("void", "nv_signals", Form(gone=True, lost=True), StepCode.signals, of_signals),
         _Function("void", "nv_pack", fused, StepCode.pack, of_fused=True),
         _Function("void", "nv_leave", fused, lambda step: step.leave(step.fuses), of_fused=True),
     )
@@ -331,7 +337,7 @@ class _Course(ctypes.Structure):
         *((name, ctypes.c_int64) for name in ("k", "steps", "every", "form", "then", "look", "beside", "columns")),
         *(
             (name, ctypes.c_void_p)
-            for name in ("rows", "activity", "weights", "states", "formed", "changing", "probed")
+            for name in ("rows", "activity", "weights", "states", "formed", "weighed", "changing", "probed")
         ),
     ]
 
@@ -347,8 +353,6 @@ class CStepper:
         self.functions: Library = c_functions.library()
         #: the inputs of the step that is made: what it computes of them stands there behind it
         self.vector = np.zeros(network.vector_size)
-        #: not where a rule has changed, behind a step, a weight that a synapse reads
-        self.forms_signals = not ((network.synapses.numbers >= 0) & (network.connections.rules.whole() >= 0)).any()
         #: the inputs that a step computes, and of each input whether it is one
         self._computed = _NO_INPUTS
         self._reads = np.zeros(len(network.inputs), dtype=np.uint8)
@@ -377,6 +381,9 @@ class CStepper:
         self._structure: Structure | None = None
         #: signals of synapses behind a step that is kept, of all connections
         self._formed = np.zeros(len(network.connections) if len(network.synapses.holders) else 0)
+        #: the weights of that step, where rules change some that synapses read
+        learning = (network.synapses.numbers >= 0) & (network.connections.rules.whole() >= 0)
+        self._weighed = np.zeros(len(network.connections) if learning.any() else 0)
         #: what the next run reads of states, and where it puts that
         self._probed: tuple[Probe, FloatArray] | None = None
         #: the first step at which nothing is held, left out, still or lost
@@ -463,7 +470,9 @@ class CStepper:
         if self._probed is not None:
             probe, states = self._probed
             numbers, self._probed = probe.addresses(state, self._formed), None
-            course.formed = self._formed.ctypes.data if probe.forms else None
+            if probe.forms:
+                course.formed = self._formed.ctypes.data
+                course.weighed = self._weighed.ctypes.data if len(self._weighed) else None
             course.columns, course.states, course.probed = len(numbers), states.ctypes.data, numbers.ctypes.data
         made: int = self._run(self._address, ctypes.addressof(course))
         state.k += made

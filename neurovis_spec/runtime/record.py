@@ -206,11 +206,11 @@ def run_steps(network: Network, state: State, course: Course, rows: RowSink, pro
     forming = Forming(network, backend.functions) if columns.probe.forms else None
     make: _Make = _OneByOne(hands, columns, stepper, body, frozenset(course.inputs or ()), forming)
     pace = _Pace(STRETCH, STRETCH)
-    # a runner gives the activities of all neurons and all changing weights, states only where it is a probing one, and
-    # signals of synapses where it forms them
+    # a runner gives the activities of all neurons and all changing weights, states and signals of synapses only where
+    # it is a probing one
     plain = columns.neurons is None and len(columns.weights) == len(network.changing)
     if columns.probe.names:
-        plain = plain and isinstance(stepper, Probing) and (stepper.forms_signals or not columns.probe.forms)
+        plain = plain and isinstance(stepper, Probing)
     if (
         isinstance(stepper, Runner)
         and plain
