@@ -29,7 +29,7 @@ from neurovis_spec.language.expressions.functions import Library
 from neurovis_spec.runtime import c_flows, c_functions, c_library, c_plan
 from neurovis_spec.runtime.backend import Availability, BackendError, Capabilities
 from neurovis_spec.runtime.c_code import Code, Form, Table, Tables, function, state_name, words_of
-from neurovis_spec.runtime.c_step import StepCode, begins_otherwise, incoming_in
+from neurovis_spec.runtime.c_step import Built, StepCode, begins_otherwise
 from neurovis_spec.runtime.lags import ring_lengths
 from neurovis_spec.runtime.signals import SignalLayout, signal_layout
 from neurovis_spec.runtime.state import Conditions, Mask, State, Structure
@@ -219,7 +219,8 @@ class _Function(NamedTuple):
 
 
 def _write(network: Network, layout: SignalLayout) -> Written:
-    emitter, tables, plan = Emitter(), Tables("double", LONGEST), c_plan.plan_of(network)
+    emitter, tables, built = Emitter(), Tables("double", LONGEST), Built(network, layout)
+    plan = built.plan
     small = len(network.neurons) + len(network.connections) <= c_plan.written_out(plan, SMALL)
     bodies: list[str] = []
     pointers = _pointer_lines(network, plan)
@@ -227,13 +228,12 @@ def _write(network: Network, layout: SignalLayout) -> Written:
     rules = all(one.kind == RULE and not one.use.definition.flows for one in network.projections)
     watched = bool(network.projections) and rules and not small
     # a network that is written out is in registers, and nothing is gained
-    incoming = incoming_in(network)
-    whole = StepCode(network, Code(emitter, tables, network.dt, {}), Form(), incoming, layout, plan)
+    whole = StepCode(built, Code(emitter, tables, network.dt, {}), Form())
     fused = not small and whole.count + int(whole.fuses.sum()) > 0
     for type_, name, form, write, parameters, of_fused in _functions(small, watched):
         code = Code(emitter, tables, network.dt, network.settable.variables)
         if fused or not of_fused:
-            write(StepCode(network, code, form, incoming, layout, plan))
+            write(StepCode(built, code, form))
         if type_ == "double":
             code.line("return odd;" if form.watched and code.lines else "return 0.0;")
         head = f"static {type_} {name}(const nv_state *p{parameters})"

@@ -68,15 +68,11 @@ class Some(NamedTuple):
     target: Place | None = None
 
 
-@dataclass(frozen=True)
-class Sight:
-    """What formulas see of connections: of their ends what was left there last, of the states of a synapse's targets
-    that flow what they are behind the integration. ``sent``: the history has what is sent now."""
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """What there is to read at the ends of the connections of a network, whatever form of a step reads it."""
 
     network: Network
-    code: Code
-    form: Form
-    sent: bool = False
 
     @cached_property
     def depth(self) -> int:
@@ -89,7 +85,7 @@ class Sight:
         return lags_of(self.network)
 
     @cached_property
-    def ends(self) -> list[dict[str, End]]:
+    def read(self) -> list[dict[str, End]]:
         """What each projection reads of the ends of its connections."""
         return [ends_of(self.network, one) for one in self.network.projections]
 
@@ -97,6 +93,22 @@ class Sight:
     def positions(self) -> IntArray:
         """The place of each neuron in its population."""
         return self.network.located("neuron").positions
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What formulas see of connections: of their ends what was left there last, of the states of a synapse's targets
+    that flow what they are behind the integration. ``sent``: the history has what is sent now."""
+
+    ends: Ends
+    code: Code
+    form: Form
+    sent: bool = False
+
+    @property
+    def network(self) -> Network:
+        """Whose connections they are."""
+        return self.ends.network
 
     def known(self, some: Some, read: Collection[str]) -> dict[str, Value]:
         """All that formulas see of one connection, of what they ``read``."""
@@ -129,11 +141,11 @@ class Sight:
 
     def at_ends(self, some: Some, read: Collection[str]) -> dict[str, Value]:
         """What formulas see of both ends of one connection."""
-        return {name: self.at_end(some, name, end) for name, end in self.ends[some.number].items() if name in read}
+        return {name: self.at_end(some, name, end) for name, end in self.ends.read[some.number].items() if name in read}
 
     def of_target(self, some: Some, read: Collection[str]) -> dict[str, Value]:
         """What formulas see of the target, whatever the connection; as identifiers."""
-        ends = self.ends[some.number].items()
+        ends = self.ends.read[some.number].items()
         return {
             name: self.code.let("a", self.at_end(some, name, end))
             for name, end in ends
@@ -163,7 +175,7 @@ class Sight:
         place = some.target
         if place is None:
             connections = projection.members[some.which]
-            place = code.at(self.positions[self.network.connections.targets[connections]], some.place)
+            place = code.at(self.ends.positions[self.network.connections.targets[connections]], some.place)
         model = self.target(projection).model
         number = [one.name for one in model.definition.kept].index(state)
         return f"{state_name(model.owner, number)}[{place}]"
@@ -181,7 +193,7 @@ class Sight:
         members, first = self.target(projection).members, int(end.places[0])
         if first < len(self.network.neurons):
             return members
-        position = int(self.positions[self.network.connections.targets[projection.members[:1]][0]])
+        position = int(self.ends.positions[self.network.connections.targets[projection.members[:1]][0]])
         return np.arange(first - position, first - position + len(members), dtype=np.int64)
 
     def past_or_now(self, some: Some, end: End) -> Value:
@@ -193,8 +205,8 @@ class Sight:
         if not own.any():
             return now
         is_rule = self.network.projections[some.number].kind == RULE
-        if self.sent and is_rule and self.lags is not None and self.lags.there[connections].any():
-            return self.between_steps(connections, self.lags, end.places[some.which], place)
+        if self.sent and is_rule and self.ends.lags is not None and self.ends.lags.there[connections].any():
+            return self.between_steps(connections, self.ends.lags, end.places[some.which], place)
         if own_of(self.late(connections), place).any():
             value = self.remembered(connections, index, place, *self.steps_ago(delays, place))
         else:
@@ -222,8 +234,8 @@ class Sight:
     def steps_ago(self, ago: IntArray, place: Place) -> tuple[str, str]:
         """How many steps ago, and the row of the history that is of then."""
         back = str(self.code.at(ago, place))
-        self.code.head["now"] = f"const int32_t now = (int32_t)(k % {self.depth});"
-        return back, f"(now + {self.depth} - ({back})) % {self.depth}"
+        self.code.head["now"] = f"const int32_t now = (int32_t)(k % {self.ends.depth});"
+        return back, f"(now + {self.ends.depth} - ({back})) % {self.ends.depth}"
 
     def remembered(self, connections: Indices, index: IntArray, place: Place, ago: str, row: str) -> str:
         """What was sent so many steps ago, 0 where that is lost; with a continuous delay what was sent at the first
@@ -242,7 +254,8 @@ class Sight:
 
     def late(self, connections: Indices) -> BoolArray:
         """Which of some connections have a continuous delay."""
-        return np.zeros(len(connections), dtype=np.bool_) if self.lags is None else self.lags.there[connections]
+        lags = self.ends.lags
+        return np.zeros(len(connections), dtype=np.bool_) if lags is None else lags.there[connections]
 
     def past(self, index: Indices, delays: IntArray, place: Place) -> str:
         """What was sent d steps ago, from the history, whose rows have all activities and outlets."""
@@ -250,11 +263,11 @@ class Sight:
         n = len(self.network.neurons) + self.network.outlet_count
         source = code.at(index, place)
         if (own == own[0]).all():
-            name, row = f"h{own[0]}", f"(size_t)((k + {self.depth - own[0]}) % {self.depth})*{n}"
+            name, row = f"h{own[0]}", f"(size_t)((k + {self.ends.depth - own[0]}) % {self.ends.depth})*{n}"
             code.head[name] = f"const {code.real} *const {name} = history + {row};"
             return f"{name}[{source}]"
-        code.head["now"] = f"const int32_t now = (int32_t)(k % {self.depth});"
-        row = f"(now + {self.depth} - ({code.at(delays, place)})) % {self.depth}"
+        code.head["now"] = f"const int32_t now = (int32_t)(k % {self.ends.depth});"
+        row = f"(now + {self.ends.depth} - ({code.at(delays, place)})) % {self.ends.depth}"
         return f"history[(size_t)({row})*{n} + {source}]"
 
 

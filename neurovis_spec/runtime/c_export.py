@@ -31,7 +31,7 @@ from neurovis_spec.runtime.c_code import Code, Form, Tables, function, state_nam
 from neurovis_spec.runtime.c_draws import drawing
 from neurovis_spec.runtime.c_names import LONGEST_STRING, identifiers, prefix, string, words
 from neurovis_spec.runtime.c_settable import ExportError, fixed, formula, write_follow
-from neurovis_spec.runtime.c_step import StepCode, begins_otherwise, incoming_in, write_input
+from neurovis_spec.runtime.c_step import Built, StepCode, begins_otherwise, write_input
 from neurovis_spec.runtime.columns import probe_of
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.lags import ring_lengths
@@ -104,7 +104,7 @@ class Exported:
         self.fixing = any(order >= 0 for phase in self.phases for order in phase.order[n:of_neurons])
         self.fixing_joined = any(order >= 0 for phase in self.phases for order in phase.order[of_neurons:])
         self.clampable = network.clampable if self.fixing_joined else of_neurons if self.fixing else n
-        self.plan = c_plan.plan_of(self.network)
+        self.built = Built(self.network, signal_layout(network, own=True))
         self.members = self._members()
 
     # ---- what there is -----------------------------------------------------------------------------------------
@@ -164,7 +164,7 @@ class Exported:
             Member("parameters", state.conditions.parameters, "parameters of the spec and of its instances"),
             Member("variables", state.conditions.variables, "numbers that follow parameters"),
             Member("vector", np.zeros(network.vector_size), "the inputs and the noise of a step"),
-            Member("work", np.zeros(c_plan.work_size(self.plan)), "what an integration keeps between stages"),
+            Member("work", np.zeros(c_plan.work_size(self.built.plan)), "what an integration keeps between stages"),
         ]
         if self.holding:
             about = "what neurons are held at" + (", then states" if self.clampable > len(self.network.neurons) else "")
@@ -321,7 +321,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             name: f"{real} *{quick} const {name} = state->{name};"
             for name in ("activity", "weights", "signals", "history", "outlets")
         }
-        pointer_lines |= c_plan.pointer_lines(self.plan, real, quick, "state->work")
+        pointer_lines |= c_plan.pointer_lines(self.built.plan, real, quick, "state->work")
         pointer_lines["fresh"] = f"const int fresh = {int(not self.state.continued)};"
         pointer_lines["lesioned"] = f"const unsigned char *{quick} const lesioned = state->lesioned;"
         pointer_lines["x"] = f"{real} *{quick} const x = state->variables;"
@@ -364,7 +364,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
         network, code, pointer_lines = self.network, self._code(), self._pointer_lines()
         left_out = self._left_out()
         form = Form(
-            written_out=len(network.neurons) + len(network.connections) <= c_plan.written_out(self.plan, SMALL),
+            written_out=len(network.neurons) + len(network.connections) <= c_plan.written_out(self.built.plan, SMALL),
             first=self.takes_initial,
             held=self.holding,
             fixed=self.fixing,
@@ -373,7 +373,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             still="still" in left_out,
             lost="lost" in left_out,
         )
-        StepCode(network, code, form, incoming_in(network), signal_layout(network, own=True), self.plan).write()
+        StepCode(self.built, code, form).write()
         before: list[str] = []
         for name in sorted(left_out.keys() & words_of(code.lines)):  # what never learns asks for none that is still
             kind, phases = left_out[name]

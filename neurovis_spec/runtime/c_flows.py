@@ -95,7 +95,7 @@ class _Integration:
         self.now = "fy" if "fy" in self.plan.parts else "fx"
         self.varying = {one.key: one.varies for one in self.plan.states}
         #: what formulas of connections see at a stage
-        self.sight = _StageSight(self.network, self.code, step.form, plan=self.plan)
+        self.sight = _StageSight(step.sight.ends, self.code, step.form, plan=self.plan)
         self.forming = Forming(self.sight, {one.number: one.signal for one in self.plan.contacts})
 
     def write(self) -> None:
@@ -266,10 +266,10 @@ class _Integration:
     def derivatives(self, first: str) -> None:
         """The inputs of a stage, what connections take at it, the derivatives."""
         self.inputs()
-        if self.sight.lags is not None and len(self.plan.lagging):
+        if self.sight.ends.lags is not None and len(self.plan.lagging):
             # the second stage in the middle sees what the first one does
             with self.code.block("if (stage != 2)" if self.method == "rk4" else ""):
-                write_arriving(self.step, self.sight.lags, self.plan.lagging)
+                write_arriving(self.step, self.sight.ends.lags, self.plan.lagging)
         parts = self.plan.of_stage
         for part, one in taken_in_order(parts):
             if not self.step.form.held and one.places[0] in self.plan.idle:
@@ -407,7 +407,8 @@ class _Integration:
         }
         step, forming = self.step, Forming(self.sight, formulas)
         form = replace(step.form, fused=False)  # these are summed here alone: no weights are packed in their order
-        arrivals = Arrivals(self.network, self.plan.back(part, through), self.code, form, step.layout, forming)
+        incoming = self.plan.back[part.number, through.port.name, through.state]
+        arrivals = Arrivals(self.network, incoming, self.code, form, step.layout, forming)
         return self.code.text(self.code.let("u", arrivals.combined(place)))
 
     def slope(
@@ -481,15 +482,15 @@ class _StageSight(Sight):
     def past_or_now(self, some: Some, end: End) -> Value:
         """What was sent as long ago as the delay is: with a continuous one before this share of the step was over."""
         connections, place = self.network.projections[some.number].members[some.which], some.place
-        if self.lags is None or not own_of(self.late(connections), place).any():
+        if self.ends.lags is None or not own_of(self.late(connections), place).any():
             return super().past_or_now(some, end)
-        code, lags, index = self.code, self.lags.some(connections), end.places[some.which]
+        code, lags, index = self.code, self.ends.lags.some(connections), end.places[some.which]
         q, back = code.let("q", f"share - {code.text(code.number(lags.part, place))}"), code.at(lags.whole + 1, place)
         slot, ago = code.name("i"), code.name("i")
-        code.head["now"] = f"const int32_t now = (int32_t)(k % {self.depth});"
-        code.line(f"const int32_t {slot} = nv_slot(now, {back}, {self.depth}, {q});")
+        code.head["now"] = f"const int32_t now = (int32_t)(k % {self.ends.depth});"
+        code.line(f"const int32_t {slot} = nv_slot(now, {back}, {self.ends.depth}, {q});")
         code.line(f"const int32_t {ago} = {back} + ({q} < {code.text(0.0)});")
-        steps = [(ago, slot), (f"{ago} - 1", f"nv_next({slot}, {self.depth})")]
+        steps = [(ago, slot), (f"{ago} - 1", f"nv_next({slot}, {self.ends.depth})")]
         sent = [self.remembered(connections, index, place, *one) for one in steps]
         between = f"nv_between({', '.join(sent)}, {q})"
         if own_of(self.late(connections), place).all():

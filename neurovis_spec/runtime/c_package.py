@@ -29,9 +29,7 @@ from neurovis_spec.runtime.stages import (
     Formulas,
     Part,
     apart,
-    contacts_of,
     formed_at,
-    parts_of,
     signal_of,
     unfolded,
 )
@@ -175,11 +173,12 @@ def _of_synapses(network: Network) -> int:
 def _integration(exported: Exported) -> tuple[int, list[str]]:
     """How many functions the integration calls in a step, and what else it takes; none where nothing flows."""
     network = exported.network
-    by = network.integration
-    if by is None:
+    plan = exported.built.plan
+    if plan is None:
         return 0, []
-    parts, stages = parts_of(network, by), len(STAGES[by.method]) * by.substeps
-    joined = [(one, len(one.projection.members)) for one in contacts_of(network, by)]
+    by, parts = plan.operation, plan.of_stage
+    stages = len(STAGES[by.method]) * by.substeps
+    joined = [(one, len(one.projection.members)) for one in plan.contacts]
     states = sum(len(part.flows) * len(part.population.members) for part in parts)
     states += sum(len(one.flows) * count for one, count in joined)
     signals = sum(len(apart(port)[1]) for part in parts for port in part.ports)

@@ -109,7 +109,7 @@ class Plan:
     @cached_property
     def of_stage(self) -> tuple[Part, ...]:
         """What is done at a stage, population by population."""
-        return parts_of(self.network, self.operation)
+        return parts_of(self.network, self.operation, self.contacts, self.flows if self.contacts else None)
 
     @cached_property
     def contacts(self) -> tuple[Contacts, ...]:
@@ -142,8 +142,16 @@ class Plan:
             for port in part.ports
         }
 
-    def back(self, part: Part, through: Through) -> Incoming:
-        """The signals of a port that change with a state of the neuron itself."""
+    @cached_property
+    def back(self) -> Mapping[tuple[int, str, str], Incoming]:
+        """The signals of a port that change with a state of the neuron itself, by population, port and state."""
+        return {
+            (part.number, one.port.name, one.state): self._back(part, one)
+            for part in self.of_stage
+            for one in part.through
+        }
+
+    def _back(self, part: Part, through: Through) -> Incoming:
         found = [one.number for one in self.contacts if through.state in dict(one.back.trees)]
         positions = apart(through.port)[1]
         kinds = self.network.synapses.numbers[through.port.incoming[positions]]

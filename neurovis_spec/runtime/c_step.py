@@ -18,8 +18,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import replace
-from functools import partial, singledispatch
+from dataclasses import dataclass, replace
+from functools import cached_property, partial, singledispatch
 from itertools import chain
 from typing import NamedTuple
 
@@ -50,8 +50,8 @@ from neurovis_spec.language.expressions.emit_c import Made, Value
 from neurovis_spec.language.expressions.tree import Tree, names
 from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, incoming_of
 from neurovis_spec.runtime.c_code import Code, Form, Place, plus, state_name
-from neurovis_spec.runtime.c_connections import Forming, Sight, Some, taken, taken_at
-from neurovis_spec.runtime.c_plan import Plan
+from neurovis_spec.runtime.c_connections import Ends, Forming, Sight, Some, taken, taken_at
+from neurovis_spec.runtime.c_plan import Plan, plan_of
 from neurovis_spec.runtime.signals import DelayClass, SharedSlots, SignalLayout
 from neurovis_spec.runtime.stages import signal_of, target_of, unfolded
 from neurovis_spec.runtime.state import Mask
@@ -64,22 +64,45 @@ _NO_CLOCK: Mapping[str, Value] = {}
 _RULES_SIDE_BY_SIDE = 4
 
 
-class StepCode:
-    """Writes the body of a step. ``incoming`` is what arrives at each port of each population, ``layout`` where signals
-    are under way, ``plan`` what is integrated: all forms of a step share them."""
+@dataclass(frozen=True, eq=False)
+class Built:
+    """What all forms of the step of a network share, each worked out once; ``layout``: where signals are under way."""
 
-    def __init__(
-        self,
-        network: Network,
-        code: Code,
-        form: Form,
-        incoming: Sequence[Sequence[Incoming]],
-        layout: SignalLayout,
-        plan: Plan | None,
-    ) -> None:
-        self.network, self.code, self.form, self.layout, self.plan = network, code, form, layout, plan
+    network: Network
+    layout: SignalLayout
+
+    @cached_property
+    def plan(self) -> Plan | None:
+        """What is integrated."""
+        return plan_of(self.network)
+
+    @cached_property
+    def ends(self) -> Ends:
+        """What there is to read at the ends of connections."""
+        return Ends(self.network)
+
+    @cached_property
+    def incoming(self) -> list[list[Incoming]]:
+        """What arrives at each port of each population."""
+        network = self.network
+        return [
+            [
+                incoming_of(network, port, len(one.members), fusible=network.sending is None and _plain(one))
+                for port in one.ports
+            ]
+            for one in network.populations
+        ]
+
+
+class StepCode:
+    """Writes the body of a step of one form."""
+
+    def __init__(self, built: Built, code: Code, form: Form) -> None:
+        self.network, self.code, self.form = built.network, code, form
+        self.layout, self.plan = layout, plan = built.layout, built.plan
+        network = built.network
         #: what formulas of synapses see before their targets are updated, and those of rules behind all
-        self.sight, self.behind = Sight(network, code, form), Sight(network, code, form, sent=True)
+        self.sight, self.behind = Sight(built.ends, code, form), Sight(built.ends, code, form, sent=True)
         synapses = ((number, one) for number, one in enumerate(network.projections) if one.kind == SYNAPSE)
         forming = Forming(self.sight, {number: signal_of(one) for number, one in synapses})
         #: what ports have beside what arrives, by their names
@@ -88,7 +111,7 @@ class StepCode:
         self.read_at_update = [self._read_at_update(one.model.definition) for one in network.populations]
         self.arrivals = [
             [Arrivals(network, one, code, form, self.layout, forming) for one in of_population]
-            for of_population in incoming
+            for of_population in built.incoming
         ]
         #: connections that are fused, (m,)
         self.fuses = np.zeros(len(network.connections), dtype=np.bool_)
@@ -183,7 +206,7 @@ class StepCode:
         network = self.network
         for number in [] if arrivals.kinds is None else np.unique(arrivals.kinds[arrivals.kinds >= 0]).tolist():
             undelayed = network.connections.delays[network.projections[number].members] == 0
-            for name, end in self.sight.ends[number].items():
+            for name, end in self.sight.ends.read[number].items():
                 places = end.places[undelayed] if end.past else end.places
                 if not name.startswith("post") and np.isin(network.neuron_of[places], population.members).any():
                     return True
@@ -503,7 +526,7 @@ class StepCode:
             self.store_each(len(slots.sent), partial(self.sharing, slots))
         for one in self.layout.rings:
             self.fill(one)
-        if depth := self.sight.depth:
+        if depth := self.sight.ends.depth:
             n, beside = len(self.network.neurons), self.network.outlet_count
             row = f"(size_t)(k % {depth})*{n + beside}"
             code.line(f"memcpy(history + {row}, activity, {n}*sizeof(activity[0]));")
@@ -702,17 +725,6 @@ def begins_otherwise(network: Network) -> bool:
     flows."""
     flows = any(use.definition.flows or use.definition.staying for _, use in network.uses)
     return flows or bool((~np.isnan(network.neurons.initial)).any())
-
-
-def incoming_in(network: Network) -> list[list[Incoming]]:
-    """What arrives at each port of each population."""
-    return [
-        [
-            incoming_of(network, port, len(population.members), fusible=network.sending is None and _plain(population))
-            for port in population.ports
-        ]
-        for population in network.populations
-    ]
 
 
 def _plain(population: Population) -> bool:

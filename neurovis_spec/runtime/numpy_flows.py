@@ -142,11 +142,12 @@ class _Flow:
 
     def __init__(self, step: Step, operation: Integrate) -> None:
         self.step, self.code, self.network, self.operation = step, step.code, step.network, operation
-        working = [_Joined(one, *step.working(one.number)) for one in contacts_of(step.network, operation)]
+        contacts = contacts_of(step.network, operation)
+        working = [_Joined(one, *step.working(one.number)) for one in contacts]
         self.contacts = {one.at.number: one for one in working if len(one.projection.members)}
         #: of activities and outlets whether they are, where connections read them now, those of a stage
         self.flowing = flowing(step.whole) if working else np.zeros(0, dtype=np.bool_)
-        self.parts = parts_of(step.network, operation, self.flowing)
+        self.parts = parts_of(step.network, operation, contacts, self.flowing)
         #: where in what is taken at a stage each activity and each outlet lies, −1 for the others
         self.taken = places_among_taken(self.network, self.parts)
         #: the flow states, whose they are and by how many, and where each of them lies among all

@@ -76,10 +76,11 @@ class Flow:
 
     def __init__(self, seen: Seen, operation: Integrate) -> None:
         self.seen, self.network, self.operation = seen, seen.network, operation
-        self.parts = parts_of(seen.network, operation)
         self.contacts = {one.number: one for one in contacts_of(seen.network, operation)}
+        flows = flowing(seen.network) if self.contacts else np.zeros(0, dtype=np.bool_)
+        self.parts = parts_of(seen.network, operation, self.contacts.values(), flows)
         #: of activities and outlets whether they are, where connections read them now, those of a stage
-        self.flowing = flowing(seen.network).tolist() if self.contacts else []
+        self.flowing: list[bool] = flows.tolist()
         #: whose states flow
         self.uses = {part.population.model.owner: part.population.model for part in self.parts}
         self.uses |= {one.projection.use.owner: one.projection.use for one in self.contacts.values()}

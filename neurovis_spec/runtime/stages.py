@@ -187,10 +187,13 @@ def times(start: float, h: float, substep: int = 0, substeps: int = 1) -> Times:
     return Times(*(Moment(t, (substep + part) / substeps) for t, part in zip(seconds, PARTS, strict=True)))
 
 
-def parts_of(network: Network, operation: Integrate, flows: BoolArray | None = None) -> tuple[Part, ...]:
-    """What is done at a stage, population by population. ``flows`` is what is ``flowing`` in the network before a
-    lesion, which changes nothing of that."""
-    contacts = {one.number: one for one in contacts_of(network, operation)}
+def parts_of(
+    network: Network, operation: Integrate, joined: Iterable[Contacts], flows: BoolArray | None = None
+) -> tuple[Part, ...]:
+    """What is done at a stage, population by population; ``joined`` is what is done projection by projection
+    (``contacts_of``), and ``flows`` what is ``flowing`` in the network before a lesion, which changes nothing of
+    that."""
+    contacts = {one.number: one for one in joined}
     taken = _taken(network, operation, contacts.values(), flowing(network) if contacts and flows is None else flows)
     parts = []
     for number in operation.populations:

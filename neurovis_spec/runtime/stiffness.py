@@ -100,7 +100,8 @@ def _with_slopes(network: Network) -> tuple[Network, list[_Slope], Mapping[int, 
     by = network.integration
     assert by is not None
     by = replace(by, method="exponential")
-    through = {part.number: part.through for part in parts_of(network, by)}
+    contacts = contacts_of(network, by)
+    through = {part.number: part.through for part in parts_of(network, by, contacts)}
     slopes: list[_Slope] = []
     populations = []
     for number, population in enumerate(network.populations):
@@ -123,4 +124,4 @@ def _with_slopes(network: Network) -> tuple[Network, list[_Slope], Mapping[int, 
         populations.append(replace(population, model=replace(model, definition=definition), activation=activation))
     program = tuple(by if isinstance(one, Integrate) else one for one in network.program)
     sloped = replace(network, populations=tuple(populations), program=program)
-    return sloped, slopes, {one.number: one for one in contacts_of(network, by)}
+    return sloped, slopes, {one.number: one for one in contacts}
