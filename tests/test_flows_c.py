@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tempfile
 import warnings
 from pathlib import Path
@@ -171,6 +172,18 @@ def test_random_networks_run_alike_when_exported(small: int, spec: Spec) -> None
         warnings.simplefilter("ignore")
         patch.setattr(c_export, "SMALL", small)
         runs_alike(nv.compile(spec), Path(folder), steps=12)
+
+
+@pytest.mark.parametrize("text", [MANY, JOINED], ids=["ports", "synapses"])
+def test_what_arrives_is_put_together_in_the_struct_of_what_is_exported(text: str, tmp_path: Path) -> None:
+    """Not on the stack, of which a microcontroller has little."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        network = nv.compile_text(text.replace("METHOD", "heun"))
+        runs_alike(network, tmp_path, steps=9)
+    source = c_export.Exported(network.network).source()
+    assert "double *const u" in source
+    assert not re.findall(r"^ +double u\d+\[\d+\];", source, re.MULTILINE)
 
 
 @pytest.mark.parametrize("method", ["rk4", "exponential"])

@@ -315,8 +315,8 @@ class Arrivals:
                     self._add(total, "e", slice(None))
                 yield place, code.text(self._finished(total))
 
-    def matrix(self) -> str:
-        """The sums of a full matrix; the name of their array. It adds source by source:
+    def matrix(self, name: str) -> None:
+        """The sums of a full matrix, into an array of this name. It adds source by source:
 
         for (int32_t q = 0; q < 3; q++) {
             const double a = activity[q];
@@ -325,8 +325,6 @@ class Arrivals:
         }
         """
         code, count = self.code, self.count
-        name = code.name("u")
-        code.line(f"{code.real} {name}[{count}];")
         code.line(code.loop("p", count))
         code.line(f"    {name}[p] = {code.text(self.start('p'))};")
         delay = int(self.delays[0])
@@ -347,7 +345,6 @@ class Arrivals:
             else:
                 shift = code.remainder(delay)
                 code.line(f"    {name}[p] += signals[{offset} + {delay}*({count}*q + p) + {shift}];")
-        return name
 
     def combined(self, place: Place) -> Value:
         """All that arrives at one neuron as one number. In a loop (of neurons with equally many connections) the c-th

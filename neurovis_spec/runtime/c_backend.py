@@ -52,8 +52,8 @@ _NEVER: Final = 1 << 62
 #: for each state or output of a model or a rule; ``x``: the numbers that can be set; ``parameters``; ``s``: the inputs
 #: of the step; ``reads``: of each input whether the step computes it by its expression; ``held``, ``holding``,
 #: ``lesioned``, ``gone``, ``still``, ``lost``, ``before``, ``packed``: as ``Form`` says; ``given``: the tables that are
-#: too long for the text; ``work``: what an integration keeps. ``k`` and ``form``: the step that ``nv_once`` makes, and
-#: its form.
+#: too long for the text; ``work``: what an integration keeps, and arrays of what arrives. ``k`` and ``form``: the step
+#: that ``nv_once`` makes, and its form.
 #:
 #: ``nv_course``: ``steps`` steps from ``k`` on, the first in ``form``, the others in the form ``then``; the inputs of
 #: each are a row of ``rows``, but for those that the step computes, which it puts there. Steps that ``every`` divides
@@ -181,7 +181,7 @@ class Written:
     long_tables: tuple[Table, ...]
     #: how many weights are packed in whole runs
     packed: int
-    #: how many numbers an integration keeps
+    #: how many numbers ``nv_state.work`` has
     work: int
     #: whether connections share signals
     shares: bool
@@ -222,7 +222,7 @@ def _write(network: Network, layout: SignalLayout) -> Written:
     emitter, tables, built = Emitter(), Tables("double", LONGEST), Built(network, layout)
     plan = built.plan
     small = len(network.neurons) + len(network.connections) <= c_plan.written_out(plan, SMALL)
-    bodies: list[str] = []
+    bodies, room = list[str](), 0
     pointers = _pointer_lines(network, plan)
     # loops over connections that store something in other operations are not watched
     rules = all(one.kind == RULE and not one.use.definition.flows for one in network.projections)
@@ -233,7 +233,8 @@ def _write(network: Network, layout: SignalLayout) -> Written:
     for type_, name, form, write, parameters, of_fused in _functions(small, watched):
         code = Code(emitter, tables, network.dt, network.settable.variables)
         if fused or not of_fused:
-            write(StepCode(built, code, form))
+            write(step := StepCode(built, code, form))
+            room = max(room, step.room)
         if type_ == "double":
             code.line("return odd;" if form.watched and code.lines else "return 0.0;")
         head = f"static {type_} {name}(const nv_state *p{parameters})"
@@ -256,9 +257,8 @@ def _write(network: Network, layout: SignalLayout) -> Written:
         "\n".join(bodies),
     ]
     text = "\n\n".join(part for part in parts if part) + _TAIL
-    return Written(
-        text, tuple(tables.passed_in), whole.count if fused else 0, c_plan.work_size(plan), bool(layout.shared)
-    )
+    work = c_plan.work_size(plan) + room
+    return Written(text, tuple(tables.passed_in), whole.count if fused else 0, work, bool(layout.shared))
 
 
 def _functions(small: bool, watched: bool) -> tuple[_Function, ...]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -71,6 +72,13 @@ class Member:
 _STATES = {"cells": "states of models", "traces": "states of rules", "synapse": "states of synapses"}
 
 
+class _Computing(NamedTuple):
+    """Lines of functions, and how many numbers of ``work`` these put together what arrives in."""
+
+    lines: list[str]
+    room: int
+
+
 class Exported:
     """The C of one network."""
 
@@ -105,7 +113,6 @@ class Exported:
         self.fixing_joined = any(order >= 0 for phase in self.phases for order in phase.order[of_neurons:])
         self.clampable = network.clampable if self.fixing_joined else of_neurons if self.fixing else n
         self.built = Built(self.network, signal_layout(network, own=True))
-        self.members = self._members()
 
     # ---- what there is -----------------------------------------------------------------------------------------
 
@@ -143,8 +150,9 @@ class Exported:
             at, order, lesioned, gone=structure.gone, still=structure.still, lost=structure.lost, clamps=clamps
         )
 
-    def _members(self) -> list[Member]:
-        """The arrays of the struct, without those that are empty."""
+    @cached_property
+    def members(self) -> list[Member]:
+        """The arrays of the struct, without those that are empty. Raises ExportError."""
         network, state = self.network, self.state
         # the state may have checks of a run, which this network has not
         cells = {
@@ -164,12 +172,16 @@ class Exported:
             Member("parameters", state.conditions.parameters, "parameters of the spec and of its instances"),
             Member("variables", state.conditions.variables, "numbers that follow parameters"),
             Member("vector", np.zeros(network.vector_size), "the inputs and the noise of a step"),
-            Member("work", np.zeros(c_plan.work_size(self.built.plan)), "what an integration keeps between stages"),
+            Member("work", np.zeros(c_plan.work_size(self.built.plan) + self._computing.room), self._about_work()),
         ]
         if self.holding:
             about = "what neurons are held at" + (", then states" if self.clampable > len(self.network.neurons) else "")
             members.append(Member("holding", np.zeros(self.clampable), about))
         return [member for member in members if len(member.begin) or member.name in ("activity", "weights")]
+
+    def _about_work(self) -> str:
+        """What is kept within a step."""
+        return "what is put together" if self.built.plan is None else "what an integration keeps between stages"
 
     def _about_history(self) -> str:
         """What the history is."""
@@ -270,14 +282,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
 
     def source(self) -> str:
         """The text of NAME.c. Raises ExportError."""
-        body: list[str] = []
-        if self.network.settable.slots:
-            body += [*self._follow(), ""]
-        if self.network.changes:
-            body += [*self._events(), ""]
-        if self.network.vector_size:
-            body += [*self._sense(), ""]
-        body += [*self._compute(), "", *self._init(), "", *self._step()]
+        body = [*self._computing.lines, "", *self._init(), "", *self._step()]
         for parameter, c_name in zip(self.settable, self.settable_names, strict=True):
             body += ["", *self._set(parameter, c_name)]
         if self.holding:
@@ -295,6 +300,19 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             "\n".join(body),
         ]
         return "\n\n".join(part.strip("\n") for part in parts if part) + "\n"
+
+    @cached_property
+    def _computing(self) -> _Computing:
+        """What ``NAME_step`` calls. Raises ExportError."""
+        lines: list[str] = []
+        if self.network.settable.slots:
+            lines += [*self._follow(), ""]
+        if self.network.changes:
+            lines += [*self._events(), ""]
+        if self.network.vector_size:
+            lines += [*self._sense(), ""]
+        step = self._compute()
+        return _Computing([*lines, *step.lines], step.room)
 
     def _names(self) -> str:
         """The names of the neurons; those that are too long for a literal as arrays."""
@@ -359,7 +377,7 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             found["lost"] = "int64_t", [np.maximum(phase.lost, first) for phase in phases]
         return found
 
-    def _compute(self) -> list[str]:
+    def _compute(self) -> _Computing:
         """The step itself."""
         network, code, pointer_lines = self.network, self._code(), self._pointer_lines()
         left_out = self._left_out()
@@ -373,7 +391,8 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             still="still" in left_out,
             lost="lost" in left_out,
         )
-        StepCode(self.built, code, form).write()
+        step = StepCode(self.built, code, form)
+        step.write()
         before: list[str] = []
         for name in sorted(left_out.keys() & words_of(code.lines)):  # what never learns asks for none that is still
             kind, phases = left_out[name]
@@ -382,7 +401,8 @@ int {self.name}_set_{c_name}({self.name}_state *state, {self.real} value);
             pointer_lines[name] = f"const {kind} *const {name} = {which};"
         if self.takes_initial:
             code.head["first"] = "const int first = k == 0;"
-        return [*before, *self._function(code, "What a step computes.", "void nv_compute", pointer_lines)]
+        lines = self._function(code, "What a step computes.", "void nv_compute", pointer_lines)
+        return _Computing([*before, *lines], step.room)
 
     def _function(
         self, code: Code, about: str, declaration: str, pointer_lines: dict[str, str], more: str = ""

@@ -9,6 +9,9 @@ the ports that a stage reads, and what connections take there. The parts are
     fj  how much these change with their own states            expressions as they are at a stage
     fs  sums of derivatives, over stages                   fg  what their noise is multiplied by
     fl  what arrives at a stage with continuous delays
+
+and behind all of them, also where there is no plan, ``fu``: arrays of what arrives at the neurons of a population,
+where that is put together before any of these goes on.
 """
 
 from __future__ import annotations
@@ -307,7 +310,7 @@ def plan_of(network: Network) -> Plan | None:
 
 
 def work_size(plan: Plan | None) -> int:
-    """How many numbers ``work`` has."""
+    """How many numbers of ``work`` an integration keeps."""
     return 0 if plan is None else plan.parts[""]
 
 
@@ -319,7 +322,6 @@ def written_out(plan: Plan | None, most: int) -> int:
 
 def pointer_lines(plan: Plan | None, real: str, quick: str, work: str) -> dict[str, str]:
     """For each part of ``work``, the line that gives it its name; ``quick`` is how ``restrict`` is written."""
-    if plan is None:
-        return {}
-    parts = {name: start for name, start in plan.parts.items() if name}
+    parts = {} if plan is None else {name: start for name, start in plan.parts.items() if name}
+    parts["fu"] = work_size(plan)
     return {name: f"{real} *{quick} const {name} = {work} + {start};" for name, start in parts.items()}

@@ -20,7 +20,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, singledispatch
-from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -77,6 +76,13 @@ class Built:
         return plan_of(self.network)
 
     @cached_property
+    def in_work(self) -> bool:
+        """Whether arrays of what arrives lie in ``work``, behind what an integration keeps there: not on the stack, as
+        they always have where nothing flows and all arrives at one port, without synapses."""
+        synapses = any(one.kind == SYNAPSE for one in self.network.projections)
+        return self.plan is not None or synapses or len(self.network.port_names) > 1
+
+    @cached_property
     def ends(self) -> Ends:
         """What there is to read at the ends of connections."""
         return Ends(self.network)
@@ -98,7 +104,7 @@ class StepCode:
     """Writes the body of a step of one form."""
 
     def __init__(self, built: Built, code: Code, form: Form) -> None:
-        self.network, self.code, self.form = built.network, code, form
+        self.built, self.network, self.code, self.form = built, built.network, code, form
         self.layout, self.plan = layout, plan = built.layout, built.plan
         network = built.network
         #: what formulas of synapses see before their targets are updated, and those of rules behind all
@@ -113,6 +119,8 @@ class StepCode:
             [Arrivals(network, one, code, form, self.layout, forming) for one in of_population]
             for of_population in built.incoming
         ]
+        #: how many numbers of ``work`` arrays of what arrives take at most, and how many they take here
+        self.room = self._taken = 0
         #: connections that are fused, (m,)
         self.fuses = np.zeros(len(network.connections), dtype=np.bool_)
         #: how many weights are packed
@@ -144,8 +152,14 @@ class StepCode:
 
     @property
     def packing(self) -> Iterator[Arrivals]:
-        """Whatever may have its weights packed."""
-        return (one for one in chain(*self.arrivals, self.at_stages.values()) if one.can_be_fused or one.can_be_packed)
+        """Whatever may have its weights packed, of what is read at an update and at a stage."""
+        at_updates = (
+            own
+            for number, arrivals in enumerate(self.arrivals)
+            for port, own in zip(self.network.populations[number].ports, arrivals, strict=True)
+            if port.name in self.read_at_update[number]
+        )
+        return (one for one in (*at_updates, *self.at_stages.values()) if one.can_be_fused or one.can_be_packed)
 
     def pack(self) -> None:
         """The weights of fused populations, and of synapses, in the order in which they are read, where they do not lie
@@ -191,7 +205,7 @@ class StepCode:
         if any(own.kinds is not None for own in arrivals.values()):
             self.hold_ahead(number)
         ahead = {one: own for one, own in arrivals.items() if self.reads_within(population, own)}
-        with self.code.block("") if ahead else nullcontext():
+        with self.holding_arrays() if ahead else nullcontext():
             gathered = {one: self.gathered(own, len(population.members)) for one, own in ahead.items()}
 
             def updated(place: Place, totals: Mapping[int, str]) -> None:
@@ -215,8 +229,7 @@ class StepCode:
     def gathered(self, arrivals: Arrivals, count: int) -> str:
         """What arrives at a port of all neurons of a population, before any of them is updated: the name of an
         array."""
-        code, name = self.code, self.code.name("u")
-        code.line(f"{code.real} {name}[{count}];")
+        code, name = self.code, self.array(count)
 
         def gather(place: Place, totals: Mapping[int, str]) -> None:
             code.line(f"{name}[{place}] = {code.text(arrivals.combined(place))};")
@@ -249,7 +262,7 @@ class StepCode:
         first = next(iter(ahead), None)
         beside = first is not None and ahead[first].lanes is not None
         summed = {one: own for one, own in ahead.items() if one != first or not beside}
-        with code.block("") if summed else nullcontext():
+        with self.holding_arrays() if summed else nullcontext():
             sums = {one: self.summed(own, count) for one, own in summed.items()}
             if first is not None and beside:
                 lanes = ahead[first].lanes
@@ -262,13 +275,32 @@ class StepCode:
 
     def summed(self, arrivals: Arrivals, count: int) -> str:
         """What arrives at a port of all neurons of a population, combined: the name of an array."""
+        name = self.array(count)
         if arrivals.dense:
-            return arrivals.matrix()
-        assert arrivals.lanes is not None
-        name = self.code.name("u")
-        self.code.line(f"{self.code.real} {name}[{count}];")
-        with arrivals.beside(arrivals.lanes) as (where, total):
-            self.code.line(f"{name}[{where}] = {total};")
+            arrivals.matrix(name)
+        else:
+            assert arrivals.lanes is not None
+            with arrivals.beside(arrivals.lanes) as (where, total):
+                self.code.line(f"{name}[{where}] = {total};")
+        return name
+
+    @contextmanager
+    def holding_arrays(self) -> Iterator[None]:
+        """A block for lines that make arrays and read them: behind it their room is free."""
+        taken = self._taken
+        with self.code.block(""):
+            yield
+        self._taken = taken
+
+    def array(self, count: int) -> str:
+        """The name of a new array for what arrives at so many neurons."""
+        code, name = self.code, self.code.name("u")
+        if self.built.in_work:
+            code.line(f"{code.real} *const {name} = fu + {self._taken};")
+            self._taken += count
+            self.room = max(self.room, self._taken)
+        else:
+            code.line(f"{code.real} {name}[{count}];")
         return name
 
     @contextmanager
