@@ -143,6 +143,17 @@ class Sight:
         """What formulas see of both ends of one connection."""
         return {name: self.at_end(some, name, end) for name, end in self.ends.read[some.number].items() if name in read}
 
+    def end_at(self, projection: Projection) -> tuple[End, IntArray]:
+        """What of an end says whether a spike has come to connections of a projection, and how many steps ago."""
+        end, delays = self.ends.read[projection.use.owner.number][projection.when], self.network.connections.delays
+        return end, delays[projection.members] if end.past else np.zeros(len(projection.members), dtype=np.int64)
+
+    def comes(self, projection: Projection, some: Some) -> list[str]:
+        """The condition that a spike has come to one connection, where that matters."""
+        if not projection.when:
+            return []
+        return [f"{self.at_end(some, projection.when, self.ends.read[some.number][projection.when])} != 0"]
+
     def of_target(self, some: Some, read: Collection[str]) -> dict[str, Value]:
         """What formulas see of the target, whatever the connection; as identifiers."""
         ends = self.ends.read[some.number].items()

@@ -16,7 +16,7 @@ and where K's signals are shared, ``weights[0]*signals[0]`` and ``signals[0] = a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, singledispatch
@@ -30,12 +30,14 @@ from neurovis_spec.compiler.network import Input, Network, Outlet
 from neurovis_spec.compiler.program import (
     PHASES,
     SYNAPSE,
+    Advance,
     Definition,
     Gather,
     Holder,
     Key,
     Learn,
     Operation,
+    Phase,
     Population,
     Port,
     Projection,
@@ -51,8 +53,9 @@ from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, incoming_of
 from neurovis_spec.runtime.c_code import Code, Form, Place, plus, state_name
 from neurovis_spec.runtime.c_connections import Ends, Forming, Sight, Some, taken, taken_at
 from neurovis_spec.runtime.c_plan import Plan, plan_of
+from neurovis_spec.runtime.events import Rows, rows_of
 from neurovis_spec.runtime.signals import DelayClass, SharedSlots, SignalLayout
-from neurovis_spec.runtime.stages import signal_of, target_of, unfolded
+from neurovis_spec.runtime.stages import acts_now, port_with, signal_of, target_of, unfolded
 from neurovis_spec.runtime.state import Mask
 
 _NONE: Mapping[str, Made] = {}
@@ -89,14 +92,32 @@ class Built:
 
     @cached_property
     def incoming(self) -> list[list[Incoming]]:
-        """What arrives at each port of each population."""
+        """What arrives at each port of each population, but for spikes of the same step that act behind all."""
         network = self.network
         return [
             [
-                incoming_of(network, port, len(one.members), fusible=network.sending is None and _plain(one))
+                incoming_of(
+                    network,
+                    port if port.now is None else port_with(port, ~acts_now(port)),
+                    len(one.members),
+                    fusible=network.sending is None and _plain(one),
+                )
                 for port in one.ports
             ]
             for one in network.populations
+        ]
+
+    @cached_property
+    def now(self) -> list[list[Incoming | None]]:
+        """The spikes of the same step that act behind all, at each port of each population; None at most ports."""
+        return [
+            [
+                None
+                if port.now is None
+                else incoming_of(self.network, port_with(port, acts_now(port)), len(one.members), fusible=False)
+                for port in one.ports
+            ]
+            for one in self.network.populations
         ]
 
 
@@ -110,11 +131,16 @@ class StepCode:
         #: what formulas of synapses see before their targets are updated, and those of rules behind all
         self.sight, self.behind = Sight(built.ends, code, form), Sight(built.ends, code, form, sent=True)
         synapses = ((number, one) for number, one in enumerate(network.projections) if one.kind == SYNAPSE)
-        forming = Forming(self.sight, {number: signal_of(one) for number, one in synapses})
+        self.forming = forming = Forming(self.sight, {number: signal_of(one) for number, one in synapses})
         #: what ports have beside what arrives, by their names
         self.own = {name: _own(network, name) for name in network.port_names}
+        #: what becomes of the states of each population before its update, phase by phase
+        self.phases = [_phases(network, number) for number in range(len(network.populations))]
         #: the names that are read when a population is updated
-        self.read_at_update = [self._read_at_update(one.model.definition) for one in network.populations]
+        self.read_at_update = [
+            frozenset().union(*(self._read_in(one) for one in self.definitions(number)))
+            for number in range(len(network.populations))
+        ]
         self.arrivals = [
             [Arrivals(network, one, code, form, self.layout, forming) for one in of_population]
             for of_population in built.incoming
@@ -340,6 +366,30 @@ class StepCode:
         self.hold_activity(neuron)
         self.let_out(number, place, neuron)
 
+    def jump_now(self, number: int) -> None:
+        """The states of a population that jump by spikes of the same step, which ports hold alone."""
+        population, code = self.network.populations[number], self.code
+        made = replace(population.model.definition.during(("jump_now",)), gives=())
+        read = self._read_in(made)
+        arrivals = {
+            one: Arrivals(self.network, incoming, code, self.form, self.layout, self.forming)
+            for one, incoming in enumerate(self.built.now[number])
+            if incoming is not None and population.ports[one].name in read
+        }
+
+        def jumped(place: Place, totals: Mapping[int, str]) -> None:
+            ports: dict[str, Value] = {port.name: 0.0 for port in population.ports}
+            for one, own in arrivals.items():
+                ports[population.ports[one].name] = code.let("u", totals.get(one) or own.combined(place))
+            seen = {**code.parameters(population.model, place), **self.sight.clock(made), **ports}
+            stored = self.states(population.model, place)
+            functions, kept = self.activation(population, place), partial(self.unless_held, population.model, place)
+            new, _ = self.change(made, seen, stored, functions, kept)
+            self.store([(stored[name], value) for name, value in new.items()])
+
+        with self.unless_first():
+            self.each(len(population.members), arrivals, jumped)
+
     def let_out(self, number: int, place: Place, neuron: Place) -> None:
         """What connections take of a neuron beside its activity; nothing of one that is lesioned."""
         stored = self.states(self.network.populations[number].model, place)
@@ -364,9 +414,16 @@ class StepCode:
             self.code.line(f"if (held[{neuron}])")
             self.code.line(f"    activity[{neuron}] = holding[{neuron}];")
 
-    def _read_at_update(self, made: Definition) -> frozenset[str]:
-        """The names that a model reads when its neurons are updated, derivatives left out."""
-        if not made.flows:
+    def definitions(self, number: int) -> tuple[Definition, ...]:
+        """What of the model of a population is carried out at its update, one behind the other; the last gives the
+        activity and the outputs."""
+        made = self.network.populations[number].model.definition
+        ahead = (replace(made.during((phase,)), gives=()) for phase in self.phases[number])
+        return *ahead, made.at_update
+
+    def _read_in(self, made: Definition) -> frozenset[str]:
+        """The names that a part of a model reads when its neurons are updated, derivatives left out."""
+        if made.gives and not (made.flows or made.fires):
             return made.read
         ends = [] if self.network.episode is None else [one.each_episode for one in made.lasting]
         readers = [*(one.each_step for one in (*made.lasting, *made.fleeting)), *ends]
@@ -427,11 +484,17 @@ class StepCode:
         code, population = self.code, self.network.populations[number]
         made, stored = population.model.definition, self.states(population.model, place)
         seen: Mapping[str, Value] = {**code.parameters(population.model, place), **self.sight.clock(made), **ports}
-        states = {one.name: stored[one.name] for one in made.state}
+        states: dict[str, Value] = {one.name: stored[one.name] for one in made.state}
         self.hold_states(population.model, place)
         functions, kept = self.activation(population, place), partial(self.unless_held, population.model, place)
-        new, given = self.change(made, seen, states, functions, kept, begins=self.form.first)
-        self.store([(stored[name], value) for name, value in new.items()])
+        changed: dict[str, Value] = {}
+        *ahead, last = self.definitions(number)
+        for part in ahead:
+            new, _ = self.change(part, seen, states, functions, kept, self.form.first, states)
+            states |= new
+            changed |= new
+        new, given = self.change(last, seen, states, functions, kept, self.form.first)
+        self.store([(stored[name], value) for name, value in (changed | new).items()])
         self.store([(stored[one.name], given[one.name]) for one in made.outputs])
         self.store([(f"activity[{neuron}]", given["activity"])])
 
@@ -475,14 +538,15 @@ class StepCode:
         self,
         made: Definition,
         seen: Mapping[str, Value],
-        stored: Mapping[str, str],
+        stored: Mapping[str, Value],
         functions: Mapping[str, Made] = _NONE,
         bounded: Callable[[str, Value], Value] = lambda name, value: value,
         begins: bool = False,
+        staying: Collection[str] | None = None,
     ) -> tuple[dict[str, Value], dict[str, Value]]:
         """What becomes of all that lasts of a definition, which is ``stored`` there, from old values at once, and once
         more at an episode's end, ``bounded``; and what does not last, made from the new states. Nothing is stored
-        yet. With ``begins`` there is a first step, at which what stays as it is does."""
+        yet. With ``begins`` there is a first step, at which what stays as it is (``staying``) does."""
         code = self.code
         steps = made.steps
         ends = {one.name: one.each_episode for one in made.lasting}
@@ -492,8 +556,8 @@ class StepCode:
         new = self.values(steps, known, "n", functions)
         new = {name: bounded(name, value) for name, value in new.items()}
         for name in new if begins else ():
-            if name in made.staying:
-                new[name] = code.let("n", f"first ? {stored[name]} : {code.text(new[name])}")
+            if name in (made.staying if staying is None else staying):
+                new[name] = code.let("n", f"first ? {code.text(stored[name])} : {code.text(new[name])}")
         given = self.values(fleeting, known | new, "y", functions)
         if self.network.episode is None or not any(tree is not None for tree in ends.values()):
             return new, given
@@ -608,16 +672,58 @@ class StepCode:
         read = unfolded(made.let, changes).names
         self.hold_ahead(target_of(self.network, projection))
 
-        def received(place: Place, totals: Mapping[int, str]) -> None:
+        def received(place: Place, totals: Mapping[int, str] = _NO_TOTALS) -> None:
             some = Some(number, np.arange(len(members)), place)
-            left_out = f"if (!gone[{code.at(members, place)}])" if self.form.gone else ""
-            with code.block(left_out) if left_out else nullcontext():
+            conditions = [f"!gone[{code.at(members, place)}]"] if self.form.gone else []
+            conditions += self.sight.comes(projection, some)
+            with code.block(f"if ({' && '.join(conditions)})") if conditions else nullcontext():
                 stored, seen = self.sight.states(some), self.sight.known(some, read)
                 kept = partial(self.unless_held, projection.use, place)
                 new, _ = self.change(made, seen, stored, bounded=kept, begins=self.form.first)
                 self.store([(stored[name], value) for name, value in new.items()])
 
-        self.each(len(members), _NO_ARRIVALS, received)
+        if projection.when and not self.form.written_out:
+            with self.rows(projection, self.sight) as place:
+                received(place)
+        else:
+            self.each(len(members), _NO_ARRIVALS, received)
+
+    @contextmanager
+    def rows(self, projection: Projection, sight: Sight) -> Iterator[Place]:
+        """The body of a loop over the connections of a projection to which a spike has come, by ``when`` of it: source
+        by source, or target by target."""
+        code, members = self.code, projection.members
+        end, delays = sight.end_at(projection)
+        rows = rows_of(end.places, delays)
+        with self.fired(rows, sight.sent or bool(delays.all())) as (ago, row):
+            starts, order = code.tables.name(rows.starts), code.at(rows.order, "e")
+            with code.block(code.loop("e", f"{starts}[{row} + 1]", f"{starts}[{row}]")):
+                code.line(f"const int32_t q = {order};")
+                if self.form.lost and ago:
+                    code.line(f"if (k - {ago} < lost[{code.at(members, 'q')}])")
+                    code.line("    continue;")
+                yield "q"
+
+    @contextmanager
+    def fired(self, rows: Rows, remembered: bool) -> Iterator[tuple[str, str]]:
+        """The body of a loop over the rows of what has fired: how many steps ago, "" for now, and which row. What has
+        been sent is in the history, where it is ``remembered``; with delays of 0 alone it is what is now."""
+        code, depth = self.code, self.built.ends.depth
+        if not remembered or not rows.delays.any():
+            with code.block(code.loop("r", len(rows.ends))):
+                code.line(f"if ({taken_at(self.network, code, rows.ends, 'r')} == 0)")
+                code.line("    continue;")
+                yield "", "r"
+            return
+        n = len(self.network.neurons) + self.network.outlet_count
+        firsts = code.tables.name(rows.firsts)
+        with code.block(code.loop("d", len(rows.delays))):
+            code.line(f"const int32_t ago = {code.at(rows.delays, 'd')};")
+            code.line(f"const {code.real} *const h = history + (size_t)((k + {depth} - ago) % {depth})*{n};")
+            with code.block(code.loop("r", f"{firsts}[d + 1]", f"{firsts}[d]")):
+                code.line(f"if (h[{code.at(rows.ends, 'r')}] == 0)")
+                code.line("    continue;")
+                yield "ago", "r"
 
     def signals(self) -> None:
         """The signal of each connection with a synapse as it is behind a step, into ``formed``; 0 of one that is left
@@ -641,6 +747,10 @@ class StepCode:
             for place in range(count):
                 with code.block(""):
                     self.connections(projection, [place])
+            return
+        if projection.when:
+            with self.rows(projection, self.behind) as at:
+                self.connections(projection, [at], ["odd"] if self.form.watched else [])
             return
         lanes = 1 if self.form.still else _RULES_SIDE_BY_SIDE
         in_lanes = count - count % lanes
@@ -673,7 +783,7 @@ class StepCode:
             self.store(leaving)
         for made in stores:
             self.store(made)
-        if self.form.still and isinstance(places[0], int):
+        if isinstance(places[0], int) and self.leaves_out(projection, places[0]):
             code.indent -= 1
             code.line("}")
 
@@ -694,12 +804,12 @@ class StepCode:
         """The weight and the states of one connection, at a step and, where it has one, at an episode's end: where
         each is stored, and what."""
         code, connection = self.code, self.code.at(projection.members, place)
-        if self.form.still:
+        if conditions := self.leaves_out(projection, place):
             if isinstance(place, int):
-                code.line(f"if (!still[{connection}]) {{")
+                code.line(f"if ({' && '.join(conditions)}) {{")
                 code.indent += 1
             else:
-                code.line(f"if (still[{connection}])")
+                code.line(f"if ({conditions[0].removeprefix('!')})")
                 code.line("    continue;")
         rule = projection.use
         seen = code.parameters(rule, place) | self.behind.clock(rule.definition) | self.seen(projection, place)
@@ -714,6 +824,14 @@ class StepCode:
 
         new, _ = self.change(rule.definition, seen, stored, bounded=bounded, begins=self.form.first)
         return [(stored[name], value) for name, value in new.items()]
+
+    def leaves_out(self, projection: Projection, place: Place) -> list[str]:
+        """What must hold of a connection for its rule to be carried out; a loop over what has fired knows of that."""
+        conditions = [f"!still[{self.code.at(projection.members, place)}]"] if self.form.still else []
+        if projection.when and isinstance(place, int):
+            some = Some(projection.use.owner.number, np.arange(len(projection.members)), place)
+            conditions += self.behind.comes(projection, some)
+        return conditions
 
     def bounded(self, projection: Projection, place: Place, weight: Value) -> Value:
         """A new weight within its bounds."""
@@ -737,6 +855,12 @@ class StepCode:
         return self.behind.at_ends(some, unfolded(made.let, [*made.steps.values(), *ends]).names)
 
 
+def _phases(network: Network, population: int) -> tuple[Phase, ...]:
+    """What becomes of the states of a population before its update, behind what arrives."""
+    ahead = (one for one in network.program if isinstance(one, Advance) and one.population == population)
+    return tuple(one.phase for one in ahead if one.phase != "jump_now")
+
+
 class _Own(NamedTuple):
     """What a port has beside what arrives, each (n,): its bias, and what that is called; where its input and its noise
     stand in the vector of the step, −1 for nowhere."""
@@ -756,6 +880,7 @@ def begins_otherwise(network: Network) -> bool:
     """Whether the first step of a run is another one than all others: of neurons with ``initial``, or where anything
     flows."""
     flows = any(use.definition.flows or use.definition.staying for _, use in network.uses)
+    flows |= any(isinstance(one, Advance) for one in network.program)
     return flows or bool((~np.isnan(network.neurons.initial)).any())
 
 
@@ -790,12 +915,19 @@ def write(operation: Operation, step: StepCode) -> None:
 @write.register(Gather)
 def _together(operation: ReadInputs | Gather, step: StepCode) -> None:
     """Nothing: ``s`` holds the inputs (``StepCode.read``), and what a population gathers is computed neuron by neuron,
-    with its update."""
+    with its update or what comes of it now."""
 
 
 @write.register
 def _update(operation: Update, step: StepCode) -> None:
     step.population(operation.population)
+
+
+@write.register
+def _advance(operation: Advance, step: StepCode) -> None:
+    """Jumps by spikes of the same step; all else is computed neuron by neuron, with the update."""
+    if operation.phase == "jump_now":
+        step.jump_now(operation.population)
 
 
 @write.register

@@ -237,16 +237,27 @@ def _at_stages(network: Network, population: Population) -> Population:
 
 def port_with(port: Port, keep: BoolArray) -> Port:
     """A port with those of its connections alone that it keeps."""
-    factors, staged = port.factors, port.staged
+    factors, staged, now = port.factors, port.staged, port.now
     if staged is not None:
         staged = (np.cumsum(keep) - 1)[staged[keep[staged]]]
+    if now is not None:
+        now = (np.cumsum(keep) - 1)[now[keep[now]]]
     return replace(
         port,
         incoming=port.incoming[keep],
         slots=port.slots[keep],
         factors=None if factors is None else factors[keep],
         staged=staged,
+        now=now if now is not None and len(now) else None,
     )
+
+
+def acts_now(port: Port) -> BoolArray:
+    """Which of the connections to a port bring spikes of the same step that act behind all of them."""
+    found = np.zeros(len(port.incoming), dtype=np.bool_)
+    if port.now is not None:
+        found[port.now] = True
+    return found
 
 
 def contacts_of(network: Network, operation: Integrate) -> tuple[Contacts, ...]:
