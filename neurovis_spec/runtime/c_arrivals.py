@@ -24,6 +24,7 @@ from neurovis_spec.language.expressions.emit_c import Value
 from neurovis_spec.language.words import Combine
 from neurovis_spec.runtime.c_code import Code, Form, Place, plus, state_name
 from neurovis_spec.runtime.c_connections import Forming, Some, taken
+from neurovis_spec.runtime.events import Rows, in_order, rows_of
 from neurovis_spec.runtime.signals import SignalLayout
 from neurovis_spec.runtime.stages import taken_by
 
@@ -129,11 +130,15 @@ class Incoming:
     runs: tuple[_Run, ...] = ()
     #: whether none of the weights changes in a step, so that those of runs may be packed
     weights_stay: bool = False
+    #: where spikes are all that comes, the connections by what has fired
+    rows: Rows | None = None
+    #: whether they come to each neuron in the order of its connections then
+    in_order: bool = True
 
 
-def incoming_of(network: Network, port: Port, count: int, fusible: bool = True) -> Incoming:
+def incoming_of(network: Network, port: Port, count: int, fusible: bool = True, spiking: bool = False) -> Incoming:
     """What arrives at a port of a population of ``count`` neurons: worked out once, read by each form of a step.
-    ``fusible``: whether it may be formed where it arrives."""
+    ``fusible``: whether it may be formed where it arrives; ``spiking``: whether spikes are all that comes."""
     connections, incoming, slots = network.connections, port.incoming, port.slots
     delays, rules = connections.delays.some(incoming), connections.rules.some(incoming)
     late = connections.lags is not None and not bool(np.isnan(connections.lags[incoming]).all())
@@ -151,6 +156,10 @@ def incoming_of(network: Network, port: Port, count: int, fusible: bool = True) 
         runs = () if few else _runs(kinds, own, ends)
         stay = bool((rules < 0).all())
         return Incoming(own, ends, degree, False, False, None, factors, port.combine, kinds, runs, stay)
+    if spiking and bool((delays > 0).all()) == bool((delays > 0).any()):
+        fired = rows_of(np.asarray(taken_by(network)[own], dtype=np.int64), connections.delays[own])
+        ordered = in_order(fired, np.repeat(np.arange(count), degrees), own)
+        return Incoming(own, ends, degree, False, False, None, factors, "sum", rows=fired, in_order=ordered)
     full = port.combine == "sum" and degree > 1 and 1 < count <= _BESIDE and len(_different(delays)) == 1 and not late
     if full:
         rows, sent = own.reshape(count, degree), taken_by(network)[own].reshape(count, degree)
@@ -244,6 +253,8 @@ class Arrivals:
             self.lanes, read = incoming.lanes
             self.connections = self.connections[read]
             self.factors = None if self.factors is None else self.factors[read]
+        #: where whatever has fired is gone through in place of all connections, these by that
+        self.rows, self.in_order = None if form.written_out else incoming.rows, incoming.in_order
         self.kinds, self.runs = incoming.kinds, () if form.written_out else incoming.runs
         self.can_be_packed = bool(self.runs) and incoming.weights_stay
         self._packs = form.fused and self.can_be_packed
@@ -291,6 +302,27 @@ class Arrivals:
             read = np.concatenate([run.edges for run in self.runs])
             return np.asarray(self.connections[read], dtype=self.connections.dtype)
         return self.connections if self.can_be_fused and not self.dense else self.connections[:0]
+
+    @cached_property
+    def slots(self) -> IntArray:
+        """The neuron of each connection: its place in the population."""
+        return np.repeat(np.arange(self.count), np.diff(self.ends))
+
+    def add_spike(self, total: str, edge: Place, column: _Column, sent: str, ago: str) -> None:
+        """Lines that add what one connection brings, of a spike of so many steps ago (now where nothing is said), which
+        ``sent`` is."""
+        code, connections = self.code, self.connections[column]
+        connection = code.at(connections, edge)
+        conditions = [f"!gone[{connection}]"] if self.form.gone else []
+        weighted = not ago or bool(self.shares[column].all())
+        if ago and weighted and self.form.lost:
+            conditions.append(f"k - {ago} >= lost[{connection}]")
+        term = f"weights[{connection}]*{sent}" if weighted else self._signal(edge, column)
+        if self.factors is not None:
+            term = f"{term}*{self._operand(code.number(self.factors[column], edge))}"
+        if conditions:
+            code.line(f"if ({' && '.join(conditions)})")
+        code.line(f"{'    ' if conditions else ''}{total} += {term};")
 
     @contextmanager
     def beside(self, lanes: _Lanes) -> Iterator[tuple[Place, str]]:

@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, Indices, IntArray
+from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray
 from neurovis_spec.compiler.events.settable import HIGH, LOW, bias_of
 from neurovis_spec.compiler.network import Input, Network, Outlet
 from neurovis_spec.compiler.program import (
@@ -53,7 +53,8 @@ from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, incoming_of
 from neurovis_spec.runtime.c_code import Code, Form, Place, plus, state_name
 from neurovis_spec.runtime.c_connections import Ends, Forming, Sight, Some, taken, taken_at
 from neurovis_spec.runtime.c_plan import Plan, plan_of
-from neurovis_spec.runtime.events import Rows, rows_of
+from neurovis_spec.runtime.c_spikes import Firing
+from neurovis_spec.runtime.events import are_spikes, rows_of, takes_spikes
 from neurovis_spec.runtime.signals import DelayClass, SharedSlots, SignalLayout
 from neurovis_spec.runtime.stages import acts_now, port_with, signal_of, target_of, unfolded
 from neurovis_spec.runtime.state import Mask
@@ -93,7 +94,7 @@ class Built:
     @cached_property
     def incoming(self) -> list[list[Incoming]]:
         """What arrives at each port of each population, but for spikes of the same step that act behind all."""
-        network = self.network
+        network, spikes = self.network, self.spikes
         return [
             [
                 incoming_of(
@@ -101,11 +102,17 @@ class Built:
                     port if port.now is None else port_with(port, ~acts_now(port)),
                     len(one.members),
                     fusible=network.sending is None and _plain(one),
+                    spiking=takes_spikes(network, port, spikes),
                 )
                 for port in one.ports
             ]
             for one in network.populations
         ]
+
+    @cached_property
+    def spikes(self) -> BoolArray:
+        """Which of all activities and outlets are spikes."""
+        return are_spikes(self.network)
 
     @cached_property
     def now(self) -> list[list[Incoming | None]]:
@@ -114,7 +121,7 @@ class Built:
             [
                 None
                 if port.now is None
-                else incoming_of(self.network, port_with(port, acts_now(port)), len(one.members), fusible=False)
+                else incoming_of(self.network, port_with(port, acts_now(port)), len(one.members), False, spiking=True)
                 for port in one.ports
             ]
             for one in self.network.populations
@@ -131,6 +138,7 @@ class StepCode:
         #: what formulas of synapses see before their targets are updated, and those of rules behind all
         self.sight, self.behind = Sight(built.ends, code, form), Sight(built.ends, code, form, sent=True)
         synapses = ((number, one) for number, one in enumerate(network.projections) if one.kind == SYNAPSE)
+        self.firing = Firing(built.ends, built.spikes, code, form)
         self.forming = forming = Forming(self.sight, {number: signal_of(one) for number, one in synapses})
         #: what ports have beside what arrives, by their names
         self.own = {name: _own(network, name) for name in network.port_names}
@@ -284,7 +292,7 @@ class StepCode:
                 with code.block(""):
                     body(place, _NO_TOTALS)
             return
-        ahead = {one: own for one, own in arrivals.items() if own.dense or own.lanes is not None}
+        ahead = {one: own for one, own in arrivals.items() if own.dense or (own.lanes or own.rows) is not None}
         first = next(iter(ahead), None)
         beside = first is not None and ahead[first].lanes is not None
         summed = {one: own for one, own in ahead.items() if one != first or not beside}
@@ -302,6 +310,10 @@ class StepCode:
     def summed(self, arrivals: Arrivals, count: int) -> str:
         """What arrives at a port of all neurons of a population, combined: the name of an array."""
         name = self.array(count)
+        if arrivals.rows is not None:
+            marks = "" if arrivals.in_order else self.array(-(-len(arrivals.connections) // 64))
+            self.firing.add_up(arrivals, arrivals.rows, name, marks)
+            return name
         if arrivals.dense:
             arrivals.matrix(name)
         else:
@@ -369,7 +381,7 @@ class StepCode:
     def jump_now(self, number: int) -> None:
         """The states of a population that jump by spikes of the same step, which ports hold alone."""
         population, code = self.network.populations[number], self.code
-        made = replace(population.model.definition.during(("jump_now",)), gives=())
+        made = replace(population.model.definition.during(["jump_now"]), gives=())
         read = self._read_in(made)
         arrivals = {
             one: Arrivals(self.network, incoming, code, self.form, self.layout, self.forming)
@@ -418,7 +430,7 @@ class StepCode:
         """What of the model of a population is carried out at its update, one behind the other; the last gives the
         activity and the outputs."""
         made = self.network.populations[number].model.definition
-        ahead = (replace(made.during((phase,)), gives=()) for phase in self.phases[number])
+        ahead = (replace(made.during([phase]), gives=()) for phase in self.phases[number])
         return *ahead, made.at_update
 
     def _read_in(self, made: Definition) -> frozenset[str]:
@@ -617,9 +629,13 @@ class StepCode:
         which = ~self.fuses if self.form.fused else np.ones(len(self.fuses), dtype=np.bool_)
         for number in self.sent_with:
             which[self.network.projections[number].members] = False
+        if not self.form.written_out:
+            spikes = which & self.firing.own(self.layout)
+            self.firing.leave(spikes, self.layout)
+            which &= ~spikes
         self.leave(which)
         for slots in self.layout.shared:
-            self.store_each(len(slots.sent), partial(self.sharing, slots))
+            self.share(slots)
         for one in self.layout.rings:
             self.fill(one)
         if depth := self.sight.ends.depth:
@@ -628,6 +644,21 @@ class StepCode:
             code.line(f"memcpy(history + {row}, activity, {n}*sizeof(activity[0]));")
             if beside:
                 code.line(f"memcpy(history + {row} + {n}, outlets, {beside}*sizeof(outlets[0]));")
+
+    def share(self, slots: SharedSlots) -> None:
+        """What is sent to all connections that share it; of spikes where something fires, or did when that left which
+        is there."""
+        spikes = self.firing.spikes[slots.sent]
+        if self.form.written_out or not spikes.any():
+            self.store_each(len(slots.sent), partial(self.sharing, slots))
+            return
+        code, places = self.code, slots.start + slots.length * np.arange(len(slots.sent))
+        at = np.flatnonzero(spikes)
+        rows = rows_of(slots.sent[at].astype(np.int64), np.full(len(at), slots.delay))
+        with self.firing.now_or_then(rows) as now:
+            code.line(f"signals[{code.at(places[at][rows.order], 'r')} + k % ago] = {now};")
+        others = np.flatnonzero(~spikes)
+        self.store_each(len(others), lambda place: self.sharing(slots, place, others))
 
     def fill(self, slots: DelayClass | SharedSlots) -> None:
         """With a continuous delay what comes before the first step is what is sent there."""
@@ -654,12 +685,12 @@ class StepCode:
         signal = f"weights[{code.at(members, place)}]*{taken(self.network, code, members, place)}"
         return f"signals[{slot}{shift}]", signal
 
-    def sharing(self, slots: SharedSlots, place: Place) -> tuple[str, Value]:
-        """What is sent to all connections that share it: its slot, and what leaves."""
+    def sharing(self, slots: SharedSlots, place: Place, some: Indices | slice = slice(None)) -> tuple[str, Value]:
+        """What is sent to all connections that share it, or to those that share ``some``: its slot, and what leaves."""
         code = self.code
-        slot = code.at(np.arange(slots.start, slots.stop, slots.length), place)
+        slot = code.at(np.arange(slots.start, slots.stop, slots.length)[some], place)
         shift = "" if slots.length == 1 else f" + {code.remainder(slots.length)}"
-        return f"signals[{slot}{shift}]", taken_at(self.network, code, slots.sent, place)
+        return f"signals[{slot}{shift}]", taken_at(self.network, code, slots.sent[some], place)
 
     # ---- connections -------------------------------------------------------------------------------------------
 
@@ -695,7 +726,7 @@ class StepCode:
         code, members = self.code, projection.members
         end, delays = sight.end_at(projection)
         rows = rows_of(end.places, delays)
-        with self.fired(rows, sight.sent or bool(delays.all())) as (ago, row):
+        with self.firing.before(rows, sight.sent or bool(delays.all())) as (ago, row, _):
             starts, order = code.tables.name(rows.starts), code.at(rows.order, "e")
             with code.block(code.loop("e", f"{starts}[{row} + 1]", f"{starts}[{row}]")):
                 code.line(f"const int32_t q = {order};")
@@ -703,27 +734,6 @@ class StepCode:
                     code.line(f"if (k - {ago} < lost[{code.at(members, 'q')}])")
                     code.line("    continue;")
                 yield "q"
-
-    @contextmanager
-    def fired(self, rows: Rows, remembered: bool) -> Iterator[tuple[str, str]]:
-        """The body of a loop over the rows of what has fired: how many steps ago, "" for now, and which row. What has
-        been sent is in the history, where it is ``remembered``; with delays of 0 alone it is what is now."""
-        code, depth = self.code, self.built.ends.depth
-        if not remembered or not rows.delays.any():
-            with code.block(code.loop("r", len(rows.ends))):
-                code.line(f"if ({taken_at(self.network, code, rows.ends, 'r')} == 0)")
-                code.line("    continue;")
-                yield "", "r"
-            return
-        n = len(self.network.neurons) + self.network.outlet_count
-        firsts = code.tables.name(rows.firsts)
-        with code.block(code.loop("d", len(rows.delays))):
-            code.line(f"const int32_t ago = {code.at(rows.delays, 'd')};")
-            code.line(f"const {code.real} *const h = history + (size_t)((k + {depth} - ago) % {depth})*{n};")
-            with code.block(code.loop("r", f"{firsts}[d + 1]", f"{firsts}[d]")):
-                code.line(f"if (h[{code.at(rows.ends, 'r')}] == 0)")
-                code.line("    continue;")
-                yield "ago", "r"
 
     def signals(self) -> None:
         """The signal of each connection with a synapse as it is behind a step, into ``formed``; 0 of one that is left

@@ -10,7 +10,41 @@ from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.arrays import Indices, IntArray
+from neurovis_spec.arrays import BoolArray, Indices, IntArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import SPIKE, Population, Port
+from neurovis_spec.language.expressions.tree import Name
+
+
+def are_spikes(network: Network) -> BoolArray:
+    """For the activities of all neurons and the outlets behind them whether they are spikes."""
+    n = len(network.neurons)
+    found = np.zeros(n + network.outlet_count, dtype=np.bool_)
+    for population in network.populations:
+        if is_spike(population, "activity"):
+            found[population.members] = True
+    for one in network.outlets:
+        population = network.populations[one.population]
+        start = n + one.start
+        found[start : start + len(population.members)] = is_spike(population, one.name)
+    return found
+
+
+def is_spike(population: Population, name: str) -> bool:
+    """Whether the activity, an output or a state of a population is its spike."""
+    made = population.model.definition
+    formulas = {one.name: one.each_step for one in made.gives}
+    return made.fires and (name == SPIKE or formulas.get(name) == Name(SPIKE))
+
+
+def takes_spikes(network: Network, port: Port, spikes: BoolArray) -> bool:
+    """Whether spikes are all that comes to a port, and are added up there. ``spikes``: what of all that can be taken is
+    one."""
+    if port.combine != "sum" or not len(port.incoming) or not spikes.any():
+        return False
+    sources = network.connections.sources
+    taken = sources.some(port.incoming) if network.sending is None else network.sending[port.incoming]
+    return bool(spikes[taken].all() and (network.synapses.numbers[port.incoming] < 0).all())
 
 
 class Rows(NamedTuple):
@@ -43,3 +77,10 @@ def rows_of(ends: IntArray, delays: IntArray) -> Rows:
         np.append(new, len(ends)),
         order,
     )
+
+
+def in_order(rows: Rows, slots: Indices, connections: Indices) -> bool:
+    """Whether what comes to each of the ``slots`` is in the order of its connections, row by row."""
+    by_slot = np.argsort(slots[rows.order], kind="stable")
+    same = np.diff(slots[rows.order][by_slot]) == 0
+    return bool((np.diff(connections[rows.order][by_slot])[same] > 0).all())
