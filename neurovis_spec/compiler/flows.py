@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-from neurovis_spec.compiler.program import MODEL, SLOPE_F, Definition, Quantity, ports_of
+from neurovis_spec.compiler.program import MODEL, SLOPE_F, SPIKE, Definition, Quantity, ports_of
 from neurovis_spec.language.expressions.derivative import derivative, slope
 from neurovis_spec.language.expressions.tree import Name, Number, Tree, names
 from neurovis_spec.language.words import Method
@@ -68,6 +68,23 @@ def ports_read_by(definition: Definition) -> PortsRead:
 def sent_by(model: Definition, sends: str) -> str:
     """What a connection takes of a neuron of this model that is told to take this; "" is what the model sends."""
     return sends or model.send or MODEL.gives
+
+
+def is_spike(model: Definition, sent: str) -> bool:
+    """Whether what a model sends is its spike: that state, or what is nothing else."""
+    sent = sent_by(model, sent)
+    let = dict(model.let)
+    tree: Tree | None = next((one.each_step for one in model.gives if one.name == sent), Name(sent))
+    while isinstance(tree, Name) and tree.name in let:
+        tree = let[tree.name]
+    return model.fires and tree == Name(SPIKE)
+
+
+def reads_spike(model: Definition, sent: str) -> bool:
+    """Whether what a model sends is its spike, or made of that."""
+    sent = sent_by(model, sent)
+    formulas = [one.each_step for one in model.gives if one.name == sent]
+    return model.fires and SPIKE in reads(model, formulas or [Name(sent)])
 
 
 def flows_by(definition: Definition, sent: str) -> frozenset[str] | None:

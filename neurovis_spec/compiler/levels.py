@@ -27,6 +27,7 @@ from neurovis_spec.arrays import BoolArray, Indices, IntArray
 from neurovis_spec.compiler.flows import (
     PortsRead,
     flows_by,
+    is_spike,
     known_behind_flow,
     plain_flow,
     ports_read_by,
@@ -45,6 +46,8 @@ def default_delay(
     is sent is made of what flows there alone, and a derivative of the target reads what arrives; with a synapse where
     all that this reads of the source is made so; else 1."""
     if synapse is not None:
+        if synapse.has("on_pre"):
+            return 1
         return 0 if all(plain_flow(source, name) for name in read_at("pre", synapse, sends)) else 1
     if not source.flows or ports_read_by(target).flow.isdisjoint(ports):
         return 1
@@ -85,6 +88,8 @@ class Order(NamedTuple):
     level: IntArray
     stage: IntArray
     stages: Stages | None = None
+    #: by ports which signals of their Line are spikes that act behind all of a step, so that nobody waits for them
+    now: Mapping[str, BoolArray] = MappingProxyType({})
 
 
 def order_of(
@@ -95,13 +100,46 @@ def order_of(
     if wired.flow or any(one.flows for one in models):
         return _Coupled(models, model, wired, held).order
     level: IntArray | Cycle = np.zeros(len(model), dtype=np.int64)
+    now: Mapping[str, BoolArray] = {}
     if (wired.delays.kept == 0).any():
         waited_for = wired.undelayed
         if wired.synapses:
             waited_for = waited_for & Taken(models, model, wired).waited_for
+        now = acting_now(models, model, wired)
+        waited_for = waited_for & ~_all_now(wired, now)
         undelayed = np.flatnonzero(waited_for)
         level = levels_along(len(model), undelayed, wired.sources.some(undelayed), wired.targets.some(undelayed))
-    return level if isinstance(level, Cycle) else Order(level, np.zeros(len(model), dtype=np.int64))
+    return level if isinstance(level, Cycle) else Order(level, np.zeros(len(model), dtype=np.int64), now=now)
+
+
+def acting_now(models: Sequence[Definition], model: Indices, wired: Wired) -> dict[str, BoolArray]:
+    """By ports which connections of their Line bring spikes without delay to neurons whose states jump by them, and
+    that read the port nowhere else: they act behind all spikes of the step. Ports without any are left out."""
+    if not any(one.fires for one in models) or not wired.undelayed.any():
+        return {}
+    taken = Taken(models, model, wired)
+    plain = wired.undelayed & ~taken.of_entries(lambda synapse: True)
+    spikes = plain & taken.all("pre", taken.of_models(is_spike))
+    result = {}
+    for port, line in wired.lines.items():
+        reading = [ports_read_by(one) for one in models]
+        alone = np.array([port in one.jump - one.update - one.flow for one in reading], dtype=np.bool_)[model]
+        connections = slice(None) if line.connections is None else line.connections
+        found = spikes[connections] & alone[wired.targets.compact()[connections]]
+        if found.any():
+            result[port] = np.asarray(found)
+    return result
+
+
+def _all_now(wired: Wired, now: Mapping[str, BoolArray]) -> BoolArray:
+    """The connections (m,) all of whose ports are among those."""
+    counts = np.zeros(len(wired.entry), dtype=np.int64)
+    for port, line in wired.lines.items():
+        connections = slice(None) if line.connections is None else line.connections
+        counts[connections] += 1
+        if port in now:
+            counts[connections] -= now[port]
+    return np.asarray(counts == 0)
 
 
 class _Open(NamedTuple):
@@ -205,7 +243,19 @@ class _Coupled:
     @cached_property
     def by_update(self) -> dict[str, BoolArray]:
         """By ports for each neuron whether what is made once a step reads it."""
-        return {port: self._of_neurons(port, [one.update for one in self.reads]) for port in self.wired.lines}
+        return {port: self._of_neurons(port, [one.once for one in self.reads]) for port in self.wired.lines}
+
+    @cached_property
+    def acting_now(self) -> dict[str, BoolArray]:
+        """By ports which connections of their Line bring spikes that act behind all of the step."""
+        return acting_now(self.models, self.model, self.wired)
+
+    def _updated(self, port: str) -> BoolArray:
+        """For each of the open connections to a port whether what it brings is read once a step, where its target is
+        updated."""
+        among, _, _, targets = self.open[port]
+        result = self.by_update[port][targets]
+        return result & ~self.acting_now[port][among] if port in self.acting_now else result
 
     @cached_property
     def through(self) -> dict[str, BoolArray]:
@@ -298,13 +348,15 @@ class _Coupled:
             staged[port] = np.zeros(len(among), dtype=np.bool_)
             staged[port][among] = self.staged[port]
         made, ahead = self._taken_at_stages(), self._ahead(known)
-        return Order(level[:n], stage, Stages(int(level[n]), staged, made, ahead, self._lagging()))
+        stages = Stages(int(level[n]), staged, made, ahead, self._lagging())
+        return Order(level[:n], stage, stages, self.acting_now)
 
     def _lagging(self) -> BoolArray | None:
         """The connections (m,) with a delay in seconds that bring anew at each stage what flows; None without any."""
         if self.wired.timed is None:
             return None
-        result = self.making & self.wired.timed & self.taken.all("pre", self._flowing[0])
+        result = self.making & self.wired.timed & self.taken.all("pre", self._flowing[0]) & self.taken.waited_for
+        result &= ~self.taken.of_entries(lambda synapse: synapse.has("on_pre"))
         return result if result.any() else None
 
     def _taken_at_stages(self) -> BoolArray:
@@ -350,8 +402,8 @@ class _Coupled:
         """For each connection whether what it takes is needed once a step: for a port of the target that is read then,
         or for states of its synapse."""
         result = self.receiving.copy()
-        for port, (_, connections, _, targets) in self.open.items():
-            result[connections[self.by_update[port][targets]]] = True
+        for port, (_, connections, _, _) in self.open.items():
+            result[connections[self._updated(port)]] = True
         return result
 
     def _stages(self) -> IntArray | Cycle:
@@ -387,7 +439,7 @@ class _Coupled:
         ]
         waited_for, held = self.wired.undelayed & taken.waited_for, ~taken.all("pre", self._flowing[0])
         for port, (_, connections, sources, targets) in self.open.items():
-            updated = self.by_update[port][targets] | self.receiving[connections]
+            updated = self._updated(port) | self.receiving[connections]
             now = updated & waited_for[connections]
             begins = np.where(known[connections], integration, sources)
             edges.append((connections[now], begins[now], targets[now]))

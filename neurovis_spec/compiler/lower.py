@@ -17,9 +17,12 @@ from neurovis_spec.compiler.levels import Order, Stages
 from neurovis_spec.compiler.neurons.groups import Built
 from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.program import (
+    AT_SPIKE,
     DRIVE,
     PHASES,
     RULE,
+    SYNAPSE,
+    Advance,
     Diffuse,
     Gather,
     Integrate,
@@ -60,47 +63,81 @@ def make_program(
     if order.stages is not None:
         before = sum(population.level < order.stages.level for population in populations)
         integration = _integration(populations, projected.projections, order.stages, by)
-    updates: list[list[Operation]] = [[Gather(number), Update(number)] for number in range(len(populations))]
+    updates = [_updating(number, one) for number, one in enumerate(populations)]
+    behind = _at_once(populations, projected.projections)
     learning = _learning(projected.projections)
-    program = ReadInputs(), *chain(*updates[:before]), *integration, *chain(*updates[before:]), Send(), *learning
+    program = (
+        ReadInputs(),
+        *chain(*updates[:before]),
+        *integration,
+        *chain(*updates[before:]),
+        *behind,
+        Send(),
+        *learning,
+    )
     return receiving(program, projected.projections, projected.targets)
+
+
+def _updating(number: int, population: Population) -> list[Operation]:
+    """What becomes of a population, behind the integration of its states."""
+    model = population.model.definition
+    ahead: list[Operation] = [Advance(number, "jump")] if model.has("jump") else []
+    if model.fires:
+        ahead += [Advance(number, "each_step")] if model.has("each_step") else []
+        ahead.append(Advance(number, "fire"))
+    return [Gather(number), *ahead, Update(number)]
+
+
+def _at_once(populations: tuple[Population, ...], projections: tuple[Projection, ...]) -> Iterator[Operation]:
+    """What spikes do that are without delay, behind all of them."""
+    for number, one in enumerate(projections):
+        if one.kind == SYNAPSE and one.at_once:
+            yield Receive(number, ("on_pre",))
+    for number, population in enumerate(populations):
+        if any(port.now is not None for port in population.ports):
+            yield from (Gather(number, now=True), Advance(number, "jump_now"))
 
 
 def receiving(
     program: Iterable[Operation], projections: Sequence[Projection], targets: Mapping[int, int]
 ) -> tuple[Operation, ...]:
     """The program in which what of the states of synapses is made once a step is: an episode's end of it when their
-    targets are updated, the rest before anything is gathered for these. ``targets`` are their populations, by the
-    numbers of the projections."""
+    targets are updated, the rest before anything is gathered for these, first what arriving spikes do. ``targets`` are
+    their populations, by the numbers of the projections."""
     made: list[Operation] = []
     for operation in program:
-        if isinstance(operation, Receive):
+        if isinstance(operation, Receive) and not projections[operation.projection].at_once:
             continue
         made.append(operation)
-        if isinstance(operation, Gather | Update):
-            phase: Phase = "each_step" if isinstance(operation, Gather) else "each_episode"
+        if isinstance(operation, Gather | Update) and operation != Gather(operation.population, now=True):
+            phases: tuple[Phase, ...] = ("each_episode",)
+            if isinstance(operation, Gather):
+                phases = "on_pre", "each_step"
             place = len(made) - isinstance(operation, Gather)
             made[place:place] = [
                 Receive(number, (phase,))
+                for phase in phases
                 for number, target in targets.items()
                 if target == operation.population
-                and any(getattr(one, phase) is not None for one in projections[number].use.definition.state)
+                and projections[number].use.definition.has(phase)
+                and not (phase == "on_pre" and projections[number].at_once)
             ]
     return tuple(made)
 
 
 def _learning(projections: tuple[Projection, ...]) -> Iterator[Operation]:
-    """The rules of all connections. Where some have several, a phase of all comes before the next, in the order in
-    which connections have them."""
+    """The rules of all connections. Where some have several, or spikes change something, a phase of all comes before
+    the next, in the order in which connections have them."""
     rules = [number for number, one in enumerate(projections) if one.kind == RULE]
-    if not any(projections[number].place for number in rules):
+    spiking = any(one.acts for number in rules for one in projections[number].use.definition.lasting)
+    if not spiking and not any(projections[number].place for number in rules):
         yield from map(Learn, rules)
         return
-    for phase in PHASES:
+    for phase in (*AT_SPIKE, *PHASES):
         for number in sorted(rules, key=lambda number: projections[number].place):
             definition = projections[number].use.definition
-            ends = [one.each_episode for one in definition.lasting]
-            if any(tree is not None for tree in (definition.steps.values() if phase == "each_step" else ends)):
+            along = phase == "each_step" and any(tree is not None for tree in definition.steps.values())
+            if along or definition.has(phase):
                 yield Learn(number, (phase,))
 
 
@@ -167,6 +204,7 @@ class _Arriving(NamedTuple):
     slots: Indices
     factors: FloatArray | None = None
     staged: Indices | None = None
+    now: Indices | None = None
 
 
 _NOTHING = _Arriving(frozen(np.zeros(0, dtype=np.int8)), frozen(np.zeros(0, dtype=np.int8)))
@@ -190,12 +228,14 @@ def _arriving(
         for at in _split(population_of[ends], count):
             incoming = at if connections is None else connections[at]
             anew = None if staged is None else np.flatnonzero(staged[at])
+            now = np.flatnonzero(order.now[port][at]) if port in order.now else None
             result[port].append(
                 _Arriving(
                     incoming=frozen(incoming),
                     slots=frozen(places[ends[at]]),
                     factors=None if factors is None or (factors[at] == 1).all() else frozen(factors[at]),
                     staged=None if anew is None or not len(anew) else frozen(anew),
+                    now=None if now is None or not len(now) else frozen(now),
                 )
             )
     return result

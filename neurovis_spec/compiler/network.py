@@ -20,10 +20,13 @@ from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
 from neurovis_spec.compiler.events.changes import Change
 from neurovis_spec.compiler.events.settable import Binding, ParameterFormula, Part, Settable
+from neurovis_spec.compiler.flows import is_spike
 from neurovis_spec.compiler.names.state_references import StateOf
 from neurovis_spec.compiler.program import (
     DRIVE,
+    MODEL,
     RULE,
+    SPIKE,
     SYNAPSE,
     Definition,
     Each,
@@ -267,6 +270,8 @@ def outlets_of(populations: Sequence[Population], asked: Collection[str]) -> tup
     for number, population in enumerate(populations):
         model = population.model.definition
         for one in model.kept if asked or model.send else ():
+            if is_spike(model, MODEL.gives) and one.name == SPIKE:
+                continue  # the activity is that
             if one.name in asked or one.name == model.send:
                 found.append(Outlet(number, one.name, start))
                 start += len(population.members)

@@ -398,6 +398,8 @@ class Projection:
     #: the name of an end (``pre.spike``, ``post.spike``) that must not be 0 of a connection for anything of it to be
     #: carried out; "" where all are
     when: str = ""
+    #: of a synapse that spikes change whether its connections have no delay, so that they do behind all of the step
+    at_once: bool = False
 
     @property
     def asks(self) -> frozenset[str]:

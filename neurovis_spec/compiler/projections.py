@@ -38,6 +38,7 @@ class _Alike(NamedTuple):
     parameters: tuple[str, ...]
     place: int
     population: int = -1
+    at_once: bool = False
 
 
 class _Some(NamedTuple):
@@ -67,7 +68,7 @@ def make_projections(made: Connected, populations: tuple[Population, ...]) -> Pr
         for use in bundle.uses:
             for piece in use.pieces:
                 of_kind = found[piece.definition.kind.name]
-                for key, inside in _alike(use, piece, bundle.targets, population_of):
+                for key, inside in _alike(use, piece, bundle, population_of):
                     some = _Some(use, piece, start + piece.places[inside], inside)
                     of_kind.setdefault(key, []).append(some)
         start += len(bundle.sources)
@@ -80,18 +81,22 @@ def make_projections(made: Connected, populations: tuple[Population, ...]) -> Pr
 
 
 def _alike(
-    use: InUse, piece: Piece, targets: Indices, population_of: IntArray
+    use: InUse, piece: Piece, bundle: Bundle, population_of: IntArray
 ) -> Iterator[tuple[_Alike, IntArray | slice]]:
-    """The connections of a piece by what projections they are members of. ``targets``: of all of its entry."""
+    """The connections of a piece by what projections they are members of."""
     definition = piece.definition
     read = {name.text for name in definition.end_names}
     names = definition.kind.name, definition.name, tuple(one for one in definition.parameters if one in read)
     if definition.kind == RULE:
         yield _Alike(*names, use.place), slice(None)
         return
-    populations = population_of[targets[piece.places]]
+    populations = population_of[bundle.targets[piece.places]]
+    at_once = np.asarray(bundle.delays[piece.places] == 0) & definition.has("on_pre")
     for population in np.flatnonzero(np.bincount(populations)).tolist():
-        yield _Alike(*names, use.place, population), np.flatnonzero(populations == population)
+        for now in (False, True):
+            inside = np.flatnonzero((populations == population) & (at_once == now))
+            if len(inside):
+                yield _Alike(*names, use.place, population, now), inside
 
 
 def _asked(bundles: Sequence[Bundle]) -> set[str]:
@@ -157,4 +162,4 @@ def _projection(number: int, key: _Alike, some: list[_Some], ends: _Ends) -> Pro
     names = frozenset(name for one in some for signal in one.use.signals.values() for name in signal.states)
     read = {name.text: frozen(ends.read(name, members)) for name in first.piece.read}
     use = Use(Owner(definition.kind.name, number), definition, parameters)
-    return Projection(members, (use,), signals, read, key.place, names)
+    return Projection(members, (use,), signals, read, key.place, names, at_once=key.at_once)

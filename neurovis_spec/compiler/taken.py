@@ -17,7 +17,7 @@ import numpy as np
 from neurovis_spec.arrays import BoolArray, FloatArray, Indices, IntArray, IntColumn, frozen, narrow
 from neurovis_spec.compiler.flows import sent_by
 from neurovis_spec.compiler.network import PLAIN_ROUTE, Route
-from neurovis_spec.compiler.program import DRIVE, MODEL, Definition
+from neurovis_spec.compiler.program import DRIVE, MODEL, PHASES, Definition
 
 #: An end of a connection.
 Side: TypeAlias = Literal["pre", "post"]
@@ -28,6 +28,7 @@ _NOTHING: Final = 0
 def read_at(side: Side, definition: Definition, sends: str) -> tuple[str, ...]:
     """What a definition of connections reads of an end, by the names of that neuron's model: what is sent is ``sends``,
     as a Route has it."""
+    definition = definition.during(PHASES)  # what spikes change is changed behind what orders a step
     found = dict.fromkeys(one.name for one in definition.end_names if one.side == side)
     read = definition.read
     if side == "pre" and not read.isdisjoint(("pre", "sent")):

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from neurovis_spec.arrays import BoolArray, Indices, IntArray
+from neurovis_spec.compiler.flows import is_spike
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import SPIKE, Population, Port
-from neurovis_spec.language.expressions.tree import Name
+from neurovis_spec.compiler.program import MODEL, Port
 
 
 def are_spikes(network: Network) -> BoolArray:
@@ -21,20 +21,12 @@ def are_spikes(network: Network) -> BoolArray:
     n = len(network.neurons)
     found = np.zeros(n + network.outlet_count, dtype=np.bool_)
     for population in network.populations:
-        if is_spike(population, "activity"):
-            found[population.members] = True
+        found[population.members] = is_spike(population.model.definition, MODEL.gives)
     for one in network.outlets:
         population = network.populations[one.population]
         start = n + one.start
-        found[start : start + len(population.members)] = is_spike(population, one.name)
+        found[start : start + len(population.members)] = is_spike(population.model.definition, one.name)
     return found
-
-
-def is_spike(population: Population, name: str) -> bool:
-    """Whether the activity, an output or a state of a population is its spike."""
-    made = population.model.definition
-    formulas = {one.name: one.each_step for one in made.gives}
-    return made.fires and (name == SPIKE or formulas.get(name) == Name(SPIKE))
 
 
 def takes_spikes(network: Network, port: Port, spikes: BoolArray) -> bool:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import singledispatch
 from typing import NamedTuple
 
@@ -19,6 +20,7 @@ from neurovis_spec.compiler.network import Network, Outlet
 from neurovis_spec.compiler.program import (
     CENTRE,
     MODEL,
+    Advance,
     Diffuse,
     Gather,
     Integrate,
@@ -39,7 +41,7 @@ from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.backend import Availability, Capabilities
 from neurovis_spec.runtime.reference_flows import Flow
 from neurovis_spec.runtime.reference_seen import NO_FUNCTIONS, Functions, NetworkArray, Seen, is_first, with_let
-from neurovis_spec.runtime.stages import formulas_of, given
+from neurovis_spec.runtime.stages import acts_now, formulas_of, given
 from neurovis_spec.runtime.state import State
 
 
@@ -88,15 +90,17 @@ class ReferenceStepper(Seen):
             perform(operation, self, state, inputs)
         state.k += 1
 
-    def gather(self, population: Population, state: State, inputs: FloatArray) -> dict[str, list[float]]:
-        """What each member is given at each port: what arrives, combined, + bias + input + noise."""
+    def gather(
+        self, population: Population, state: State, inputs: FloatArray, now: bool = False
+    ) -> dict[str, list[float]]:
+        """What each member is given at each port: what arrives, combined, + bias + input + noise; of spikes that act
+        ``now``, behind all others, these alone."""
         self.hold_states(population.model, state)
-        return {
-            port.name: self.given(
-                population, port, self.signals(port, range(len(port.incoming)), state), state, inputs.tolist()
-            )
-            for port in population.ports
-        }
+        result = {}
+        for port in population.ports:
+            signals = self.signals(port, np.flatnonzero(acts_now(port) == now).tolist(), state)
+            result[port.name] = self.given(population, port, signals, state, None if now else inputs.tolist())
+        return result
 
     def update(self, number: int, ports: Mapping[str, Sequence[float]], state: State) -> None:
         """The states of a population from old states and the ports, then outputs and activities from the new ones, and
@@ -117,6 +121,18 @@ class ReferenceStepper(Seen):
         for outlet in network.outlets:
             if outlet.population == number:
                 self.let_out(outlet, state.cells[population.model.owner][outlet.name], state)
+
+    def advance_in(self, operation: Advance, state: State) -> None:
+        """What becomes of the states of a population in a phase before its update, from old values and the ports."""
+        if is_first(state):
+            return
+        population, ports = self.network.populations[operation.population], self.ports[operation.population]
+        definition = replace(population.model.definition.during([operation.phase]), gives=())
+        use = replace(population.model, definition=definition)
+        self.hold_states(use, state)
+        for position in range(len(population.members)):
+            seen = self.known(use, position, state) | {name: values[position] for name, values in ports.items()}
+            self.change(use, position, seen, state, {}, self.functions_of(population, position, state))
 
     def hold_states(self, use: Use, state: State) -> None:
         """The states of a definition in use that are held, at what they are held at."""
@@ -148,7 +164,8 @@ class ReferenceStepper(Seen):
         """One neuron's step: its states and outputs are replaced, its activity is returned."""
         seen = self.known(population.model, position, state) | ports
         functions = self.functions_of(population, position, state)
-        return self.change(population.model, position, seen, state, {}, functions)["activity"]
+        use = replace(population.model, definition=population.model.definition.at_update)
+        return self.change(use, position, seen, state, {}, functions)["activity"]
 
     def change(
         self,
@@ -177,8 +194,8 @@ class ReferenceStepper(Seen):
             ends = [(one.name, one.each_episode) for one in definition.lasting]
             new = changed(new, ends, with_let({**seen, **new}, definition.let, functions), lasting, functions) | fixed
             results = results | new
-        for name, values in cells.items():
-            values[position] = results[name]
+        for name in cells.keys() & results.keys():
+            cells[name][position] = results[name]
         return results
 
     def fixed(self, use: Use, position: int, state: State) -> dict[str, float]:
@@ -214,6 +231,8 @@ class ReferenceStepper(Seen):
         for position, connection in enumerate(projection.members.tolist()):
             if not state.conditions.structure.gone[connection]:
                 seen = self.known(projection.use, position, state) | self.before_update(projection, position, state)
+                if projection.when and not seen[projection.when]:
+                    continue
                 seen["weight"] = float(state.weights[connection])
                 self.change(projection.use, position, seen, state, {})
 
@@ -235,6 +254,8 @@ class ReferenceStepper(Seen):
             return self.at(index, state) if index < behind else float(inputs[index - behind])
 
         seen = self.known(projection.rule, position, state) | self.seen(projection, position, state, now, 1.0)
+        if projection.when and not seen[projection.when]:
+            return
         if projection.rule.definition.moves_centre:
             centre = Bounded(self.centre(connection, state), -math.inf, math.inf)
             self.change(projection.rule, position, seen, state, {CENTRE: centre})
@@ -278,7 +299,13 @@ def _read(operation: ReadInputs, by: ReferenceStepper, state: State, inputs: Flo
 
 @perform.register
 def _gather(operation: Gather, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
-    by.ports[operation.population] = by.gather(by.network.populations[operation.population], state, inputs)
+    population = by.network.populations[operation.population]
+    by.ports[operation.population] = by.gather(population, state, inputs, operation.now)
+
+
+@perform.register
+def _advance(operation: Advance, by: ReferenceStepper, state: State, inputs: FloatArray) -> None:
+    by.advance_in(operation, state)
 
 
 @perform.register

@@ -129,18 +129,26 @@ class Seen:
         return float(state.cells[use.owner][CENTRE][positions[connection]])
 
     def given(
-        self, population: Population, port: Port, signals: Iterable[Signal], state: State, inputs: Sequence[float]
+        self,
+        population: Population,
+        port: Port,
+        signals: Iterable[Signal],
+        state: State,
+        inputs: Sequence[float] | None,
     ) -> list[float]:
-        """What each member is given at a port: these signals, combined in their order, + bias + input + noise."""
+        """What each member is given at a port: these signals, combined in their order, + bias + input + noise; without
+        ``inputs`` the signals alone."""
         arriving: list[list[Signal]] = [[] for _ in population.members]
         for signal in signals:
             arriving[signal.slot].append(signal)
         result = []
         for neuron, own in zip(population.members.tolist(), arriving, strict=True):
-            value = combined(port.combine, own) + self.bias[port.name].at(neuron, state)
-            for fed in self.fed[port.name]:
-                if fed[neuron] >= 0:
-                    value += inputs[fed[neuron]]
+            value = combined(port.combine, own)
+            if inputs is not None:
+                value += self.bias[port.name].at(neuron, state)
+                for fed in self.fed[port.name]:
+                    if fed[neuron] >= 0:
+                        value += inputs[fed[neuron]]
             result.append(value)
         return result
 

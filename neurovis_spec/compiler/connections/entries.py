@@ -27,6 +27,7 @@ from neurovis_spec.compiler.connections.patterns import all_to_all, drawn_alone,
 from neurovis_spec.compiler.connections.plasticity import Learning, rules_of
 from neurovis_spec.compiler.connections.routes import default_delays, route_of
 from neurovis_spec.compiler.connections.signals import ConnectionEnds, Place
+from neurovis_spec.compiler.connections.spikes import SpikeCheck
 from neurovis_spec.compiler.connections.twins import both_ways, doubled, in_turn, one_of_each
 from neurovis_spec.compiler.connections.weight_scale import Scaled, check_scale, scaled
 from neurovis_spec.compiler.events.settable import Assembled, Distance, Part
@@ -255,6 +256,10 @@ class EntryBuilder:
         if self.symmetric:
             into_flow = into_flow | models.into_flow(sources, route)
         check_below_step(delays, into_flow, self.constants)
+        if models.fires:
+            pairs = models.pairs(sources, targets) + (models.pairs(targets, sources) if self.symmetric else [])
+            check = SpikeCheck(route, made, [one.rule for one in rules], pairs, self.key.span, findings)
+            check.check(undelayed=bool((delays.steps == 0).any()))
         if not len(shape.i):  # without connections there is nothing that they would do
             rules, synapse = (), None
         learns = {name: any(one.rule.given.name == name for one in rules) for name in ("weight", "centre")}

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from neurovis_spec.compiler.connections.signals import Signal
 from neurovis_spec.compiler.events.settable import Part
 from neurovis_spec.compiler.neurons.groups import Built, is_written
 from neurovis_spec.compiler.neurons.populate import Census
-from neurovis_spec.compiler.program import MODEL, SYNAPSE, Definition, EndName, ports_of
+from neurovis_spec.compiler.program import MODEL, SPIKE, SYNAPSE, Definition, EndName, ports_of
 from neurovis_spec.compiler.taken import Side, is_kept
 from neurovis_spec.compiler.values.arguments import Settled
 from neurovis_spec.diagnostics import Findings, Home, Span, Undeclared, shorten
@@ -85,6 +85,10 @@ def in_use(settled: Settled, span: Span, at: Joined, findings: Findings) -> InUs
         read = tuple(meaning.name for meaning, one in zip(found, is_parameter, strict=True) if not one)
         pieces.append(Piece(places, grown, values, read))
     return InUse(tuple(pieces), parts) if _sign_is_constant(pieces, span, findings) else UNKNOWN
+
+
+#: What spikes in place of models that make a spike of an activity.
+_SPIKING: Final = {"integrate_and_fire": "lif", "izhikevich": "izhikevich_ode"}
 
 
 class _Meaning(NamedTuple):
@@ -153,6 +157,12 @@ def _report(
 ) -> None:
     """That the model of a group has nothing of a name that a definition reads there, though that of another may."""
     model, what = lacking.kind.model.definition, f"the {definition.kind.name} '{definition.name}' reads {name.text}"
+    if name.name == SPIKE:
+        who, other = "source" if name.side == "pre" else "target", _SPIKING.get(model.name)
+        message = f"the {definition.kind.name} '{definition.name}' needs a {who} that spikes: the model "
+        message += f"'{model.name}' of '{lacking.name}' has no 'spike'"
+        findings.error("spiking-needed", span, message, f"take {other}" if other else "add spike: {when: …} to it")
+        return
     having = next((one for one in groups if _has(one.kind.model.definition, name.name)), None)
     message = f"{what}, and the model '{model.name}' of '{lacking.name}' has no '{shorten(name.name)}'"
     if having is not None:

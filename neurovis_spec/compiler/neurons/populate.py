@@ -68,6 +68,17 @@ class Models:
         """Whether any has a state with a derivative."""
         return any(one.flows for one in self.different)
 
+    @property
+    def fires(self) -> bool:
+        """Whether any fires."""
+        return any(one.fires for one in self.different)
+
+    def pairs(self, sources: Indices, targets: Indices) -> list[tuple[Definition, Definition]]:
+        """The models of both ends of connections, each pair once."""
+        numbers = self.of[sources].astype(np.int64) * len(self.different) + self.of[targets]
+        found = (divmod(number, len(self.different)) for number in np.unique(numbers).tolist())
+        return [(self.different[source], self.different[target]) for source, target in found]
+
 
 class Inside(NamedTuple):
     """A group, and where neurons of it stand among others."""
