@@ -136,7 +136,7 @@ def _compile_sections(spec: Spec, request: Request, findings: Findings) -> _Sect
     check_dt(spec, files, used, findings)
     if declared.integration.method in BY_SLOPE:
         check_slopes(spec, files, used, findings)
-        check_slopes_through(spec, files, census.groups, connected.bundles, findings)
+        check_slopes_through(spec, files, census, connected.bundles, findings)
     finder = finder_of(census, connected, findings)
     render = render_settings(spec.render, finder, constants)
     outputs = make_outputs(spec, finder)

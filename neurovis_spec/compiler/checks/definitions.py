@@ -20,6 +20,7 @@ from neurovis_spec.compiler.flows import jacobian, slope_by, with_slope
 from neurovis_spec.compiler.names.references import key_of, key_span
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.groups import Built
+from neurovis_spec.compiler.neurons.populate import Census
 from neurovis_spec.compiler.program import ACTIVATION, DRIVE, MODEL, RULE, SYNAPSE, Definition, EndName, Kind
 from neurovis_spec.compiler.values.builtin import installed
 from neurovis_spec.compiler.values.constants import value_of
@@ -271,11 +272,11 @@ class _Sloped(NamedTuple):
 
 
 def check_slopes_through(
-    spec: Spec, included: Iterable[Library], groups: Iterable[Built], bundles: Iterable[Bundle], findings: Findings
+    spec: Spec, included: Iterable[Library], census: Census, bundles: Iterable[Bundle], findings: Findings
 ) -> None:
     """Report the same of what a synapse makes of a state of its target, and of what the target makes of that."""
-    groups, libraries, told = list(groups), (spec, *included), set[tuple[str, str, str]]()
-    for one in (sloped for bundle in bundles for sloped in _sloped_through(bundle, groups)):
+    libraries, told = (spec, *included), set[tuple[str, str, str]]()
+    for one in (sloped for bundle in bundles for sloped in _sloped_through(bundle, census)):
         key = one.used.definition.name, one.formula, one.by
         if key in told:
             continue
@@ -286,18 +287,17 @@ def check_slopes_through(
             _slope_too_long(one.what, error, one.used.place_of(one.formula, libraries), findings)
 
 
-def _sloped_through(bundle: Bundle, groups: Iterable[Built]) -> Iterator[_Sloped]:
+def _sloped_through(bundle: Bundle, census: Census) -> Iterator[_Sloped]:
     """What a synapse of an entry brings, by the states of its targets that it reads; and the derivatives of these by
     the ports where that arrives."""
     made = (one.definition for use in bundle.uses for one in use.pieces if one.definition.kind == SYNAPSE)
     synapse = next(made, None)  # what is a parameter at an end makes no difference here
     if synapse is None or synapse.given.each_step is None:
         return
-    for group in groups:
-        inside = (bundle.targets >= group.group.start) & (bundle.targets < group.group.start + group.group.count)
+    for group in census.groups_of(bundle.targets):
         model, choice = group.kind.model.definition, group.model.model
         combine = {DRIVE: group.group.combine} | {port.name: port.combine for port in model.ports}
-        for state in model.flows if inside.any() else ():
+        for state in model.flows:
             end = EndName("post", state.name).text
             if end not in synapse.read or state.derivative is None:
                 continue
