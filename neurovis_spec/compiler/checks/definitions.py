@@ -54,7 +54,7 @@ _NOUNS = {"let": "intermediate value", "signals": "signal", "parameters": "param
 
 def check_formulas(compiled: Compiled, findings: Findings) -> None:
     """Warn of parts of definitions that nothing reads, and of formulas that replace what they should change."""
-    shown, at_ends = _shown(compiled.network), _read_at_ends(compiled)
+    at_ends, of_neurons, of_connections = _read_at_ends(compiled), _taken(compiled.network), _shown(compiled.network)
     for library in compiled.libraries:
         for kind, result_noun in _RESULT_NOUN.items():
             for name, model in library.definitions[kind.section].items():
@@ -62,7 +62,7 @@ def check_formulas(compiled: Compiled, findings: Findings) -> None:
                 parts = _parts_of(model, written)
                 result = f"the {written.gives}" if written.gives else result_noun
                 _check_parts(parts, written, result, at_ends if kind == MODEL else (), findings)
-                _check_flows(parts, written, shown if kind == MODEL else (), result, findings)
+                _check_flows(parts, written, of_neurons if kind == MODEL else of_connections, result, findings)
                 if kind.lasting:
                     _check_replaced(parts, written, compiled.library.definitions.of(kind).known()[name], findings)
 
@@ -157,13 +157,17 @@ def _given(written: Parts) -> frozenset[str]:
 # Derivatives
 
 
-def _shown(network: Network) -> frozenset[str]:
+def _taken(network: Network) -> frozenset[str]:
     """The names of states that somebody outside their model asks for: a connection, a synapse or a rule, an output, a
     picture."""
     found = {route.sends for route in network.connections.routes} | {outlet.name for outlet in network.outlets}
-    found |= {state.state for output in network.outputs for state in output.states}
-    found |= {one.state for one in network.render.show}
-    return frozenset(found.union(curve.state for panel in network.render.figure for curve in panel.shown or ()))
+    return frozenset(found.union((one.state for one in network.render.show), _shown(network)))
+
+
+def _shown(network: Network) -> frozenset[str]:
+    """The names of states that are outputs or stand in a figure; nothing else asks for those of connections."""
+    outputs = (state.state for output in network.outputs for state in output.states)
+    return frozenset((*outputs, *(curve.state for panel in network.render.figure for curve in panel.shown or ())))
 
 
 def _check_flows(

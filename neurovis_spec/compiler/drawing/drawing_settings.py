@@ -85,7 +85,7 @@ class LayoutSettings:
 @dataclass(frozen=True, slots=True)
 class Curve:
     """A number of each step: the activity of a neuron, the weight of a connection, a ``state`` of the model of a neuron
-    or of the rule of a connection. ``index`` is that of the neuron or of the connection."""
+    or of a rule or the synapse of a connection. ``index`` is that of the neuron or of the connection."""
 
     of: Literal["neuron", "connection"]
     index: int
