@@ -27,8 +27,6 @@ from neurovis_spec.language.yaml.source import AnyList, Node, Scalar
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 
 Plain: TypeAlias = "bool | int | float | str | list[Plain] | dict[str, Plain] | None"
-#: sections that an included file brings in
-_BROUGHT = INCLUDED
 
 
 def whole_text(spec: Spec, request: Request, sources: Mapping[str, str]) -> str:
@@ -43,7 +41,7 @@ def whole_text(spec: Spec, request: Request, sources: Mapping[str, str]) -> str:
     root.pop("include", None)
     for file in included:
         brought = reader.mapping(file.model.source, file.folder, ())
-        for section in _BROUGHT:
+        for section in INCLUDED:
             there, more = root.setdefault(section, {}), brought.get(section)
             if isinstance(there, dict) and isinstance(more, dict):
                 there.update(more)

@@ -453,11 +453,6 @@ class Network:
         ]
         return {name: self._drawn_end + place for place, name in enumerate(formulas)}
 
-    @cached_property
-    def noise_index(self) -> IntArray:
-        """Where the noise of each neuron's drive stands in that vector, −1 without noise; (n,)."""
-        return self.noise_of(DRIVE)
-
     def noise_of(self, port: str = "", state: str = "") -> IntArray:
         """Where the noise of a port, or the standard normal numbers of a flow state, of each neuron stand in the vector
         of a step, −1 without; (n,)."""
