@@ -14,6 +14,8 @@ from scenes import file_of, film_of, scene_of
 import neurovis_spec as nv
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.scene import THEMES, Scene, colours, still
+from neurovis_spec.scene.collapse import gathered
+from neurovis_spec.scene.teachers import drawn_teachers
 
 SPEC = """
 neurovis: 1
@@ -200,3 +202,44 @@ def test_a_neuron_that_is_named_twice_is_one_glyph(tmp_path: Path) -> None:
     for again, file in ((["C"], "one.svg"), (["C", "C"], "other.svg")):
         network.render(tmp_path / file, step=3, collapse=again)
     assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "other.svg").read_bytes()
+
+
+#: a rule that learns from a state of one neuron, and from one value for each source
+STATES_TAUGHT = """
+neurovis: 1
+name: taught
+time: {dt: 0.1}
+models: {cell: {state: {v: {derivative: drive - v}}, activity: v}}
+rules: {rls: {signals: [error, p], weight: {each_step: weight - 0.1*error*p}}}
+neurons: {A: {count: 3, model: cell}, K: {count: 3, model: cell}, E: {model: cell}, O: {model: cell}}
+connections:
+  A -> K: {weight: 1, pattern: one_to_one}
+  K -> O: {weight: 1, plasticity: {rls: {error: E.v, p: {from: K}}}}
+  O -> E: 1
+"""
+
+
+@pytest.mark.parametrize(
+    ("collapse", "taught"),
+    [
+        ([], ["E.v is the error of rls", *(f"K{i} is the p of rls" for i in (1, 2, 3))]),
+        (["A"], ["E.v is the error of rls", *(f"K{i} is the p of rls" for i in (1, 2, 3))]),
+        (["K"], ["E.v is the error of rls"]),
+        (["O"], []),
+    ],
+)
+def test_who_teaches_by_a_state_has_a_dotted_line_where_it_and_its_pupil_are_drawn(
+    collapse: list[str], taught: list[str]
+) -> None:
+    network = nv.compile_text(STATES_TAUGHT)
+    members = {group.name: tuple(group.indices) for group in network.network.neurons.groups}
+    drawn = gathered(network.network, [(name, members[name]) for name in collapse])
+    names = drawn.network.neurons.names
+    found = [
+        f"{names[one.source]}{'.' * bool(one.state)}{one.state} is the {one.signal} of {one.rule}"
+        for one in drawn_teachers(drawn)
+    ]
+    assert found == taught
+    pictured = nv.compile_text(STATES_TAUGHT + (f"render: {{collapse: [{collapse[0]}]}}\n" if collapse else ""))
+    scene = scene_of(pictured, pictured.run(1).snapshot(0))
+    assert [group.title.split("\n")[1] for group in scene.groups if "signal" in group.data] == taught

@@ -26,7 +26,6 @@ from neurovis_spec.compiler.drawing.drawing_settings import (
 from neurovis_spec.compiler.events.changes import Change
 from neurovis_spec.compiler.events.settable import Settable
 from neurovis_spec.compiler.network import Connections, Group, Instance, Network, Neurons
-from neurovis_spec.compiler.program import RULE, Projection
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.ends import EndArray, ends_of
 from neurovis_spec.scene.lesions import lesions_of
@@ -229,7 +228,7 @@ class _Gatherer:
             noises=(),
             populations=(),
             program=(),
-            projections=self._projections(),
+            projections=(),
             layout=self._layout(),
             render=self._render(),
             instances=self._instances(),
@@ -361,27 +360,6 @@ class _Gatherer:
             if other >= 0 and np.array_equal(back, self.bundles[other]):
                 result[place] = other
         return integers(result) if (result >= 0).any() else None
-
-    def _projections(self) -> tuple[Projection, ...]:
-        """Rules whose signals and targets are neurons that are drawn: these are taught, and have an error."""
-        count, result = len(self.whole.neurons), []
-        targets = self.whole.connections.targets.whole()
-        for one in self.whole.projections:
-            if one.kind != RULE:
-                continue
-            ends = [targets[one.members], *one.signals.values()]
-            drawn = all(
-                (index < count).all() and not any(unit in self.glyphs for unit in self.unit[index].tolist())
-                for index in ends
-            )
-            bundle = self.bundle[one.members]
-            if not drawn or (bundle < 0).any():
-                continue
-            members, first = np.unique(bundle, return_index=True)
-            signals = {name: self.unit[index[first]] for name, index in one.signals.items()}
-            parameters = {name: values[first] for name, values in one.rule.parameters.items()}
-            result.append(Projection(members, (replace(one.rule, parameters=parameters),), signals))
-        return tuple(result)
 
     def _layout(self) -> LayoutSettings:
         old = self.whole.layout

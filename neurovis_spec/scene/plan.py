@@ -50,7 +50,7 @@ from neurovis_spec.scene.scaling import scaled, scaled_group
 from neurovis_spec.scene.shown import Shown, shown
 from neurovis_spec.scene.signals import Signals
 from neurovis_spec.scene.spots import beyond
-from neurovis_spec.scene.teachers import Teacher, dash, dotted, fewer, label_of, room_of, teachers_of
+from neurovis_spec.scene.teachers import Teacher, dash, dotted, drawn_teachers, fewer, label_of, room_of
 from neurovis_spec.scene.themes import theme_of, tints_of
 from neurovis_spec.scene.titles import Titled, elsewhere, in_one_place, outline
 
@@ -193,7 +193,7 @@ def _content(drawn: Gathered, layout: Layout, settings: RenderSettings, weights:
     rooms = _rooms(network, layout) if settings.labels else {}
     sides = {index: layout.labels[network.neurons.names[index]] for index in rooms}
     boxes = boxes_of(network, positions, routes, rooms)
-    teachers, notes = _dotted(network, seen)
+    teachers, notes = _dotted(drawn, seen)
     beside = room_beside(network, RADIUS * UNIT) if settings.labels else []
     beside = [(index, reach) for index, reach in beside if index not in rooms]
     extent = _extent(positions, radii, routes, boxes, beside, rooms.values())
@@ -292,14 +292,14 @@ def _ground(content: _Content, page: _OnPage) -> Ground:
     )
 
 
-def _dotted(network: Network, seen: Shown) -> tuple[list[Teacher], tuple[str, ...]]:
+def _dotted(drawn: Gathered, seen: Shown) -> tuple[list[Teacher], tuple[str, ...]]:
     """The pairs that get dotted lines, and all that the picture says of what it leaves out."""
-    teachers = [one for one in teachers_of(network) if seen.focus[one.source] and seen.focus[one.target]]
+    teachers = [one for one in drawn_teachers(drawn) if seen.focus[one.source] and seen.focus[one.target]]
     few = len(teachers) - _MOST_TEACHERS
     if few <= 0:
         return teachers, seen.notes
     note = f"{few:,} of {len(teachers):,} dotted lines of rules are left out"
-    return fewer(network, teachers, _MOST_TEACHERS), (*seen.notes, note)
+    return fewer(drawn.network, teachers, _MOST_TEACHERS), (*seen.notes, note)
 
 
 def _in_user_units(made: Plan, unit: float) -> Plan:
@@ -608,7 +608,8 @@ def _dotted_groups(content: _Content, page: _OnPage, theme: Theme) -> list[Group
     groups = []
     for teacher, line in zip(content.teachers, page.guides, strict=True):
         source, target = names[teacher.source], names[teacher.target]
-        words = f"{source} ⇢ {target}\n{source} is the {teacher.signal} of {teacher.rule}"
+        taught_by = f"{source}.{teacher.state}" if teacher.state else source
+        words = f"{source} ⇢ {target}\n{taught_by} is the {teacher.signal} of {teacher.rule}"
         width = 1.6 if line.head > 5 else 0.9
         head = Arrowhead(line.tip, line.direction, 0.8 * line.head, head_half_width(0.6, 0.8 * line.head), theme.muted)
         dots_ = Spline(line.points, theme.muted, width, dash(width))

@@ -9,13 +9,14 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.geometry import Rect
+from neurovis_spec.scene.collapse import Gathered
 from neurovis_spec.scene.geometry import sample
 from neurovis_spec.scene.lines import Line, trimmed
 from neurovis_spec.scene.obstacles import Obstacles
@@ -25,25 +26,37 @@ _BENDS = (0.0, *(side * bend for bend in (0.09, 0.18, 0.27, 0.36, 0.48, 0.6) for
 
 @dataclass(frozen=True, slots=True)
 class Teacher:
-    """``source`` is the ``signal`` of the rule by which connections to ``target`` learn (neuron indices)."""
+    """``source`` is the ``signal`` of the rule by which connections to ``target`` learn (neuron indices), or its
+    ``state`` or output of this name is."""
 
     source: int
     target: int
     signal: str
     rule: str
+    state: str = ""
 
 
 def teachers_of(network: Network) -> list[Teacher]:
     """Every pair once, in the order of the rules; none from a neuron to itself."""
     found: dict[tuple[int, int], Teacher] = {}
-    neurons = network.neuron_of.tolist()
+    neurons, states = network.neuron_of.tolist(), [""] * len(network.neurons)
+    for outlet in network.outlets:
+        states += [outlet.name] * len(network.populations[outlet.population].members)
     for projection in network.projections:
         for signal, sources in projection.signals.items():
             for source, target in zip(sources.tolist(), network.connections.targets[projection.members], strict=True):
                 if source < len(neurons) and neurons[source] != target:
                     pair = (neurons[source], int(target))
-                    found.setdefault(pair, Teacher(*pair, signal, projection.rule.definition.name))
+                    rule = projection.rule.definition.name
+                    found.setdefault(pair, Teacher(*pair, signal, rule, states[source]))
     return list(found.values())
+
+
+def drawn_teachers(drawn: Gathered) -> list[Teacher]:
+    """The pairs of the whole of which both neurons are drawn, and in no glyph, by their indices in what is drawn."""
+    pairs = ((one, int(drawn.unit[one.source]), int(drawn.unit[one.target])) for one in teachers_of(drawn.whole))
+    glyph = drawn.glyph
+    return [replace(one, source=a, target=b) for one, a, b in pairs if not glyph[a] and not glyph[b]]
 
 
 def fewer(network: Network, teachers: Sequence[Teacher], most: int) -> list[Teacher]:
