@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import gzip
+import json
+import struct
+
 import numpy as np
 import pytest
 
 import neurovis_spec as nv
 from neurovis_spec.live.history import Bins, Members, Recorded, Ring
+from neurovis_spec.live.protocol import TRACE, LookAt, ProtocolError, command_of, trace_message
 from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.simulated import SimulatedSource
-from neurovis_spec.live.turns import Set
+from neurovis_spec.live.turns import Hold, Set
 from neurovis_spec.live.view import view_of
 
 SPEC = """neurovis: 1
@@ -28,11 +33,11 @@ RECORDING = COMPILED.run(steps=40)
 
 
 def neurons(*indices: int) -> Members:
-    return Members(True, np.array(indices))
+    return Members("neurons", np.array(indices))
 
 
 def connections(*indices: int) -> Members:
-    return Members(False, np.array(indices))
+    return Members("connections", np.array(indices), added=True)
 
 
 @pytest.mark.parametrize("recorded", [False, True])
@@ -122,6 +127,121 @@ def test_items_of_a_view_stand_for_what_is_gathered() -> None:
     compiled = nv.compile_text(text)
     view = view_of(compiled, compiled.gains)
     found = [view.members(item) for item in ("n0", "n1", "c0", "c1", "n2", "c2")]
-    assert [None if one is None else (one.neurons, one.indices.tolist()) for one in found] == [
-        (True, [0, 1, 2]), (True, [3]), (False, [0, 1, 2]), (False, [3, 4, 5]), None, None,
+    assert [None if one is None else (one.of, one.indices.tolist()) for one in found] == [
+        ("neurons", [0, 1, 2]), ("neurons", [3]), ("connections", [0, 1, 2]), ("connections", [3, 4, 5]), None, None,
     ]  # fmt: skip
+
+
+#: a synapse with a state, a rule with one, an output; nothing between A1 and C has a name
+NAMED = """neurovis: 1
+name: named
+time: {dt: 0.1, steps: 20}
+models: {cell: {state: {v: {derivative: drive - v}}, outputs: {twice: 2*v}, activity: v}}
+synapses: {gate: {state: {g: {initial: 0.5, derivative: pre.v - g}}, signal: weight*g*(1 - post.v)}}
+rules: {tracing: {state: {trace: {each_step: 0.9*trace + pre}}, weight: {each_step: weight + 0.01*trace}}}
+neurons: {A: {count: 2, model: cell, bias: [0.4, 1]}, B: {model: cell, bias: 1}, C: {}}
+connections:
+  A -> B: {weight: 0.5, synapse: gate, plasticity: tracing}
+  A1 -> C: 1
+  B -> A1: {weight: 0.5, plasticity: tracing}
+"""
+
+
+@pytest.mark.parametrize("recorded", [False, True])
+def test_states_outputs_and_signals_have_traces_by_their_names(recorded: bool) -> None:
+    compiled = nv.compile_text(NAMED)
+    made, view = compiled.run(states="all"), view_of(compiled, compiled.gains)
+    source: RecordedSource | SimulatedSource
+    source = RecordedSource(compiled.network, made) if recorded else SimulatedSource(compiled.simulator())
+    while source.step < 19:
+        source.advance()
+    wanted = {"n0.v": "A1.v", "n1.twice": "A2.twice", "c0.g": "(A1 -> B).g", "c1.signal": "(A2 -> B).signal"}
+    for item, name in {**wanted, "c1.trace": "(A2 -> B).trace", "c3.trace": "(B -> A1).trace"}.items():
+        members = view.members(item)
+        assert members is not None
+        read = source.history.read(members, Bins(0, 1, 20))
+        np.testing.assert_allclose(read[:, 0], made[name], rtol=1e-6)
+        assert view.values(source.seen(), [item], source.quantities) == {item: made[name][-1]}
+    for item in ("c2.signal", "n3.v", "c0.h", "c0.v", "n0.signal", "c9.g"):
+        assert view.members(item) is None
+        assert view.values(source.seen(), [item], source.quantities) == {}
+
+
+def test_traces_say_by_numbers_which_names_they_are_of() -> None:
+    """As a page unpacks them: items, the numbers of names, then the ranges."""
+    some, others = np.ones((2, 2), np.float32), np.zeros((2, 2), np.float32)
+    data = trace_message(7, {(5, 0): some, (5, 3): others}, Bins(4, 2, 2))
+    assert struct.unpack_from("<BxHIdII", data) == (TRACE, 7, 2, 4.0, 2, 2)
+    assert np.frombuffer(data, "<u4", 4, 24).tolist() == [5, 5, 0, 3]
+    assert np.frombuffer(data, "<f4", 8, 24 + 16).tolist() == [*[1] * 4, *[0] * 4]
+
+
+@pytest.mark.parametrize(
+    "item", ["c5.", "c5.g.h", "c5.1", ".g", "g", "(A -> B).g", "c5.g ", "c5.é", "c" + "5" * 10 + ".g"]
+)
+def test_what_is_no_id_with_a_name_is_refused(item: str) -> None:
+    for message in (
+        {"type": "look", "items": [item]},
+        {"type": "trace", "items": [item], "first": 0, "every": 1, "bins": 1},
+    ):
+        with pytest.raises(ProtocolError, match="ids of neurons and connections"):
+            command_of(json.dumps(message))
+
+
+def test_ids_may_have_a_name() -> None:
+    asked = command_of(json.dumps({"type": "look", "items": ["c5.signal", "n0.v", "c5", "c5.signal"]}))
+    assert asked == LookAt(("c5.signal", "n0.v", "c5"))
+
+
+def test_what_a_recording_does_not_hold_is_not_known() -> None:
+    compiled = nv.compile_text(NAMED)
+    source, view = RecordedSource(compiled.network, compiled.run()), view_of(compiled, compiled.gains)
+    state, signal = view.members("c0.g"), view.members("c0.signal")
+    assert state is not None
+    assert signal is not None
+    assert np.isnan(source.history.read(state, Bins(0, 1, 20))).all()
+    assert np.isfinite(source.history.read(signal, Bins(0, 1, 20))).all(), "pictures need it"
+    assert [*view.values(source.seen(), ["c0.g", "c0.signal", "c0"], source.quantities)] == ["c0.signal", "c0"]
+    heard = Ring(4, 4)
+    heard.note(0, np.zeros(4), np.zeros(4))
+    assert np.isnan(heard.read(state, Bins(0, 1, 1))).all()
+
+
+def test_the_page_knows_the_names_of_what_is_drawn_and_glyphs_have_those_of_their_members() -> None:
+    compiled = nv.compile_text(NAMED)
+    view = view_of(compiled, compiled.gains)
+    names = [view.listed.lists[number] for number in view.listed.of.tolist()]
+    of_connections = [("trace", "g", "signal")] * 2 + [(), ("trace",)]
+    assert names == [*of_connections, *[("v", "twice")] * 3, ()]
+    scene = json.loads(gzip.decompress(view.content))
+    assert [tuple(scene["named"][number]) for number in scene["names"]] == names
+    assert view.place("c1.signal") == (1, 3)
+    assert view.place("n2.twice") == (6, 2)
+    assert view.place("n2") == (6, 0)
+    glyphs = nv.compile_text(NAMED + "render: {collapse: [A]}\n")
+    view, source = view_of(glyphs, glyphs.gains), SimulatedSource(glyphs.simulator())
+    source.advance()
+    assert source.quantities is not None
+    values = dict(zip(view.quantities.names, source.quantities.tolist(), strict=True))
+    told = view.values(source.seen(), ["n0.v", "c0.signal", "c0.g", "c2.trace"], source.quantities)
+    assert told["n0.v"] == (values["A1.v"] + values["A2.v"]) / 2
+    assert told["c0.g"] == (values["(A1 -> B).g"] + values["(A2 -> B).g"]) / 2
+    assert told["c0.signal"] == values["(A1 -> B).signal"] + values["(A2 -> B).signal"]
+    assert told["c2.trace"] == values["(B -> A1).trace"]
+
+
+def test_going_back_and_a_turn_say_the_quantities_of_the_step_that_is_shown() -> None:
+    compiled = nv.compile_text(NAMED)
+    made, view, source = (
+        compiled.run(states="all"),
+        view_of(compiled, compiled.gains),
+        SimulatedSource(compiled.simulator()),
+    )
+    while source.step < 15:
+        source.advance()
+    for step in (4, 12):
+        source.go(step)
+        assert view.values(source.seen(), ["c0.g"], source.quantities)["c0.g"] == made["(A1 -> B).g"][step]
+    source.turn(Hold("(A1 -> B).g", 3.0))
+    source.advance()
+    assert view.values(source.seen(), ["c0.g"], source.quantities)["c0.g"] == 3

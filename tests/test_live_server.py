@@ -141,8 +141,10 @@ class Eyes:
             return SCENE
         if data[0] == TRACE:
             _, _, count, _, _, bins = struct.unpack_from("<BxHIdII", data)
-            ranges = np.frombuffer(data, "<f4", 2 * bins * count, 24 + 4 * count).reshape(count, bins, 2)
-            self.traces = dict(zip(np.frombuffer(data, "<u4", count, 24).tolist(), ranges, strict=True))
+            items, names = np.frombuffer(data, "<u4", 2 * count, 24).reshape(2, count)
+            assert not names.any(), "nothing in this network has one"
+            ranges = np.frombuffer(data, "<f4", 2 * bins * count, 24 + 8 * count).reshape(count, bins, 2)
+            self.traces = dict(zip(items.tolist(), ranges, strict=True))
             return TRACE
         _, _, self.serial, changed, step, self.first, self.last, words = struct.unpack_from("<BxHIIdddH", data)
         self.step = int(step)
@@ -334,7 +336,7 @@ def test_whoever_asks_for_traces_is_sent_them_once(owner: bool) -> None:
         async with live.stream(live.access.owner if owner else live.access.viewer) as stream:
             eyes = Eyes(stream)
             await eyes.until(lambda: eyes.step >= 60)
-            await eyes.ask("trace", items=["n3", "c0", "c99"], first=10, every=5, bins=8)
+            await eyes.ask("trace", items=["n3", "c0", "c99", "c0.trace"], first=10, every=5, bins=8)
             await eyes.until(lambda: bool(eyes.traces))
             assert set(eyes.traces) == {6 + 3, 0}
             rows = recording.activity[10:50, 3].reshape(8, 5)

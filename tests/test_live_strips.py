@@ -220,3 +220,54 @@ def test_a_click_on_a_cell_holds_the_next_of_parallel_connections(tmp_path: Path
                 await told(opened, name)
 
     asyncio.run(main())
+
+
+GATES = """neurovis: 1
+name: gates
+time: {dt: 0.01}
+models: {cell: {state: {v: {derivative: drive - v}}, activity: v}}
+synapses: {gate: {state: {g: {initial: 0.5, derivative: pre.v - g}}, signal: weight*g*(1 - post.v)}}
+inputs: {wave: {expression: sin(2*t)}}
+neurons: {A: {model: cell, input: wave}, B: {model: cell}}
+connections: {A -> B: {weight: 2, synapse: gate}}
+"""
+
+
+def test_states_and_signals_are_chosen_and_pinned(tmp_path: Path) -> None:
+    spec = tmp_path / "gates.yaml"
+    spec.write_text(GATES)
+    choice = "document.querySelectorAll('.what')[{0}]"
+
+    async def chosen(opened: Page, place: int, name: str) -> None:
+        await opened.ask(f"{choice.format(place)}.value = '{name}'; {choice.format(place)}.onchange()")
+
+    async def main() -> None:
+        async with shown(str(spec), tmp_path) as (opened, compiled, _):
+            await opened.until(f"{STEP} > 60")
+            step = await pause(opened)
+            made = compiled.run(step + 1, states="all")
+            await opened.click(*places(compiled)["A -> B"])
+            await told(opened, "A → B")
+            options = f"[...{choice.format(0)}.options].map((one) => one.text).join()"
+            assert await opened.ask(options) == "weight,g,signal"
+            assert not await opened.ask(f"{choice.format(0)}.hidden")
+            now = "Number(document.querySelectorAll('.now')[{0}].textContent.replace('−', '-'))"
+            await chosen(opened, 0, "g")
+            await opened.key("p")
+            await chosen(opened, 1, "signal")
+            for place, name in enumerate(("g", "signal")):
+                values = made[f"(A -> B).{name}"]
+                await opened.until(f"{TRACE.format(place)}?.startsWith('A → B, {name} from step 0 to {step}')")
+                await opened.until(f"Math.abs({now.format(place)} - {values[step]}) < 1e-5")
+                assert await drawn(opened, place)
+                for number in (values.min(), values.max()):
+                    assert f"{number:.6g}".replace("-", "−") in str(await opened.ask(TRACE.format(place)))
+            await opened.key("Escape")
+            await opened.key("]")
+            await opened.until(f"{TITLE.format(1)} == 'A'")
+            assert await opened.ask(f"[...{choice.format(1)}.options].map((one) => one.text).join()") == "activity,v"
+            assert await opened.ask(f"{choice.format(1)}.value") == ""
+            await opened.ask("document.querySelector('.pin').click()")
+            await opened.until("document.querySelectorAll('.trace').length == 1")
+
+    asyncio.run(main())

@@ -133,9 +133,9 @@ def test_traces_are_read_of_what_came(source: ReceivedSource) -> None:
     source.hear_activity(8, 8, np.zeros(3))
     bins = Bins(0, 1, 9)
     nan = float("nan")
-    found = source.history.read(Members(True, np.array([1])), bins)
+    found = source.history.read(Members("neurons", np.array([1])), bins)
     assert np.array_equal(found[:, 0], [0, 1, 2, nan, nan, nan, 6, 7, nan], equal_nan=True)
-    found = source.history.read(Members(False, np.array([0])), bins)
+    found = source.history.read(Members("connections", np.array([0]), added=True), bins)
     assert np.array_equal(found[:, 1], [0.5, 1.5, 2.5, nan, nan, nan, 6.5, 7.5, nan], equal_nan=True)
 
 

@@ -144,7 +144,7 @@ def test_the_live_page_has_the_same_colours_and_traces_of_it() -> None:
         now = np.cos(source.seen().snapshot.activity[:3])
         assert (view.glance(source.seen()).discs[:3] == np.rint(LEVELS * now)).all()
         assert view.values(source.seen(), ["n0"]) == {"n0": pytest.approx(now[0])}
-        assert source.history.read(Members(True, np.array([1])), Bins(40, 1, 1))[0, 0] == pytest.approx(now[1])
+        assert source.history.read(Members("neurons", np.array([1])), Bins(40, 1, 1))[0, 0] == pytest.approx(now[1])
 
 
 def test_a_recording_without_it_is_refused_with_what_to_do(tmp_path: Path) -> None:

@@ -1,13 +1,15 @@
 """The history: what neurons did and what connections weighed, step by step, in bounded memory, for traces.
 
-In: the activities and weights of each step. Out: of any of them the least and the largest value in each of some bins
-of steps. One thread notes, others read without waiting: what is read while it changes may be wrong for one picture.
+In: the activities, weights and quantities (``runtime/quantities.py``) of each step. Out: of any of them the least and
+the largest value in each of some bins of steps. One thread notes, others read without waiting: what is read while it
+changes may be wrong for one picture.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final, Protocol, TypeAlias
+from typing import Final, Literal, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +25,7 @@ _STEPS, _NEXT = 1 << 16, 16
 _READ: Final = 1 << 20
 
 Range: TypeAlias = npt.NDArray[np.float32]
+Of: TypeAlias = Literal["neurons", "connections", "quantities"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +39,12 @@ class Bins:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Members:
-    """What a trace is of: the mean activity of neurons, or of the states that they show, or the sum of the weights of
-    connections (indices)."""
+    """What a trace is of, by indices: activities of neurons, or the states that they show; weights of connections; or
+    quantities. Several are ``added`` up, as weights and signals are, or else it is their mean."""
 
-    neurons: bool
+    of: Of
     indices: IntArray
+    added: bool = False
 
 
 class History(Protocol):
@@ -69,7 +73,7 @@ def _joined(members: Members, values: FloatArray | Range) -> FloatArray | Range:
     if values.shape[1] == 1:
         return values[:, 0]
     with np.errstate(over="ignore", invalid="ignore"):
-        joined: FloatArray = np.mean(values, 1, np.float64) if members.neurons else np.sum(values, 1, np.float64)
+        joined: FloatArray = np.sum(values, 1, np.float64) if members.added else np.mean(values, 1, np.float64)
         return joined
 
 
@@ -79,12 +83,14 @@ def _thinned(rows: IntArray, members: Members) -> IntArray:
 
 
 class Ring:
-    """The latest steps of a run of n neurons and m connections; where ``room`` (bytes) is full the oldest go."""
+    """The latest steps of a run of n neurons and m connections, with k quantities, where it is known what they are;
+    where ``room`` (bytes) is full the oldest go."""
 
-    def __init__(self, neurons: int, connections: int, room: int = ROOM) -> None:
-        self._neurons = neurons
-        self._size = max(2 * _NEXT, min(_STEPS, room // (4 * max(1, neurons + connections))))
-        self._values = np.empty((self._size, neurons + connections), np.float32)
+    def __init__(self, neurons: int, connections: int, quantities: int = 0, room: int = ROOM) -> None:
+        self._starts: Mapping[Of, int] = {"neurons": 0, "connections": neurons, "quantities": neurons + connections}
+        width = neurons + connections + quantities
+        self._size = max(2 * _NEXT, min(_STEPS, room // (4 * max(1, width))))
+        self._values = np.empty((self._size, width), np.float32)
         self._first, self._last = 0, -1
 
     @property
@@ -92,7 +98,7 @@ class Ring:
         """The first and the last step that are known; the last is the smaller where none is."""
         return self._first, self._last
 
-    def note(self, step: int, activity: FloatArray, weights: FloatArray) -> None:
+    def note(self, step: int, activity: FloatArray, weights: FloatArray, quantities: FloatArray | None = None) -> None:
         """Keep a step; one that is known stays as it is."""
         if self._first <= step <= self._last:
             return
@@ -103,7 +109,10 @@ class Ring:
         self._first = max(self._first, step + 1 + _NEXT - self._size)
         row = self._values[step % self._size]
         with np.errstate(over="ignore"):
-            row[: self._neurons], row[self._neurons :] = activity, weights
+            n, known = self._starts["connections"], self._starts["quantities"]
+            row[:n], row[n:known] = activity, weights
+            if quantities is not None:
+                row[known:] = quantities
         self._last = step
 
     def cut(self, step: int) -> None:
@@ -116,7 +125,9 @@ class Ring:
         first, last = self._first, self._last
         end = min(last, bins.first + bins.every * bins.count - 1)
         steps = _thinned(np.arange(max(first, bins.first), end + 1), members)
-        columns = members.indices + (0 if members.neurons else self._neurons)
+        columns = members.indices + self._starts[members.of]
+        if len(columns) and columns.max() >= self._values.shape[1]:
+            return np.full((bins.count, 2), np.nan, np.float32)
         if len(columns) > 1 or not len(steps):
             values = self._values[(steps % self._size)[:, None], columns]
         else:  # of one member all steps are read, of which the later may stand before the earlier
@@ -128,10 +139,11 @@ class Ring:
 
 class Recorded:
     """The steps of a recording, which holds all activities and weights; ``told`` (rows, n) is what traces of neurons
-    show, by default the activities."""
+    show, by default the activities; ``columns`` (k,) are those of the quantities, −1 of one that it does not hold."""
 
-    def __init__(self, recording: Recording, told: FloatArray | None = None) -> None:
+    def __init__(self, recording: Recording, told: FloatArray | None = None, columns: IntArray | None = None) -> None:
         self._recording, self._told = recording, recording.activity if told is None else told
+        self._quantities = np.zeros(0, np.int64) if columns is None else columns
         self._column = np.full(len(recording.sources), -1, np.int64)
         self._column[recording.plastic] = np.arange(len(recording.plastic))
         self._fixed = np.zeros(len(recording.sources))
@@ -142,8 +154,12 @@ class Recorded:
         steps = self._recording.step
         ends = np.searchsorted(steps, [bins.first, bins.first + bins.every * bins.count])
         rows = _thinned(np.arange(*ends), members)
-        if members.neurons:
+        if members.of == "neurons":
             values = self._told[rows[:, None], members.indices]
+        elif members.of == "quantities":
+            columns = self._quantities[members.indices]
+            values = np.full((len(rows), len(columns)), np.nan)
+            values[:, columns >= 0] = self._recording.states[rows[:, None], columns[columns >= 0]]
         else:
             column, values = self._column[members.indices], np.tile(self._fixed[members.indices], (len(rows), 1))
             values[:, column >= 0] = self._recording.weights[rows[:, None], column[column >= 0]]

@@ -169,12 +169,11 @@ class Hub:
         client, self._reader = self._waiting.popleft(), None
         wanted, client.wanted = client.wanted, None
         if client in self._clients and shown is not None and wanted is not None:
-            lines, traces = len(shown.glance.lines), {}
+            traces = {}
             for item in wanted.items:
                 members = shown.view.members(item)
                 if members is not None:
-                    index = int(item[1:]) + (lines if members.neurons else 0)
-                    traces[index] = shown.history.read(members, wanted.bins)
+                    traces[shown.view.place(item)] = shown.history.read(members, wanted.bins)
             client.traces = trace_message(self._version, traces, wanted.bins)
             client.wake.set()
         now = self._loop.time()
@@ -214,7 +213,8 @@ class Hub:
             client.asked = bool(client.items)
         if client.asked:
             client.asked = False
-            yield values_message(shown.glance.step, shown.view.values(shown.seen, client.items))
+            values = shown.view.values(shown.seen, client.items, shown.quantities)
+            yield values_message(shown.glance.step, values)
         if client.traces:
             traces, client.traces = client.traces, b""
             yield traces

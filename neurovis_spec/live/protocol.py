@@ -66,8 +66,9 @@ LARGEST, _LONGEST = 16_384, 4096
 _MOST = (1 << 53) - 1
 #: The most components of an input, and parameters set at once.
 _MANY = 1024
-#: The most items whose values a client gets, and the id of one.
-_WATCHED, _ITEM = 64, re.compile(r"[nc][0-9]{1,9}", re.ASCII)
+#: The most items whose values a client gets, and the id of one: of a neuron or a connection, perhaps with the name of
+#: something that it has.
+_WATCHED, _ITEM = 64, re.compile(r"[nc][0-9]{1,9}(\.[A-Za-z_]\w{0,200})?", re.ASCII)
 #: The gains of Eqs. 2–5.
 _GAINS = ("activity", "signal", "thickness", "change")
 #: The most items that a client is sent traces of at once, the most bins, and steps in each.
@@ -148,10 +149,11 @@ def values_message(step: int, values: Mapping[str, float]) -> str:
     return _text("values", step=step, values=known)
 
 
-def trace_message(version: int, traces: Mapping[int, Range], bins: Bins) -> bytes:
-    """Traces of items (connections, then neurons): the least and the largest value of each bin."""
+def trace_message(version: int, traces: Mapping[tuple[int, int], Range], bins: Bins) -> bytes:
+    """Traces of items (connections, then neurons), each with what of it that is: 0 its activity or weight, else the
+    number of a name in the list that the scene has for it, from 1 on. The least and the largest value of each bin."""
     head = _TRACE_HEAD.pack(TRACE, version, len(traces), bins.first, bins.every, bins.count)
-    items = np.array(list(traces), "<u4")
+    items = np.array(list(traces), "<u4").reshape(-1, 2).T
     return b"".join([head, items.tobytes(), *(trace.astype("<f4").tobytes() for trace in traces.values())])
 
 
@@ -206,8 +208,8 @@ Check: TypeAlias = Callable[[object], object]
 
 @dataclass(frozen=True, slots=True)
 class LookAt:
-    """The client wants the exact values of neurons (``n3``) and connections (``c5``) with each frame; it is nobody
-    else's business, so viewers may ask for it."""
+    """The client wants the exact values of neurons (``n3``) and connections (``c5``), or of what these have by a name
+    (``c5.g``), with each frame; it is nobody else's business, so viewers may ask for it."""
 
     items: tuple[str, ...]
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.history import Recorded
 from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned, drawn, recalled
@@ -19,6 +20,7 @@ from neurovis_spec.runtime.columns import columns_of
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.fitting import fitted
+from neurovis_spec.runtime.quantities import Quantities
 from neurovis_spec.runtime.record import end_values
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.rows import After
@@ -47,7 +49,9 @@ class RecordedSource:
         known = {name: column for column, name in enumerate(recording.state_names)}
         self._states = [known[name] for name in names] if names and known.keys() >= set(names) else None
         self._controls, self._state, self._applied = Controls(network), initial_state(network), 0
-        self.history = Recorded(self._recording, ShownStates(network).recorded(self._recording))
+        every = Quantities(network).names if known else ()
+        self._columns = np.array([known.get(name, -1) for name in every], np.int64)
+        self.history = Recorded(self._recording, ShownStates(network).recorded(self._recording), self._columns)
 
     @property
     def step(self) -> int:
@@ -78,6 +82,11 @@ class RecordedSource:
     def learning(self) -> dict[str, bool | None]:
         """No rule can be stopped."""
         return {}
+
+    @property
+    def quantities(self) -> FloatArray | None:
+        """Those of the current step, NaN where the recording does not hold one."""
+        return np.where(self._columns < 0, np.nan, self._recording.states[self._row, self._columns])
 
     @property
     def backend(self) -> str:

@@ -16,6 +16,7 @@ from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import Final, ParamSpec, TypeAlias
 
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.live.clock import FRAMES, Clock, Pace
 from neurovis_spec.live.commands import (
     Appearance,
@@ -67,6 +68,7 @@ class Shown:
     status: Status
     history: History
     body: Drawn
+    quantities: FloatArray | None
 
 
 Stage: TypeAlias = tuple[Source, View]
@@ -370,4 +372,5 @@ class Run:
             appearance=self.appearance,
         )
         seen = source.seen()
-        return Shown(self._view, seen, self._view.glance(seen), source.reach, status, source.history, source.body)
+        glance, reach = self._view.glance(seen), source.reach
+        return Shown(self._view, seen, glance, reach, status, source.history, source.body, source.quantities)

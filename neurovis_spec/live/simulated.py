@@ -19,6 +19,7 @@ from operator import attrgetter
 
 import numpy as np
 
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.body import BodyError
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.history import Ring
@@ -39,6 +40,7 @@ from neurovis_spec.live.turns import (
     turn,
 )
 from neurovis_spec.runtime.columns import columns_of
+from neurovis_spec.runtime.quantities import Quantities
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.runtime.rows import After
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
@@ -70,7 +72,9 @@ class SimulatedSource:
         self._simulation, self._room = simulation, room
         self._probe = columns_of(self.network).probe
         self._shown, self._signals = ShownStates(self.network), Signals(self.network)
-        self._ends = SetEnds(self.network)
+        self._ends, self._every = SetEnds(self.network), Quantities(self.network)
+        #: those of the current step
+        self.quantities: FloatArray | None = None
         self._signals.follow(simulation)
         self._origin = simulation.state() if origin is None else origin
         self._begin(self._origin if begin is None else begin, turned, fed or {})
@@ -78,7 +82,7 @@ class SimulatedSource:
 
     def _begin(self, state: State, turned: Sequence[Turned], fed: Mapping[str, tuple[float, ...]]) -> None:
         self._past = Past(self._room)
-        self.history = Ring(len(self.network.neurons), len(self.network.connections))
+        self.history = Ring(len(self.network.neurons), len(self.network.connections), len(self._every))
         self._fading = Fading(self.network)
         self._fed, self._turned = dict(fed), list(turned)
         #: what was true after the current step, where events have changed it since
@@ -316,7 +320,8 @@ class SimulatedSource:
         self._ended = run.ended
         previous = before.weights if before is not None and before.step == step - 1 else None
         activity, shown = run.activity, self._shown.of_run(run)
-        self.history.note(step, activity if shown is None else shown, weights)
+        self.quantities = run.looked(self._every)
+        self.history.note(step, activity if shown is None else shown, weights, self.quantities)
         seen = self._fading.follow(np.array([step]), activity[None]) if self._fading else None
         sent = self._signals.of_run(run)
         snapshot = Snapshot(step, activity, weights, previous, seen, pose, run.sensed, shown, sent, ends)

@@ -133,7 +133,12 @@ class Source(Protocol):
 
     @property
     def history(self) -> History:
-        """The past activities and weights, for traces; another thread may read it."""
+        """The past activities, weights and quantities, for traces; another thread may read it."""
+        ...
+
+    @property
+    def quantities(self) -> FloatArray | None:
+        """The quantities of the current step (``runtime/quantities.py``), (k,); None where they are not known."""
         ...
 
     @property

@@ -6,6 +6,7 @@ Glance: colours, widths and glows as small numbers, as fine as can be seen (Eqs.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -17,12 +18,14 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compilation import Compilation
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import SYNAPSE
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.live.commands import AS_IT_IS, Appearance
 from neurovis_spec.live.declared import declared
 from neurovis_spec.live.drawing import Moved, content, moved
 from neurovis_spec.live.history import Members
 from neurovis_spec.live.source import Mask, Seen
+from neurovis_spec.runtime.quantities import Glyphs, Listed, Quantities
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.scene import Scene
 from neurovis_spec.scene.caption import caption
@@ -80,6 +83,9 @@ class View:
     appearance: Appearance
     #: the same network, drawn otherwise
     otherwise: Callable[[Appearance], View]
+    #: what can be asked for by a name, and the names of what is drawn
+    quantities: Quantities
+    listed: Listed
     #: what stays of a picture of the same network in which more changes, at least so wide (page units)
     planned: Callable[[Network, float], tuple[Gathered, Plan]]
 
@@ -113,22 +119,43 @@ class View:
         result: npt.NDArray[np.int64] = np.minimum(parts, SHARES).astype(np.int64)
         return result
 
-    def values(self, seen: Seen, items: Iterable[str]) -> dict[str, float]:
-        """Exact activities, or states that are shown (``n3``), and weights (``c5``) at a step, by these ids; unknown
-        ones are left out."""
+    def values(self, seen: Seen, items: Iterable[str], quantities: FloatArray | None = None) -> dict[str, float]:
+        """Exact activities, or states that are shown (``n3``), weights (``c5``) and ``quantities`` (``c5.g``) at a
+        step, by these ids; unknown ones are left out, and quantities of which nothing is known."""
         snapshot = self.drawn.snapshot(seen.snapshot)
-        result = {}
+        result = dict[str, float]()
         for item in items:
-            values, index = snapshot.told if item[0] == "n" else snapshot.weights, int(item[1:])
-            if index < len(values):
+            key, _, name = item.partition(".")
+            values, index = snapshot.told if item[0] == "n" else snapshot.weights, int(key[1:])
+            if name:
+                members = None if quantities is None else self.members(item)
+                if members is not None and quantities is not None:
+                    own = quantities[members.indices]
+                    value = float(own.sum() if members.added else own.mean())
+                    result |= {} if math.isnan(value) else {item: value}
+            elif index < len(values):
                 result[item] = float(values[index])
         return result
 
     def members(self, item: str) -> Members | None:
-        """What of the network an item (``n3``, ``c5``) stands for; None where there is none."""
-        neurons, index = item[0] == "n", int(item[1:])
-        of, count = (self.drawn.unit, len(self.drawn.sizes)) if neurons else (self.drawn.bundle, len(self.drawn.counts))
-        return Members(neurons, np.flatnonzero(of == index)) if index < count else None
+        """What of the network an item stands for (``n3``, ``c5``), or what of that has a name (``c5.g``); None where
+        there is none."""
+        key, _, name = item.partition(".")
+        neurons = item[0] == "n"
+        members = np.flatnonzero((self.drawn.unit if neurons else self.drawn.bundle) == int(key[1:]))
+        if not name:
+            found = Members("neurons", members) if neurons else Members("connections", members, added=True)
+        else:
+            places = self.quantities.places("neuron" if neurons else "connection", name, members)
+            found = Members("quantities", places, added=not neurons and name == SYNAPSE.gives)
+        return found if len(found.indices) else None
+
+    def place(self, item: str) -> tuple[int, int]:
+        """The number of an item that there is among connections, then neurons; and that of its name among those that
+        the page knows, from 1 on, 0 without one."""
+        key, _, name = item.partition(".")
+        index = int(key[1:]) + (len(self.drawn.counts) if item[0] == "n" else 0)
+        return index, 1 + self.listed.lists[self.listed.of[index]].index(name) if name else 0
 
     def moved(self, layout: Layout) -> Moved:
         """What stands, and runs, elsewhere in another layout."""
@@ -180,12 +207,14 @@ def view_of(
     rows = order_of(drawn.network, stands, range(len(drawn.network.neurons)))
     written = compiled.spec.render
     themed = theme is not None or (written is not None and written.theme is not None)
-    words = content(
-        drawn.network, scene, rows, constants, {**declared(compiled), "themes": list(THEMES), "themed": themed}
-    )
+    quantities = Quantities(network)
+    listed = quantities.listed(Glyphs(drawn.unit, len(drawn.sizes)), Glyphs(drawn.bundle, len(drawn.counts)))
+    names = {"named": [list(one) for one in listed.lists], "names": listed.of.tolist() if len(quantities) else []}
+    more = {**declared(compiled), **names, "themes": list(THEMES), "themed": themed}
+    words = content(drawn.network, scene, rows, constants, more)
     otherwise = partial(view_of, compiled, gains, theme, engine, layout=layout)
     anew = partial(_planned, stands, seen, settings)
-    return View(drawn, seen, planned, largest, stands, words, appearance, otherwise, anew)
+    return View(drawn, seen, planned, largest, stands, words, appearance, otherwise, quantities, listed, anew)
 
 
 def _planned(

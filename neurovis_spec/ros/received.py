@@ -206,6 +206,10 @@ class ReceivedSource:
         return {} if self._steering is None else self._steering.learning
 
     @property
+    def quantities(self) -> None:
+        """States of models, rules and synapses are not received."""
+
+    @property
     def backend(self) -> str:
         """What makes the steps elsewhere is not known."""
         return ""

@@ -38,6 +38,7 @@ from neurovis_spec.runtime.errors import RecordingError, UnknownNameError, unkno
 from neurovis_spec.runtime.formed import Forming
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.names import Names, names_of
+from neurovis_spec.runtime.quantities import Quantities
 from neurovis_spec.runtime.record import end_values
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.references import find_lasting_state, find_neurons, find_parts
@@ -333,6 +334,10 @@ class Simulation:
         """The states that a probe reads, (columns,); None where it reads none. Signals are known where they are
         followed."""
         return probe.now(self._state, self._signals) if probe.names else None
+
+    def looked(self, quantities: Quantities) -> FloatArray:
+        """All quantities as they are now, (k,). Signals are known where they are followed."""
+        return quantities.now(self._state, self._signals)
 
     @property
     def outputs(self) -> Mapping[str, np.float64 | FloatArray]:

@@ -291,7 +291,7 @@ Object.assign(controls.keys, {
   t: ['open or close the panel for turning', () => turning.toggle()],
   y: ['open or close the panel of the body', () => body.toggle()],
   m: ['the matrix of the weights in place of the picture, and back', () => choose(!matrix)],
-  p: ['pin the strip of what is held, or unpin it', () => strips.toggle(attention.held)],
+  p: ['pin the strip of what is held, or unpin it', () => strips.toggle()],
   '<': ['show more of the past', () => scrubber.more(1)],
   '>': ['show less of the past', () => scrubber.more(-1)],
   Escape: [

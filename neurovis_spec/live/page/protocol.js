@@ -22,7 +22,7 @@ import { isStill } from './camera.js';
 /** @typedef {{version: number, name: string, title: string, width: number, height: number, density: number,
  *   theme: Theme, dt: number | null, discs: number, lines: number, parameters: Declared[],
  *   inputs: {name: string, size: number, description: string}[], rules: {connections: string, rule: string}[], themes: string[],
- *   themed: boolean, order: number[], ends: number[][], bands: [number, string, number][], constants: Constants,
+ *   themed: boolean, named: string[][], names: number[], order: number[], ends: number[][], bands: [number, string, number][], constants: Constants,
  *   groups: Group[]}} Scene */
 /** @typedef {{first: number, every: number, ranges: Map<string, Float32Array>}} Traces */
 /** @typedef {{serial: number, step: number, first: number, last: number, caption: string, discs: Int8Array,
@@ -92,16 +92,26 @@ export function take(buffer, version, look) {
   return true;
 }
 
-/** Unpack traces: by id, the least and the largest value of each bin. @param {ArrayBuffer} buffer @param {number} lines
- * @returns {Traces} */
-function unpackTraces(buffer, lines) {
+/** The names of what a neuron or a connection has beside its activity or weight. @param {Scene | null} scene @param {string} id
+ * @returns {string[]} */
+export function namesOf(scene, id) {
+  if (!scene || !/^[nc]\d+$/.test(id)) return [];
+  const item = Number(id.slice(1)) + (id[0] === 'n' ? scene.lines : 0);
+  return scene.named[scene.names[item] ?? 0];
+}
+
+/** Unpack traces: by id, with a name behind a point where there is one, the least and the largest value of each bin.
+ * @param {ArrayBuffer} buffer @param {Scene} scene @returns {Traces} */
+function unpackTraces(buffer, scene) {
   const view = new DataView(buffer),
     count = view.getUint32(4, true),
     bins = view.getUint32(20, true);
   const ranges = new Map();
+  const which = new Uint32Array(buffer, 24 + 4 * count, count);
   new Uint32Array(buffer, 24, count).forEach((item, at) => {
-    const id = item < lines ? `c${item}` : `n${item - lines}`;
-    ranges.set(id, new Float32Array(buffer, 24 + 4 * count + 8 * bins * at, 2 * bins));
+    const id = item < scene.lines ? `c${item}` : `n${item - scene.lines}`,
+      name = which[at] ? `.${namesOf(scene, id)[which[at] - 1]}` : '';
+    ranges.set(id + name, new Float32Array(buffer, 24 + 8 * count + 8 * bins * at, 2 * bins));
   });
   return { first: view.getFloat64(8, true), every: view.getUint32(16, true), ranges };
 }
@@ -219,7 +229,7 @@ export class Link {
       const from = 4 + new DataView(data).getUint16(2, true);
       this.listener.file(new TextDecoder().decode(data.slice(4, from)), new Blob([data.slice(from)]));
     } else if (kind === TRACE && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
-      this.listener.traces(unpackTraces(data, this.scene.lines));
+      this.listener.traces(unpackTraces(data, this.scene));
     }
   }
 

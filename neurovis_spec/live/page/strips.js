@@ -3,6 +3,7 @@
  */
 
 import { signed } from './attention.js';
+import { namesOf } from './protocol.js';
 import { THUMB } from './scrubber.js';
 
 /** @typedef {import('./attention.js').Attention} Attention */
@@ -10,8 +11,10 @@ import { THUMB } from './scrubber.js';
 /** @typedef {import('./protocol.js').Link} Link */
 /** @typedef {import('./protocol.js').Traces} Traces */
 /** @typedef {import('./scrubber.js').Scrubber} Scrubber */
-/** @typedef {{id: string, data: string, name: HTMLButtonElement, value: HTMLElement, canvas: HTMLCanvasElement,
- *   ends: HTMLElement[], pin: HTMLButtonElement, parts: HTMLElement[]}} Strip */
+/** What it shows of a neuron or a connection: its activity or weight where `what` is empty; `key` is what that is asked by.
+`told` what is said of it.
+ * @typedef {{id: string, what: string, key: string, told: string, data: string, name: HTMLButtonElement, choice: HTMLSelectElement, value: HTMLElement,
+ *   canvas: HTMLCanvasElement, ends: HTMLElement[], pin: HTMLButtonElement, parts: HTMLElement[]}} Strip */
 
 /** The most strips that are pinned; milliseconds between two traces that are asked for, and until one is asked for again. */
 const PINS = 8,
@@ -51,6 +54,7 @@ export class Strips {
   strip() {
     const name = element('button', 'of'),
       value = element('span', 'now'),
+      choice = element('select', 'what'),
       label = element('div', 'label');
     const canvas = element('canvas', 'trace'),
       ends = [element('span', 'end'), element('span', 'end')];
@@ -58,13 +62,31 @@ export class Strips {
       scale = element('div', 'scale'),
       numbers = element('div', 'ends');
     /** @type {Strip} */
-    const strip = { id: '', data: '', name, value, canvas, ends, pin, parts: [label, canvas, scale] };
-    label.append(name, value);
+    const strip = {
+      id: '',
+      what: '',
+      key: '',
+      told: '',
+      data: '',
+      name,
+      choice,
+      value,
+      canvas,
+      ends,
+      pin,
+      parts: [label, canvas, scale],
+    };
+    label.append(name, choice, value);
     numbers.append(...ends);
     scale.append(numbers, pin);
     canvas.setAttribute('role', 'img');
     name.onclick = () => this.attention.hold(strip.id);
-    pin.onclick = () => this.toggle(strip.id);
+    pin.onclick = () => this.toggle(strip);
+    choice.onchange = () => {
+      this.of(strip, this.attention.groups.get(strip.id), choice.value);
+      if (strip !== this.held) this.of(this.held, this.attention.groups.get(this.held.id), this.held.what);
+      this.list();
+    };
     canvas.onpointerdown = canvas.onpointermove = (/** @type {PointerEvent} */ event) => {
       if (event.buttons !== 1 || this.scrubber.scrub.disabled) return;
       canvas.setPointerCapture(event.pointerId);
@@ -73,19 +95,31 @@ export class Strips {
     return strip;
   }
 
-  /** Say what a strip is of. @param {Strip} strip @param {Group | undefined} group */
-  of(strip, group) {
-    const name = group ? group.title.split('\n')[0] : '',
+  /** Say what a strip is of. @param {Strip} strip @param {Group | undefined} group @param {string} [what] the name of what it
+   * shows, where there is that */
+  of(strip, group, what = '') {
+    const called = group ? group.title.split('\n')[0] : '',
       isPinned = strip !== this.held;
     [strip.id, strip.data] = group ? [group.id, JSON.stringify(group.data)] : ['', ''];
-    const again = !isPinned && this.pinned.some(({ id }) => id === strip.id);
-    strip.name.textContent = name;
-    strip.name.title = name;
+    const names = namesOf(this.link.scene, strip.id);
+    strip.what = names.includes(what) ? what : '';
+    strip.key = strip.what ? `${strip.id}.${strip.what}` : strip.id;
+    strip.told = strip.what ? `${called}, ${strip.what}` : called;
+    const again = !isPinned && this.pinned.some(({ key }) => key === strip.key);
+    const first = group?.data.neuron === undefined ? 'weight' : (group.data.state ?? 'activity');
+    strip.choice.replaceChildren(
+      ...[first, ...names.filter((one) => one !== first)].map((one, at) => new Option(one, at ? one : '')),
+    );
+    strip.choice.value = strip.what;
+    strip.choice.hidden = !names.some((one) => one !== first);
+    strip.choice.setAttribute('aria-label', `what is shown of ${called}`);
+    strip.name.textContent = called;
+    strip.name.title = called;
     strip.pin.textContent = isPinned ? '×' : 'pin';
-    strip.pin.setAttribute('aria-label', `${isPinned ? 'unpin' : 'pin'} ${name}`);
+    strip.pin.setAttribute('aria-label', `${isPinned ? 'unpin' : 'pin'} ${strip.told}`);
     strip.pin.hidden = again || (!isPinned && this.pinned.length >= PINS);
     this.place.classList.toggle('nothing', !this.held.id);
-    strip.canvas.setAttribute('aria-label', `trace of ${name}`);
+    strip.canvas.setAttribute('aria-label', `trace of ${strip.told}`);
     this.clear(strip);
   }
 
@@ -101,7 +135,7 @@ export class Strips {
     const groups = [...this.attention.groups.values()];
     this.pinned = this.pinned.filter((strip) => {
       const same = groups.find(({ data }) => JSON.stringify(data) === strip.data);
-      if (same) this.of(strip, same);
+      if (same) this.of(strip, same, strip.what);
       return same;
     });
     this.waiting = false;
@@ -111,30 +145,36 @@ export class Strips {
   /** Something is held, or nothing. @param {Group | undefined} group */
   hold(group) {
     if ((group ? group.id : '') !== this.held.id) this.of(this.held, group);
+    this.want();
     this.show();
   }
 
-  /** Pin what is held, or unpin it. @param {string} id */
-  toggle(id) {
+  /** Pin what a strip shows, by default that of what is held, or unpin it. @param {Strip} [of] */
+  toggle({ id, what, key } = this.held) {
     const group = this.attention.groups.get(id),
-      known = this.pinned.findIndex((strip) => strip.id === id);
+      known = this.pinned.findIndex((strip) => strip.key === key);
     const focused = this.place.contains(document.activeElement);
     if (!group || (known < 0 && this.pinned.length >= PINS)) return;
     if (known < 0) {
       const strip = this.strip();
       this.pinned.push(strip);
-      this.of(strip, group);
+      this.of(strip, group, what);
     } else this.pinned.splice(known, 1);
-    this.of(this.held, this.attention.groups.get(this.held.id));
+    this.of(this.held, this.attention.groups.get(this.held.id), this.held.what);
     this.list();
     const { pin } =
       this.pinned[known < 0 ? this.pinned.length - 1 : Math.min(known, this.pinned.length - 1)] || this.held;
     if (focused) (pin.checkVisibility({ visibilityProperty: true }) ? pin : this.scrubber.scrub).focus();
   }
 
+  /** Have the values of what is shown asked for. */
+  want() {
+    this.attention.also = [...this.pinned, this.held].map(({ key }) => key);
+  }
+
   /** Show the strips that there are. */
   list() {
-    this.attention.also = this.pinned.map(({ id }) => id);
+    this.want();
     this.attention.ask();
     const focused = /** @type {HTMLElement} */ (document.activeElement);
     this.place.replaceChildren(...[...this.pinned, this.held].flatMap(({ parts }) => parts));
@@ -148,10 +188,10 @@ export class Strips {
     if (!look) return;
     const { low, high, events, known: turned } = this.scrubber,
       width = Math.max(1, this.held.canvas.clientWidth - 2 * THUMB);
-    const items = [...new Set([...this.pinned, this.held].map(({ id }) => id))].filter(Boolean);
-    for (const { id, value } of [...this.pinned, this.held]) {
-      const now = this.attention.values[id],
-        words = id && now !== undefined ? signed(now) : '';
+    const items = [...new Set([...this.pinned, this.held].map(({ key }) => key))].filter(Boolean);
+    for (const { key, value } of [...this.pinned, this.held]) {
+      const now = this.attention.values[key],
+        words = key && now !== undefined ? signed(now) : '';
       if (value.textContent !== words) value.textContent = words;
     }
     const every = Math.max(1, Math.ceil((high - low + 1) / Math.min(width, 2000))),
@@ -173,7 +213,7 @@ export class Strips {
   take(traces) {
     this.waiting = false;
     for (const strip of [...this.pinned, this.held]) {
-      const trace = traces.ranges.get(strip.id);
+      const trace = traces.ranges.get(strip.key);
       if (trace) this.paint(strip, trace, traces);
     }
     this.show();
@@ -236,8 +276,8 @@ export class Strips {
     canvas.setAttribute(
       'aria-label',
       known
-        ? `${strip.name.textContent} from step ${scrubber.low} to ${scrubber.high}: between ${signed(low)} and ${signed(high)}`
-        : `${strip.name.textContent}: nothing is known of these steps`,
+        ? `${strip.told} from step ${scrubber.low} to ${scrubber.high}: between ${signed(low)} and ${signed(high)}`
+        : `${strip.told}: nothing is known of these steps`,
     );
   }
 }
