@@ -302,7 +302,11 @@ def test_legends_and_matrices_have_the_ends_that_events_lead_to(tmp_path: Path) 
     network = compiled(REVERSING)
     made = network.run()
     scene = scene_of(network, at(network, made, 0))
-    assert {shape.text for shape in scene.shapes() if isinstance(shape, Text)} >= {"excites", "inhibits", "neither"}
+    assert {shape.text for shape in scene.shapes() if isinstance(shape, Text)} >= {
+        "excites",
+        "inhibits",
+        "neither excites nor inhibits",
+    }
     assert {name: shape.kind for name, shape in heads(scene).items()} == {
         "A -> B": "arrow",
         "A -> C": "arrow",
