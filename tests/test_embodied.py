@@ -36,6 +36,14 @@ def same(one: Recording, other: Recording) -> bool:
     return all(a.shape == b.shape and a.tobytes() == b.tobytes() for a, b in pairs)
 
 
+def test_a_command_reads_no_signal_of_a_synapse() -> None:
+    synapse = "synapses: {gap: {signal: weight*pre}}\n"
+    joined = SPEC.replace("{weight: -0.7}", "{weight: -0.7, synapse: gap}")
+    spec = joined.replace("drive: O1", "drive: (P -> O1).signal")
+    with pytest.raises(BodyError, match="a command reads a signal of a synapse"):
+        carted(spec=spec + synapse).run(3)
+
+
 def by_hand(steps: int, given: str, backend: str) -> Recording:
     """A run as a loop of one's own: the network without a body, and a cart beside it."""
     bare = replace(carted().network, body=None)

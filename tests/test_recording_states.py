@@ -13,6 +13,8 @@ from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.turns import Set
 from neurovis_spec.runtime.c_backend import CStepper
+from neurovis_spec.runtime.c_package import files
+from neurovis_spec.runtime.c_settable import ExportError
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.recording import Recording
 
@@ -351,3 +353,53 @@ def test_a_run_in_c_makes_many_steps_a_call_where_states_are_kept(monkeypatch: p
 
     monkeypatch.setattr(CStepper, "step", refuse)
     assert len(nv.compile_text(SPEC).run(states=WANTED, backend="c")) == 30
+
+
+SIGNALS = """neurovis: 1
+name: signals
+time: {dt: 0.1, steps: 8}
+parameters: {g: 0.5}
+models: {m: {state: {v: {derivative: drive - v}}, activity: v}}
+synapses: {gap: {signal: weight*(pre.v - post.v)}}
+neurons: {A: {count: 2, model: m, initial: {v: i + 1}}, B: {model: m}}
+connections:
+- A -> B: {weight: g, synapse: gap, plasticity: hebbian}
+- B -> A1: 1
+"""
+
+
+@pytest.mark.parametrize("backend", ["reference", "numpy", pytest.param("c", marks=pytest.mark.compiler)])
+def test_signals_of_synapses_are_asked_for_as_states_are(backend: str) -> None:
+    """By outputs, of runs and of single steps; by --states, where weights are left out; by measures."""
+    network = nv.compile_text(SIGNALS + "outputs: {both: (A -> B).signal, one: (A2 -> B).signal}\n")
+    run, plain = network.run(backend=backend), nv.compile_text(SIGNALS).run(backend=backend, states=["all"])
+    signals = plain["(A -> B).signal"]
+    np.testing.assert_array_equal(signals, plain.weights * (plain["A.v"] - plain["B.v"][:, None]))
+    np.testing.assert_array_equal(run["both"], signals)
+    simulation = network.simulator(backend=backend)
+    assert np.isnan(simulation.outputs["one"])
+    steps = [dict(simulation.step()) for _ in range(8)]
+    np.testing.assert_array_equal([step["both"] for step in steps], signals)
+    np.testing.assert_array_equal([step["one"] for step in steps], run["one"])
+    simulation.reset()
+    assert simulation.step()["one"] == run["one"][0]
+    few = network.run(backend=backend, weights="none", states=["(A1 -> B).signal"])
+    np.testing.assert_array_equal(few["(A1 -> B).signal"], signals[:, 0])
+
+
+def test_a_sweep_measures_signals_of_synapses(tmp_path: Path) -> None:
+    (tmp_path / "spec.yaml").write_text(SIGNALS + "outputs: {one: (A2 -> B).signal}\n")
+    one = nv.compile_text(SIGNALS).run()["(A2 -> B).signal"]
+    metrics = {"last": "(A2 -> B).signal", "mean": "mean(one)"}
+    table = nv.sweep(tmp_path / "spec.yaml", {"g": [0.5]}, metrics, jobs=1)
+    assert [table[name][0] for name in metrics] == pytest.approx([one[-1], one.mean()], rel=1e-9)
+
+
+def test_where_signals_of_synapses_are_not_formed_it_is_told() -> None:
+    network = nv.compile_text(SIGNALS + "outputs: {one: (A2 -> B).signal}\n")
+    with pytest.raises(nv.SpecError, match="a signal of a synapse is formed where it is recorded, not at each step"):
+        network.until("one > 0")
+    with pytest.raises(ExportError, match="the output 'one' is of signals of synapses, which C forms"):
+        files(network.network)
+    with pytest.raises(nv.SpecError, match="no rule changes 'B -> A1', so it has no states"):
+        nv.compile_text(SIGNALS + "outputs: {none: (B -> A1).signal}\n")

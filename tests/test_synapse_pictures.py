@@ -36,6 +36,7 @@ from neurovis_spec.scene.model import Arrowhead, Scene, Text
 from neurovis_spec.scene.reached import largest_signals
 from neurovis_spec.scene.shots import snapshots_of_run
 from neurovis_spec.scene.signals import Signals
+from neurovis_spec.text_width import width
 
 #: gap junctions, a synapse with a state, a delay and a parameter that is set, one that learns, a plain connection
 TEXT = """time: {dt: 0.01, steps: 60}
@@ -194,6 +195,16 @@ def test_the_legend_says_of_what_signals_are() -> None:
     assert words(f"[{gap}, B1 -> A1: 1]") == "signal w·a, or of a synapse"
     assert words(f"[{gap}, B1 -> A1: {{send: v}}]") == "signal w·v, or of a synapse"
     assert words("[B1 -> A1: 1]") == "signal w·a"
+
+
+def test_a_heading_of_the_legend_has_room() -> None:
+    connections = "connections: [A -> B: {pattern: one_to_one, synapse: gap}, B1 -> A1: 1]\n"
+    network = compiled(TEXT.partition("connections:")[0] + connections + "render: {gain: {signal: {A -> B: 3}}}\n")
+    shapes = scene_of(network, at(network, network.run(3), 2)).shapes()
+    found = {shape.text: shape for shape in shapes if isinstance(shape, Text)}
+    lines, thickness = found["Lines: signal w·a, or of a synapse"], found["Thickness"]
+    assert lines.point[1] == thickness.point[1]
+    assert lines.point[0] + width(lines.text, lines.size, lines.weight) < thickness.point[0]
 
 
 def test_a_state_of_a_rule_is_not_called_signal_where_a_synapse_gives_one() -> None:

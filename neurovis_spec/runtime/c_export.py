@@ -33,7 +33,7 @@ from neurovis_spec.runtime.c_draws import drawing
 from neurovis_spec.runtime.c_names import LONGEST_STRING, identifiers, prefix, string, words
 from neurovis_spec.runtime.c_settable import ExportError, fixed, formula, write_follow
 from neurovis_spec.runtime.c_step import Built, StepCode, begins_otherwise, write_input
-from neurovis_spec.runtime.columns import probe_of
+from neurovis_spec.runtime.columns import named_signals, probe_of
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.lags import ring_lengths
 from neurovis_spec.runtime.signals import signal_layout
@@ -102,6 +102,11 @@ class Exported:
             name: kept_slots[slots[name]] for name in free if slots[name] in kept_slots
         }
         self._check_events(kept_slots)
+        if signals := named_signals(network):
+            problem = (
+                f"the output '{signals[0]}' is of signals of synapses, which C forms where they are added up alone"
+            )
+            raise ExportError(f"{problem}: export the network without it, or with what it is for")
         self.settable_names = identifiers(self.settable)
         self.phases = self._phases()
         #: whether any phase holds neurons

@@ -179,6 +179,12 @@ def probe_of(network: Network, states: Iterable[StateOf]) -> Probe:
     return _probe(network, list(singles(states)))
 
 
+def named_signals(network: Network) -> list[str]:
+    """The outputs of a spec that have signals of synapses among them."""
+    named = [one for one in network.outputs if one.states] if len(network.joined) else []
+    return [one.name for one in named if probe_of(network, one.states).forms]
+
+
 def _probe(network: Network, wanted: list[tuple[str, Each, int]]) -> Probe:
     """A probe of single states: the name, what has it ("neuron", "connection"), and the index of that."""
     places: dict[tuple[Owner, str], tuple[list[int], list[int]]] = {}

@@ -56,6 +56,10 @@ class Embodied:
         #: the commands of the spec, by the places of their actuators
         self._moved = {_place(self.body.actuators, one.actuator, "actuator"): one for one in self._settings.moved}
         self._commands, self._probe = _commands(network, self._moved.values())
+        if self._probe.forms:
+            raise BodyError(
+                "a command reads a signal of a synapse", "command by activities, states and outputs of models"
+            )
         self._moves = np.array(list(self._moved), dtype=np.int64)
         self._size = sum(port.size for port in self.body.actuators)
         #: the number of the episode to come or going on; whether the last step ended one

@@ -78,7 +78,7 @@ def find_lasting_state(network: Network, reference: str) -> StateOf | None:
     if name is None:
         return None
     if isinstance(name.owner, Arrow):
-        return _state(network, part, names)
+        return _state(network, part, names, outputs=False)
     if isinstance(names.find(name.owner.text), str):
         return None
     neurons = find_neurons(name.owner.text, names)
@@ -105,7 +105,7 @@ def _state(network: Network, part: Part, names: Names, *, outputs: bool = True) 
     if name is None:
         raise UnknownNameError(f"'{text}' is no state: write K.v for v of K's model, (K -> O).v for that of a rule")
     if isinstance(name.owner, Arrow):
-        one = connections_state(name, _between(network, name.owner, names), _wiring_of(network))
+        one = connections_state(name, _between(network, name.owner, names), _wiring_of(network), outputs=outputs)
     else:
         holders = _holders_of(network, MODEL)
         if not outputs:
@@ -134,6 +134,7 @@ def _holders_of(network: Network, kind: Kind) -> tuple[Holder, ...]:
 def _wiring_of(network: Network) -> Wiring:
     """All connections, with the states of their rules and synapses."""
     rules, synapses = (_holders_of(network, kind) for kind in (RULE, SYNAPSE))
+    synapses = tuple(one._replace(outputs=(SYNAPSE.gives,)) for one in synapses)
     connections = network.connections
     ends = connections.sources.whole(), connections.targets.whole()
     return Wiring(*ends, connections.entries, rules, synapses=synapses)

@@ -14,7 +14,7 @@ from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Self, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -30,7 +30,7 @@ from neurovis_spec.language.expressions.tree import Number
 from neurovis_spec.language.units import UnitError, measured, number_in
 from neurovis_spec.likeness import suggest
 from neurovis_spec.runtime.backend import Backend, Reading, Ready, ready
-from neurovis_spec.runtime.columns import ALL, Keep, Probe, probe_of
+from neurovis_spec.runtime.columns import ALL, Keep, Probe, named_signals, probe_of
 from neurovis_spec.runtime.controls import Controls
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.embodied import Embodied, embodied
@@ -49,6 +49,9 @@ from neurovis_spec.runtime.watch import Checked, Watch
 
 if TYPE_CHECKING:
     from neurovis_spec.runtime.recorder import Recorder
+
+#: What reads an output, of the state and the signals (m,) behind a step.
+_Reader: TypeAlias = Callable[[State, FloatArray | None], np.float64 | FloatArray]
 
 #: Clamps by hand come after those of events.
 _BY_HAND = 1 << 62
@@ -87,7 +90,7 @@ class Simulation:
         self._apply(self._begin)
         self._recorder: Recorder | None = None
         #: what forms the signals of each step, where somebody follows them, and those of the last one
-        self._forming: Forming | None = None
+        self._forming = Forming(network, self._backend.functions) if named_signals(network) else None
         self._signals: FloatArray | None = None
         #: what was true after the last step, where events of the step to come have changed something (``ended``)
         self._ended: After | None = None
@@ -153,7 +156,7 @@ class Simulation:
         return names_of(self.network)
 
     @cached_property
-    def _outputs(self) -> tuple[tuple[str, Callable[[State], np.float64 | FloatArray]], ...]:
+    def _outputs(self) -> tuple[tuple[str, _Reader], ...]:
         """How each output is read, by its name."""
         return tuple((entry.name, _reader(self.network, entry)) for entry in self.network.outputs)
 
@@ -345,7 +348,7 @@ class Simulation:
         state = self._state
         found: dict[str, np.float64 | FloatArray] = {}
         for name, read in self._outputs:
-            found[name] = read(state)
+            found[name] = read(state, self._signals)
         return found
 
     def set(self, values: Mapping[str, float | str] | None = None, /, **parameters: float | str) -> None:
@@ -533,12 +536,12 @@ def _number(name: str, value: object, unit: str) -> float | None:
         raise ParameterError(f"parameter '{name}': {error}") from None
 
 
-def _reader(network: Network, output: Output) -> Callable[[State], np.float64 | FloatArray]:
-    """What reads an output from the state after a step."""
+def _reader(network: Network, output: Output) -> _Reader:
+    """What reads an output from the state and the signals after a step."""
     if output.states:
         probe = probe_of(network, output.states)
-        return (lambda state: np.float64(probe.now(state)[0])) if output.scalar else probe.now
+        return (lambda state, signals: np.float64(probe.now(state, signals)[0])) if output.scalar else probe.now
     if output.scalar:
         index = int(output.neurons[0])
-        return lambda state: state.activity[index]  # of an array of doubles: an np.float64
-    return lambda state: state.activity[output.neurons]
+        return lambda state, _: state.activity[index]  # of an array of doubles: an np.float64
+    return lambda state, _: state.activity[output.neurons]

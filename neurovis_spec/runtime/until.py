@@ -12,7 +12,8 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.runtime.measures import Measure, Meter, measure_of
+from neurovis_spec.diagnostics import Span
+from neurovis_spec.runtime.measures import Measure, Meter, findings_of, measure_of
 from neurovis_spec.runtime.rows import Rows, RowSink
 from neurovis_spec.runtime.state import State
 
@@ -40,6 +41,11 @@ class Until:
 
     def __init__(self, text: str, network: Network) -> None:
         self.measure: Measure = measure_of(text, network, LABEL, bounded=True)
+        if self.measure.probe.forms:
+            findings = findings_of(text, LABEL)
+            message = "a signal of a synapse is formed where it is recorded, not at each step"
+            findings.error("unknown-name", Span(LABEL, 1, 1, 1, len(text) + 1), message, "ask for what it is made of")
+            findings.check()
         self.ending: Ending | None = None
 
     def watch(self, rows: RowSink, state: State, steps: int) -> Watched:

@@ -213,7 +213,7 @@ def _ramp(words: str, rows: Sequence[tuple[str, str, str]], theme: Theme) -> Leg
             Text((across / 2, y), middle, SMALL, theme.muted, "middle"),
             Text((across, y), right, SMALL, theme.muted, "end"),
         ]
-    return LegendEntry(tuple(shapes), across, high(len(rows)))
+    return LegendEntry(tuple(shapes), max(across, texts.width(words, HEADING, 600)), high(len(rows)))
 
 
 def _strokes(scale: Scale, weights: Sequence[float], theme: Theme) -> LegendEntry:

@@ -13,6 +13,7 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
 from neurovis_spec.compiler.names.state_references import StateOf
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import SYNAPSE
 from neurovis_spec.layout.labels import names_in_parts, parts_of
 from neurovis_spec.runtime.errors import RecordingError
 from neurovis_spec.runtime.recording import Recording
@@ -59,9 +60,14 @@ def short_names(curves: Sequence[Curve], network: Network) -> list[tuple[str, st
 
 def kind_of(curves: Sequence[Curve]) -> str:
     """What they all are, in a word or two."""
-    kinds = {"state": any(c.state for c in curves), "weight": any(c.of == "connection" and not c.state for c in curves)}
-    kinds["activity"] = any(c.of == "neuron" and not c.state for c in curves)
-    return ", ".join(kind for kind in ("activity", "weight", "state") if kinds[kind])
+    kinds = {_kind_of(curve) for curve in curves}
+    return ", ".join(kind for kind in ("activity", "weight", "signal", "state") if kind in kinds)
+
+
+def _kind_of(curve: Curve) -> str:
+    if curve.of == "neuron":
+        return "state" if curve.state else "activity"
+    return {"": "weight", SYNAPSE.gives: "signal"}.get(curve.state, "state")
 
 
 def states_of(panels: Sequence[Panel], network: Network) -> tuple[str, ...]:

@@ -24,7 +24,7 @@ from neurovis_spec.compiler.names.state_references import (
 )
 from neurovis_spec.compiler.neurons.groups import is_written
 from neurovis_spec.compiler.neurons.populate import Census
-from neurovis_spec.compiler.program import Definition, Quantity
+from neurovis_spec.compiler.program import SYNAPSE, Definition, Quantity
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.references import Arrow, DottedName, Part, StateName, parse_sum
@@ -124,7 +124,11 @@ class Finder:
         one: StateOf | Refusal | Unknown
         if isinstance(name.owner, Arrow):
             connections = self._between(name.owner, text)
-            one = UNKNOWN if connections is UNKNOWN else connections_state(name, connections, self.wiring)
+            one = (
+                UNKNOWN
+                if connections is UNKNOWN
+                else connections_state(name, connections, self.wiring, outputs=models is None)
+            )
         else:
             neurons = resolve_part(name.owner, text, self.directory, self.findings)
             one = UNKNOWN if neurons is UNKNOWN else model_state(name, neurons, models or self.models)
@@ -146,7 +150,7 @@ def finder_of(census: Census, made: Connected, findings: Findings) -> Finder:
         rules += [_holder(members, learning.rule.name, learning.rule.kept) for learning in bundle.rules]
         if bundle.synapse is not None:
             synapse = bundle.synapse.definition
-            synapses.append(_holder(members, synapse.name, synapse.state))
+            synapses.append(_holder(members, synapse.name, synapse.state)._replace(outputs=(SYNAPSE.gives,)))
     names = tuple(bundle.name for bundle in made.bundles)
     empty = tuple(bundle.empty for bundle in made.bundles if bundle.empty is not None)
     ends = made.sources.compact(), made.targets.compact()

@@ -59,7 +59,7 @@ class Refusal(NamedTuple):
 
 class Holder(NamedTuple):
     """Members (neurons, or connections) whose model, rule or synapse is ``kind`` and has these states, and these
-    outputs beside them, where outputs are asked for, too."""
+    outputs beside them, where outputs are asked for, too; a synapse's is its signal."""
 
     members: IntArray
     kind: str
@@ -103,15 +103,19 @@ def model_state(name: StateName, neurons: Sequence[int], models: Iterable[Holder
     return StateOf.of("neuron", name.state, wanted)
 
 
-def connections_state(name: StateName, connections: IntArray, wiring: Wiring) -> StateOf | Refusal | Unknown:
-    """A state of those of these connections whose rule or synapse has it; UNKNOWN where the connection that has it may
-    be one that is invalid."""
+def connections_state(
+    name: StateName, connections: IntArray, wiring: Wiring, *, outputs: bool = True
+) -> StateOf | Refusal | Unknown:
+    """A state of those of these connections whose rule or synapse has it, or, as ``outputs`` are asked for, too, their
+    signal; UNKNOWN where the connection that has it may be one that is invalid."""
     rules, synapses = (
         [holder for holder in some if np.isin(connections, holder.members).any()]
         for some in (wiring.rules, wiring.synapses)
     )
     holders = (*rules, *synapses)
-    having = [holder.members for holder in holders if name.state in holder.states]
+    having = [
+        holder.members for holder in holders if name.state in (*holder.states, *(holder.outputs if outputs else ()))
+    ]
     if having:
         return StateOf.of("connection", name.state, connections[np.isin(connections, np.concatenate(having))])
     if not wiring.complete:
