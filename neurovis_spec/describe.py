@@ -66,18 +66,22 @@ def _neurons(network: Network) -> list[dict[str, object]]:
 def _connections(network: Network) -> list[dict[str, object]]:
     names, connections = network.neurons.names, network.connections
     routes, synapses = _routes(network), _synapses(network)
+    twins = () if connections.twins is None else connections.twins.tolist()
     return [
         {"from": names[source], "to": names[target], "weight": weight, "delay": delay, "rule": rule}
         | (routes[entry] if routes else {})
         | ({"synapse": synapses[entry]} if synapses else {})
-        for source, target, weight, delay, rule, entry in zip(
-            connections.sources.tolist(),
-            connections.targets.tolist(),
-            connections.weights.tolist(),
-            connections.delays.tolist(),
-            _rules(network),
-            connections.entry.tolist(),
-            strict=True,
+        | ({"symmetric": twins[index] >= 0} if twins else {})
+        for index, (source, target, weight, delay, rule, entry) in enumerate(
+            zip(
+                connections.sources.tolist(),
+                connections.targets.tolist(),
+                connections.weights.tolist(),
+                connections.delays.tolist(),
+                _rules(network),
+                connections.entry.tolist(),
+                strict=True,
+            )
         )
     ]
 

@@ -12,7 +12,9 @@ from scenes import film_of, scene_of
 from small_specs import compiled
 
 import neurovis_spec as nv
+from neurovis_spec.cli.overview import overview
 from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.describe import describe
 from neurovis_spec.layout.problem import problem_of
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.turns import Lesion
@@ -183,6 +185,23 @@ def test_focus_and_paths_find_a_line_by_either_direction() -> None:
     (snapshot,) = snapshots_of(made.network, made.run(3), [1])
     settings = replace(made.network.render, path=("N3 -> N1", (2,), (0,)))
     assert sorted(lines(scene_of(made, snapshot, settings=settings))) == ["N1 -> N2", "N2 -> N3"]
+
+
+def test_inspect_says_what_is_symmetric() -> None:
+    made = network("N -> N: {pattern: chain, synapse: gap, symmetric: true}\n  - N1 -> M: {weight: 2}")
+    told = overview(made).splitlines()
+    begin = told.index("connections") + 1
+    assert [" ".join(line.split()) for line in told[begin : begin + 3]] == [
+        "entry number symmetric weight delay synapse",
+        "N -> N 10 both ways 1 0 gap",
+        "N1 -> M 3 2 0",
+    ]
+    described = describe(made.network, ("layered", ""))["connections"]
+    assert isinstance(described, list)
+    assert [one["symmetric"] for one in described] == [True] * 10 + [False] * 3
+    plain = describe(network("N1 -> M1: 1").network, ("layered", ""))["connections"]
+    assert isinstance(plain, list)
+    assert "symmetric" not in plain[0]
 
 
 def test_what_cannot_be_symmetric_is_told() -> None:

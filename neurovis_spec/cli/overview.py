@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 #: The largest network whose connection matrix is shown, in neurons.
 _MATRIX = 24
 _OF_GROUPS = ("group", "neurons", "size", "activation", "model", "combine", "bias", "input", "box")
-_OF_ENTRIES = ("entry", "number", "weight", "delay", "port", "sends", "synapse", "rule", "bounds")
+_OF_ENTRIES = ("entry", "number", "symmetric", "weight", "delay", "port", "sends", "synapse", "rule", "bounds")
 
 
 def overview(compiled: CompiledNetwork) -> str:
@@ -157,10 +157,11 @@ def _entries(network: Network) -> list[tuple[str, ...]]:
 def _entry(connections: Connections, index: int, route: Route, members: IntArray) -> tuple[str, ...]:
     name = connections.entries[index]
     if not len(members):
-        return name, "0", "", "", "", "", "", "", ""
+        return name, "0", *[""] * (len(_OF_ENTRIES) - 2)
     return (
         name,
         f"{len(members):,}",
+        "both ways" if connections.twins is not None and connections.twins[members[0]] >= 0 else "",
         spread(connections.weights[members].tolist()),
         _delays(connections, members),
         "" if route.ports == PLAIN_ROUTE.ports else ", ".join(map(_port, route.ports)),
