@@ -131,3 +131,31 @@ connections: {A -> B: {weight: 0.5, delay: 4.3 ms}, B -> A: {weight: -0.8, delay
     assert all(one.order == pytest.approx(1.6, abs=0.4) for one in errors(text).values())
     finer = stretched(compiled(text).network, 4).connections
     assert (finer.delays.tolist(), finer.lags and finer.lags.tolist()) == ([34, 34], [34.4, 34.4])
+
+
+CHAOS = """neurovis: 1
+name: lorenz
+time: {dt: 0.02, steps: 1500}
+models:
+  lorenz:
+    state:
+      x: {initial: 1, derivative: 10*(y - x)}
+      y: {initial: 1, derivative: x*(28 - z) - y}
+      z: {initial: 1, derivative: x*y - 8/3*z}
+    activity: x
+neurons: {L: {model: lorenz}}
+"""
+
+
+def test_an_order_that_is_none_is_explained(tmp_path: Path) -> None:
+    """Of a chaotic run; over fewer steps, which is what is said to do, there is the order of the method."""
+    (tmp_path / "a.yaml").write_text(CHAOS)
+    made = CliRunner().invoke(neurovis, ["run", str(tmp_path / "a.yaml"), "--check-step"])
+    assert made.exit_code == 0
+    last = made.stdout.splitlines()[-1]
+    assert last.startswith("help: an order below 0.5 (L")
+    assert "the run is chaotic" in last
+    assert "check fewer steps, such as 150," in last
+    check = nv.compile_text(CHAOS).check_step(steps=150)
+    assert check.hint == ""
+    assert [one.order for one in check.errors] == pytest.approx([4, 4, 4, 4], abs=0.2)

@@ -261,3 +261,5 @@ def _print_check(network: CompiledNetwork, check: StepCheck) -> None:
         order = f"none: {one.why}" if one.order is None else f"{one.order:.2f}"
         rows.append((one.name, f"{one.first:.2e}", f"{one.second:.2e}", order))
     click.echo(table(rows, ("", "max |Δ| dt, dt/2", "dt/2, dt/4", "order")))
+    if check.hint:
+        click.echo(f"help: {check.hint}")

@@ -29,6 +29,10 @@ from neurovis_spec.runtime.recording import Recording
 
 #: what is less than this share of the largest value is rounding, and says nothing of an order
 _ROUNDING = 1e-13
+#: an order below this shows no convergence at all: the lowest of a method is 1
+_LEAST_ORDER = 0.5
+#: so many names are told
+_MOST_TOLD = 3
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,22 @@ class StepCheck:
     steps: int
     backend: str
     errors: tuple[StepError, ...]
+
+    @property
+    def hint(self) -> str:
+        """What an order says that is no method's, as shorter steps bring the runs no nearer to each other, and what to
+        do; empty where there is none."""
+        apart = [one.name for one in self.errors if one.order is not None and one.order < _LEAST_ORDER]
+        if not apart:
+            return ""
+        more = f" and {len(apart) - _MOST_TOLD} more" if len(apart) > _MOST_TOLD else ""
+        told = ", ".join(apart[:_MOST_TOLD]) + more
+        return (
+            f"an order below {_LEAST_ORDER} ({told}) says that shorter steps bring the runs no nearer to each other. "
+            "Either the step is too long for what is fastest: take a shorter dt, or a method for stiff equations "
+            "(integrate: exponential). Or the run is chaotic, so that any difference grows until it is as large as the "
+            f"values: check fewer steps, such as {max(2, self.steps // 10)}, in which it stays small"
+        )
 
 
 def check_step(network: Network, course: Course, progress: Progress | None = None) -> StepCheck:
