@@ -83,7 +83,7 @@ def test_its_value_is_read_and_checked() -> None:
 
 
 def test_what_it_excludes_and_needs_is_reported_once() -> None:
-    conflict = ("conflicting-keys", "'mood' beside 'bias', which says it already", "remove 'mood'")
+    conflict = ("conflicting-keys", "'mood' beside 'bias': only one of the two may be there", "remove 'mood'")
     assert found("{count: 2, bias: 1, mood: 1}") == [conflict]
     assert found("{mood: 1}") == [("useless-key", "'mood' is of many", None)]
     assert [code for code, _, _ in found("{coutn: 2, mood: 1}")] == ["unknown-key"]

@@ -271,7 +271,7 @@ class NotWith:
     """Keys that exclude that of a field. ``why`` and ``hint`` may name {own} and {other}, the two keys."""
 
     others: tuple[Written, ...]
-    why: str = "'{own}' beside '{other}', which says it already"
+    why: str = "'{own}' beside '{other}': only one of the two may be there"
     hint: str | None = "remove '{own}'"
     code: str = "conflicting-keys"
 

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterable
 from collections.abc import Mapping as AnyMapping
 from contextlib import suppress
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Final
 
 from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, ValidationInfo
 from pydantic.json_schema import JsonSchemaValue
@@ -289,6 +289,9 @@ class ScaleModel(Model):
 
 #: Rows of centres say which neurons are connected, as a matrix does; those of delays have a cell for each pair.
 _CENTRE, _DELAY = AsTable("centre"), AsTable("delay")
+_WHICH: Final = (
+    "'{own}' beside '{other}': '{other}' says which neurons are connected, so that '{own}' has nothing to say"
+)
 
 
 class ConnectionModel(Model):
@@ -305,17 +308,21 @@ class ConnectionModel(Model):
     weight: Annotated[
         FormulaField | None,
         PAIR,
-        NotWith(("matrix", "edges"), hint="write the weights into '{other}'; an edge is [FROM, TO, WEIGHT, DELAY]"),
+        NotWith(
+            ("matrix", "edges"),
+            "'{own}' beside '{other}', in which each connection has a weight of its own",
+            "write the weights into '{other}'; an edge is [FROM, TO, WEIGHT, DELAY]",
+        ),
     ] = Field(None, description="One number, or an expression of i, j, n_from, n_to (default 1).")
     centre: Annotated[CentreField, PAIR] | None = Field(
         None, description="For combine: distance; like weight or matrix (default 0)."
     )
     scale: ScaleModel | None = Field(None, description="Scales the weights of this entry together when they are made.")
     matrix: MatrixField | None = Field(None, description="Dense rows, rows are sources; null means no connection.")
-    edges: Annotated[EdgesField | None, NotWith(("matrix", _CENTRE))] = Field(
+    edges: Annotated[EdgesField | None, NotWith(("matrix", _CENTRE), _WHICH)] = Field(
         None, description="[[from, to, weight, delay], …], the last two optional."
     )
-    pattern: Annotated[PatternField | None, NotWith(("matrix", "edges", _CENTRE))] = Field(
+    pattern: Annotated[PatternField | None, NotWith(("matrix", "edges", _CENTRE), _WHICH)] = Field(
         None,
         description="Which pairs are connected: all_to_all, one_to_one, chain, ring, {random: {probability: p}}, ….",
     )
