@@ -517,19 +517,24 @@ class Pair(NamedTuple):
     span: Span
 
 
-def pair(wanted: str) -> Leaf[Node]:
-    """The annotation of a field that takes two numbers or expressions; ``wanted`` is what they are, for a finding."""
+#: What to do with a position of three numbers.
+FLAT: Final = "leave the third number out: positions, and the distances between them, are in a plane"
+
+
+def pair(wanted: str, of_three: str | None = None) -> Leaf[Node]:
+    """The annotation of a field that takes two numbers or expressions; ``wanted`` is what they are, for a finding, and
+    ``of_three`` what to do where there are three."""
 
     def check(node: Node, info: ValidationInfo) -> Pair:
         if not isinstance(node, Sequence) or len(node.items) != 2:
-            refuse(info, node, wanted)
+            refuse(info, node, wanted, of_three if isinstance(node, Sequence) and len(node.items) == 3 else None)
         first, second = each(node.items, as_formula, info)
         return Pair(first, second, node.span)
 
     return Leaf(check, TWO)
 
 
-PointField = Annotated[Pair, pair("a position [x, y]")]
+PointField = Annotated[Pair, pair("a position [x, y]", FLAT)]
 
 
 def as_title(node: Node, info: ValidationInfo) -> Located[bool] | Located[str]:

@@ -22,7 +22,7 @@ from neurovis_spec.language.located import formula_of
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
-from neurovis_spec.language.values import FileReference
+from neurovis_spec.language.values import FLAT, FileReference
 from neurovis_spec.language.yaml.source import TEXT, AnyList, Scalar, Sequence
 
 _POSITION = formula_at(GroupModel, "position", 0)
@@ -47,7 +47,8 @@ def _from_file(reference: FileReference, n: int | Unknown, findings: Findings, f
     if (rows, columns) == (n, 2):
         return np.array(table.values, dtype=np.float64)
     wanted = f"positions of {plural(n, 'neuron')} are {plural(n, 'row')} of 2 numbers"
-    findings.error("wrong-size", reference.path.span, f"{wanted}; the file has {rows} × {columns}")
+    hint = FLAT if (rows, columns) == (n, 3) else None
+    findings.error("wrong-size", reference.path.span, f"{wanted}; the file has {rows} × {columns}", hint)
     return UNKNOWN
 
 
@@ -56,6 +57,9 @@ def _from_rows(node: AnyList, n: int | Unknown, constants: Constants) -> FloatAr
     findings = constants.findings
     one = n is not UNKNOWN and _one_for_all(node, n)
     if n is not UNKNOWN and not one and len(node) != n:
+        if len(node) == 3 and all(isinstance(item, Scalar) for item in node.items):
+            findings.error("wrong-type", node.span, f"{_TWO} [x, y]", FLAT)
+            return UNKNOWN
         findings.error("wrong-size", node.span, f"{plural(len(node), 'position')} for {plural(n, 'neuron')}")
         return UNKNOWN
     row = "" if n is UNKNOWN else f"{_TWO} [x, y]"
@@ -64,7 +68,7 @@ def _from_rows(node: AnyList, n: int | Unknown, constants: Constants) -> FloatAr
         return UNKNOWN
     wrong = np.flatnonzero(cells.widths != 2)
     for place in wrong[:PATIENCE].tolist() if row else ():
-        findings.error("wrong-type", cells.row_span(place), row)
+        findings.error("wrong-type", cells.row_span(place), row, FLAT if cells.widths[place] == 3 else None)
     which = np.arange(len(cells.kinds))
     if n is UNKNOWN or len(wrong):
         values_of(cells, which, constants, dict.fromkeys(_POSITION.sees, UNKNOWN))
