@@ -18,10 +18,22 @@ from neurovis_spec.arrays import BoolArray, Indices, IntArray
 from neurovis_spec.compiler.events.settable import CENTRES, bias_of
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import CENTRE, Population, Port, Projection
+from neurovis_spec.runtime.events import are_spikes, in_order, rows_of, takes_spikes
 from neurovis_spec.runtime.lags import Lags
 from neurovis_spec.runtime.numpy_code import Code, any_given
+from neurovis_spec.runtime.numpy_spikes import Arriving, sums
 from neurovis_spec.runtime.signals import DelayClass, SharedSlots, SignalLayout
-from neurovis_spec.runtime.stages import End, Formed, behind_flow, ends_of, formed_at, signal_of, taken_by, target_of
+from neurovis_spec.runtime.stages import (
+    End,
+    Formed,
+    acts_now,
+    behind_flow,
+    ends_of,
+    formed_at,
+    signal_of,
+    taken_by,
+    target_of,
+)
 from neurovis_spec.runtime.state import NEVER_LOST, Structure
 
 
@@ -46,6 +58,11 @@ class Step:
     spread: dict[tuple[int, str], str] = field(default_factory=dict)
     #: by projections, those of the signals of synapses before their targets are updated
     formed: dict[int, str] = field(default_factory=dict)
+
+    @property
+    def spikes(self) -> BoolArray:
+        """Which of all activities and outlets are spikes."""
+        return are_spikes(self.network)
 
     def working(self, number: int) -> Working:
         """The connections of a projection that do something."""
@@ -75,11 +92,61 @@ class Working(NamedTuple):
 def gathered(step: Step, number: int, port: Port) -> str:
     """What is at a port of a population: what arrives there, combined, + bias + input + noise."""
     population = step.network.populations[number]
-    arriving = ""
-    if len(port.incoming):
-        signals = signals_at(step, number, port, np.arange(len(port.incoming)))
-        arriving = step.code.let("u", combined(step, population, port, signals))
+    arriving, places = "", np.flatnonzero(~acts_now(port))
+    if len(places):
+        arriving = arriving_at(step, number, port, places)
     return with_step_values(step, population, port, with_bias(step, population, port, arriving))
+
+
+def brought_now(step: Step, number: int, port: Port) -> str:
+    """What spikes of the same step bring to a port that act behind all of it, and nothing else."""
+    places = np.flatnonzero(acts_now(port))
+    if len(places):
+        return arriving_at(step, number, port, places)
+    return step.code.constant(np.zeros(len(step.network.populations[number].members)))
+
+
+def arriving_at(step: Step, number: int, port: Port, places: Indices) -> str:
+    """What arrives at a port of a population by the connections at these places, combined."""
+    population = step.network.populations[number]
+    if spikes := _spikes_at(step, port, places, len(population.members)):
+        return spikes
+    signals = signals_at(step, number, port, places)
+    return step.code.let("u", finished(port, accumulated(step, population, port, places, signals)))
+
+
+def _spikes_at(step: Step, port: Port, places: Indices, count: int) -> str:
+    """The sums of the spikes that come to a port, of the connections at these places, as code; "" where anything else
+    comes, too, or where some have a delay and some have none."""
+    network = step.network
+    incoming = port.incoming[places]
+    delays = network.connections.delays[incoming]
+    shares = step.layout.shares[incoming] | (delays == 0)
+    alike = bool((delays > 0).any()) == bool((delays > 0).all()) and bool(shares.any()) == bool(shares.all())
+    if not (alike and takes_spikes(network, port, step.spikes)):
+        return ""
+    rows = rows_of(np.asarray(taken_by(network)[incoming], dtype=np.int64), delays)
+    lost, order = step.structure.lost[incoming], rows.order
+    arriving = Arriving(
+        rows=rows,
+        connections=np.ascontiguousarray(incoming[order], dtype=np.intp),
+        ends=np.repeat(rows.ends, np.diff(rows.starts)),
+        slots=np.ascontiguousarray(port.slots[places][order], dtype=np.intp),
+        factors=None if port.factors is None else port.factors[places][order],
+        offsets=None if shares.any() else step.layout.offsets[incoming].astype(np.int64)[order],
+        delays=delays[order],
+        lost=lost[order] if (lost > NEVER_LOST).any() else None,
+        in_order=in_order(rows, port.slots[places], incoming),
+        neurons=count,
+    )
+    step.code.namespace["sums"] = sums
+    sent = "" if delays.any() else f", {all_sent(step)}"
+    return step.code.let("u", f"sums({step.code.constant(arriving)}, k, history, weights, signals{sent})")
+
+
+def all_sent(step: Step) -> str:
+    """All activities and outlets as they are now."""
+    return "np.concatenate((activity, outlets))" if step.network.outlet_count else "activity"
 
 
 def with_bias(step: Step, population: Population, port: Port, arriving: str) -> str:
@@ -381,11 +448,6 @@ def _centres(step: Step, connections: Indices) -> str:
         elif code.is_set(CENTRES) or any_given(centres[some]) or len(places) < len(own):
             parts.append((code.numbers(CENTRES, centres, some, share=False), places))
     return put_together(code, parts, len(own), "c") if len(parts) > 1 else "".join(values for values, _ in parts)
-
-
-def combined(step: Step, population: Population, port: Port, signals: str) -> str:
-    """What arrives at each member from all connections as one number."""
-    return finished(port, accumulated(step, population, port, np.arange(len(port.incoming)), signals))
 
 
 def finished(port: Port, arrived: str) -> str:

@@ -118,16 +118,7 @@ class Code:
         """The parameters of a definition in use, of ``some`` of its members or of all; and the time, where it is in
         another unit there."""
         numbers = {name: self.numbers(Key(use.owner, name), array, some) for name, array in use.parameters.items()}
-        return numbers | self._time(use.definition)
-
-    def _time(self, definition: Definition) -> dict[str, str]:
-        unit = definition.per_second
-        if unit == 1.0:
-            return {}
-        if "t" in definition.read:
-            self._tell_time()
-            self.head_lines.add(f"t_{unit:.0f} = t_ * {unit!r}")
-        return {"dt": self.constant(np.float64(self.dt * unit)), "t": f"t_{unit:.0f}"}
+        return numbers | self.time(use.definition)
 
     def functions(self, use: Use) -> Functions:
         """The functions of an activation in use, which formulas of a model call."""
@@ -173,6 +164,27 @@ class Code:
             return self.view(_VARIABLES, f"{start}:{start + 1}")
         whole = self.view(_VARIABLES, f"{start}:{start + size}")
         return whole if some is None else self.select(whole, some, size)
+
+    def numbers_of(self, array: Key, values: FloatArray, some: Indices | None, which: str) -> str:
+        """The numbers of those of the members, of ``some`` of all or all, that code says: one number where all are the
+        same."""
+        variable = self._variables.get(array)
+        numbers = values if some is None else values[some]
+        if (variable is None and isinstance(shared(numbers), np.float64)) or (
+            variable is not None and variable.size == 1
+        ):
+            return self.numbers(array, values, some)
+        return f"{self.numbers(array, values, some, share=False)}[{which}]"
+
+    def time(self, definition: Definition) -> dict[str, str]:
+        """The time, where it is in another unit in a definition."""
+        unit = definition.per_second
+        if unit == 1.0:
+            return {}
+        if "t" in definition.read:
+            self._tell_time()
+            self.head_lines.add(f"t_{unit:.0f} = t_ * {unit!r}")
+        return {"dt": self.constant(np.float64(self.dt * unit)), "t": f"t_{unit:.0f}"}
 
     def is_set(self, array: Key) -> bool:
         """Whether an array can be set in a run."""

@@ -31,6 +31,7 @@ from neurovis_spec.compiler.flows import ports_read_by
 from neurovis_spec.compiler.network import Network, Outlet
 from neurovis_spec.compiler.program import (
     MODEL,
+    Advance,
     Diffuse,
     Gather,
     Integrate,
@@ -43,9 +44,12 @@ from neurovis_spec.compiler.program import (
     Send,
     SendAhead,
     Update,
+    Use,
 )
 from neurovis_spec.runtime.numpy_arrivals import (
     Step,
+    Working,
+    brought_now,
     ends_at,
     gathered,
     seen_before_update,
@@ -55,6 +59,7 @@ from neurovis_spec.runtime.numpy_arrivals import (
     slots_of,
 )
 from neurovis_spec.runtime.numpy_code import FIRST, Cell, Code, emit_change
+from neurovis_spec.runtime.numpy_events import come_to_some, seen_by
 from neurovis_spec.runtime.numpy_flows import diffuse, integrate
 from neurovis_spec.runtime.numpy_lags import behind_lags
 from neurovis_spec.runtime.signals import SharedSlots
@@ -74,12 +79,40 @@ def _read(operation: ReadInputs, step: Step) -> None:
 
 @emit.register
 def _gather(operation: Gather, step: Step) -> None:
-    """What is at each port of a population that its step reads."""
+    """What is at each port of a population that its step reads; of spikes that act behind all of the step these
+    alone."""
     population = step.network.populations[operation.population]
     read = ports_read_by(population.model.definition).once
+    if operation.now:
+        step.ports[operation.population] = {
+            port.name: brought_now(step, operation.population, port) for port in population.ports if port.name in read
+        }
+        return
     step.ports[operation.population] = {
         port.name: gathered(step, operation.population, port) for port in population.ports if port.name in read
     }
+
+
+@emit.register
+def _advance(operation: Advance, step: Step) -> None:
+    """The states of a population in a phase, from old values and what was gathered; not at the first step."""
+    code, population = step.code, step.network.populations[operation.population]
+    model = population.model
+    definition = replace(model.definition.during([operation.phase]), gives=())
+    code.line(f"if fixed: hold_cells(fixed, {code.constant((model.owner,))}, cells)")
+    code.line(f"if not ({FIRST}):")
+    code.indent += 1
+    known = code.parameters(model) | step.ports[operation.population]
+    count = len(population.members)
+    cells = {one.name: _cell(code, model, one.name, count) for one in definition.state}
+    emit_change(code, definition, known, cells, None, code.functions(population.activation))
+    code.indent -= 1
+
+
+def _cell(code: Code, use: Use, name: str, count: int) -> Cell:
+    """A state of all members of a population."""
+    now, key = code.state(use, name), code.constant(Key(use.owner, name))
+    return Cell(now, f"{now}[:]", held=f"held_at(fixed, {key}, {{}}, {count})".format)
 
 
 @emit.register
@@ -102,6 +135,12 @@ def _receive(operation: Receive, step: Step) -> None:
         return
     trees = (tree for one in definition.state for tree in (one.each_step, one.each_episode))
     read = unfolded(definition.let, trees).names
+    if projection.when:
+        with come_to_some(step, Working(projection, some), sent=False) as which:
+            weights = f"weights[{code.constant(projection.members.astype(np.intp))}[{which}]]"
+            seen = seen_by(step, Working(projection, some), which, read) | {"weight": weights}
+            emit_change(code, definition, seen, _cells_at(code, projection, some, which), None)
+        return
     seen = code.parameters(projection.use, some) | seen_before_update(step, projection, read)
     cells = _cells_of(code, projection, some)
     emit_change(code, definition, seen, cells, step.network.episode)
@@ -137,7 +176,7 @@ def _update(operation: Update, step: Step) -> None:
     seen = code.parameters(model) | step.ports[number]
     cells = {one.name: cell(one.name) for one in model.definition.kept}
     functions = code.functions(activation)
-    given = emit_change(code, model.definition, seen, cells, network.episode, functions)
+    given = emit_change(code, model.definition.at_update, seen, cells, network.episode, functions)
     place = code.position(population.members, len(network.neurons))
     code.line(f"activity{place} = {unless_first(given['activity'], first)}")
     code.line(f"if holds and holds[{number}]: activity[holds[{number}][0]] = holds[{number}][1]")
@@ -235,6 +274,9 @@ def _learn(operation: Learn, step: Step) -> None:
     if not len(projection.members):
         return
     rule = projection.rule
+    if projection.when:
+        _learn_of_spikes(step, Working(projection, learning))
+        return
     seen = code.parameters(rule, learning) | seen_at(step, projection)
     cells = _cells_of(code, projection, learning)
     count = len(network.connections)
@@ -245,6 +287,31 @@ def _learn(operation: Learn, step: Step) -> None:
             lambda weight: _bounded(code, network, projection, weight),
         )
     emit_change(code, rule.definition, seen, cells, network.episode)
+
+
+def _learn_of_spikes(step: Step, working: Working) -> None:
+    """The rule of a projection at those of its connections to which a spike has come."""
+    code, network, (projection, learning) = step.code, step.network, working
+    definition = projection.rule.definition
+    read = unfolded(definition.let, definition.steps.values()).names
+    with come_to_some(step, working, sent=True) as which:
+        seen, cells = seen_by(step, working, which, read), _cells_at(code, projection, learning, which)
+        if not definition.moves_centre:
+            weights = f"weights[{code.constant(projection.members.astype(np.intp))}[{which}]]"
+            cells["weight"] = Cell(weights, weights, lambda weight: _bounded(code, network, projection, weight, which))
+        emit_change(code, definition, seen, cells, None)
+
+
+def _cells_at(code: Code, projection: Projection, some: IntArray | None, which: str) -> dict[str, Cell]:
+    """What is kept of a synapse or a rule at those of the connections of a projection, ``some`` of all or all, that
+    code says."""
+    use, at = projection.use, which if some is None else f"{code.constant(some)}[{which}]"
+
+    def cell(name: str) -> Cell:
+        place, key = f"{code.state(use, name)}[{at}]", code.constant(Key(use.owner, name))
+        return Cell(place, place, held=f"held_at(fixed, {key}, {{}}, len({which}), {at})".format)
+
+    return {one.name: cell(one.name) for one in use.definition.kept}
 
 
 def _cells_of(code: Code, projection: Projection, some: IntArray | None) -> dict[str, Cell]:
@@ -260,14 +327,18 @@ def _cells_of(code: Code, projection: Projection, some: IntArray | None) -> dict
     return {one.name: cell(one.name) for one in use.definition.kept}
 
 
-def _bounded(code: Code, network: Network, projection: Projection, weight: str) -> str:
+def _bounded(code: Code, network: Network, projection: Projection, weight: str, which: str = "") -> str:
+    """Weights within their bounds, of those of the connections that code says, else of all."""
     members = projection.members
     for function, array, values in (
         ("maximum", LOW, network.connections.low.whole()),
         ("minimum", HIGH, network.connections.high.whole()),
     ):
         if code.is_set(array) or np.isfinite(values[members]).any():
-            weight = f"np.{function}({weight}, {code.numbers(array, values, members, share=False)})"
+            bounds = code.numbers(array, values, members, share=False)
+            if which:
+                bounds = code.numbers_of(array, values, members, which)
+            weight = f"np.{function}({weight}, {bounds})"
     return weight
 
 
