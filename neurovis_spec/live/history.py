@@ -111,8 +111,7 @@ class Ring:
         with np.errstate(over="ignore"):
             n, known = self._starts["connections"], self._starts["quantities"]
             row[:n], row[n:known] = activity, weights
-            if quantities is not None:
-                row[known:] = quantities
+            row[known:] = np.nan if quantities is None else quantities
         self._last = step
 
     def cut(self, step: int) -> None:

@@ -68,7 +68,7 @@ _MOST = (1 << 53) - 1
 _MANY = 1024
 #: The most items whose values a client gets, and the id of one: of a neuron or a connection, perhaps with the name of
 #: something that it has.
-_WATCHED, _ITEM = 64, re.compile(r"[nc][0-9]{1,9}(\.[A-Za-z_]\w{0,200})?", re.ASCII)
+_WATCHED, _ITEM = 64, re.compile(r"[nc][0-9]{1,9}(\.[A-Za-z_]\w{0,4095})?", re.ASCII)
 #: The gains of Eqs. 2–5.
 _GAINS = ("activity", "signal", "thickness", "change")
 #: The most items that a client is sent traces of at once, the most bins, and steps in each.

@@ -11,8 +11,8 @@ import { THUMB } from './scrubber.js';
 /** @typedef {import('./protocol.js').Link} Link */
 /** @typedef {import('./protocol.js').Traces} Traces */
 /** @typedef {import('./scrubber.js').Scrubber} Scrubber */
-/** What it shows of a neuron or a connection: its activity or weight where `what` is empty; `key` is what that is asked by.
-`told` what is said of it.
+/** What it shows of a neuron or a connection: its activity or weight where `what` is empty; `key` is what that is asked by,
+ * `told` what it is called.
  * @typedef {{id: string, what: string, key: string, told: string, data: string, name: HTMLButtonElement, choice: HTMLSelectElement, value: HTMLElement,
  *   canvas: HTMLCanvasElement, ends: HTMLElement[], pin: HTMLButtonElement, parts: HTMLElement[]}} Strip */
 
@@ -138,6 +138,7 @@ export class Strips {
       if (same) this.of(strip, same, strip.what);
       return same;
     });
+    this.of(this.held, this.attention.groups.get(this.held.id), this.held.what);
     this.waiting = false;
     this.list();
   }
