@@ -399,7 +399,7 @@ def test_where_signals_of_synapses_are_not_formed_it_is_told() -> None:
     network = nv.compile_text(SIGNALS + "outputs: {one: (A2 -> B).signal}\n")
     with pytest.raises(nv.SpecError, match="a signal of a synapse is formed where it is recorded, not at each step"):
         network.until("one > 0")
-    with pytest.raises(ExportError, match="the output 'one' is of signals of synapses, which C forms"):
+    with pytest.raises(ExportError, match="the output 'one' is of signals of synapses, which exported C does not"):
         files(network.network)
     with pytest.raises(nv.SpecError, match="no rule changes 'B -> A1', so it has no states"):
         nv.compile_text(SIGNALS + "outputs: {none: (B -> A1).signal}\n")

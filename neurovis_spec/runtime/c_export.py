@@ -104,9 +104,9 @@ class Exported:
         self._check_events(kept_slots)
         if signals := named_signals(network):
             problem = (
-                f"the output '{signals[0]}' is of signals of synapses, which C forms where they are added up alone"
+                f"the output '{signals[0]}' is of signals of synapses, which exported C does not form by themselves"
             )
-            raise ExportError(f"{problem}: export the network without it, or with what it is for")
+            raise ExportError(f"{problem}: export the network without this output")
         self.settable_names = identifiers(self.settable)
         self.phases = self._phases()
         #: whether any phase holds neurons
