@@ -117,8 +117,9 @@ class CompiledNetwork(Compilation):
 
         ``inputs`` replace the sources of inputs: arrays of (steps,) or (steps, size). ``states`` are recorded as well
         (``K.v``, ``(K -> O).eligibility``), and so are those that outputs name; ``neurons`` (``O + K``) are the only
-        ones that are recorded, ``weights="none"`` leaves the weights out. The run ends at the first step after which
-        ``until`` is true (``"rms(O - T, last=129) < 0.01"``). ``checkpoint`` is a file from which the run goes on
+        ones that are recorded, ``weights="none"`` leaves the weights out, ``signals="none"`` what is sent in place of
+        activities and the signals of synapses, by which pictures colour lines. The run ends at the first step after
+        which ``until`` is true (``"rms(O - T, last=129) < 0.01"``). ``checkpoint`` is a file from which the run goes on
         exactly, if it is there, and which holds its state at the end; ``steps`` are those to be made now. With ``last``
         the last of the steps that would be recorded is the only one, and memory does not grow with the steps. The
         network has the ``body`` of its spec; that of a YAML file in its place; none with ``body=False``. Raises

@@ -52,6 +52,7 @@ class KeepKeywords(TypedDict, total=False):
     states: str | Sequence[str]
     neurons: str | Sequence[str]
     weights: Literal["plastic", "none"]
+    signals: Literal["all", "none"]
 
 
 class RunKeywords(KeepKeywords, total=False):
@@ -107,7 +108,7 @@ class FilmKeywords(PictureKeywords, total=False):
 
 
 COMPILE: Final[CompileKeywords] = {"parameters": None, "root": None, "limit": None, "body": True}
-KEEP: Final[KeepKeywords] = {"every": 1, "states": (), "neurons": (), "weights": "plastic"}
+KEEP: Final[KeepKeywords] = {"every": 1, "states": (), "neurons": (), "weights": "plastic", "signals": "all"}
 RUN: Final[RunKeywords] = {
     "backend": None,
     "every": 1,
@@ -117,6 +118,7 @@ RUN: Final[RunKeywords] = {
     "states": (),
     "neurons": (),
     "weights": "plastic",
+    "signals": "all",
     "checkpoint": None,
     "body": True,
 }
@@ -175,8 +177,11 @@ def keep_of(given: KeepKeywords, last: bool = False) -> Keep:
 
     if given["weights"] not in ("plastic", "none"):
         raise ValueError(f"weights are 'plastic' or 'none', not {given['weights']!r}")
+    if given["signals"] not in ("all", "none"):
+        raise ValueError(f"signals are 'all' or 'none', not {given['signals']!r}")
     neurons, states = arguments.texts("neurons", given["neurons"]), arguments.texts("states", given["states"])
-    return Keep(neurons, given["weights"] == "plastic", states, last=arguments.truth("last", last))
+    weights, sent = given["weights"] == "plastic", given["signals"] == "all"
+    return Keep(neurons, weights, states, last=arguments.truth("last", last), sent=sent)
 
 
 def course_of(

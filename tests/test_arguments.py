@@ -219,7 +219,7 @@ def test_numbers_of_any_make_are_taken() -> None:
     assert len(run(np.int64(3), every=np.int32(2))) == 2
 
 
-RUN = ("backend", "every", "start", "until", "progress", "states", "neurons", "weights", "checkpoint")
+RUN = ("backend", "every", "start", "until", "progress", "states", "neurons", "weights", "signals", "checkpoint")
 PICTURE = ("recording", "inputs", "theme", "engine", "view", "progress", "collapse", "focus", "paths", "min_weight")
 
 
@@ -239,7 +239,7 @@ def test_a_function_names_its_keywords_and_refuses_others(
 ) -> None:
     """Also those that it shares with others, which stand in one place: for ``help`` and for completion."""
     shown = inspect.signature(function).parameters
-    other = {"every": 1, "states": (), "neurons": (), "weights": "plastic", "collapse": ()}
+    other = {"every": 1, "states": (), "neurons": (), "weights": "plastic", "signals": "all", "collapse": ()}
     film = {**other, "every": None}
     for name, default in named.items():
         wanted = default if default is not None else (film if "frames" in shown else other).get(name)

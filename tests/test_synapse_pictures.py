@@ -173,6 +173,11 @@ def test_a_recording_that_lacks_it_says_so_and_has_no_colours() -> None:
 def test_a_partial_recording_a_sweep_and_plain_networks_hold_none() -> None:
     network = compiled(TEXT)
     assert network.run(3, neurons=["A"]).state_names == network.run(3, weights="none").state_names == ()
+    without = network.run(3, signals="none")
+    assert without.state_names == ()
+    np.testing.assert_array_equal(without.weights, network.run(3).weights)
+    with pytest.raises(ValueError, match="signals are 'all' or 'none', not 'some'"):
+        network.run(3, signals="some")  # type: ignore[arg-type]
     assert columns_of(network.network, Keep(sent=False)).probe.names == ()
     fixed = compiled(TEXT.replace(", plasticity: {hebbian: {rate: 0.1}}", ""))
     assert fixed.run(3, weights="none").state_names == ()

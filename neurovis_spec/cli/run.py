@@ -52,6 +52,7 @@ class Keeping:
     states: tuple[str, ...]
     neurons: tuple[str, ...]
     weights: Literal["plastic", "none"]
+    signals: Literal["all", "none"]
     until: str | None
     checkpoint: Path | None
 
@@ -65,6 +66,7 @@ class Keeping:
             "states": self.states,
             "neurons": self.neurons,
             "weights": self.weights,
+            "signals": self.signals,
             "checkpoint": self.checkpoint,
         }
 
@@ -91,6 +93,13 @@ keeping_options: Final = as_one(
         type=click.Choice(["plastic", "none"]),
         default="plastic",
         help="Record the weights that can change, the default, or none.",
+    ),
+    click.option(
+        "--signals",
+        type=click.Choice(["all", "none"]),
+        default="all",
+        help="Record by what pictures colour lines where that is no weight times an activity, such as the signals of "
+        "synapses, the default, or none.",
     ),
     click.option(
         "--until",
@@ -158,10 +167,10 @@ def command(spec: str, running: Running, keeping: Keeping, checking: Checking, o
     """Run a network and write a recording.
 
     A recording holds the activity of every neuron and every weight that can change, at every step, or what of it
-    --every, --neurons and --weights choose; and the states that the outputs of the spec or --states name. Without -o
-    nothing is written, and the last step's values are printed. Ctrl-C ends a run, as do SIGTERM, SIGHUP and SIGQUIT;
-    its recording holds the steps until then. If a run is killed, a part beside the file holds them (.x.npz.part), which
-    is read where the file is not there.
+    --every, --neurons, --weights and --signals choose; and the states that the outputs of the spec or --states name.
+    Without -o nothing is written, and the last step's values are printed. Ctrl-C ends a run, as do SIGTERM, SIGHUP and
+    SIGQUIT; its recording holds the steps until then. If a run is killed, a part beside the file holds them
+    (.x.npz.part), which is read where the file is not there.
 
     With --checkpoint a run is made in parts: each goes on exactly where the last one ended, --steps counts the steps to
     be made now, and the parts together are bit for bit the run in one go, as they are made by one backend.
