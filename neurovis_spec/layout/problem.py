@@ -91,7 +91,6 @@ class NamedProblem:
 
         pins = {index[name]: (float(x), float(y)) for name, (x, y) in self.pins.items()}
         boxes = _merged((name, members(of)) for name, of in self.boxes)
-        back = frozenset(self.symmetric)
         free = LayoutProblem(
             network=self.network,
             neurons=names,
@@ -99,9 +98,7 @@ class NamedProblem:
                 LayoutGroup(name, tuple(index[member] for member in of))
                 for name, of in sorted(self.groups, key=lambda group: natural_key(group[0]))
             ),
-            edges=_in_order(
-                LayoutEdge(name, index[a], index[b], delay, name in back) for name, a, b, delay in self.edges
-            ),
+            edges=self._edges(index),
             pins=dict(sorted(pins.items())),
             direction=self.direction,
             arrange=tuple(sorted((tuple(index[member] for member in of), how) for of, how in self.arrange)),
@@ -134,10 +131,11 @@ class NamedProblem:
             plan=tuple(sorted(cells, key=lambda cell: (cell.scope, cell.members))),
         )
 
-
-def _in_order(edges: Iterable[LayoutEdge]) -> tuple[LayoutEdge, ...]:
-    """As ``edge_key`` orders their names, without a key for each of 50,000: neurons are in their order already."""
-    return tuple(sorted(edges, key=lambda edge: (edge.source, edge.target, len(edge.name), edge.name)))
+    def _edges(self, index: Mapping[str, int]) -> tuple[LayoutEdge, ...]:
+        """As ``edge_key`` orders their names, without a key for each of 50,000: neurons are in their order already."""
+        back = frozenset(self.symmetric)
+        edges = (LayoutEdge(name, index[a], index[b], delay, name in back) for name, a, b, delay in self.edges)
+        return tuple(sorted(edges, key=lambda edge: (edge.source, edge.target, len(edge.name), edge.name)))
 
 
 def modules_of(
