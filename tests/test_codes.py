@@ -53,7 +53,7 @@ EMITTERS = {
 #: Codes that are put together, and codes that stand in a table or a default.
 MADE = {"f'unknown-{what}'": {"unknown-activation", "unknown-model", "unknown-rule", "unknown-synapse"}}
 ELSEWHERE = {"wrong-type", "conflicting-keys", "yaml-syntax", "no-comprehensions", "foreign-operator", "useless-allow"}
-SHAPE = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)+|alias|anchor|directive|internal|tag|transposed")
+SHAPE = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)+|alias|anchor|directive|internal|tag|transposed|unit")
 
 
 @cache

@@ -12,6 +12,7 @@ from typing import Annotated, ClassVar, Final, Literal, NamedTuple, TypeAlias, c
 
 from pydantic import Field, ValidationInfo
 
+from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.grammar import (
     IN_ACTIVATION,
     IN_CENTRE,
@@ -28,6 +29,7 @@ from neurovis_spec.language.grammar import (
     declaring,
     naming,
 )
+from neurovis_spec.language.keys import Keys
 from neurovis_spec.language.located import (
     BoolField,
     Formula,
@@ -46,7 +48,7 @@ from neurovis_spec.language.located import (
 )
 from neurovis_spec.language.model import Model, Named
 from neurovis_spec.language.unknown import Unknown
-from neurovis_spec.language.values import LOCAL, ParameterField, ParameterModel, PortsField, WrittenPort
+from neurovis_spec.language.values import LOCAL, ParameterField, ParameterModel, PortsField, WrittenPort, put_in_unit
 from neurovis_spec.language.words import TimeUnit
 from neurovis_spec.language.yaml.source import Node, Scalar
 
@@ -108,12 +110,19 @@ class StateModel(Model):
     each_step: FormulaField | None = Field(None, description="Its new value at each step.")
     each_episode: FormulaField | None = Field(None, description="Its new value at an episode's end.")
     derivative: FormulaField | None = Field(None, description=_DERIVATIVE)
-    unit: TextField | None = Field(None, description="Its unit, which is shown.")
+    unit: TextField | None = Field(None, description="Its unit, which is shown; formulas are checked by it.")
 
     @property
     def flow(self) -> Flow:
         """How it changes over the time of a step."""
         return Flow(self.derivative, unit=value_or(self.unit, ""))
+
+    @classmethod
+    def _keys(cls, keys: Keys, findings: Findings) -> dict[str, object]:
+        """What is written with a unit is a number in that of the state."""
+        result = super()._keys(keys, findings)
+        put_in_unit(result, ("initial",), findings)
+        return result
 
     @classmethod
     def _foreign(cls, name: str) -> tuple[str, str] | None:
@@ -214,6 +223,14 @@ class Parts(NamedTuple):
     time: TimeUnit = "s"
     sign: Formula | None = None
     spike: SpikeModel | None = None
+
+    @property
+    def units(self) -> AnyMapping[str, str]:
+        """The units that are declared, by the names of what has them."""
+        found = {name: parameter.measure for name, parameter in self.parameters.items()}
+        found |= {name: state.flow.unit for name, state in (self.state or {}).items()}
+        found |= {port.name.value: port.unit for port in self.ports}
+        return {name: unit for name, unit in found.items() if unit}
 
 
 class DefinitionModel(Model):

@@ -5,7 +5,7 @@ In: nodes. Out: one frozen value each, so that nobody behind this module asks ag
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from collections.abc import Mapping as AnyMapping
 from typing import Annotated, ClassVar, Final, Generic, NamedTuple, TypeAlias, TypeVar, cast, get_args
 
@@ -50,6 +50,7 @@ from neurovis_spec.language.located import (
     as_bool,
     as_formula,
     as_identifier,
+    as_measured,
     as_parts,
     as_text,
     as_time,
@@ -320,6 +321,20 @@ def as_formulas(node: Node, info: ValidationInfo) -> Formula | FormulaList:
     return as_formula(node, info)
 
 
+def as_all_measured(node: Node, info: ValidationInfo) -> Formula | FormulaList:
+    """The same of what may have a unit: numbers with one stay texts."""
+    if isinstance(node, AnyList):
+        return FormulaList(each(node.items, as_measured, info), node.span)
+    return as_measured(node, info)
+
+
+def all_in_unit(formulas: Formula | FormulaList, unit: str, findings: Findings) -> Formula | FormulaList:
+    """The same with numbers with a unit in this one, if it is any (``in_unit``)."""
+    if isinstance(formulas, FormulaList):
+        return FormulaList(tuple(in_unit(item, unit, findings) for item in formulas.items), formulas.span)
+    return in_unit(formulas, unit, findings)
+
+
 class Initial(NamedTuple):
     """What a group begins with: its activity at step 0 (None: it is computed), and states of its model."""
 
@@ -333,7 +348,7 @@ def as_initial(node: Node, info: ValidationInfo) -> Initial:
         return Initial(as_formulas(node, info))
     if not node.entries:
         refuse(info, node, "a value, or states with their values", "write {activity: 0.5}")
-    found = {entry.name: (Located(entry.name, entry.key), as_formulas(entry.value, info)) for entry in node.entries}
+    found = {entry.name: (Located(entry.name, entry.key), as_all_measured(entry.value, info)) for entry in node.entries}
     _, activity = found.pop(ACTIVITY, (None, None))
     return Initial(activity, tuple(found.values()))
 
@@ -389,7 +404,7 @@ DestinationsField = Annotated[
     Leaf(as_destinations, Either((Plain(TEXT.written, PORT), Map({}, FORMULA, PORT, least=1)))),
 ]
 BiasField = Annotated[
-    tuple[AtPort[Formula | FormulaList], ...], at_ports(as_formulas, FORMULAS, "a bias, or ports with biases")
+    tuple[AtPort[Formula | FormulaList], ...], at_ports(as_all_measured, FORMULAS, "a bias, or ports with biases")
 ]
 NoiseField = Annotated[tuple[AtPort[Formula], ...], at_ports(as_formula, FORMULA, "a noise, or ports with noises")]
 
@@ -426,13 +441,18 @@ class ParameterModel(Model):
     def _keys(cls, keys: Keys, findings: Findings) -> dict[str, object]:
         """What is written with a unit is a number in that of the parameter."""
         result = super()._keys(keys, findings)
-        unit = result.get("unit")
-        if isinstance(unit, Scalar) and isinstance(unit.value, str):
-            for key in ("value", "min", "max"):
-                node = result.get(key)
-                if isinstance(node, Scalar) and isinstance(node.value, str) and measured(node.value) is not None:
-                    result[key] = in_unit(Located(node.value, node), unit.value, findings)
+        put_in_unit(result, ("value", "min", "max"), findings)
         return result
+
+
+def put_in_unit(written: dict[str, object], keys: Iterable[str], findings: Findings) -> None:
+    """Of what has a ``unit``: put numbers with another one in this, where they are the values of these keys."""
+    unit = written.get("unit")
+    if isinstance(unit, Scalar) and isinstance(unit.value, str):
+        for key in keys:
+            node = written.get(key)
+            if isinstance(node, Scalar) and isinstance(node.value, str) and measured(node.value) is not None:
+                written[key] = in_unit(Located(node.value, node), unit.value, findings)
 
 
 ParameterField = Annotated[ParameterModel, Short("value", "a number or an expression")]

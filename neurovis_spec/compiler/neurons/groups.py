@@ -43,7 +43,7 @@ from neurovis_spec.language.located import (
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown, known
-from neurovis_spec.language.values import AtPort, Choice, FormulaList, Initial
+from neurovis_spec.language.values import AtPort, Choice, FormulaList, Initial, all_in_unit
 from neurovis_spec.language.yaml.source import AnyList, Scalar
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 from neurovis_spec.likeness import meant, nearest
@@ -226,7 +226,9 @@ class Builder:
         """The bias by ports, where there is one, and what of it follows parameters."""
         result: dict[str, FloatArray] = {}
         following: list[Part] = []
+        units = {port.name: port.unit for port in kind.model.definition.ports}
         for port, formulas in self._at_ports(model.bias, name, kind, model):
+            formulas = all_in_unit(formulas, units.get(port, ""), self.constants.findings)
             with self.constants.following() as parts:
                 bias = self._drawn(formulas, n, "bias", name, None if port == DRIVE else port)
             if bias is not UNKNOWN:
@@ -255,11 +257,13 @@ class Builder:
         result: dict[str, FloatArray] = {}
         neuron = kind.model.definition
         model_known = is_written(kind, model)  # else it is invalid, and reported
-        states = tuple(state.name for state in neuron.state)
+        units = {state.name: state.unit for state in neuron.state}
+        states = tuple(units)
         for state, formulas in given.states:
             if model_known and state.value not in states:
                 found = no_state("model", neuron.name, f"of '{name}'", state.value, states)
                 found.report("unknown-state", state.span, self.constants.findings)
+            formulas = all_in_unit(formulas, units.get(state.value, ""), self.constants.findings)
             values = self._drawn(formulas, n, "initial", name, state.value)
             if values is not UNKNOWN:
                 result[state.value] = values

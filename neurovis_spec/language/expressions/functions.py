@@ -2,9 +2,9 @@
 
 In: floats. Out: floats, by IEEE 754: poles are infinities, undefined values NaN, overflow an infinity; nothing raises.
 A row says all that is known of a function: on floats (the reference), on NumPy arrays, as NumPy code, in C; its
-derivatives, what it hides, where it is undefined, and what the manual says of it. Adding one is adding a row. A Library
-is what all of them are computed by on arrays: NumPy's own functions, which differ from those of the C library in the
-last bit, or others.
+derivatives, what it hides, where it is undefined, how units go through it, and what the manual says of it. Adding one
+is adding a row. A Library is what all of them are computed by on arrays: NumPy's own functions, which differ from those
+of the C library in the last bit, or others.
 """
 
 from __future__ import annotations
@@ -197,6 +197,12 @@ class Undefined(NamedTuple):
 Agreement: TypeAlias = Literal["bits", "zeros", "rounding"]
 
 
+#: How units go through an operation: its arguments and its value have the same one (``same``); its arguments have, and
+#: the value is a number (``compared``); all of them are numbers (``number``); the arguments have any, and the value is
+#: a number (``sign``); the others say how that of the value follows.
+Passing: TypeAlias = Literal["same", "compared", "number", "sign", "product", "quotient", "root", "power"]
+
+
 @dataclass(frozen=True, slots=True)
 class Operation:
     """An operator between a and b, and what it is to each consumer.
@@ -220,6 +226,7 @@ class Operation:
     infinite: tuple[Undefined, ...] = ()
     undefined: tuple[Undefined, ...] = ()
     agree: Agreement = "bits"
+    units: Passing = "same"
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -241,6 +248,7 @@ class Function(Operation):
     """
 
     agree: Agreement = "rounding"
+    units: Passing = "number"
     about: str = ""
     helper: str = ""
 
@@ -304,33 +312,37 @@ _BROKEN_POWER = Undefined("takes a broken power of a number below 0", "x < 0", "
 OPERATORS: Mapping[str, Operation] = MappingProxyType({
     "+": Operation("a + b", operator.add, np.add, "+", "+", ("1", "1")),
     "-": Operation("a - b", operator.sub, np.subtract, "-", "-", ("1", "-1")),
-    "*": Operation("a * b", operator.mul, np.multiply, "*", "*", ("b", "a")),
+    "*": Operation("a * b", operator.mul, np.multiply, "*", "*", ("b", "a"), units="product"),
     "/": Operation(
         "a / b", divide, np.divide, "np.divide({0}, {1})", "/", ("1/b", "-a/b^2"),
-        hides=_behind, infinite=_BY_ZERO, undefined=_BY_ZERO,
+        hides=_behind, infinite=_BY_ZERO, undefined=_BY_ZERO, units="quotient",
     ),
     "%": Operation(
         "a % b", modulo, np.remainder, "np.remainder({0}, {1})", "nv_mod({0}, {1})", ("1", "-floor(a/b)"),
         hides=_behind, undefined=_BY_ZERO, agree="zeros",
     ),
-    "<": Operation("a < b", operator.lt, np.less, "<", "<", None, Hidden.ALL),
-    "<=": Operation("a <= b", operator.le, np.less_equal, "<=", "<=", None, Hidden.ALL),
-    ">": Operation("a > b", operator.gt, np.greater, ">", ">", None, Hidden.ALL),
-    ">=": Operation("a >= b", operator.ge, np.greater_equal, ">=", ">=", None, Hidden.ALL),
-    "==": Operation("a == b", operator.eq, np.equal, "==", "==", None, Hidden.ALL),
-    "!=": Operation("a != b", operator.ne, np.not_equal, "!=", "!=", None, Hidden.ALL),
-    "and": Operation("a and b", lambda a, b: a != 0 and b != 0, np.logical_and, "&", "&&", None, Hidden.ALL),
-    "or": Operation("a or b", lambda a, b: a != 0 or b != 0, np.logical_or, "|", "||", None, Hidden.ALL),
+    "<": Operation("a < b", operator.lt, np.less, "<", "<", None, Hidden.ALL, units="compared"),
+    "<=": Operation("a <= b", operator.le, np.less_equal, "<=", "<=", None, Hidden.ALL, units="compared"),
+    ">": Operation("a > b", operator.gt, np.greater, ">", ">", None, Hidden.ALL, units="compared"),
+    ">=": Operation("a >= b", operator.ge, np.greater_equal, ">=", ">=", None, Hidden.ALL, units="compared"),
+    "==": Operation("a == b", operator.eq, np.equal, "==", "==", None, Hidden.ALL, units="compared"),
+    "!=": Operation("a != b", operator.ne, np.not_equal, "!=", "!=", None, Hidden.ALL, units="compared"),
+    "and": Operation(
+        "a and b", lambda a, b: a != 0 and b != 0, np.logical_and, "&", "&&", None, Hidden.ALL, units="sign",
+    ),
+    "or": Operation(
+        "a or b", lambda a, b: a != 0 or b != 0, np.logical_or, "|", "||", None, Hidden.ALL, units="sign",
+    ),
 })  # fmt: skip
 
 _ROWS = (
     Function(
         "abs(x)", math.fabs, np.absolute, "np.absolute({0})", "fabs{s}({0})", ("sign(x)",),
-        about="The absolute value.", agree="bits",
+        units="same", about="The absolute value.", agree="bits",
     ),
     Function(
         "sign(x)", sign, np.sign, "np.sign({0})", "nv_sign({0})", None,
-        about="−1, 0 or 1.", agree="bits", hides=Hidden.INFINITY,
+        units="sign", about="−1, 0 or 1.", agree="bits", hides=Hidden.INFINITY,
         helper="""static {real} nv_sign({real} x)
 {{
     return x > 0.0{s} ? 1.0{s} : x < 0.0{s} ? -1.0{s} : x == 0.0{s} ? 0.0{s} : x;
@@ -339,7 +351,7 @@ _ROWS = (
     Function(
         "min(a, b, …)", minimum, _folded(np.minimum), "np.minimum({0}, {1})", "nv_min({0}, {1})",
         ("1 if a <= b else 0", "0 if a <= b else 1"),
-        about="The least of two or more.", agree="zeros", hides=Hidden.INFINITY,
+        units="same", about="The least of two or more.", agree="zeros", hides=Hidden.INFINITY,
         helper="""static {real} nv_min({real} a, {real} b)
 {{
     return a <= b || a != a ? a : b;
@@ -348,7 +360,7 @@ _ROWS = (
     Function(
         "max(a, b, …)", maximum, _folded(np.maximum), "np.maximum({0}, {1})", "nv_max({0}, {1})",
         ("1 if a >= b else 0", "0 if a >= b else 1"),
-        about="The greatest of two or more.", agree="zeros", hides=Hidden.INFINITY,
+        units="same", about="The greatest of two or more.", agree="zeros", hides=Hidden.INFINITY,
         helper="""static {real} nv_max({real} a, {real} b)
 {{
     return a >= b || a != a ? a : b;
@@ -362,23 +374,23 @@ _ROWS = (
             "1 if x < low and low <= high else 0",
             "1 if max(x, low) > high else 0",
         ),
-        about="x, held between two bounds.", agree="zeros", hides=Hidden.INFINITY,
+        units="same", about="x, held between two bounds.", agree="zeros", hides=Hidden.INFINITY,
     ),
     Function(
         "floor(x)", _integral(math.floor), np.floor, "np.floor({0})", "floor{s}({0})", None,
-        about="The integer below.", agree="bits",
+        units="same", about="The integer below.", agree="bits",
     ),
     Function(
         "ceil(x)", _integral(math.ceil), np.ceil, "np.ceil({0})", "ceil{s}({0})", None,
-        about="The integer above.", agree="bits",
+        units="same", about="The integer above.", agree="bits",
     ),
     Function(
         "round(x)", _integral(round), np.rint, "np.rint({0})", "rint{s}({0})", None,
-        about="The nearest integer; halves go to the even one.", agree="bits",
+        units="same", about="The nearest integer; halves go to the even one.", agree="bits",
     ),
     Function(
         "sqrt(x)", _defined(math.sqrt), np.sqrt, "np.sqrt({0})", "sqrt{s}({0})", ("0.5/sqrt(x)",),
-        about="The square root.", agree="bits",
+        units="root", about="The square root.", agree="bits",
         undefined=(Undefined("takes the square root of a number below 0", "x < 0"),),
     ),
     Function(
@@ -415,7 +427,7 @@ _ROWS = (
     Function(
         "pow(x, exponent)", power, np.float_power, "np.float_power({0}, {1})", "pow{s}({0}, {1})",
         ("exponent*x^(exponent - 1)", "x^exponent*log(x)"),
-        about="x to the power of the exponent, as x^exponent.",
+        units="power", about="x to the power of the exponent, as x^exponent.",
         hides=_of_power, infinite=(_POLE_OF_POWER,), undefined=(_POLE_OF_POWER, _BROKEN_POWER),
         # np.power takes a root of −∞ where the exponent is a scalar 0.5; of a power whose exponent it knows a compiler
         # makes a product, which is not what the library gives
@@ -454,7 +466,7 @@ _ROWS = (
     Function(
         "atan2(y, x)", math.atan2, np.arctan2, "np.arctan2({0}, {1})", "atan2{s}({0}, {1})",
         ("x/(x^2 + y^2)", "-y/(x^2 + y^2)"),
-        about="The angle of the point (x, y), from −π to π.", hides=Hidden.INFINITY,
+        units="compared", about="The angle of the point (x, y), from −π to π.", hides=Hidden.INFINITY,
     ),
     Function(
         "sinh(x)", _unbounded(math.sinh, odd=True), np.sinh, "np.sinh({0})", "sinh{s}({0})", ("cosh(x)",),
@@ -479,7 +491,7 @@ _ROWS = (
     ),
     Function(
         "step(x)", step, _step, "np.heaviside({0}, 1.0)", "nv_step({0})", None,
-        about="1 from 0 on, else 0.", agree="bits", hides=Hidden.INFINITY,
+        units="sign", about="1 from 0 on, else 0.", agree="bits", hides=Hidden.INFINITY,
         helper="""static {real} nv_step({real} x)
 {{
     return x >= 0.0{s} ? 1.0{s} : x < 0.0{s} ? 0.0{s} : x;
