@@ -22,6 +22,8 @@ from neurovis_spec.runtime import c_backend, c_export
 from neurovis_spec.runtime.columns import Keep
 from neurovis_spec.runtime.course import Course
 from neurovis_spec.runtime.record import record
+from neurovis_spec.runtime.reference import ReferenceBackend
+from neurovis_spec.runtime.state import State, initial_state
 
 pytestmark = pytest.mark.compiler
 FORMS = pytest.mark.parametrize("small", [0, 600], ids=["loops", "written out"])
@@ -174,6 +176,60 @@ def test_random_networks_run_alike_when_exported(small: int, spec: Spec) -> None
         runs_alike(nv.compile(spec), Path(folder), steps=12)
 
 
+GAPS = """
+neurovis: 1
+name: gaps
+time: {dt: 0.01, integrate: METHOD}
+models:
+  cell:
+    state: {v: {initial: 0.1, derivative: GROWTH*v + drive}, s: {derivative: v - s}}
+    outputs: {above: v - 1}
+    activity: v
+synapses:
+  gap: {signal: weight*(pre.v - post.v)}
+  opened: {signal: weight*pre.s*(1 - post.v)}
+neurons: {N: {count: 20, model: cell, initial: {v: 0.1*sin(i)}}}
+connections:
+  - N -> N: {weight: "uniform(0, 0.1)", pattern: {random: {probability: 0.5}}, synapse: gap}
+  - N -> N: {weight: "uniform(0, 0.1)", pattern: {random: {probability: 0.5}}, synapse: opened}
+"""
+
+
+def in_a_block(network: nv.CompiledNetwork, steps: int) -> tuple[int, State]:
+    """How many of some steps are made by a call, and the state behind them."""
+    stepper, state = c_backend.CBackend().prepare(network.network), initial_state(network.network)
+    rows, none = np.empty((steps, len(state.activity))), np.empty((steps, 0))
+    return stepper.run(state, none, rows, none, 1, look=True), state
+
+
+@pytest.mark.parametrize("method", ["euler", "rk4"])
+def test_what_only_synapses_take_at_stages_is_there_behind_a_block(method: str) -> None:
+    """No step of it writes what none reads; weights are packed once, in the order of the stage."""
+    network = nv.compile_text(GAPS.replace("METHOD", method).replace("GROWTH", "-1"))
+    written, plain = c_backend.written(network.network), initial_state(network.network)
+    assert written.text.count("outlets[p] = ") == 2  # in nv_general and nv_let_out
+    assert written.packed == len(network.network.connections)
+    made, state = in_a_block(network, 6)
+    stepper = ReferenceBackend().prepare(network.network)
+    for _ in range(made):
+        stepper.step(plain, np.zeros(0))
+    assert made == 6
+    assert state.outlets.tobytes() == plain.outlets.tobytes()
+    for owner, own in plain.cells.items():
+        for name, values in own.items():
+            assert state.cells[owner][name].tobytes() == values.tobytes(), name
+
+
+def test_a_block_ends_behind_the_step_that_is_not_finite_where_the_activity_is_a_state() -> None:
+    network = nv.compile_text(GAPS.replace("METHOD", "euler").replace("GROWTH", "1e6"))
+    with np.errstate(all="ignore"):
+        made, state = in_a_block(network, 200)
+        before, state_before = in_a_block(network, made - 1)
+    assert before == made - 1 < 199
+    assert np.isfinite(state_before.activity).all()
+    assert not np.isfinite(state.activity).all()
+
+
 @pytest.mark.parametrize("text", [MANY, JOINED], ids=["ports", "synapses"])
 def test_what_arrives_is_put_together_in_the_struct_of_what_is_exported(text: str, tmp_path: Path) -> None:
     """Not on the stack, of which a microcontroller has little."""
@@ -239,7 +295,7 @@ events: [{{from: 5, to: 7, clamp: {{A1: 0.9}}}}, {{at: 9, set: {{p: 0.2}}}}]
 """
     monkeypatch.setattr(c_backend, "SMALL", small)
     network = nv.compile_text(text)
-    taken = c_backend.written(network.network).text.count("if (follows")
+    taken = c_backend.written(network.network).text.count("if (follows && ")
     assert taken == ((sent != "v*cos(t)") + 1) * ("each_episode" not in state)
     same_bits(network, 14)
 

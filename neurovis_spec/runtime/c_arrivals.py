@@ -415,7 +415,7 @@ class Arrivals:
                 weight = f"packed[{plus(self.begin + run.before, 'e')}]"
                 at = at._replace(known={kind: {**known, "weight": weight} for kind, known in at.known.items()})
             begin, end = (code.at(run.ends, where) for where in (target, f"({target} + 1)"))
-            with code.block(code.loop("e", str(end), begin)):
+            with code.block(code.loop("e", str(end), begin, type_="ptrdiff_t")):  # as wide as an address
                 self._add(total, "e", run.edges, at)
         return self._finished(total)
 

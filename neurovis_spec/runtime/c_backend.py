@@ -23,9 +23,10 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import RULE
+from neurovis_spec.compiler.program import RULE, Definition
 from neurovis_spec.language.expressions.emit_c import Emitter
 from neurovis_spec.language.expressions.functions import Library
+from neurovis_spec.language.expressions.tree import Name
 from neurovis_spec.runtime import c_flows, c_functions, c_library, c_plan
 from neurovis_spec.runtime.backend import Availability, BackendError, Capabilities
 from neurovis_spec.runtime.c_code import Code, Form, Table, Tables, function, state_name, words_of
@@ -111,11 +112,11 @@ NV_PUBLIC int64_t nv_once(nv_state *p)
 {
     double odd = nv_read(p, p->k, p->s);
     if (p->form == 0)
-        odd += nv_plain(p, p->k, p->s, 0);
+        odd += nv_plain(p, p->k, p->s, 0), nv_let_out(p);
     else
         nv_general(p, p->k, p->s, p->form == 2);
     p->k++;
-    return odd != 0.0 || nv_odd(p->s, INPUTS) || LOOK_NEURONS || ((!WATCHED || p->form) && LOOK_CONNECTIONS);
+    return odd != 0.0 || nv_odd(p->s, INPUTS) || LOOK_NEURONS(p->form) || ((!WATCHED || p->form) && LOOK_CONNECTIONS);
 }
 
 NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
@@ -155,6 +156,8 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
         if (kept) {
             memcpy(activity, p->activity, sizeof(double)*NEURONS);
             activity += NEURONS;
+            if (c->formed && follows)
+                nv_let_out(p);
             if (c->formed)
                 nv_signals(p, c->k + i, c->weighed ? c->weighed : p->weights, c->formed);
             for (int64_t j = 0; j < c->columns; j++)
@@ -162,11 +165,13 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
         }
         made = i + 1;
         // what no step looked at is checked here; what no step changes, once
-        if (c->look && (odd != 0.0 || LOOK_NEURONS || ((!WATCHED || form || !i) && LOOK_CONNECTIONS)))
+        if (c->look && (odd != 0.0 || LOOK_NEURONS(form) || ((!WATCHED || form || !i) && LOOK_CONNECTIONS)))
             break;
     }
     if (fused)
         nv_leave(p);
+    if (follows)
+        nv_let_out(p);
     return made;
 }
 """
@@ -235,6 +240,8 @@ def _write(network: Network, layout: SignalLayout) -> Written:
         if fused or not of_fused:
             write(step := StepCode(built, code, form))
             room = max(room, step.room)
+        if form.follows:
+            code.lines = _let_out_late(code.lines)
         if type_ == "double":
             code.line("return odd;" if form.watched and code.lines else "return 0.0;")
         head = f"static {type_} {name}(const nv_state *p{parameters})"
@@ -244,7 +251,7 @@ def _write(network: Network, layout: SignalLayout) -> Written:
     counts |= {"INPUTS": network.vector_size, "CHANGING": len(network.changing)}
     defined = [f"#define {name} {value}" for name, value in counts.items()]
     neurons, connections = _look(network)
-    defined += [f"#define LOOK_NEURONS ({neurons})", f"#define LOOK_CONNECTIONS ({connections})"]
+    defined += [f"#define LOOK_NEURONS(form) ({neurons})", f"#define LOOK_CONNECTIONS ({connections})"]
     defined += [f"#define WATCHED {int(watched)}", f"#define FUSED {int(fused)}"]
     defined.append(f"#define BEFORE {int(whole.fuses.any())}")
     used = words_of(bodies)
@@ -280,10 +287,18 @@ def _functions(small: bool, watched: bool) -> tuple[_Function, ...]:
             f"{of_step}, int follows",
             of_fused=True,
         ),
+        _Function("void", "nv_let_out", Form(), StepCode.let_all_out),
         _Function("void", "nv_signals", Form(gone=True, lost=True), StepCode.signals, of_signals),
         _Function("void", "nv_pack", fused, StepCode.pack, of_fused=True),
         _Function("void", "nv_leave", fused, lambda step: step.leave(step.fuses), of_fused=True),
     )
+
+
+def _let_out_late(lines: list[str]) -> list[str]:
+    """The lines of a step; where none reads what connections take beside activities, without those that let it out:
+    ``nv_let_out`` does when somebody else reads it."""
+    others = [line for line in lines if not line.lstrip().startswith("outlets[")]
+    return lines if "outlets" in words_of(others) else others
 
 
 def _pointer_lines(network: Network, plan: c_plan.Plan | None) -> dict[str, str]:
@@ -301,9 +316,18 @@ def _pointer_lines(network: Network, plan: c_plan.Plan | None) -> dict[str, str]
     return lines | {name: f"double *restrict const {name} = p->cells[{at}];" for at, name in enumerate(names)}
 
 
+def _shows_state(model: Definition) -> bool:
+    """Whether the activity of a model is a state of it, as it is."""
+    shown = model.given.each_step
+    return isinstance(shown, Name) and any(one.name == shown.name for one in model.state)
+
+
 def _look(network: Network) -> tuple[str, str]:
-    """The code of whether anything that neurons carry, and that connections carry, is not finite."""
+    """The code of whether anything that neurons carry, and that connections carry, is not finite behind a step of a
+    ``form``."""
     tests = {"neuron": [f"nv_odd(p->activity, {len(network.neurons)})"], "connection": list[str]()}
+    if all(_shows_state(one.model.definition) for one in network.populations):
+        tests["neuron"] = [f"(form && {tests['neuron'][0]})"]  # where nothing is held it is what a cell is
     if network.projections and len(network.changing):  # what neither a rule nor an event changes is finite
         first, last = int(network.changing[0]), int(network.changing[-1])
         tests["connection"].append(f"nv_odd(p->weights + {first}, {last - first + 1})")

@@ -171,10 +171,10 @@ class Code:
         self.indent -= 1
         self.line("}")
 
-    def loop(self, index: str, count: int | str, first: int | str = 0, step: int = 1) -> str:
+    def loop(self, index: str, count: int | str, first: int | str = 0, step: int = 1, type_: str = "int32_t") -> str:
         """The head of a loop."""
         further = f"{index}++" if step == 1 else f"{index} += {step}"
-        return f"for (int32_t {index} = {first}; {index} < {count}; {further})"
+        return f"for ({type_} {index} = {first}; {index} < {count}; {further})"
 
     def name(self, prefix: str) -> str:
         """A new identifier."""

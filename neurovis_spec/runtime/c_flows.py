@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
@@ -48,7 +48,7 @@ from neurovis_spec.language.expressions.parser import formula
 from neurovis_spec.language.expressions.tree import Name
 from neurovis_spec.language.words import Method
 from neurovis_spec.runtime.c_arrivals import Anew, Arrivals, Incoming
-from neurovis_spec.runtime.c_code import Place, plus, words_of
+from neurovis_spec.runtime.c_code import Place, plus, state_name, words_of
 from neurovis_spec.runtime.c_connections import Forming, Sight, Some, own_of, taken_at
 from neurovis_spec.runtime.c_lags import write_arriving
 from neurovis_spec.runtime.c_plan import BEGIN, MIDDLE, STAGES, FlowState, Plan
@@ -101,7 +101,8 @@ class _Integration:
     def write(self) -> None:
         """All of it."""
         code, network, plan = self.code, self.network, self.plan
-        self.copy("fx[{at}] = {now};")
+        with code.block("if (!follows)") if self.step.form.follows and plan.stays else nullcontext():
+            self.copy("fx[{at}] = {now};")
         if network.held_inputs:
             code.line(f"memcpy(fv, s, {network.vector_size}*sizeof(fv[0]));")
         for part in plan.of_stage:
@@ -131,6 +132,11 @@ class _Integration:
         """A line for each flow state, which is ``cell`` in the State, ``now`` with what is held, and ``at`` here. Those
         of connections that do nothing are not copied ``back``."""
         for one in self.plan.states:
+            if self.step.form.follows and not self.step.form.written_out:  # all do something, and nothing is held
+                here, there = f"fx + {one.start}", state_name(one.use.owner, one.place)
+                to, of = (there, here) if back else (here, there)
+                self.code.line(f"memcpy({to}, {of}, {one.size}*sizeof(fx[0]));")
+                continue
 
             def copied(place: Place, totals: Mapping[int, str], one: FlowState = one) -> None:
                 now = cell = self.step.states(one.use, place)[one.name]

@@ -77,6 +77,11 @@ class FlowState(NamedTuple):
         return self.part.population.model if isinstance(self.part, Part) else self.part.projection.use
 
     @property
+    def place(self) -> int:
+        """Which of all that is kept of its definition it is."""
+        return [one.name for one in self.use.definition.kept].index(self.name)
+
+    @property
     def size(self) -> int:
         """How many numbers it is."""
         holder = self.part.population if isinstance(self.part, Part) else self.part.projection
@@ -266,6 +271,15 @@ class Plan:
             late = np.full(len(self.network.connections), -1, dtype=np.int64)
             late[self.lagging] = np.arange(len(self.lagging))
         return Sent("fo", self.takes, late)
+
+    @cached_property
+    def stays(self) -> bool:
+        """Whether flow states are, when a step begins, as the integration of the step before has left them, if nothing
+        has come between: nothing else of a step changes any."""
+        quantities = (quantity for one in self.states for quantity in one.use.definition.flows)
+        return not self.diffuses and all(
+            one.each_step is None and one.each_episode is None and not one.acts for one in quantities
+        )
 
     def lasts(self, part: Part, one: Taken) -> bool:
         """Whether what connections take at the first stage of a step is what was made at the end of the step before, if

@@ -87,6 +87,12 @@ class Built:
         return self.plan is not None or synapses or len(self.network.port_names) > 1
 
     @cached_property
+    def settles(self) -> bool:
+        """Whether states of neurons are, behind a step, what their update has made of them: no spike of the same step
+        makes any jump."""
+        return not any(isinstance(one, Advance) and one.phase == "jump_now" for one in self.network.program)
+
+    @cached_property
     def ends(self) -> Ends:
         """What there is to read at the ends of connections."""
         return Ends(self.network)
@@ -240,7 +246,7 @@ class StepCode:
             self.hold_ahead(number)
         ahead = {one: own for one, own in arrivals.items() if self.reads_within(population, own)}
         with self.holding_arrays() if ahead else nullcontext():
-            gathered = {one: self.gathered(own, len(population.members)) for one, own in ahead.items()}
+            gathered = {one: self.summed(own, len(population.members)) for one, own in ahead.items()}
 
             def updated(place: Place, totals: Mapping[int, str]) -> None:
                 self.neuron(number, place, {**totals, **{one: f"{name}[{place}]" for one, name in gathered.items()}})
@@ -259,17 +265,6 @@ class StepCode:
                 if not name.startswith("post") and np.isin(network.neuron_of[places], population.members).any():
                     return True
         return False
-
-    def gathered(self, arrivals: Arrivals, count: int) -> str:
-        """What arrives at a port of all neurons of a population, before any of them is updated: the name of an
-        array."""
-        code, name = self.code, self.array(count)
-
-        def gather(place: Place, totals: Mapping[int, str]) -> None:
-            code.line(f"{name}[{place}] = {code.text(arrivals.combined(place))};")
-
-        self.each(count, _NO_ARRIVALS, gather)
-        return name
 
     def hold_ahead(self, number: int) -> None:
         """The states of a population that are held, before synapses read them."""
@@ -292,7 +287,8 @@ class StepCode:
                 with code.block(""):
                     body(place, _NO_TOTALS)
             return
-        ahead = {one: own for one, own in arrivals.items() if own.dense or (own.lanes or own.rows) is not None}
+        # formulas beside runs of many connections would take registers from these
+        ahead = {one: own for one, own in arrivals.items() if own.dense or own.runs or own.lanes or own.rows}
         first = next(iter(ahead), None)
         beside = first is not None and ahead[first].lanes is not None
         summed = {one: own for one, own in ahead.items() if one != first or not beside}
@@ -309,17 +305,21 @@ class StepCode:
 
     def summed(self, arrivals: Arrivals, count: int) -> str:
         """What arrives at a port of all neurons of a population, combined: the name of an array."""
-        name = self.array(count)
+        code, name = self.code, self.array(count)
+
+        def combined(place: Place, totals: Mapping[int, str]) -> None:
+            code.line(f"{name}[{place}] = {code.text(arrivals.combined(place))};")
+
         if arrivals.rows is not None:
             marks = "" if arrivals.in_order else self.array(-(-len(arrivals.connections) // 64))
             self.firing.add_up(arrivals, arrivals.rows, name, marks)
-            return name
-        if arrivals.dense:
+        elif arrivals.dense:
             arrivals.matrix(name)
-        else:
-            assert arrivals.lanes is not None
+        elif arrivals.lanes is not None:
             with arrivals.beside(arrivals.lanes) as (where, total):
-                self.code.line(f"{name}[{where}] = {total};")
+                code.line(f"{name}[{where}] = {total};")
+        else:
+            self.each(count, _NO_ARRIVALS, combined)
         return name
 
     @contextmanager
@@ -401,6 +401,13 @@ class StepCode:
 
         with self.unless_first():
             self.each(len(population.members), arrivals, jumped)
+
+    def let_all_out(self) -> None:
+        """What connections take beside activities, of all neurons."""
+        for number in sorted({outlet.population for outlet in self.network.outlets}):
+            members = self.network.populations[number].members
+            with self.code.block(self.code.loop("p", len(members))):
+                self.let_out(number, "p", self.code.at(members, "p"))
 
     def let_out(self, number: int, place: Place, neuron: Place) -> None:
         """What connections take of a neuron beside its activity; nothing of one that is lesioned."""
