@@ -15,7 +15,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -95,7 +95,7 @@ typedef struct {
 #: ``nv_odd``: whether a number is not finite. Its exponent is all ones then; one more overflows into bit 63.
 #: ``nv_once`` makes a step, after which ``k`` is that of the next, and gives whether something is not finite. In
 #: ``nv_run`` ``wait`` is the number of steps until one is kept, and ``follows`` whether the step before was made there,
-#: in the form 0.
+#: in the form 0. Behind such a step ``nv_let_out`` makes what it has left for whoever reads it.
 _TAIL: Final = """
 static uint64_t nv_odd(const double *values, int64_t count)
 {
@@ -111,10 +111,12 @@ static uint64_t nv_odd(const double *values, int64_t count)
 NV_PUBLIC int64_t nv_once(nv_state *p)
 {
     double odd = nv_read(p, p->k, p->s);
-    if (p->form == 0)
-        odd += nv_plain(p, p->k, p->s, 0), nv_let_out(p);
-    else
+    if (p->form == 0) {
+        odd += nv_plain(p, p->k, p->s, 0);
+        nv_let_out(p);
+    } else {
         nv_general(p, p->k, p->s, p->form == 2);
+    }
     p->k++;
     return odd != 0.0 || nv_odd(p->s, INPUTS) || LOOK_NEURONS(p->form) || ((!WATCHED || p->form) && LOOK_CONNECTIONS);
 }
@@ -156,10 +158,11 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
         if (kept) {
             memcpy(activity, p->activity, sizeof(double)*NEURONS);
             activity += NEURONS;
-            if (c->formed && follows)
-                nv_let_out(p);
-            if (c->formed)
+            if (c->formed) {
+                if (follows)
+                    nv_let_out(p);
                 nv_signals(p, c->k + i, c->weighed ? c->weighed : p->weights, c->formed);
+            }
             for (int64_t j = 0; j < c->columns; j++)
                 *states++ = *c->probed[j];
         }
@@ -219,8 +222,9 @@ class _Function(NamedTuple):
     write: Callable[[StepCode], None]
     #: its further parameters
     parameters: str = ""
-    #: whether it is for fused connections alone, and empty where there are none
-    of_fused: bool = False
+    #: what it is for alone, and empty where there is none of that: connections that are fused, or what steps before it
+    #: in the text leave to be let out
+    only: Literal["", "fused", "late"] = ""
 
 
 def _write(network: Network, layout: SignalLayout) -> Written:
@@ -235,13 +239,15 @@ def _write(network: Network, layout: SignalLayout) -> Written:
     # a network that is written out is in registers, and nothing is gained
     whole = StepCode(built, Code(emitter, tables, network.dt, {}), Form())
     fused = not small and whole.count + int(whole.fuses.sum()) > 0
-    for type_, name, form, write, parameters, of_fused in _functions(small, watched):
+    there = {"": True, "fused": fused, "late": False}
+    for type_, name, form, write, parameters, only in _functions(small, watched):
         code = Code(emitter, tables, network.dt, network.settable.variables)
-        if fused or not of_fused:
+        if there[only]:
             write(step := StepCode(built, code, form))
             room = max(room, step.room)
         if form.follows:
-            code.lines = _let_out_late(code.lines)
+            made, code.lines = code.lines, _let_out_late(code.lines)
+            there["late"] |= len(code.lines) < len(made)
         if type_ == "double":
             code.line("return odd;" if form.watched and code.lines else "return 0.0;")
         head = f"static {type_} {name}(const nv_state *p{parameters})"
@@ -285,12 +291,12 @@ def _functions(small: bool, watched: bool) -> tuple[_Function, ...]:
             replace(fused, watched=watched),
             StepCode.write,
             f"{of_step}, int follows",
-            of_fused=True,
+            only="fused",
         ),
-        _Function("void", "nv_let_out", Form(), StepCode.let_all_out),
+        _Function("void", "nv_let_out", Form(), StepCode.let_all_out, only="late"),
         _Function("void", "nv_signals", Form(gone=True, lost=True), StepCode.signals, of_signals),
-        _Function("void", "nv_pack", fused, StepCode.pack, of_fused=True),
-        _Function("void", "nv_leave", fused, lambda step: step.leave(step.fuses), of_fused=True),
+        _Function("void", "nv_pack", fused, StepCode.pack, only="fused"),
+        _Function("void", "nv_leave", fused, lambda step: step.leave(step.fuses), only="fused"),
     )
 
 
