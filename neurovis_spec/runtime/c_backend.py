@@ -245,7 +245,7 @@ def _write(network: Network, layout: SignalLayout) -> Written:
         if there[only]:
             write(step := StepCode(built, code, form))
             room = max(room, step.room)
-        if form.follows:
+        if form.follows and built.settles:
             made, code.lines = code.lines, _let_out_late(code.lines)
             there["late"] |= len(code.lines) < len(made)
         if type_ == "double":
@@ -256,7 +256,7 @@ def _write(network: Network, layout: SignalLayout) -> Written:
     counts = {"NEURONS": len(network.neurons), "CONNECTIONS": len(network.connections)}
     counts |= {"INPUTS": network.vector_size, "CHANGING": len(network.changing)}
     defined = [f"#define {name} {value}" for name, value in counts.items()]
-    neurons, connections = _look(network)
+    neurons, connections = _look(built)
     defined += [f"#define LOOK_NEURONS(form) ({neurons})", f"#define LOOK_CONNECTIONS ({connections})"]
     defined += [f"#define WATCHED {int(watched)}", f"#define FUSED {int(fused)}"]
     defined.append(f"#define BEFORE {int(whole.fuses.any())}")
@@ -328,11 +328,12 @@ def _shows_state(model: Definition) -> bool:
     return isinstance(shown, Name) and any(one.name == shown.name for one in model.state)
 
 
-def _look(network: Network) -> tuple[str, str]:
+def _look(built: Built) -> tuple[str, str]:
     """The code of whether anything that neurons carry, and that connections carry, is not finite behind a step of a
     ``form``."""
+    network = built.network
     tests = {"neuron": [f"nv_odd(p->activity, {len(network.neurons)})"], "connection": list[str]()}
-    if all(_shows_state(one.model.definition) for one in network.populations):
+    if built.settles and all(_shows_state(one.model.definition) for one in network.populations):
         tests["neuron"] = [f"(form && {tests['neuron'][0]})"]  # where nothing is held it is what a cell is
     if network.projections and len(network.changing):  # what neither a rule nor an event changes is finite
         first, last = int(network.changing[0]), int(network.changing[-1])
