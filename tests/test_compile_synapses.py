@@ -308,6 +308,20 @@ def test_what_is_remembered_fits_into_memory() -> None:
         nv.compile(spec)
 
 
+def test_what_a_rule_remembers_fits_into_memory() -> None:
+    rules = {"past": {"weight": {"each_step": "weight + pre"}}, "now": {"weight": {"each_step": "weight + post"}}}
+    spec = {
+        "neurovis": 1,
+        "name": "long",
+        "rules": rules,
+        "neurons": {"E": {"count": 300}},
+        "connections": {"E1 -> E2": {"plasticity": "past", "delay": 1_000_000}},
+    }
+    with pytest.raises(SpecError, match="300,000,000 numbers would be kept for a rule that reads 'pre'"):
+        nv.compile(spec)
+    nv.compile(spec | {"connections": {"E1 -> E2": {"plasticity": "now", "delay": 1_000_000}}})
+
+
 # Checks in a run
 
 

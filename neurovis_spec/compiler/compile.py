@@ -37,7 +37,7 @@ from neurovis_spec.compiler.neurons.populate import Census, populate, without_ne
 from neurovis_spec.compiler.projections import make_projections
 from neurovis_spec.compiler.ros_settings import RosSettings
 from neurovis_spec.compiler.run_checks import with_checks
-from neurovis_spec.compiler.taken import Side, read_at
+from neurovis_spec.compiler.taken import Side, read_at, reads_past
 from neurovis_spec.compiler.values.constants import Constants, Sight, parse_formula
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.parameters import make_parameters
@@ -383,18 +383,22 @@ def _outputs_of(cycle: Cycle, connected: Connected, census: Census) -> tuple[str
 
 def _signals_fit(bundles: tuple[Bundle, ...], neurons: int, findings: Findings) -> bool:
     """Whether the signals under way fit into memory: delays of all connections together. With a synapse nothing is
-    under way; in its place what all neurons send is kept for as long as its delay is."""
+    under way; in its place, and for a rule that reads ``pre``, what all neurons send is kept for as long as the delay
+    is."""
     total = 0
     for bundle in bundles:
+        kept, wanted = neurons * int(bundle.delays.max(initial=0)), list[tuple[int, str]]()
         if bundle.synapse is None:
             total += int(bundle.delays.sum())
-            much, what = total, "signals would be under way at once (connections times delay)"
+            wanted.append((total, "signals would be under way at once (connections times delay)"))
         else:
-            much = neurons * int(bundle.delays.max(initial=0))
-            what = "numbers would be kept for a synapse (neurons times delay)"
-        if much > MOST_SIGNALS:
-            findings.error("too-many", bundle.key, f"{amount(much)} {what}; {MOST_SIGNALS:,} are the most")
-            return False
+            wanted.append((kept, "numbers would be kept for a synapse (neurons times delay)"))
+        if any(reads_past(one.rule) for one in bundle.rules):
+            wanted.append((kept, "numbers would be kept for a rule that reads 'pre' (neurons times delay)"))
+        for much, what in wanted:
+            if much > MOST_SIGNALS:
+                findings.error("too-many", bundle.key, f"{amount(much)} {what}; {MOST_SIGNALS:,} are the most")
+                return False
     return True
 
 

@@ -38,6 +38,11 @@ def read_at(side: Side, definition: Definition, sends: str) -> tuple[str, ...]:
     return tuple(found)
 
 
+def reads_past(definition: Definition) -> bool:
+    """Whether a definition of connections reads what was sent before, not only what is sent now."""
+    return "pre" in definition.read or any(one.side == "pre" for one in definition.end_names)
+
+
 class Line(NamedTuple):
     """What arrives at the ports of a name: the connections, ascending (None: all), and what each signal is multiplied
     by, None where that is 1."""

@@ -12,17 +12,17 @@ from typing import Final
 
 import numpy as np
 
-from neurovis_spec.arrays import BoolArray, integers
+from neurovis_spec.arrays import BoolArray, Indices, integers
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.checks.neurons import unreached
 from neurovis_spec.compiler.connections.connect import Connected
-from neurovis_spec.compiler.flows import plain_flow, ports_read_by
+from neurovis_spec.compiler.flows import plain_flow, ports_read_by, sent_by
 from neurovis_spec.compiler.levels import Cycle, held_at, made_anew, order_of
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.groups import Built
 from neurovis_spec.compiler.program import SYNAPSE, Definition, EndName
 from neurovis_spec.compiler.stiffness import stiffest_at_begin
-from neurovis_spec.compiler.taken import Wired, read_at
+from neurovis_spec.compiler.taken import Side, Wired, read_at, reads_past
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.derivative import as_derivative
 from neurovis_spec.language.library import StateModel
@@ -82,7 +82,7 @@ def _held_couplings(compiled: Compiled, method: Method, findings: Findings) -> N
         synapse = None if bundle.synapse is None else bundle.synapse.definition
         body = compiled.entries[bundle.key].body
         span = bundle.key if body.delay is None else body.delay.span
-        if span in told or (synapse is not None and not _reads_past(synapse)):
+        if span in told or (synapse is not None and not reads_past(synapse)):
             continue
         told.add(span)
         first = np.flatnonzero(would & (entry == number))[0]
@@ -94,11 +94,6 @@ def _held_couplings(compiled: Compiled, method: Method, findings: Findings) -> N
             source, target = (census.models.different[model] for model in (start, end))
             message += f". That is the default, since {_why_held(source, bundle.route.sends, target, synapse)}"
         findings.warning("held-coupling", span, message, _IN_SECONDS if some and body.delay is not None else hint)
-
-
-def _reads_past(synapse: Definition) -> bool:
-    """Whether a synapse reads what was sent before, not only what is sent now."""
-    return "pre" in synapse.read or any(one.side == "pre" for one in synapse.end_names)
 
 
 def _why_held(source: Definition, sends: str, target: Definition, synapse: Definition | None) -> str:
@@ -130,17 +125,47 @@ def _varying(network: Network, wired: Wired) -> BoolArray:
 
 
 def _held_noise(compiled: Compiled, findings: Findings) -> None:
-    """Noise of groups that a derivative reads."""
-    told: set[Span] = set()
+    """Noise of groups that a derivative reads, by itself or in what a synapse reads of these groups."""
+    told, through, begin = set[Span](), None, 0
     for one in compiled.census.groups:
-        model = one.kind.model.definition
-        read = ports_read_by(model).flow if model.flows and one.noises else frozenset[str]()
+        model, members = one.kind.model.definition, slice(begin, begin := begin + len(one.bias))
+        read = ports_read_by(model)
         for port, formula, _ in one.noises:
-            if port in read and formula.span not in told:
-                told.add(formula.span)
-                message = f"this noise is held over each step, and a derivative of '{model.name}' reads it: its effect"
-                hint = "give the state a 'noise' of its own, which is scaled by the root of the step"
-                findings.warning("noise-held", formula.span, f"{message} becomes less with a shorter step", hint)
+            if formula.span in told:
+                continue
+            if port in read.flow:
+                reader = f"a derivative of '{model.name}' reads it"
+            else:
+                through = _read_by_synapses(compiled) if through is None else through
+                outputs = [name for name, ports in read.outputs.items() if port in ports and name in through]
+                if not any(through[name][members].any() for name in outputs):
+                    continue
+                reader = f"a derivative reads it through a synapse, in what '{model.name}' makes of it"
+            told.add(formula.span)
+            message = f"this noise is held over each step, and {reader}: its effect"
+            hint = "give the state a 'noise' of its own, which is scaled by the root of the step"
+            findings.warning("noise-held", formula.span, f"{message} becomes less with a shorter step", hint)
+
+
+def _read_by_synapses(compiled: Compiled) -> dict[str, BoolArray]:
+    """By activities and outputs for each neuron whether a synapse reads that of it and brings it to a derivative, of
+    its target or of its own."""
+    models, result = compiled.census.models, dict[str, BoolArray]()
+    derived = [ports_read_by(model).flow for model in models.different]
+    for bundle in compiled.bundles:
+        if bundle.synapse is None:
+            continue
+        synapse, ports = bundle.synapse.definition, {port for port, _ in bundle.route.ports}
+        brings = np.array([bool(synapse.flows) or not ports.isdisjoint(read) for read in derived], dtype=np.bool_)
+        used = brings[models.of[bundle.targets]]
+        ends: tuple[tuple[Side, Indices], ...] = (("pre", bundle.sources[used]), ("post", bundle.targets[used]))
+        for side, neurons in ends:
+            for sends in read_at(side, synapse, bundle.route.sends):
+                for number in np.unique(models.of[neurons]).tolist():
+                    name = sent_by(models.different[number], sends)
+                    found = result.setdefault(name, np.zeros(len(models.of), dtype=np.bool_))
+                    found[neurons[models.of[neurons] == number]] = True
+    return result
 
 
 def _steps_by_hand(compiled: Compiled, method: Method, findings: Findings) -> None:
