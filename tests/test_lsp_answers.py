@@ -277,6 +277,40 @@ def test_a_step_by_euler_is_shown_as_a_derivative(step: str, flow: str | None) -
     assert ("derivative" in found.markdown) == (flow is not None)
 
 
+@pytest.mark.parametrize(
+    ("at", "unit"),
+    [
+        ("le¦ak:", ", in pA (derived)"),
+        ("v¦:", ", in mV\n"),
+        ("w¦:", ", in pA (derived)"),
+        ("act¦ive:", " of m\n"),
+        ("g¦:", "default `2 nS`"),
+    ],
+)
+def test_a_unit_is_shown_as_it_is_declared_or_derived(at: str, unit: str) -> None:
+    text = """\
+neurovis: 1
+models:
+  m:
+    parameters: {g: {value: 2, unit: nS}, C: {value: 1, unit: pF}}
+    let: {leak: -g*v, active: step(v)}
+    state: {v: {unit: mV, derivative: (leak - w)/C}, w: {derivative: 2*w}}
+    activity: v*active
+"""
+    found = hover(*marked(text.replace(at.replace("¦", ""), at, 1)))
+    assert found is not None
+    assert unit in found.markdown
+
+
+def test_units_of_what_is_not_sound_are_not_shown() -> None:
+    for broken in ("(leak", "1 +", "[1, 2]", "{a: 1}"):
+        text = (
+            f"neurovis: 1\nmodels:\n  m: {{let: {{lea¦k: 2*v}}, state: {{v: {{derivative: {broken}}}}}, activity: v}}\n"
+        )
+        found = hover(*marked(text))
+        assert found is None or "derived" not in found.markdown
+
+
 def test_names_of_what_is_sent_and_of_ports_are_renamed() -> None:
     document, place = marked(FLOW.replace("send: curr", "send: curr¦"))
     assert apply(document, rename(document, place, "flux")).source == FLOW.replace("current", "flux")

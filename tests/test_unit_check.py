@@ -173,10 +173,50 @@ models:
     activity: y
 neurons: {A: {model: ou}}
 """
+SPIKES = """\
+models:
+  cell:
+    time: ms
+    parameters:
+      tau: {value: 20, unit: ms}
+      te: {value: 5, unit: ms}
+      El: {value: -60, unit: mV}
+      Ee: {value: 0, unit: mV}
+      Vt: {value: -50, unit: mV}
+      Vr: {value: -60, unit: mV}
+      rest: {value: 5, unit: ms}
+    ports: [excitatory, kicks, current]
+    state:
+      v: {initial: El, unit: mV, derivative: (El - v + ge*(Ee - v) + drive + current/gL)/tau, jump: kicks}
+      ge: {unit: "1", derivative: -ge/te, jump: excitatory}
+    let: {gL: "1"}
+    spike: {when: v >= Vt, set: {v: Vr}, refractory: rest, hold: v}
+synapses:
+  expo:
+    time: ms
+    parameters: {tau: {value: 5, unit: ms}, E: {value: 3, unit: mV}}
+    state: {g: {unit: nS, derivative: -g/tau, on_pre: g + weight}}
+    signal: g*(E - post.v)
+rules:
+  stdp:
+    time: ms
+    parameters:
+      tau_pre: {value: 20, unit: ms}
+      tau_post: {value: 20, unit: ms}
+      up: {value: 0.01, unit: nS}
+      down: {value: 0.0105, unit: nS}
+    state:
+      a: {derivative: -a/tau_pre, on_pre: a + up}
+      b: {derivative: -b/tau_post, on_post: b - down}
+    weight: {on_pre: weight + b, on_post: weight + a}
+neurons: {A: {model: cell, bias: 20, count: 2}}
+connections: {A1 -> A2: {synapse: expo, plasticity: stdp, port: current}}
+"""
 #: Specs whose labels are right, whole and in part.
 RIGHT = {
     "LIF": LIF, "AdEx": ADEX, "Hodgkin-Huxley": HODGKIN_HUXLEY, "COBA": COBA, "Izhikevich": IZHIKEVICH,
     "Morris-Lecar": MORRIS_LECAR, "a rule": LEARNING, "noise": NOISY,
+    "spikes": SPIKES,
 }  # fmt: skip
 #: Mistakes: the spec, what is right there and what is written in its place, and words of what is said; "" where nothing
 #: is.
@@ -203,6 +243,12 @@ MISTAKES = [
     (HODGKIN_HUXLEY, "gL: {value: 0.3, unit: mS/cm^2}", "gL: {value: 0.3, unit: mS}", "gL*(v - EL)"),
     (MORRIS_LECAR, "tanh((v - V3)/V4)", "tanh(v - V3/V4)", "V3/V4 a number without unit"),
     (MORRIS_LECAR, "phi*cosh", "cosh", ""),
+    (SPIKES, "set: {v: Vr}", "set: {v: rest}", "v is in mV, its 'set' in ms"),
+    (SPIKES, "when: v >= Vt", "when: v >= tau", "tau is in ms, v in mV"),
+    (SPIKES, "rest: {value: 5, unit: ms}", "rest: {value: 0.005, unit: s}", "rest in s: the refractory time is in s"),
+    (SPIKES, "on_pre: g + weight", "on_pre: g + tau", "tau is in ms, g in nS"),
+    (SPIKES, "on_pre: a + up", "on_pre: a + up*tau_pre", "a is in pF, weight in nS"),
+    (SPIKES, "on_post: weight + a", "on_post: weight + tau_pre", "weight in ms"),
     (NOISY, "noise: sd*sqrt(2/tau)", "noise: sd", "the noise of x is in mV, its state in mV per root of ms"),
     (NOISY, "x if t > tau else y", "x if t > tau else t", "t is in ms"),
 ]  # fmt: skip

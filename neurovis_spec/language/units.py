@@ -132,7 +132,7 @@ class Unit:
         return Unit(tuple(map(operator.sub, self.powers, other.powers)))
 
     def __pow__(self, exponent: Fraction | int) -> Unit:
-        return Unit(tuple(power * exponent for power in self.powers))
+        return self if exponent == 1 else Unit(tuple(power * exponent for power in self.powers))
 
     @property
     def is_scale(self) -> bool:

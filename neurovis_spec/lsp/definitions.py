@@ -1,4 +1,4 @@
-"""Activations, models, rules and synapses as an editor shows them: parameters, equations, description.
+"""Activations, models, rules and synapses as an editor shows them: parameters, equations, units, description.
 
 In: Items of a spec, or of the library files that ship. Out: Definitions; those of the spec and the built-in ones look
 the same, since they are written in the same language.
@@ -11,8 +11,17 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Final
 
+from pydantic import ValidationError
+
+from neurovis_spec.compiler.program import ACTIVATION, MODEL, RULE, SYNAPSE
 from neurovis_spec.compiler.values.builtin import libraries
+from neurovis_spec.compiler.values.units import Sheet, sheet_of
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.expressions.tree import ExpressionError
 from neurovis_spec.language.grammar import Kind
+from neurovis_spec.language.library import ActivationModel, DefinitionModel, ModelModel, RuleModel, SynapseModel
+from neurovis_spec.language.yaml.source import Mapping as SourceMapping
+from neurovis_spec.language.yaml.source import Node
 from neurovis_spec.lsp.names import DEFINITIONS, SECTIONS
 from neurovis_spec.lsp.outline import Item, outline
 
@@ -90,6 +99,38 @@ def known(kind: Kind, items: Iterable[Item]) -> Mapping[str, Definition]:
     section = SECTIONS[kind]
     both = {**builtin(), **definitions(items)}
     return {name: definition for (where, name), definition in both.items() if where == section}
+
+
+#: How definitions of a section are written.
+_WRITTEN: Final[Mapping[str, type[DefinitionModel]]] = {
+    ACTIVATION.section: ActivationModel,
+    MODEL.section: ModelModel,
+    RULE.section: RuleModel,
+    SYNAPSE.section: SynapseModel,
+}
+
+
+def units_of(section: str, name: str, roots: Iterable[Node | None]) -> Sheet | None:
+    """The units of a definition that is written in one of these texts, or a built-in one; None where it is not sound at
+    this moment."""
+    kind = next(kind for kind in (ACTIVATION, MODEL, RULE, SYNAPSE) if kind.section == section)
+    model = next((made for root in roots if (made := _written(section, name, root)) is not None), None)
+    built_in = (library.definitions[section] for library in libraries())
+    model = model or next((made[name] for made in built_in if name in made), None)
+    try:
+        return None if model is None else sheet_of(kind, name, model)
+    except ExpressionError:
+        return None
+
+
+def _written(section: str, name: str, root: Node | None) -> DefinitionModel | None:
+    """A definition in a text, as far as it can be read."""
+    made = root.get(section) if isinstance(root, SourceMapping) else None
+    node = made.get(name) if isinstance(made, SourceMapping) else None
+    try:
+        return None if node is None else _WRITTEN[section].model_validate(node, context=Findings())
+    except ValidationError:
+        return None
 
 
 def _definition(section: str, name: str, texts: Mapping[tuple[str, ...], str]) -> Definition:

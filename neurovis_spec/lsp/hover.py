@@ -19,7 +19,7 @@ from neurovis_spec.language.grammar import Role
 from neurovis_spec.language.patterns import PATTERNS
 from neurovis_spec.language.places import key_at, role_of
 from neurovis_spec.language.templates import Hole, pieces
-from neurovis_spec.lsp.definitions import known
+from neurovis_spec.lsp.definitions import known, units_of
 from neurovis_spec.lsp.document import Document, described, ports_of
 from neurovis_spec.lsp.index import Found, Index
 from neurovis_spec.lsp.names import DEFINITIONS, SECTIONS, Name
@@ -272,6 +272,19 @@ def _setting(document: Document, name: Name) -> str | None:
     lines = [line for line in definition.equations if line.startswith(own)]
     if not lines:
         return None
-    told = f"**{name.text}** of {owner}\n\n```\n" + "\n".join(lines) + "\n```"
+    told = (
+        f"**{name.text}** of {owner}{_unit(document, section, owner, name.text)}\n\n```\n" + "\n".join(lines) + "\n```"
+    )
     flow = as_derivative(name.text, lines[0].partition(" = ")[2]) if section != "activations" else None
     return told if flow is None else f"{told}\n\nAs an equation, which is integrated: `derivative: {flow}`"
+
+
+def _unit(document: Document, section: str, owner: str, name: str) -> str:
+    """In which unit something is in a definition, as it is declared or as it follows from formulas; "" where that is
+    not known."""
+    sheet = units_of(section, owner, (page.root for page in (document.page, *document.reach)))
+    written = "" if sheet is None else sheet.written.get(name, "")
+    if sheet is None or written or name not in sheet.known:
+        return f", in {written}" if written else ""
+    found = sheet.told(sheet.known[name])
+    return ", without unit" if found == "1" else f", in {found} (derived)"

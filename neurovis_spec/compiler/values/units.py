@@ -29,8 +29,8 @@ _NUMBERS: Final = frozenset({"pi", "e", "k"})
 
 
 class Equation(NamedTuple):
-    """A formula, and what its unit is: that of ``name`` times ``per``, any where that is "". ``key`` is what it is called
-    there."""
+    """A formula, and what its unit is: that of ``name`` times ``per``; any where that is "". ``key`` is what it is
+    called there."""
 
     name: str
     key: str
@@ -98,33 +98,33 @@ def sheet_of(kind: Kind, name: str, model: DefinitionModel, ends: Mapping[str, U
     """The units of a definition, which is sound, where those of what it reads at the ends of a connection are known
     (``pre.v``)."""
     parts = model.parts()
-    written = parts.units
+    sheet = Sheet(kind, name, parts, parts.units, {}, (), ())
+    declared = {one for _, one in sheet.names}
     time = unit_of(parts.time)
     assert time is not None
-    equations = tuple(_equations(kind, model, parts, time))
+    given = {one: unit for one, unit in {_CLOCK: time, "dt": time, "spike": NUMBER}.items() if one not in declared}
     # what is declared in a unit that is not ours has some unit: formulas give it none
-    declared = {one: found.to_formulas for one, text in written.items() if (found := unit_of(text)) is not None}
-    clock = {_CLOCK: time, "dt": time, "spike": NUMBER}
-    known = {**clock, **ends, **declared}
-    read = frozenset().union(*(names(one.tree) for one in equations), (one.name for one in equations))
-    free = read - written.keys() - _NUMBERS - known.keys() - {""}
+    labels = {one: unit.to_formulas for one, text in sheet.written.items() if (unit := unit_of(text)) is not None}
+    known = {**given, **ends, **labels}
+    equations = tuple(_equations(kind, parts, time))
+    read = frozenset().union(*(names(one.tree) for one in equations), (one.name for one in equations if one.name))
+    free = read - sheet.written.keys() - _NUMBERS - known.keys()
     while more := _deduced(equations, known, free):
         known |= more
-    sheet = Sheet(kind, name, parts, written, known, (), tuple(_faults(equations, known)))
-    declared_names = {name for _, name in sheet.names}
-    return sheet._replace(reads=tuple(sorted(read - declared_names - clock.keys() - _NUMBERS - {""})))
+    reads = tuple(sorted(read - declared - given.keys() - _NUMBERS))
+    return sheet._replace(known=known, reads=reads, faults=tuple(_faults(equations, known)))
 
 
 def _deduced(equations: Iterable[Equation], known: Mapping[str, Unit], free: frozenset[str]) -> dict[str, Unit]:
-    """The units that names get next."""
-    found: dict[str, Unit] = {}
+    """The units that names get next: by their own formulas, else by those that they are in."""
+    own: dict[str, Unit] = {}
+    within: dict[str, Unit] = {}
     for one in equations:
-        wanted = _wanted(one, known)
-        made = read_units(one.tree, known, free, wanted)
-        found = made.deduced | found
-        if wanted is None and made.unit is not None and one.name in free:
-            found.setdefault(one.name, made.unit / one.per)
-    return {name: unit for name, unit in found.items() if name not in known}
+        made = read_units(one.tree, known, free, _wanted(one, known))
+        within = made.deduced | within
+        if made.unit is not None and one.name in free and one.name not in known:
+            own.setdefault(one.name, made.unit / one.per)
+    return own or within
 
 
 def _wanted(equation: Equation, known: Mapping[str, Unit]) -> Unit | None:
@@ -165,7 +165,7 @@ def _suspect(equation: Equation, known: Mapping[str, Unit], factor: Unit) -> str
 # Equations
 
 
-def _equations(kind: Kind, model: DefinitionModel, parts: Parts, time: Unit) -> Iterator[Equation]:
+def _equations(kind: Kind, parts: Parts, time: Unit) -> Iterator[Equation]:
     """All formulas of a definition, each with the name of what it is the value of."""
     of_name: list[tuple[str, str, Formula | None]] = []
     for name, parameter in parts.parameters.items():
