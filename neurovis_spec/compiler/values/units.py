@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from neurovis_spec.compiler.program import Kind
+from neurovis_spec.diagnostics import shorten
 from neurovis_spec.language.expressions.dimensions import Misfit, read_units
 from neurovis_spec.language.expressions.parser import parse
 from neurovis_spec.language.expressions.tree import Name, Tree, names, walk
@@ -74,7 +75,7 @@ class Sheet(NamedTuple):
 
     def told(self, unit: Unit) -> str:
         """How a unit is written, in the author's words where they have it."""
-        return spelled(unit, self.written.values())
+        return shorten(spelled(unit, self.written.values()))
 
     @property
     def gives(self) -> str:
