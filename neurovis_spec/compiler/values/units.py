@@ -105,15 +105,19 @@ def sheet_of(kind: Kind, name: str, model: DefinitionModel, ends: Mapping[str, U
     assert time is not None
     given = {one: unit for one, unit in {_CLOCK: time, "dt": time, "spike": NUMBER}.items() if one not in declared}
     # what is declared in a unit that is not ours has some unit: formulas give it none
-    labels = {one: unit.to_formulas for one, text in sheet.written.items() if (unit := unit_of(text)) is not None}
-    known = {**given, **ends, **labels}
+    known = {**given, **ends, **as_known(sheet.written)}
     equations = tuple(_equations(kind, parts, time))
     read = frozenset().union(*(names(one.tree) for one in equations), (one.name for one in equations if one.name))
     free = read - sheet.written.keys() - _NUMBERS - known.keys()
     while more := _deduced(equations, known, free):
         known |= more
     reads = tuple(sorted(read - declared - given.keys() - _NUMBERS))
-    return sheet._replace(known=known, reads=reads, faults=tuple(_faults(equations, known)))
+    return sheet._replace(known=known, reads=reads, faults=tuple(faults_of(equations, known)))
+
+
+def as_known(written: Mapping[str, str]) -> dict[str, Unit]:
+    """The units of names as formulas take them, where they are made of ours."""
+    return {name: unit.to_formulas for name, text in written.items() if (unit := unit_of(text)) is not None}
 
 
 def _deduced(equations: Iterable[Equation], known: Mapping[str, Unit], free: frozenset[str]) -> dict[str, Unit]:
@@ -134,8 +138,8 @@ def _wanted(equation: Equation, known: Mapping[str, Unit]) -> Unit | None:
     return None if unit is None else unit * equation.per
 
 
-def _faults(equations: Iterable[Equation], known: Mapping[str, Unit]) -> Iterator[Fault]:
-    """What does not fit."""
+def faults_of(equations: Iterable[Equation], known: Mapping[str, Unit]) -> Iterator[Fault]:
+    """What does not fit in equations."""
     for one in equations:
         wanted = _wanted(one, known)
         made = read_units(one.tree, known, wanted=wanted)
