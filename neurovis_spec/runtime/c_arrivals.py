@@ -308,16 +308,17 @@ class Arrivals:
         """The neuron of each connection: its place in the population."""
         return np.repeat(np.arange(self.count), np.diff(self.ends))
 
-    def add_spike(self, total: str, edge: Place, column: _Column, sent: str, ago: str) -> None:
+    def add_spike(self, total: str, edge: Place, column: _Column, sent: str, ago: str, weight: Value | None) -> None:
         """Lines that add what one connection brings, of a spike of so many steps ago (now where nothing is said), which
-        ``sent`` is."""
+        ``sent`` is; ``weight`` is that of the connection where it is known."""
         code, connections = self.code, self.connections[column]
         connection = code.at(connections, edge)
         conditions = [f"!gone[{connection}]"] if self.form.gone else []
         weighted = not ago or bool(self.shares[column].all())
         if ago and weighted and self.form.lost:
             conditions.append(f"k - {ago} >= lost[{connection}]")
-        term = f"weights[{connection}]*{sent}" if weighted else self._signal(edge, column)
+        weight = f"weights[{connection}]" if weight is None else self._operand(weight)
+        term = f"{weight}*{sent}" if weighted else self._signal(edge, column)
         if self.factors is not None:
             term = f"{term}*{self._operand(code.number(self.factors[column], edge))}"
         if conditions:

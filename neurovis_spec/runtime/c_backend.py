@@ -24,6 +24,7 @@ import numpy.typing as npt
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import RULE, Definition
+from neurovis_spec.compiler.values.spikes import always_finite
 from neurovis_spec.language.expressions.emit_c import Emitter
 from neurovis_spec.language.expressions.functions import Library
 from neurovis_spec.language.expressions.tree import Name
@@ -340,8 +341,9 @@ def _look(built: Built) -> tuple[str, str]:
         tests["connection"].append(f"nv_odd(p->weights + {first}, {last - first + 1})")
     cell = 0
     for holder, use in network.uses:
-        for _ in use.definition.kept:
-            tests[use.definition.kind.each].append(f"nv_odd(p->cells[{cell}], {len(holder.members)})")
+        for one in use.definition.kept:
+            if not (use.definition.fires and always_finite(one)):
+                tests[use.definition.kind.each].append(f"nv_odd(p->cells[{cell}], {len(holder.members)})")
             cell += 1
     return " || ".join(tests["neuron"]), " || ".join(tests["connection"]) or "0"
 

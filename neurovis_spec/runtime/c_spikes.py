@@ -14,10 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from neurovis_spec.arrays import BoolArray
+from neurovis_spec.language.expressions.emit_c import Value
 from neurovis_spec.runtime.c_arrivals import Arrivals
 from neurovis_spec.runtime.c_code import Code, Form
 from neurovis_spec.runtime.c_connections import Ends, taken_at
-from neurovis_spec.runtime.events import Rows, rows_of
+from neurovis_spec.runtime.events import Rows, rows_of, weights_stay
 from neurovis_spec.runtime.signals import SignalLayout
 from neurovis_spec.runtime.stages import taken_by
 
@@ -92,9 +93,21 @@ class Firing:
                     code.line("bits[q >> 3] |= (unsigned char)(1 << (q & 7));")
                 else:
                     total = f"{name}[{code.at(arrivals.slots[rows.order], 'e')}]"
-                    arrivals.add_spike(total, "e", rows.order, sent, ago)
+                    arrivals.add_spike(total, "e", rows.order, sent, ago, self._weight(arrivals, rows))
         if marks:
             self._add_marked(arrivals, rows, name)
+
+    def _weight(self, arrivals: Arrivals, rows: Rows) -> Value | None:
+        """The weight of a connection in its row, where none of them changes in a run: one number where it is the same
+        for all, or for a row, else one of a table in the order of the rows; None where some change."""
+        network, connections = self.ends.network, arrivals.connections[rows.order]
+        if not weights_stay(network)[connections].all():
+            return None
+        weights = network.connections.weights[connections]
+        of_row = weights[rows.starts[:-1]]
+        if np.array_equal(np.repeat(of_row, np.diff(rows.starts)), weights):
+            return self.code.number(of_row, "r")
+        return self.code.number(weights, "e")
 
     def _add_marked(self, arrivals: Arrivals, rows: Rows, name: str) -> None:
         """The sums of the connections that are marked, in their order."""
@@ -119,7 +132,7 @@ class Firing:
                     row = f"(size_t)((k + {depth} - ago) % {depth})*{self.count}"
                     sent = f"history[{row} + {code.at(ends, 'q')}]"
                 total = f"{name}[{code.at(arrivals.slots, 'q')}]"
-                arrivals.add_spike(total, "q", slice(None), sent, then)
+                arrivals.add_spike(total, "q", slice(None), sent, then, None)
 
     def own(self, layout: SignalLayout) -> BoolArray:
         """The connections (m,) that send spikes and have slots of their own."""

@@ -29,6 +29,7 @@ from neurovis_spec.compiler.events.settable import HIGH, LOW, bias_of
 from neurovis_spec.compiler.network import Input, Network, Outlet
 from neurovis_spec.compiler.program import (
     PHASES,
+    SPIKE,
     SYNAPSE,
     Advance,
     Definition,
@@ -47,8 +48,9 @@ from neurovis_spec.compiler.program import (
     Update,
     Use,
 )
+from neurovis_spec.compiler.values.spikes import FIRES
 from neurovis_spec.language.expressions.emit_c import Made, Value
-from neurovis_spec.language.expressions.tree import Tree, names
+from neurovis_spec.language.expressions.tree import Name, Tree, names
 from neurovis_spec.runtime.c_arrivals import Arrivals, Incoming, incoming_of
 from neurovis_spec.runtime.c_code import Code, Form, Place, plus, state_name
 from neurovis_spec.runtime.c_connections import Ends, Forming, Sight, Some, taken, taken_at
@@ -252,7 +254,81 @@ class StepCode:
                 self.neuron(number, place, {**totals, **{one: f"{name}[{place}]" for one, name in gathered.items()}})
 
             others = {one: own for one, own in arrivals.items() if one not in ahead}
-            self.each(len(population.members), others, updated)
+            if parts := self.apart(number):
+                self.part_by_part(number, parts, others, ahead, gathered)
+            else:
+                self.each(len(population.members), others, updated)
+
+    def apart(self, number: int) -> tuple[Definition, ...]:
+        """What of the model of a population that fires is carried out in loops of their own, one behind the other, as a
+        compiler makes vectors of short ones; none where it is written neuron by neuron, or where more than the first
+        reads a port."""
+        population = self.network.populations[number]
+        ports = {port.name for port in population.ports}
+        first, *others = self.definitions(number)
+        if self.form.written_out or not population.model.definition.fires or not others:
+            return ()
+        if any(not ports.isdisjoint(self._read_in(one)) for one in others):
+            return ()
+        return *self._firing_first(first), *(part for one in others for part in self._firing_first(one))
+
+    def _firing_first(self, part: Definition) -> tuple[Definition, ...]:
+        """A part of a model that decides what fires, with that ahead, for the rest to read it; another as it is."""
+        spike = next((one for one in part.state if one.name == SPIKE and one.each_step is not None), None)
+        others = [one for one in part.state if one is not spike]
+        read = [one.each_step for one in others if one.each_step is not None]
+        if spike is None or self.form.fixed or any(SPIKE in names(tree) for tree in read):
+            return (part,)
+        let = tuple((name, Name(SPIKE) if name == FIRES else tree) for name, tree in part.let)
+        ahead = (replace(one, each_step=None) for one in others)
+        rest = replace(part, state=tuple(replace(one, each_step=None) if one is spike else one for one in part.state))
+        return replace(part, state=(spike, *ahead)), replace(rest, let=let)
+
+    def part_by_part(
+        self,
+        number: int,
+        parts: Sequence[Definition],
+        arrivals: Mapping[int, Arrivals],
+        ahead: Mapping[int, Arrivals],
+        gathered: Mapping[int, str],
+    ) -> None:
+        """The neurons of a population, part by part of its model; what arrives is read by the first of these."""
+        population, code = self.network.populations[number], self.code
+        count, model = len(population.members), population.model
+        read = self.read_at_update[number]
+
+        def changed(part: Definition, place: Place, totals: Mapping[int, str]) -> dict[str, Value]:
+            sums = {**totals, **{one: f"{name}[{place}]" for one, name in gathered.items()}}
+            first, ports = part is parts[0], dict[str, Value]()
+            for one, port in enumerate(population.ports):
+                is_read = first and port.name in read
+                ports[port.name] = self.at_port(number, one, place, sums.get(one, "")) if is_read else 0.0
+            if first:
+                self.hold_states(model, place)
+            stored = self.states(model, place)
+            states = {one.name: stored[one.name] for one in part.state}
+            seen = {**code.parameters(model, place), **self.sight.clock(part), **ports}
+            functions, kept = self.activation(population, place), partial(self.unless_held, model, place)
+            staying = states if part is not parts[-1] else None
+            new, given = self.change(part, seen, states, functions, kept, self.form.first, staying)
+            self.store([(stored[name], value) for name, value in new.items()])
+            return given
+
+        def before(place: Place, totals: Mapping[int, str], part: Definition) -> None:
+            changed(part, place, totals)
+
+        for part in parts[:-1]:
+            self.each(count, arrivals if part is parts[0] else _NO_ARRIVALS, partial(before, part=part))
+
+        def last(place: Place, totals: Mapping[int, str]) -> None:
+            given, neuron = changed(parts[-1], place, totals), code.at(population.members, place)
+            stored = self.states(model, place)
+            self.store([(stored[one.name], given[one.name]) for one in parts[-1].outputs])
+            self.store([(f"activity[{neuron}]", given["activity"])])
+            self.hold_activity(neuron)
+            self.let_out(number, place, neuron)
+
+        self.each(count, _NO_ARRIVALS, last)
 
     def reads_within(self, population: Population, arrivals: Arrivals) -> bool:
         """Whether synapses that lead to a population read, before any of it is updated, what is there of others of its
@@ -665,6 +741,8 @@ class StepCode:
         with self.firing.now_or_then(rows) as now:
             code.line(f"signals[{code.at(places[at][rows.order], 'r')} + k % ago] = {now};")
         others = np.flatnonzero(~spikes)
+        if not len(others):
+            return
         self.store_each(len(others), lambda place: self.sharing(slots, place, others))
 
     def fill(self, slots: DelayClass | SharedSlots) -> None:

@@ -39,6 +39,15 @@ def takes_spikes(network: Network, port: Port, spikes: BoolArray) -> bool:
     return bool(spikes[taken].all() and (network.synapses.numbers[port.incoming] < 0).all())
 
 
+def weights_stay(network: Network) -> BoolArray:
+    """The connections (m,) whose weights nothing changes in a run."""
+    result = np.asarray(network.connections.rules.compact() < 0)
+    for binding in network.settable.bindings:
+        if binding.weights:
+            result[binding.indices] = False
+    return result
+
+
 class Rows(NamedTuple):
     """Connections by what they take and when: row r are ``order[starts[r] : starts[r + 1]]`` of them, ascending, whose
     end is ``ends[r]``; the rows of the i-th of the ``delays``, ascending, are those from ``firsts[i]`` on, up to

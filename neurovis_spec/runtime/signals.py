@@ -21,6 +21,7 @@ import numpy as np
 from neurovis_spec.arrays import BoolArray, Indices, IntColumn, pieces, width
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import SYNAPSE
+from neurovis_spec.runtime.events import weights_stay
 from neurovis_spec.runtime.lags import lags_of, ring_lengths
 from neurovis_spec.runtime.stages import taken_by
 
@@ -132,10 +133,7 @@ def _sharing(network: Network, rings: _Rings) -> BoolArray:
     """The delayed connections (m,) whose weight nothing changes in a run, of each delay where it is worth it. Not where
     signals are multiplied: before the first one has arrived, a weight below 0 would make −0 of 0, which a sum does not
     show, but a product."""
-    shares = (rings.lengths > 0) & (network.connections.rules.compact() < 0)
-    for binding in network.settable.bindings:
-        if binding.weights:
-            shares[binding.indices] = False
+    shares = (rings.lengths > 0) & weights_stay(network)
     for population in network.populations:
         for port in population.ports:
             if port.combine == "product":

@@ -17,7 +17,7 @@ import numpy as np
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.flows import jacobian, slope_by, with_slope
-from neurovis_spec.compiler.names.references import Section, key_of, key_span
+from neurovis_spec.compiler.names.references import key_of, key_span
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.neurons.groups import Built
 from neurovis_spec.compiler.neurons.populate import Census
@@ -427,17 +427,13 @@ def check_hidden(compiled: Compiled, findings: Findings) -> None:
 
 def _choices(compiled: Compiled) -> Iterator[tuple[str, Choice]]:
     """What groups and connections name, with the section that defines such."""
-    return (choice for section, _ in compiled.sections for choice in choices_in(section))
-
-
-def choices_in(section: Section) -> Iterator[tuple[str, Choice]]:
-    """The same of a spec or a module."""
-    for group in section.neurons.values():
-        if group.activation is not None:
-            yield ACTIVATION.section, group.activation
-        if group.model is not None:
-            yield MODEL.section, group.model
-    for _, body in section.connections:
-        if body.synapse is not None:
-            yield SYNAPSE.section, body.synapse
-        yield from ((RULE.section, choice) for choice in body.plasticity)
+    for section, _ in compiled.sections:
+        for group in section.neurons.values():
+            if group.activation is not None:
+                yield ACTIVATION.section, group.activation
+            if group.model is not None:
+                yield MODEL.section, group.model
+        for _, body in section.connections:
+            if body.synapse is not None:
+                yield SYNAPSE.section, body.synapse
+            yield from ((RULE.section, choice) for choice in body.plasticity)

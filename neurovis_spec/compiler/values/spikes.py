@@ -56,7 +56,7 @@ def when_of(let: Collection[tuple[str, Tree]]) -> Tree | None:
 def with_spike(states: tuple[Quantity, ...], spike: Spike) -> tuple[Quantity, ...]:
     """The states of a model with a spike block, with those that this adds."""
     made = tuple(_firing(one, spike) for one in states)
-    rest = Call("max", (Chain(("-",), (Name(_RESTS), _ONE)), _ZERO))
+    rest = Conditional(Binary(">", Name(_RESTS), _ONE), Chain(("-",), (Name(_RESTS), _ONE)), _ZERO)
     resting = _if_fires(Chain(("+",), (_ONE, _steps(spike.refractory))), rest)
     rearmed = Chain(("and",), (Name(_ARMED), Unary("not", Name(SPIKE))))
     armed = Chain(("or",), (Unary("not", spike.when), rearmed))
@@ -114,6 +114,11 @@ def _steps(time: Tree | None) -> Tree:
         return _ZERO
     rounded = Call("floor", (Chain(("+",), (Chain(("/",), (time, Name("dt"))), Number(0.5))),))
     return Conditional(Binary(">", time, _ZERO), Call("max", (rounded, _ONE)), _ZERO)
+
+
+def always_finite(state: Quantity) -> bool:
+    """Whether a state of a model that fires is one of those that are 0 or 1."""
+    return state.name in (SPIKE, _ARMED)
 
 
 #: How a formula depends on what arrives: not at all, as a multiple of it, or otherwise.
